@@ -1,0 +1,1 @@
+"""Views and a mannequin to cameras, and how sure they are."""

@@ -1,0 +1,1 @@
+"""Sheets to views, bundles on disk, synthetic turnarounds."""

@@ -1,0 +1,1 @@
+"""Bundles to triplane radiance fields, renders and figures of merit."""

@@ -1,0 +1,1 @@
+"""Colours in, a palette and labels out."""

@@ -1,0 +1,50 @@
+"""The errors a user can cause, as one tree.
+
+ToonsetError            exit code 2: bad input or usage, one line says where, what, and what to do
+|- CameraError          a camera that cannot exist
+|- PictureError         an image file that cannot be read or is not supported
+|- SheetError           a picture without usable figures
+|- MeshError            a mesh file that cannot be read or is not a surface
+|- BundleError          a bundle or transforms.json folder that is broken
+|- PaletteError         palette colours that cannot be used
+|- OutputError          a place that cannot be written
+|- SetupError           a missing system library; the message holds the install line
+
+Numeric doubt is never an exception: it is returned as data (verdicts, probabilities, residuals).
+"""
+
+
+class ToonsetError(Exception):
+    """A user's mistake. The message says where, what was found, what is needed, what to do."""
+
+
+class CameraError(ToonsetError):
+    """A camera that cannot exist."""
+
+
+class PictureError(ToonsetError):
+    """An image file that cannot be read or is not supported."""
+
+
+class SheetError(ToonsetError):
+    """A picture without usable figures."""
+
+
+class MeshError(ToonsetError):
+    """A mesh file that cannot be read or is not a surface."""
+
+
+class BundleError(ToonsetError):
+    """A bundle or transforms.json folder that is broken."""
+
+
+class PaletteError(ToonsetError):
+    """Palette colours that cannot be used."""
+
+
+class OutputError(ToonsetError):
+    """A place that cannot be written."""
+
+
+class SetupError(ToonsetError):
+    """A missing system library; the message holds the install line."""

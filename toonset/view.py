@@ -1,0 +1,41 @@
+"""A view: one drawing of the character, cut out of its sheet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from toonset.errors import SheetError
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One drawing.
+
+    Attributes:
+        rgba: (height, width, 4) sRGB crop with straight alpha; alpha is the figure's coverage.
+        box: (x, y, width, height) of the crop in the sheet, pixels.
+        line_width_px: width of the drawn contour line; 0 where there is none.
+        name: file name of the view in a bundle, e.g. "000.png".
+    """
+
+    rgba: UInt8[np.ndarray, "height width 4"]
+    box: tuple[int, int, int, int]
+    line_width_px: float
+    name: str
+
+    def __post_init__(self) -> None:
+        """Refuse an empty drawing.
+
+        Raises:
+            SheetError: the crop has no opaque pixel.
+        """
+        if not self.mask.any():
+            raise SheetError(f"view {self.name}: no opaque pixel; crop the sheet to the figures")
+
+    @property
+    def mask(self) -> Bool[np.ndarray, "height width"]:
+        """Return which pixels the figure covers by at least half."""
+        return self.rgba[..., 3] >= 128
