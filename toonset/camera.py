@@ -50,9 +50,9 @@ class Camera:
     """
 
     rotation: Float[np.ndarray, "3 3"]
-    target: Float[np.ndarray, "3"]
+    target: Float[np.ndarray, " 3"]
     scale: float
-    center: Float[np.ndarray, "2"]
+    center: Float[np.ndarray, " 2"]
     size_wh: tuple[int, int]
     k: float = 0.0
     pixel_aspect: float = 1.0
@@ -75,7 +75,9 @@ class Camera:
         if not np.isfinite(numbers).all():
             raise CameraError("camera: a value is not finite; every number must be")
         if np.abs(self.rotation @ self.rotation.T - np.eye(3)).max() > 1e-5:
-            raise CameraError("camera: rotation is not orthonormal (R R^T differs from 1 by > 1e-5)")
+            raise CameraError(
+                "camera: rotation is not orthonormal (R R^T differs from 1 by > 1e-5)"
+            )
         if np.linalg.det(self.rotation) < 0:
             raise CameraError("camera: rotation mirrors (determinant -1); +1 is needed")
         if self.scale <= 0 or self.pixel_aspect <= 0 or self.k < 0 or min(self.size_wh) <= 0:
@@ -87,13 +89,13 @@ class Camera:
     @classmethod
     def looking_at(
         cls,
-        target: Float[np.ndarray, "3"],
+        target: Float[np.ndarray, " 3"],
         yaw: float,
         elevation: float,
         scale: float,
         size_wh: tuple[int, int],
         roll: float = 0.0,
-        center: Float[np.ndarray, "2"] | None = None,
+        center: Float[np.ndarray, " 2"] | None = None,
         k: float = 0.0,
     ) -> Camera:
         """Return the camera at `yaw`, `elevation`, `roll` (radians) that looks at `target`."""
@@ -107,7 +109,7 @@ class Camera:
         world_from_camera: Float[np.ndarray, "4 4"],
         K: Float[np.ndarray, "3 3"],
         size_wh: tuple[int, int],
-        near: Float[np.ndarray, "3"] | None = None,
+        near: Float[np.ndarray, " 3"] | None = None,
     ) -> Camera:
         """Return the same pinhole in the nested form.
 
@@ -175,7 +177,7 @@ class Camera:
 
     def project(
         self, points_world: Float[np.ndarray, "*n 3"]
-    ) -> tuple[Float[np.ndarray, "*n 2"], Float[np.ndarray, "*n"], Bool[np.ndarray, "*n"]]:
+    ) -> tuple[Float[np.ndarray, "*n 2"], Float[np.ndarray, " *n"], Bool[np.ndarray, " *n"]]:
         """Return pixels, depth (world units past the target's plane) and whether in front.
 
         Points behind a pinhole (or in its centre's plane) get NaN pixels and False.
@@ -189,14 +191,12 @@ class Camera:
         return pixels, depth, in_front
 
     def unproject(
-        self, pixels: Float[np.ndarray, "*n 2"], depth: Float[np.ndarray, "*n"]
+        self, pixels: Float[np.ndarray, "*n 2"], depth: Float[np.ndarray, " *n"]
     ) -> Float[np.ndarray, "*n 3"]:
         """Return the world points seen at `pixels` with `depth` past the target's plane."""
         depth = np.asarray(depth, dtype=np.float64)
         plane = (np.asarray(pixels, dtype=np.float64) - self.center) / self._scale_uv
-        local = np.concatenate(
-            [plane * (1 + self.k * depth)[..., None], depth[..., None]], axis=-1
-        )
+        local = np.concatenate([plane * (1 + self.k * depth)[..., None], depth[..., None]], axis=-1)
         return local @ self.rotation + self.target
 
     def rays(
@@ -241,9 +241,7 @@ class Camera:
         """Return the camera of the image scaled by `factor` (size rounded, edges aligned)."""
         width, height = (max(1, round(factor * n)) for n in self.size_wh)
         center = self.center * factor
-        return replace(
-            self, scale=self.scale * factor, center=center, size_wh=(width, height)
-        )
+        return replace(self, scale=self.scale * factor, center=center, size_wh=(width, height))
 
     def twin(self) -> Camera:
         """Return the mirror twin: for a body symmetric in x, the same outline under orthography.
@@ -254,12 +252,12 @@ class Camera:
         return replace(self, rotation=rotation, target=self.target * [-1.0, 1.0, 1.0])
 
     @property
-    def _scale_uv(self) -> Float[np.ndarray, "2"]:
+    def _scale_uv(self) -> Float[np.ndarray, " 2"]:
         return np.array([self.scale, self.scale * self.pixel_aspect])
 
 
 def rotation_from_angles(yaw: float, elevation: float, roll: float) -> Float[np.ndarray, "3 3"]:
-    """Return camera_from_world of a camera at the given angles in radians (see module docstring)."""
+    """Return camera_from_world of a camera at the given angles (radians; see the module)."""
     cy, sy, ce, se = math.cos(yaw), math.sin(yaw), math.cos(elevation), math.sin(elevation)
     right = np.array([cy, 0.0, -sy])
     down = np.array([sy * se, -ce, cy * se])

@@ -82,7 +82,9 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
     if path.exists() and not path.is_dir():
         raise OutputError(f"{path}: is a file, a folder is needed; choose another -o")
     if path.is_dir() and any(path.iterdir()) and not force:
-        raise OutputError(f"{path}: exists already; pass --force to replace it, or choose another -o")
+        raise OutputError(
+            f"{path}: exists already; pass --force to replace it, or choose another -o"
+        )
     existing = next(p for p in (path, *path.parents) if p.exists())
     if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
         raise OutputError(f"{path}: {existing} is not writable; choose another -o")

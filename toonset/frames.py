@@ -45,7 +45,7 @@ def opencv_from_pixels(pixels: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "
 
 def colmap_from_pose(
     world_from_camera: Float[np.ndarray, "4 4"],
-) -> tuple[Float[np.ndarray, "4"], Float[np.ndarray, "3"]]:
+) -> tuple[Float[np.ndarray, " 4"], Float[np.ndarray, " 3"]]:
     """Return COLMAP's (quaternion_wxyz with w >= 0, translation) of cam_from_world."""
     rotation = np.asarray(world_from_camera, dtype=np.float64)[:3, :3].T
     translation = -rotation @ world_from_camera[:3, 3]
@@ -53,7 +53,7 @@ def colmap_from_pose(
 
 
 def pose_from_colmap(
-    quaternion_wxyz: Float[np.ndarray, "4"], translation: Float[np.ndarray, "3"]
+    quaternion_wxyz: Float[np.ndarray, " 4"], translation: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, "4 4"]:
     """Return world_from_camera (OpenCV axes) of COLMAP's cam_from_world."""
     w, x, y, z = np.asarray(quaternion_wxyz, dtype=np.float64) / np.linalg.norm(quaternion_wxyz)
@@ -70,7 +70,7 @@ def pose_from_colmap(
     return pose
 
 
-def _quaternion_wxyz(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
+def _quaternion_wxyz(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " 4"]:
     """Return the unit quaternion with w >= 0 (largest-component branch, stable at 180 degrees).
 
     Source: Bar-Itzhack 2000, eigenvector of the symmetric 4x4 matrix of the rotation.

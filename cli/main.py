@@ -1,0 +1,69 @@
+"""The `toonset` program: verbs, errors to exit codes, nothing heavy imported before a verb runs.
+
+Exit codes: 0 fine; 1 our bug; 2 bad input or usage; 3 done, but a view is weak or ambiguous;
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from toonset import __version__
+from toonset.errors import ToonsetError
+
+VERBS = ("calibrate", "palette", "train", "render", "evaluate", "synth", "bench")
+
+app = typer.Typer(
+    name="toonset",
+    help="Turn a hand-drawn character sheet into cameras, a palette and a turning character.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"toonset {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def toonset(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print it.")
+    ] = False,
+) -> None:
+    """Turn a hand-drawn character sheet into cameras, a palette and a turning character."""
+
+
+for _verb in VERBS:
+    app.command(_verb)(getattr(importlib.import_module(f"toonset.cli.{_verb}"), _verb))
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    # Waiting threads that spin cost a loaded machine an order of magnitude; must precede torch.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    try:
+        app()
+    except ToonsetError as error:
+        print(f"toonset: {one_line(error)}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("toonset: interrupted", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def one_line(error: Exception) -> str:
+    """Return the message on one line, without control characters (file names are foreign text)."""
+    text = " ".join(str(error).split())
+    return "".join(c if c.isprintable() else "?" for c in text)

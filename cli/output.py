@@ -1,0 +1,64 @@
+"""What a command prints: results on stdout, progress and reasons on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+QuietFlag = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only.")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
+ForceFlag = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
+
+SECONDS_BETWEEN_LOG_LINES = 5.0
+
+
+@dataclass
+class Printer:
+    """One command's voice: `say` for people, `result` once at the end."""
+
+    as_json: bool = False
+    quiet: bool = False
+    _last: float = field(default=0.0)
+
+    def say(self, text: str) -> None:
+        """Print a line for people on stderr, unless quiet."""
+        if not self.quiet:
+            self._clear()
+            print(text, file=sys.stderr, flush=True)
+
+    def progress(self, text: str) -> None:
+        """Show where the work stands: one live line on a terminal, a line every 5 s in a log."""
+        if self.quiet:
+            return
+        if sys.stderr.isatty():
+            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+        elif time.monotonic() - self._last > SECONDS_BETWEEN_LOG_LINES:
+            print(text, file=sys.stderr, flush=True)
+            self._last = time.monotonic()
+
+    def result(self, values: dict[str, Any], text: str) -> None:
+        """Print the result: `values` as JSON with --json, else `text`."""
+        self._clear()
+        if self.as_json:
+            print(json.dumps(values, default=_plain))
+        elif text:
+            print(text)
+
+    def _clear(self) -> None:
+        if not self.quiet and sys.stderr.isatty():
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no JSON form")

@@ -1,0 +1,44 @@
+"""A scene to train on: posed RGBA pictures, with or without palette labels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.camera import Camera
+
+UNLABELLED = 255  # label of background and of mixed edge pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One posed picture.
+
+    Attributes:
+        name: its file name, e.g. "000.png".
+        camera: where it was taken from; `camera.size_wh` is the picture's size.
+        rgba: (height, width, 4) sRGB with straight alpha.
+        labels: (height, width) palette index per pixel, 255 = unlabelled; None without palette.
+    """
+
+    name: str
+    camera: Camera
+    rgba: UInt8[np.ndarray, "height width 4"]
+    labels: UInt8[np.ndarray, "height width"] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Posed pictures of one character.
+
+    Attributes:
+        frames: in file order.
+        palette: (colors, 3) sRGB that `Frame.labels` index; None without palette.
+        name: where it came from, for messages.
+    """
+
+    frames: tuple[Frame, ...]
+    palette: UInt8[np.ndarray, "colors 3"] | None
+    name: str

@@ -1,0 +1,76 @@
+"""A triangle mesh: the mannequin, in world coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from toonset.errors import MeshError
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle surface.
+
+    Attributes:
+        vertices: (n, 3) world coordinates, finite.
+        faces: (m, 3) vertex indices.
+        face_colors: (m, 3) sRGB of every face, or None where the file has no colours.
+        face_parts: (m,) part number of every face (0 where the file has no parts).
+        part_names: name of each part number.
+        name: where it came from, for messages.
+    """
+
+    vertices: Float[np.ndarray, "vertices 3"]
+    faces: Int[np.ndarray, "faces 3"]
+    face_colors: UInt8[np.ndarray, "faces 3"] | None = None
+    face_parts: Int[np.ndarray, " faces"] | None = None
+    part_names: tuple[str, ...] = ("body",)
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        """Refuse what is no surface.
+
+        Raises:
+            MeshError: no faces, a vertex that is not finite, an index out of range, no extent.
+        """
+        if len(self.faces) == 0:
+            raise MeshError(f"{self.name}: no faces; export the mesh with its triangles")
+        bad = int((~np.isfinite(self.vertices)).any(axis=1).sum())
+        if bad:
+            raise MeshError(
+                f"{self.name}: {bad} of {len(self.vertices)} vertices are NaN or infinite; "
+                "repair the mesh and export it again"
+            )
+        if self.faces.min() < 0 or self.faces.max() >= len(self.vertices):
+            raise MeshError(
+                f"{self.name}: face index {int(self.faces.max())} but {len(self.vertices)} "
+                "vertices; the file is damaged, export it again"
+            )
+        extent = float(np.ptp(self.vertices, axis=0).max())
+        if not 1e-4 <= extent <= 1e6:
+            raise MeshError(
+                f"{self.name}: extent {extent:g} world units, 1e-4 to 1e6 is needed; rescale it"
+            )
+
+    @property
+    def bounds(self) -> Float[np.ndarray, "2 3"]:
+        """Return the lowest and highest corner of the bounding box."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @property
+    def middle(self) -> Float[np.ndarray, " 3"]:
+        """Return the middle of the bounding box."""
+        return self.bounds.mean(axis=0)
+
+    @property
+    def height(self) -> float:
+        """Return the extent along +Y."""
+        return float(np.ptp(self.vertices[:, 1]))
+
+    @property
+    def radius(self) -> float:
+        """Return the distance from `middle` to the farthest vertex."""
+        return float(np.linalg.norm(self.vertices - self.middle, axis=1).max())
