@@ -1,0 +1,114 @@
+"""From any decoded picture to 8-bit sRGB with straight alpha, or a refusal by name."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image, ImageCms
+
+from toonset.errors import PictureError
+
+PLAIN_MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBa", "La", "RGBX", "YCbCr")
+GREY_16_MODES = ("I;16", "I;16L", "I;16B", "I;16N")
+SRGB_TOLERANCE = 2  # levels: a profile that moves no colour further is sRGB itself
+
+
+def rgba_of(image: Image.Image, path: Path) -> UInt8[np.ndarray, "height width 4"]:
+    """Return the pixels of a loaded picture as sRGB with straight alpha.
+
+    16-bit channels are scaled to 8 bits (never wrapped), palettes and transparent colours are
+    resolved, an embedded colour profile is converted to sRGB.
+
+    Raises:
+        PictureError: a mode or profile whose colours cannot be told.
+    """
+    profile = image.info.get("icc_profile")
+    if image.mode in GREY_16_MODES:
+        image = _grey_8(image)
+    if image.mode == "CMYK":
+        return _cmyk(image, profile, path)
+    if image.mode not in PLAIN_MODES:
+        raise PictureError(
+            f"{path}: has pixels of kind {image.mode} (32 bit, Lab or other), which is not "
+            "supported; save it as an 8-bit RGB PNG"
+        )
+    _refuse_wide_transparency(image, path)
+    if image.mode == "La":
+        image = image.convert("LA")
+    rgba = np.asarray(image.convert("RGBA")).copy()
+    if profile:
+        grey = image.mode in ("1", "L", "LA", "La")
+        rgba[..., :3] = _to_srgb(Image.fromarray(rgba[..., :3]), profile, grey, path)
+    return rgba
+
+
+def _grey_8(image: Image.Image) -> Image.Image:
+    """Scale 16-bit grey to 8 bit; one transparent grey value becomes alpha."""
+    values = np.asarray(image).astype(np.uint32)
+    grey = ((values * 255 + 32767) // 65535).astype(np.uint8)
+    transparent = image.info.get("transparency")
+    if not isinstance(transparent, int):
+        return Image.fromarray(grey)
+    alpha = np.where(values == transparent, 0, 255).astype(np.uint8)
+    return Image.merge("LA", (Image.fromarray(grey), Image.fromarray(alpha)))
+
+
+def _refuse_wide_transparency(image: Image.Image, path: Path) -> None:
+    """Refuse a transparent colour of 16-bit RGB: Pillow has already cut the pixels to 8 bit."""
+    transparent = image.info.get("transparency")
+    if image.mode == "RGB" and isinstance(transparent, tuple) and max(transparent) > 255:
+        raise PictureError(
+            f"{path}: is a 16-bit PNG with a transparent colour, which is not supported; save it "
+            "with an alpha channel"
+        )
+
+
+def _cmyk(image: Image.Image, profile: bytes | None, path: Path) -> UInt8[np.ndarray, "h w 4"]:
+    if not profile:
+        raise PictureError(
+            f"{path}: is CMYK without a colour profile, so its colours are not known; save it as "
+            "an RGB PNG"
+        )
+    rgb = _to_srgb(image, profile, False, path)
+    return np.dstack([rgb, np.full(rgb.shape[:2], 255, dtype=np.uint8)])
+
+
+def _to_srgb(
+    image: Image.Image, profile: bytes, grey: bool, path: Path
+) -> UInt8[np.ndarray, "h w 3"]:
+    """Convert through the embedded profile; a picture that is sRGB already keeps every value."""
+    try:
+        source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        space = str(source.profile.xcolor_space).strip()
+        if grey and space == "GRAY":
+            image = image.convert("L")
+        if space != {"L": "GRAY", "RGB": "RGB", "CMYK": "CMYK"}[image.mode]:
+            return np.asarray(image.convert("RGB"))  # a profile for other pixels says nothing
+        transform = ImageCms.buildTransform(
+            source, ImageCms.createProfile("sRGB"), image.mode, "RGB"
+        )
+        if _is_srgb(transform, image.mode):
+            return np.asarray(image.convert("RGB"))
+        converted = ImageCms.applyTransform(image, transform)
+    except (ImageCms.PyCMSError, OSError, ValueError, TypeError) as error:
+        raise PictureError(
+            f"{path}: its colour profile is damaged ({error}); save it as sRGB"
+        ) from error
+    assert converted is not None  # only an in-place conversion returns nothing
+    return np.asarray(converted)
+
+
+def _is_srgb(transform: ImageCms.ImageCmsTransform, mode: str) -> bool:
+    """Return whether the transform leaves a grid of colours where they are."""
+    if mode == "CMYK":
+        return False
+    steps = np.linspace(0, 255, 9).astype(np.uint8)
+    grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(27, 27, 3)
+    sample = Image.fromarray(grid).convert(mode)
+    moved = ImageCms.applyTransform(sample, transform)
+    assert moved is not None
+    change = np.asarray(moved).astype(int) - np.asarray(sample.convert("RGB"))
+    return int(np.abs(change).max()) <= SRGB_TOLERANCE
