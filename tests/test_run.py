@@ -1,0 +1,144 @@
+"""./run as a user types it, with a stand-in for the environment that it would set up."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+COPIED = ("run", "bootstrap.lock", "requirements.lock", "pyproject.toml", "toonset/__init__.py")
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="a POSIX shell is needed")
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout whose path has a space, with a ready environment in which toonset only logs."""
+    root = tmp_path / "a b"
+    for name in COPIED:
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, root / name)
+    program(root / ".venv/bin/python", f'exec {shlex.quote(sys.executable)} "$@"')
+    stand_in(root, "exit 0")
+    stamp = (root / name for name in COPIED[1:])
+    data = b"".join(path.read_bytes() for path in stamp) + os.fsencode(root.resolve())
+    checksum = subprocess.run(["cksum"], input=data, capture_output=True, check=True).stdout
+    (root / ".venv/stamp").write_bytes(checksum)
+    return root
+
+
+def program(path: Path, body: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
+    path.chmod(0o755)
+
+
+def stand_in(root: Path, body: str) -> None:
+    log = shlex.quote(str(root / "log"))
+    program(root / ".venv/bin/toonset", f'{{ pwd -P; printf "[%s]" "$@"; echo; }} >>{log}\n{body}')
+
+
+def run(
+    root: Path, *words: str, cwd: Path | None = None, **variables: str
+) -> subprocess.CompletedProcess[str]:
+    environment = {"PATH": os.environ["PATH"], "LC_ALL": "C", **variables}  # and no HOME
+    return subprocess.run(
+        [str(root / "run"), *words],
+        cwd=cwd or root,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def log_of(root: Path) -> list[str]:
+    return (root / "log").read_text(encoding="utf-8").splitlines()
+
+
+@pytest.mark.parametrize("code", [0, 1, 2, 3, 130])
+def test_a_verb_keeps_words_folder_and_exit_code(checkout: Path, tmp_path: Path, code: int) -> None:
+    stand_in(checkout, f"echo out; echo err >&2; exit {code}")
+    done = run(checkout, "calibrate", "my sheet.png", "--mesh", "*.obj", "", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (code, "out\n", "err\n")
+    assert log_of(checkout) == [
+        str(tmp_path.resolve()),
+        "[calibrate][my sheet.png][--mesh][*.obj][]",
+    ]
+
+
+def test_it_works_through_a_link(checkout: Path, tmp_path: Path) -> None:
+    link = tmp_path / "tool"
+    link.symlink_to(checkout / "run")
+    done = subprocess.run([str(link), "palette", "x"], cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    assert log_of(checkout)[-1] == "[palette][x]"
+
+
+def test_help_shows_its_own_commands_and_those_of_toonset(checkout: Path) -> None:
+    done = run(checkout, "--help")
+    assert done.returncode == 0
+    assert "./run demo" in done.stdout
+    assert "./run test [--all]" in done.stdout
+    assert log_of(checkout)[-1] == "[--help]"
+
+
+def test_demo_goes_on_after_an_uncertain_view(checkout: Path) -> None:
+    stand_in(checkout, "case $1 in calibrate) exit 3 ;; esac")
+    (checkout / "demo").mkdir()
+    (checkout / "demo/old").touch()
+    done = run(checkout, "demo", cwd=checkout.parent)
+    assert done.returncode == 0, done.stderr
+    assert [line.split("]")[0] for line in log_of(checkout)[1::2]] == [
+        "[calibrate",
+        "[palette",
+        "[train",
+        "[render",
+    ]
+    assert "$ ./run calibrate examples/sheet.png" in done.stdout
+    assert "weak or ambiguous" in done.stderr
+    assert not (checkout / "demo/old").exists()
+
+
+@pytest.mark.parametrize(("verb", "code"), [("calibrate", 2), ("train", 1)])
+def test_demo_stops_at_a_failure(checkout: Path, verb: str, code: int) -> None:
+    stand_in(checkout, f"case $1 in {verb}) exit {code} ;; esac")
+    done = run(checkout, "demo")
+    assert done.returncode == code
+    assert log_of(checkout)[-1].startswith(f"[{verb}]")
+    assert "Look at" not in done.stdout
+
+
+def test_an_unsuitable_python_is_refused_by_name(checkout: Path, tmp_path: Path) -> None:
+    old = tmp_path / "python2"
+    program(old, "exit 1")
+    done = run(checkout, "calibrate", PYTHON=str(old))
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        f"run: PYTHON={old} does not run Python 3.11 to 3.13; choose another"
+    ]
+    assert not (checkout / "log").exists()
+
+
+def test_a_changed_lock_is_installed_and_a_failure_is_shown(checkout: Path) -> None:
+    with (checkout / "requirements.lock").open("a", encoding="utf-8") as lock:
+        lock.write("# changed\n")
+    program(
+        checkout / ".venv/bin/python",
+        f'case " $* " in *" pip install "*) echo "no space"; exit 1 ;; esac\n'
+        f'exec {shlex.quote(sys.executable)} "$@"',
+    )
+    done = run(checkout, "calibrate", "x")
+    assert done.returncode == 2
+    assert "no space" in done.stderr
+    assert "install.log" in done.stderr
+    assert not (checkout / ".venv/stamp").exists()
+    assert not (checkout / "log").exists()
