@@ -1,0 +1,213 @@
+"""Contour alignment of one view: robust two-sided point-to-line Gauss-Newton, from one start.
+
+Residuals, in pixels of the working scale: (a) every rim point against the nearest drawn contour
+point, (b) every drawn contour point against the nearest rim point, both along the drawn normal.
+"Nearest" is measured over position and outline direction together, so that the two sides of a
+thin limb are not confused. Geman-McClure weights w = (t^2 / (t^2 + d^2))^2 with t annealed from
+coarse to fine make far points, such as a hat that the mesh lacks, count little.
+
+Source of the scheme: correspondence-line trackers (Stoiber et al. 2022, SRT3D; Tian et al. 2022)
+with iterative closest points instead of colour lines: a drawing has its outline given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from toonset.calib.contour import Contour
+from toonset.calib.pose import PARAMETERS, Pose, project, project_with_jacobian
+from toonset.calib.rim import Rim, Surface, find_rim
+
+MAX_TURN = np.radians(12.0)  # per iteration: beyond it the matches of this iteration mean nothing
+DIRECTION_OF_HEIGHT = 0.06  # a contour turned by 60 degrees counts as this far away
+ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
+NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
+EFFECTIVE_POINTS = 40.0  # independent outline errors per view (they are correlated along it)
+
+
+@dataclass(frozen=True)
+class ElevationPrior:
+    """What is known of a view's elevation before looking at it, radians."""
+
+    mean: float = np.radians(5.0)  # artists look slightly down
+    sigma: float = np.radians(20.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Corresponding points of rim and drawing.
+
+    Attributes:
+        points: (n, 3) rim points, surface coordinates.
+        targets: (n, 2) drawn points in pixels.
+        normals: (n, 2) outward normals of the drawn outline there.
+        distances: (n,) pixel distance before the step, direction included.
+        drawn: number of leading rows that come from drawn points (the rest from rim points).
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    targets: Float[np.ndarray, "n 2"]
+    normals: Float[np.ndarray, "n 2"]
+    distances: Float[np.ndarray, " n"]
+    drawn: int
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A refined hypothesis.
+
+    Attributes:
+        pose: in pixels of the full-size view.
+        cost: mean squared two-sided outline distance, each capped, over height squared.
+        error: root mean square of the uncapped part, over height: what is badly off stays out.
+        coverage: share of rim and drawn points nearer than the cap.
+    """
+
+    pose: Pose
+    cost: float
+    error: float
+    coverage: float
+
+
+class Drawing:
+    """A contour at a working scale with its search tree (built once, used by every start)."""
+
+    def __init__(self, contour: Contour, height_px: float, max_points: int) -> None:
+        """Scale `contour` to `height_px` and thin it to about `max_points`."""
+        self.factor = height_px / contour.height_px
+        scaled = contour.scaled(self.factor)
+        every = max(1, round(len(scaled.points) / max_points))
+        left, top, width, height = scaled.box
+        margin = 0.3 * height
+        self.offset = np.array([left - margin, top - margin])
+        self.points = scaled.points[::every] - self.offset
+        self.normals = scaled.normals[::every]
+        self.height = height
+        self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
+        self.direction_px = DIRECTION_OF_HEIGHT * height
+        self.tree = KDTree(np.hstack([self.points, self.direction_px * self.normals]))
+
+    def pose_in(self, pose: Pose) -> Pose:
+        """Return a full-size pose in working pixels."""
+        scaled = pose.scaled(self.factor)
+        return replace(scaled, shift=scaled.shift - self.offset)
+
+    def pose_out(self, pose: Pose) -> Pose:
+        """Return a working pose in full-size pixels."""
+        return replace(pose, shift=pose.shift + self.offset).scaled(1 / self.factor)
+
+
+def align(
+    drawing: Drawing,
+    surface: Surface,
+    start: Pose,
+    widths: Float[np.ndarray, " iterations"],
+    prior: ElevationPrior = ElevationPrior(),
+) -> Fit:
+    """Return `start` (full-size pixels) refined by one Gauss-Newton step per entry of `widths`.
+
+    Args:
+        drawing: the outline at the working scale.
+        surface: the mannequin.
+        start: first pose; its k is kept.
+        widths: the robust width of each step over the figure's height.
+        prior: of the elevation.
+    """
+    pose = drawing.pose_in(start)
+    for width in widths:
+        matches = match(drawing, surface, pose)
+        step = _gauss_newton_step(matches, pose, width * drawing.height, drawing.height, prior)
+        pose = pose.moved(step)
+        if np.abs(step[:3]).max() < 1e-4 and width == widths[-1]:
+            break
+    return measure(drawing, surface, pose)
+
+
+def measure(drawing: Drawing, surface: Surface, pose: Pose, cap: float = 0.05) -> Fit:
+    """Return the fit of a working pose: capped two-sided outline distance over height."""
+    matches = match(drawing, surface, pose)
+    relative = matches.distances / drawing.height
+    sides = (relative[: matches.drawn], relative[matches.drawn :])
+    cost = float(np.mean([np.mean(np.minimum(side, cap) ** 2) for side in sides]))
+    near = relative[relative < cap]
+    error = float(np.sqrt(np.mean(near**2))) if len(near) else 1.0
+    return Fit(drawing.pose_out(pose), cost, error, float(np.mean(relative < cap)))
+
+
+def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
+    """Return two-sided nearest neighbours of rim and drawn outline at a working pose."""
+    spacing = max(1.0, drawing.height / 128)
+    rim = find_rim(surface, project(pose, surface.vertices), drawing.size_wh, spacing)
+    if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
+        far = np.full(len(drawing.points), drawing.height)
+        zeros = np.zeros((len(far), 3))
+        return Matches(zeros, drawing.points, drawing.normals, far, len(far))
+    rim = _thinned(rim, len(drawing.points))
+    seen = np.hstack([project(pose, rim.points), drawing.direction_px * rim.normals])
+    wanted = drawing.tree.data
+    far_drawn, to_rim = KDTree(seen).query(wanted)
+    far_rim, to_drawn = drawing.tree.query(seen)
+    return Matches(
+        np.concatenate([rim.points[to_rim], rim.points]),
+        np.concatenate([drawing.points, drawing.points[to_drawn]]),
+        np.concatenate([drawing.normals, drawing.normals[to_drawn]]),
+        np.concatenate([far_drawn, far_rim]),
+        len(drawing.points),
+    )
+
+
+def _thinned(rim: Rim, wanted: int) -> Rim:
+    every = max(1, len(rim.points) // max(wanted, 1))
+    return Rim(rim.points[::every], rim.normals[::every])
+
+
+def _gauss_newton_step(
+    matches: Matches, pose: Pose, width_px: float, height_px: float, prior: ElevationPrior
+) -> Float[np.ndarray, " 6"]:
+    pixels, jacobian = project_with_jacobian(pose, matches.points)
+    residual = (matches.normals * (pixels - matches.targets)).sum(axis=1)
+    rows = np.einsum("ni,nij->nj", matches.normals, jacobian[..., :PARAMETERS])
+    weights = (width_px**2 / (width_px**2 + matches.distances**2)) ** 2
+    # both directions count the same, however many points each has
+    side = np.arange(len(weights)) < matches.drawn
+    counts = np.where(side, side.sum(), max((~side).sum(), 1))
+    weights = weights * EFFECTIVE_POINTS / (2 * counts) / (NOISE_OF_HEIGHT * height_px) ** 2
+    normal = (rows * weights[:, None]).T @ rows
+    gradient = rows.T @ (weights * residual)
+    prior_matrix, prior_gradient = upright_prior(pose, prior)
+    normal += prior_matrix + 1e-3 * np.diag(np.diag(normal)) + 1e-9 * np.eye(PARAMETERS)
+    step = -np.linalg.solve(normal, gradient + prior_gradient)
+    turn = float(np.linalg.norm(step[:3]))
+    return step * min(1.0, MAX_TURN / max(turn, 1e-12), 0.3 / max(abs(step[5]), 1e-12))
+
+
+def upright_prior(
+    pose: Pose, prior: ElevationPrior
+) -> tuple[Float[np.ndarray, "6 6"], Float[np.ndarray, " 6"]]:
+    """Return the Gauss-Newton matrix and gradient of the roll and elevation priors."""
+    (roll, elevation), (d_roll, d_elevation) = tilt(pose)
+    matrix, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    for off, slope, sigma in (
+        (roll, d_roll, ROLL_SIGMA),
+        (elevation - prior.mean, d_elevation, prior.sigma),
+    ):
+        matrix[:3, :3] += np.outer(slope, slope) / sigma**2
+        gradient[:3] += off * slope / sigma**2
+    return matrix, gradient
+
+
+def tilt(pose: Pose) -> tuple[tuple[float, float], Float[np.ndarray, "2 3"]]:
+    """Return (roll, elevation) in radians and their derivatives by the left increment w.
+
+    With up = R e_y: roll = atan2(up_x, -up_y), elevation = atan2(-up_z, |up_xy|), d up = w x up.
+    """
+    x, y, z = pose.rotation[:, 1]
+    flat = max(float(np.hypot(x, y)), 1e-6)
+    d_up = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    d_roll = (-y * d_up[0] + x * d_up[1]) / flat**2
+    angles = (float(np.arctan2(x, -y)), float(np.arctan2(-z, flat)))
+    return angles, np.stack([d_roll, -d_up[2] / flat])

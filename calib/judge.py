@@ -1,0 +1,122 @@
+"""How sure: probabilities of the alternatives, uncertainties in angles, verdicts in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from toonset.calib.align import Drawing, measure
+from toonset.calib.hypotheses import Candidates, is_twin
+from toonset.calib.joint import JointFit
+from toonset.calib.pose import PARAMETERS, Pose
+from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
+from toonset.calib.rim import Surface
+from toonset.camera import angles_from_rotation, rotation_distance
+from toonset.view import View
+
+SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
+WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
+FAILED_COVERAGE = 0.70
+WEAK_ANGLE = np.radians(6.0)  # one sigma of yaw or elevation
+OTHER = np.radians(15.0)  # an alternative this far away is another camera
+
+
+def judge_view(
+    view: View,
+    drawing: Drawing,
+    surface: Surface,
+    joint: JointFit,
+    index: int,
+    candidates: Candidates,
+    probability: Float[np.ndarray, " n"],
+) -> ViewCalibration:
+    """Return the camera of view `index` with what is known about it."""
+    pose = joint.poses[index]
+    size_wh = (view.rgba.shape[1], view.rgba.shape[0])
+    fit = measure(drawing, surface, drawing.pose_in(pose))
+    own = slice(PARAMETERS * index, PARAMETERS * (index + 1))
+    covariance = _in_view_pixels(joint.covariance[own, own], drawing.factor)
+    far = [
+        (float(p), f.pose)
+        for p, f in zip(probability, candidates.fits, strict=True)
+        if rotation_distance(f.pose.rotation, pose.rotation) > OTHER
+    ]
+    far.sort(key=lambda item: -item[0])
+    mirrored = [item for item in far if is_twin(pose, item[1])]
+    p_flip = sum(p for p, _ in mirrored)
+    p_other = sum(p for p, _ in far) - p_flip
+    twin = mirrored[0][1] if mirrored else pose.twin()
+    sigmas = _sigmas(pose, covariance)
+    verdict, reason = _verdict(fit.coverage, sigmas, p_flip, p_other)
+    return ViewCalibration(
+        view.name,
+        pose.camera(surface.middle, size_wh),
+        sigmas,
+        covariance,
+        p_flip,
+        twin.camera(surface.middle, size_wh),
+        tuple(Alternative(q.camera(surface.middle, size_wh), p) for p, q in far[:4]),
+        fit.error,
+        fit.coverage,
+        verdict,
+        reason,
+    )
+
+
+def judge_sheet(views: Sequence[ViewCalibration]) -> tuple[Verdict, str]:
+    """Return the sheet's verdict: the worst that at least half of its views have.
+
+    One uncertain view makes the sheet weak. So does a single drawing: nothing confirms its scale
+    and elevation.
+    """
+    named = ", ".join(f"{x.name} {x.verdict}" for x in views if x.verdict != "ok")
+    worst: Verdict = "ok"
+    for level in SEVERITY:
+        if 2 * sum(SEVERITY.index(x.verdict) >= SEVERITY.index(level) for x in views) >= len(views):
+            worst = level
+    if len(views) == 1 and worst == "ok":
+        return "weak", "a single drawing: nothing confirms its scale, elevation and perspective"
+    if worst == "ok" and named:
+        return "weak", named
+    return worst, named
+
+
+def _verdict(coverage: float, sigmas: Sigmas, p_flip: float, p_other: float) -> tuple[Verdict, str]:
+    apart = f"{100 * (1 - coverage):.0f} % of the outlines are more than 5 % of the height apart"
+    if coverage < FAILED_COVERAGE:
+        return "failed", f"{apart}: this is not the mannequin's pose or shape"
+    if p_flip > 1 - SURE:
+        return "ambiguous", f"the mirror twin (front and back swapped) has p = {p_flip:.2f}"
+    if p_other > 1 - SURE:
+        return "ambiguous", f"another direction fits as well, p = {p_other:.2f}"
+    if coverage < WEAK_COVERAGE:
+        return "weak", f"{apart}: the mannequin's shape differs from the drawing's"
+    if max(sigmas.yaw, sigmas.elevation) > WEAK_ANGLE:
+        worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
+        return "weak", f"the outline hardly changes with {worst}"
+    return "ok", ""
+
+
+def _in_view_pixels(
+    covariance: Float[np.ndarray, "6 6"], factor: float
+) -> Float[np.ndarray, "6 6"]:
+    """Return the covariance with shifts in pixels of the view instead of the working scale."""
+    units = np.array([1, 1, 1, 1 / factor, 1 / factor, 1])
+    return covariance * np.outer(units, units)
+
+
+def _sigmas(pose: Pose, covariance: Float[np.ndarray, "6 6"]) -> Sigmas:
+    step = 1e-5
+    here = np.array(angles_from_rotation(pose.rotation))
+    slopes = np.zeros((3, 3))
+    for axis in range(3):
+        move = np.zeros(PARAMETERS)
+        move[axis] = step
+        change = np.array(angles_from_rotation(pose.moved(move).rotation)) - here
+        slopes[:, axis] = (change + np.pi) % (2 * np.pi) - np.pi
+    angles = np.sqrt(np.diag(slopes @ covariance[:3, :3] @ slopes.T)) / step
+    shift = float(np.sqrt(np.trace(covariance[3:5, 3:5]) / 2))
+    yaw, elevation, roll = (float(min(a, np.pi)) for a in angles)
+    return Sigmas(yaw, elevation, roll, float(np.sqrt(covariance[5, 5])), shift)

@@ -1,0 +1,88 @@
+"""What calibration returns: cameras, how sure they are, and what else they could be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from toonset.calib.joint import ModelChoice
+from toonset.camera import Camera
+
+Verdict = Literal["ok", "weak", "ambiguous", "failed"]
+SEVERITY: tuple[Verdict, ...] = ("ok", "weak", "ambiguous", "failed")
+
+
+@dataclass(frozen=True, eq=False)
+class Sigmas:
+    """One standard deviation of each number of a camera; angles in radians, shift in pixels."""
+
+    yaw: float
+    elevation: float
+    roll: float
+    scale_relative: float
+    shift_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another camera that explains the drawing, with its probability."""
+
+    camera: Camera
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class ViewCalibration:
+    """One drawing's camera.
+
+    Attributes:
+        name: the view's file name.
+        camera: in pixels of the view's crop.
+        sigmas: 1-sigma, deflated for correlated outline errors.
+        covariance: (6, 6) of (rotation increment in camera axes, shift px, log scale).
+        p_flip: probability that the mirror twin is right instead.
+        twin: the mirror twin's camera (refined to this drawing).
+        alternatives: other refined cameras, most probable first.
+        outline_error: robust outline distance over the figure's height.
+        coverage: share of both outlines that lie within 5 % of the height of each other.
+        verdict: ok, weak, ambiguous or failed.
+        reason: why, in words; empty when ok.
+    """
+
+    name: str
+    camera: Camera
+    sigmas: Sigmas
+    covariance: Float[np.ndarray, "6 6"]
+    p_flip: float
+    twin: Camera
+    alternatives: tuple[Alternative, ...]
+    outline_error: float
+    coverage: float
+    verdict: Verdict
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The cameras of a sheet.
+
+    Attributes:
+        views: in sheet order.
+        model: orthographic or perspective, with the evidence.
+        outline_offset: drawn outline outside of the mannequin's, over the figure's height.
+        noise: robust outline error of the sheet, over the figure's height.
+        verdict: the worst that holds for the sheet as a whole.
+        reason: why, in words.
+        seconds: per step.
+    """
+
+    views: tuple[ViewCalibration, ...]
+    model: ModelChoice
+    outline_offset: float
+    noise: float
+    verdict: Verdict
+    reason: str
+    seconds: dict[str, float]

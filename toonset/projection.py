@@ -1,0 +1,72 @@
+"""The camera model of `toonset.camera` in torch: batched over views, differentiable, any device.
+
+Rotations are kornia's `So3`, the division is its `project_points_z1`: with the homogeneous depth
+1 + k z_c the pinhole and the orthographic camera are one expression, and k = 0 is a regular point.
+"""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float
+from kornia.geometry.camera import PinholeCamera, project_points_z1, unproject_points_z1
+from kornia.geometry.liegroup import So3
+from torch import Tensor
+
+from toonset.camera import Camera
+
+
+def rotate(
+    rotation: Float[Tensor, "views 3 3"], turn: Float[Tensor, "views 3"]
+) -> Float[Tensor, "views 3 3"]:
+    """Return exp(turn) rotation, the left increment of the solvers (rotation vectors, radians)."""
+    return So3.exp(turn).matrix() @ rotation
+
+
+def project(
+    rotation: Float[Tensor, "views 3 3"],
+    center: Float[Tensor, "views 2"],
+    scale_uv: Float[Tensor, "views 2"],
+    k: Float[Tensor, " views"],
+    offsets: Float[Tensor, "views points 3"],
+) -> Float[Tensor, "views points 2"]:
+    """Return the pixels of points given relative to each camera's target.
+
+    Points at or behind a pinhole's centre have no pixel: NaN.
+    """
+    local = offsets @ rotation.transpose(-1, -2)
+    relative_depth = 1 + k[:, None] * local[..., 2]
+    seen = relative_depth > 0
+    safe = torch.where(seen, relative_depth, torch.ones_like(relative_depth))
+    plane = project_points_z1(torch.cat([local[..., :2], safe[..., None]], dim=-1))
+    pixels = center[:, None] + scale_uv[:, None] * plane
+    return torch.where(seen[..., None], pixels, torch.nan)
+
+
+def unproject(
+    rotation: Float[Tensor, "views 3 3"],
+    center: Float[Tensor, "views 2"],
+    scale_uv: Float[Tensor, "views 2"],
+    k: Float[Tensor, " views"],
+    pixels: Float[Tensor, "views points 2"],
+    depth: Float[Tensor, "views points"],
+) -> Float[Tensor, "views points 3"]:
+    """Return points relative to each target from pixels and depth past the target's plane."""
+    plane = (pixels - center[:, None]) / scale_uv[:, None]
+    relative_depth = (1 + k[:, None] * depth)[..., None]
+    local = unproject_points_z1(plane, relative_depth)[..., :2]
+    return torch.cat([local, depth[..., None]], dim=-1) @ rotation
+
+
+def kornia_pinholes(cameras: list[Camera]) -> PinholeCamera:
+    """Return pinhole cameras as kornia's batched `PinholeCamera` (float64).
+
+    Raises:
+        CameraError: one is orthographic; call `Camera.as_pinhole` first.
+    """
+    intrinsics = torch.eye(4, dtype=torch.float64).repeat(len(cameras), 1, 1)
+    intrinsics[:, :3, :3] = torch.stack([torch.from_numpy(camera.K) for camera in cameras])
+    extrinsics = torch.stack([torch.from_numpy(camera.camera_from_world) for camera in cameras])
+    width, height = (
+        torch.tensor([float(camera.size_wh[axis]) for camera in cameras]) for axis in (0, 1)
+    )
+    return PinholeCamera(intrinsics, extrinsics, height, width)
