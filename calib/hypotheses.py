@@ -91,7 +91,7 @@ def probabilities(views: Sequence[Candidates]) -> list[Float[np.ndarray, " n"]]:
 
 
 def energies_with(view: Candidates, prior: ElevationPrior) -> Float[np.ndarray, " n"]:
-    """Return the candidates' energies with an elevation prior (heavy tails: one view may differ)."""
+    """Return energies with an elevation prior; its tails are heavy, as one view may differ."""
     elevations = np.array([tilt(fit.pose)[0][1] for fit in view.fits])
     off = (elevations - prior.mean) / prior.sigma
     return view.energies + 2.0 * np.log1p(off**2 / 4.0)

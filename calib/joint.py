@@ -69,12 +69,14 @@ class ModelChoice:
         distance_heights: camera distance in body heights; infinity for orthographic.
         bic_gain: BIC(orthographic) - BIC(perspective); above the margin perspective is proven.
         effective_samples: outline samples counted as independent.
+        margin: BIC gain that proves perspective.
     """
 
     model: str
     distance_heights: float
     bic_gain: float
     effective_samples: float
+    margin: float = BIC_MARGIN
 
 
 def fit_sheet(

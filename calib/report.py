@@ -1,0 +1,102 @@
+"""A calibration as plain data: the content of calibration.json, and one line per view."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from toonset.calib.result import Calibration, ViewCalibration
+from toonset.camera import Camera
+
+SCHEMA = "toonset-calibration/1"
+
+
+def calibration_dict(calibration: Calibration) -> dict[str, Any]:
+    """Return the JSON form; angles in degrees, lengths in world units or pixels of the view.
+
+    Callers add what only they know: options, seed, versions, input hashes.
+    """
+    model = calibration.model
+    perspective = math.isfinite(model.distance_heights)
+    return {
+        "schema": SCHEMA,
+        "verdict": calibration.verdict,
+        "reason": calibration.reason,
+        "camera_model": {
+            "chosen": model.model,
+            "distance_heights": model.distance_heights if perspective else None,
+            "bic_gain_of_perspective": model.bic_gain,
+            "bic_margin": model.margin,
+            "effective_samples": model.effective_samples,
+        },
+        "outline_offset_of_height": calibration.outline_offset,
+        "outline_noise_of_height": calibration.noise,
+        "views": [_view_dict(view) for view in calibration.views],
+        "seconds": {step: round(value, 4) for step, value in calibration.seconds.items()},
+    }
+
+
+def model_line(calibration: Calibration) -> str:
+    """Return what camera model was chosen and why, for people."""
+    model = calibration.model
+    evidence = (
+        f"BIC gain of perspective {model.bic_gain:.1f}, {model.margin:.0f} needed, "
+        f"{model.effective_samples:.0f} effective samples"
+    )
+    if model.model == "orthographic":
+        return f"camera model: orthographic ({evidence})"
+    return f"camera model: perspective from {model.distance_heights:.1f} body heights ({evidence})"
+
+
+def view_line(view: ViewCalibration) -> str:
+    """Return one line about a view for people."""
+    yaw, elevation, _ = (math.degrees(a) for a in view.camera.angles)
+    text = (
+        f"{view.name}  yaw {yaw % 360:6.1f} +- {math.degrees(view.sigmas.yaw):4.1f}  "
+        f"elevation {elevation:5.1f} +- {math.degrees(view.sigmas.elevation):4.1f}  "
+        f"p_flip {view.p_flip:.2f}  {view.verdict}"
+    )
+    return f"{text}: {view.reason}" if view.reason else text
+
+
+def _view_dict(view: ViewCalibration) -> dict[str, Any]:
+    sigmas = view.sigmas
+    return {
+        "name": view.name,
+        "verdict": view.verdict,
+        "reason": view.reason,
+        "camera": _camera_dict(view.camera),
+        "sigma": {
+            "yaw_deg": math.degrees(sigmas.yaw),
+            "elevation_deg": math.degrees(sigmas.elevation),
+            "roll_deg": math.degrees(sigmas.roll),
+            "scale_relative": sigmas.scale_relative,
+            "shift_px": sigmas.shift_px,
+        },
+        "covariance": view.covariance.tolist(),
+        "covariance_of": "rotation vector in camera axes (rad), shift u v (px), log scale",
+        "p_flip": view.p_flip,
+        "twin": _camera_dict(view.twin),
+        "alternatives": [
+            {"probability": other.probability, "camera": _camera_dict(other.camera)}
+            for other in view.alternatives
+        ],
+        "outline_error_of_height": view.outline_error,
+        "outline_coverage": view.coverage,
+    }
+
+
+def _camera_dict(camera: Camera) -> dict[str, Any]:
+    yaw, elevation, roll = (math.degrees(angle) for angle in camera.angles)
+    return {
+        "model": "orthographic" if camera.is_orthographic else "pinhole",
+        "yaw_deg": yaw,
+        "elevation_deg": elevation,
+        "roll_deg": roll,
+        "camera_from_world_rotation": camera.rotation.tolist(),
+        "target": camera.target.tolist(),
+        "scale_px_per_unit": camera.scale,
+        "center_px": camera.center.tolist(),
+        "k": camera.k,
+        "size_wh": list(camera.size_wh),
+    }
