@@ -1,0 +1,58 @@
+"""How wide the drawn contour line of a figure is."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+DARKEST_CONTOUR = 100.0  # luma of 255: a lighter border is no ink
+LEAST_INKED = 0.7  # of the border that must be dark to speak of a contour
+MOST_DEEP = 0.5  # of the border's darkness: if so much goes on inside, the figure itself is dark
+NOT_INK = 24  # levels above the ink: another colour
+LUMA = np.array([0.299, 0.587, 0.114])  # Source: ITU-R BT.601
+WIDEST = 0.05  # of the figure's height
+
+
+def contour_width_px(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
+    """Return the width in pixels of the dark line along the figure's outline; 0 = no contour.
+
+    From the border inwards, layer by layer, the share of pixels that have been dark all the way
+    stays near 1 within the line and falls behind it to the share of dark clothes and hair. The
+    width is the area under that curve above its floor.
+    """
+    mask = np.pad(rgba[..., 3] >= 128, 1)
+    luma = np.pad(rgba[..., :3] @ LUMA, 1, constant_values=255)
+    depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    rows = np.flatnonzero(mask.any(axis=1))
+    layers = int(np.clip(WIDEST * (rows[-1] - rows[0] + 1), 6, 40))
+    layers = min(layers, int(depth.max()))
+    dark = mask & (luma < _threshold(luma[(depth > 0) & (depth <= 2)], luma[depth > 2]))
+    run = ~mask
+    shares = []
+    for layer in range(1, layers + 1):
+        ring = (depth > layer - 0.5) & (depth <= layer + 0.5)
+        reached = cv2.dilate(run.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        inked = ring & dark & reached
+        shares.append(float(inked.sum() / max(ring.sum(), 1)))
+        run = inked if layer == 1 else run | inked
+    return _width(np.array(shares))
+
+
+def _threshold(border: np.ndarray, inside: np.ndarray) -> float:
+    """Return the luma halfway between the ink and the darkest common tone inside."""
+    ink = float(np.percentile(border, 25)) if border.size else 255.0
+    if ink > DARKEST_CONTOUR or not inside.size:
+        return 0.0
+    lighter = inside[inside > ink + NOT_INK]
+    tone = float(np.percentile(lighter, 10)) if lighter.size else 255.0
+    return (ink + tone) / 2
+
+
+def _width(shares: np.ndarray) -> float:
+    if len(shares) < 3 or shares[:2].max() < LEAST_INKED:
+        return 0.0
+    top, floor = float(shares[:2].max()), float(shares[-1])
+    if floor > MOST_DEEP * top:
+        return 0.0
+    return float(np.clip((shares - floor) / (top - floor), 0, 1).sum())
