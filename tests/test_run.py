@@ -14,6 +14,14 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("run", "bootstrap.lock", "requirements.lock", "pyproject.toml", "toonset/__init__.py")
 
+HOLD_THE_LOCK = """
+import fcntl, sys
+with open(sys.argv[1], "w") as lock:
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    print("held", flush=True)
+    sys.stdin.readline()
+"""
+
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="a POSIX shell is needed")
 
 
@@ -142,3 +150,38 @@ def test_a_changed_lock_is_installed_and_a_failure_is_shown(checkout: Path) -> N
     assert "install.log" in done.stderr
     assert not (checkout / ".venv/stamp").exists()
     assert not (checkout / "log").exists()
+
+
+def test_a_python_without_ensurepip_gets_the_install_line(checkout: Path, tmp_path: Path) -> None:
+    shutil.rmtree(checkout / ".venv")
+    bare = tmp_path / "python3"
+    program(
+        bare,
+        f'case "$*" in *ensurepip*) exit 1 ;; esac\nexec {shlex.quote(sys.executable)} "$@"',
+    )
+    done = run(checkout, "calibrate", PYTHON=str(bare))
+    assert done.returncode == 2
+    assert "apt-get install python3-venv" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_second_call_waits_for_the_one_that_sets_up(checkout: Path) -> None:
+    stamp = (checkout / ".venv/stamp").rename(checkout / "stamp.kept")
+    (checkout / ".venv/lock").touch()
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLD_THE_LOCK, str(checkout / ".venv/lock")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    assert holder.stdout is not None
+    assert holder.stdout.readline() == b"held\n"
+    second = subprocess.Popen(
+        [str(checkout / "run"), "palette"], cwd=checkout, stderr=subprocess.PIPE
+    )
+    assert second.stderr is not None
+    assert b"waiting for another" in second.stderr.readline()
+    stamp.rename(checkout / ".venv/stamp")  # the first call is done: nothing is left to install
+    holder.communicate(b"\n", timeout=60)
+    _, errors = second.communicate(timeout=60)
+    assert (second.returncode, errors) == (0, b"")
+    assert log_of(checkout)[-1] == "[palette]"
