@@ -18,6 +18,7 @@ PURE = 0.95  # of the contrast: a layer of pixels that has it is no longer mixed
 GROWTH = 1.04  # of the contrast per step inwards: slower growth is shading, not an edge
 HARD_CONTRAST = 16  # levels: below it the figure is too like the background to divide
 OFF_LINE = 5.0  # levels, beyond the background's noise: farther off the line is no mixture
+SHADED = 0.2  # of the contrast: so far the next pixel's colour may differ from that in the mixture
 STEPS = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
 
 Pixels = tuple[np.ndarray, np.ndarray]
@@ -31,20 +32,20 @@ def edge_softness_px(
 ) -> int:
     """Return how many pixels deep the figure's edge is mixed with the background; 0 = hard.
 
-    A layer of pixels counts as pure if its median contrast to the background is that of the
-    colours farther inside. Pixel art is hard, anti-aliased drawings have 1, scans 2 or 3.
+    A layer of pixels counts as pure if three quarters of it have the contrast to the background
+    of the colours farther inside. Pixel art is hard, anti-aliased drawings have 1, scans 2 or 3.
     """
     depth = _depth(mask)
     away = _away(rgb, background)
     for softness in range(SOFTEST_EDGE_PX):
-        layer = np.nonzero((depth > softness) & (depth <= softness + 1))
+        layer = _pixels((depth > softness) & (depth <= softness + 1))
         pure = away[_pure_pixels(layer, depth, away, tolerance)]
         contrast = np.linalg.norm(pure, axis=1)
         usable = contrast > HARD_CONTRAST
         if not usable.any():
             continue
         ratio = np.linalg.norm(away[layer], axis=1)[usable] / contrast[usable]
-        if np.median(ratio) >= PURE:
+        if np.percentile(ratio, 25) >= PURE:
             return softness
     return SOFTEST_EDGE_PX
 
@@ -77,12 +78,12 @@ def cut_out(
         return rgba
     depth = _depth(mask)
     away = _away(rgb, background)
-    band = np.nonzero(mask & (depth <= softness_px))
+    band = _pixels(mask & (depth <= softness_px + 1))
     pure = away[_pure_pixels(band, depth, away, tolerance)]
     ground = np.array(background, dtype=np.float64)
     alpha = _coverage(away[band], pure, ground, tolerance)
     levels = np.maximum(np.rint(255 * alpha), 1)
-    rgba[(*band, 3)] = levels
+    rgba[band[0], band[1], 3] = levels
     color = ground + away[band] * (255 / levels)[:, None]
     rgba[band[0], band[1], :3] = np.clip(np.rint(color), 0, 255)
     return rgba
@@ -94,6 +95,11 @@ def _depth(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height 
     return cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
 
 
+def _pixels(mask: Bool[np.ndarray, "height width"]) -> Pixels:
+    rows, columns = np.nonzero(mask)
+    return rows, columns
+
+
 def _away(rgb: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:
     return rgb.astype(np.float64) - np.array(background, dtype=np.float64)
 
@@ -102,17 +108,19 @@ def _pure_pixels(start: Pixels, depth: np.ndarray, away: np.ndarray, tolerance: 
     """Return for every pixel of the edge the pixel inwards whose colour is unmixed.
 
     One step goes to the deepest neighbour. It is taken while that neighbour is farther from the
-    background and the starting colour lies on the line from the background to it.
+    background and the starting colour lies on the line from the background to it; strictly so
+    after the first step, lest the walk goes from light skin on to dark hair.
     """
     here = (start[0].copy(), start[1].copy())
     mixed = away[start]
     walking = np.ones(len(start[0]), dtype=bool)
-    for _ in range(SOFTEST_EDGE_PX):
+    for step in range(SOFTEST_EDGE_PX):
         there = _step_inwards(here, depth)
         now = np.linalg.norm(away[here], axis=1)
         then = np.linalg.norm(away[there], axis=1)
         _, off_line = _project(mixed, away[there])
-        walking &= (then > GROWTH * now + 1) & (off_line <= OFF_LINE + tolerance)
+        allowed = np.maximum(OFF_LINE + tolerance, SHADED * then if step == 0 else 0.0)
+        walking &= (then > GROWTH * now + 1) & (off_line <= allowed)
         here = (np.where(walking, there[0], here[0]), np.where(walking, there[1], here[1]))
     return here
 
@@ -141,8 +149,9 @@ def _coverage(
 ) -> np.ndarray:
     """Return alpha of C - B given F - B, never below what an un-mixed colour in range needs."""
     share, off_line = _project(mixed, pure)
-    divisible = np.linalg.norm(pure, axis=1) > HARD_CONTRAST
-    is_mixture = divisible & (off_line <= OFF_LINE + tolerance)
+    contrast = np.linalg.norm(pure, axis=1)
+    allowed = np.maximum(OFF_LINE + tolerance, SHADED * contrast)
+    is_mixture = (contrast > HARD_CONTRAST) & (off_line <= allowed)
     room = np.where(mixed > 0, 255 - ground, ground)
     needed = (np.abs(mixed) / np.maximum(room, 1)).max(axis=1)
     return np.where(is_mixture, np.clip(np.maximum(share, needed), 0, 1), 1.0)

@@ -12,6 +12,8 @@ between arm and body) if all of this holds:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
@@ -24,9 +26,51 @@ LINE_ART = 0.5  # of the figure: more of it in the background's colour is a line
 INK_LUMA = 64  # of 255: darker is ink
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
 AS_INKED = 0.5  # of the outline's share of ink
-MORE_SHADES = 0.05  # of the border, beyond the outline's share of soft shades
+SLACK = 0.05  # of the border: the shares of a short border are rough
 SQUARE = np.ones((3, 3), np.uint8)
 LUMA = np.array([0.299, 0.587, 0.114])  # Source: ITU-R BT.601
+
+
+@dataclass(frozen=True)
+class BorderLook:
+    """Counts of pixels along a border.
+
+    Attributes:
+        ink: dark pixels within 3 px.
+        near: pixels within 3 px.
+        shades: pixels 3 to 4 px away that are nearly background; nearer, the edge itself is soft.
+        far: pixels 3 to 4 px away.
+    """
+
+    ink: int
+    near: int
+    shades: int
+    far: int
+
+    def __add__(self, other: BorderLook) -> BorderLook:
+        """Return the look of both borders together."""
+        return BorderLook(
+            self.ink + other.ink,
+            self.near + other.near,
+            self.shades + other.shades,
+            self.far + other.far,
+        )
+
+    def could_belong_to(self, outline: BorderLook) -> bool:
+        """Return whether this border is as inked as the outline, and as free of soft shades."""
+        ink, shades = self.ink / max(self.near, 1), self.shades / max(self.far, 1)
+        least_ink = AS_INKED * outline.ink / max(outline.near, 1) - SLACK
+        return ink >= least_ink and shades <= outline.shades / max(outline.far, 1) + SLACK
+
+
+def outline_look(
+    rgb: UInt8[np.ndarray, "height width 3"],
+    mask: Bool[np.ndarray, "height width"],
+    enclosed: Bool[np.ndarray, "height width"],
+    background: tuple[int, int, int],
+) -> BorderLook:
+    """Return what a figure's outline looks like; see `open_holes` for the arguments."""
+    return _look(~mask, mask & ~enclosed, difference(rgb, background), rgb @ LUMA)
 
 
 def open_holes(
@@ -34,6 +78,7 @@ def open_holes(
     mask: Bool[np.ndarray, "height width"],
     enclosed: Bool[np.ndarray, "height width"],
     background: tuple[int, int, int],
+    outline: BorderLook,
     least_share: float,
 ) -> tuple[Bool[np.ndarray, "height width"], int]:
     """Return the figure without its holes, and how many there were.
@@ -43,13 +88,13 @@ def open_holes(
         mask: the figure with everything that it encloses.
         enclosed: its patches in the background's colour.
         background: that colour.
+        outline: what the outlines of all figures of the sheet look like.
         least_share: of the figure's area; a smaller patch is no hole.
     """
     area = int(mask.sum())
     if not enclosed.any() or int(enclosed.sum()) > LINE_ART * area:
         return mask, 0
     contrast, luma = difference(rgb, background), rgb @ LUMA
-    outline = _border_look(~mask, mask & ~enclosed, contrast, luma)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(
         enclosed.astype(np.uint8), connectivity=4
     )
@@ -59,35 +104,25 @@ def open_holes(
             continue
         window = _window(stats[number], labels.shape)
         patch = labels[window] == number
-        solid = (mask & ~enclosed)[window]
-        look = _border_look(patch, solid, contrast[window], luma[window])
-        if not _has_islands(patch) and _alike(look, outline):
+        look = _look(patch, (mask & ~enclosed)[window], contrast[window], luma[window])
+        if look.could_belong_to(outline) and not _has_islands(patch):
             result[window] &= ~patch
             opened += 1
     return result, opened
 
 
-def _border_look(
+def _look(
     empty: np.ndarray, solid: np.ndarray, contrast: np.ndarray, luma: np.ndarray
-) -> tuple[float, float]:
-    """Return the share of ink within 3 px of a patch, and of soft shades 3 to 4 px away.
-
-    The nearer two pixels are left out of the shades: there the edge itself is soft.
-    """
-    reach = [
-        cv2.dilate(empty.astype(np.uint8), SQUARE, iterations=steps) > 0 for steps in (2, 3, 4)
-    ]
-    ink = luma[reach[1] & solid] < INK_LUMA
-    shades = contrast[reach[2] & ~reach[0] & solid] < SOFT_SHADE
-    return _share(ink), _share(shades)
-
-
-def _share(values: np.ndarray) -> float:
-    return float(values.mean()) if values.size else 0.0
-
-
-def _alike(hole: tuple[float, float], outline: tuple[float, float]) -> bool:
-    return hole[0] >= AS_INKED * outline[0] and hole[1] <= outline[1] + MORE_SHADES
+) -> BorderLook:
+    patch = empty.astype(np.uint8)
+    reach = [cv2.dilate(patch, SQUARE, iterations=steps) > 0 for steps in (2, 3, 4)]
+    near, far = reach[1] & solid, reach[2] & ~reach[0] & solid
+    return BorderLook(
+        int((luma[near] < INK_LUMA).sum()),
+        int(near.sum()),
+        int((contrast[far] < SOFT_SHADE).sum()),
+        int(far.sum()),
+    )
 
 
 def _window(stat: np.ndarray, shape: tuple[int, int]) -> tuple[slice, slice]:

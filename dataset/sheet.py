@@ -13,7 +13,7 @@ from jaxtyping import Bool, Int, UInt8
 from toonset.dataset.background import Background, find_background
 from toonset.dataset.cutout import cut_out, edge_softness_px
 from toonset.dataset.figures import Blobs, Grouping, find_blobs, group_blobs
-from toonset.dataset.holes import open_holes
+from toonset.dataset.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.line_width import contour_width_px
 from toonset.errors import SheetError
 from toonset.view import View
@@ -82,12 +82,7 @@ def split_sheet(
             "sheet to one character"
         )
     crops = [_crop(blobs, grouping, number, options.margin_px) for number in range(grouping.count)]
-    softness = _softness(rgba, ground, crops)
-    views, holes = [], 0
-    for number, (box, mask) in enumerate(crops):
-        view, opened = _view(rgba, ground, (box, mask), softness, f"{number:03d}.png", options)
-        views.append(view)
-        holes += opened
+    views, holes = _views(rgba, ground, crops, options)
     warnings = _warnings(ground, grouping, views, holes)
     return Sheet(tuple(views), ground.rgb, ground.sure, warnings)
 
@@ -129,8 +124,7 @@ def _window(picture: np.ndarray, box: Box) -> np.ndarray:
 
 def _softness(rgba: np.ndarray, ground: Background, crops: list[Crop]) -> int:
     """Return the edge softness of the sheet: the median of its figures'."""
-    if ground.rgb is None:
-        return 0
+    assert ground.rgb is not None  # a transparent sheet has its own alpha
     each = [
         edge_softness_px(_window(rgba, box)[..., :3], mask, ground.rgb, ground.tolerance)
         for box, mask in crops
@@ -138,25 +132,36 @@ def _softness(rgba: np.ndarray, ground: Background, crops: list[Crop]) -> int:
     return int(np.median(each))
 
 
-def _view(
-    rgba: np.ndarray,
-    ground: Background,
-    crop: Crop,
-    softness: int,
-    name: str,
-    options: SheetOptions,
-) -> tuple[View, int]:
-    box, mask = crop
-    picture = _window(rgba, box)
+def _views(
+    rgba: np.ndarray, ground: Background, crops: list[Crop], options: SheetOptions
+) -> tuple[list[View], int]:
+    """Return the views and the number of opened holes."""
+    holes = 0
     if ground.rgb is None:
-        cut, opened = np.where(mask[..., None], picture, np.uint8(0)), 0
+        cuts = [np.where(mask[..., None], _window(rgba, box), np.uint8(0)) for box, mask in crops]
     else:
-        enclosed = _window(ground.enclosed, box) & mask
-        mask, opened = open_holes(picture[..., :3], mask, enclosed, ground.rgb, options.least_hole)
-        cut = cut_out(picture[..., :3], mask, ground.rgb, ground.tolerance, softness)
+        softness = _softness(rgba, ground, crops)
+        look = BorderLook(0, 0, 0, 0)
+        for box, mask in crops:
+            enclosed = _window(ground.enclosed, box) & mask
+            look += outline_look(_window(rgba, box)[..., :3], mask, enclosed, ground.rgb)
+        cuts = []
+        for box, mask in crops:
+            rgb, enclosed = _window(rgba, box)[..., :3], _window(ground.enclosed, box) & mask
+            solid, opened = open_holes(rgb, mask, enclosed, ground.rgb, look, options.least_hole)
+            cuts.append(cut_out(rgb, solid, ground.rgb, ground.tolerance, softness))
+            holes += opened
+    boxes = [box for box, _ in crops]
+    return [
+        _view(cut, box, f"{i:03d}.png")
+        for i, (cut, box) in enumerate(zip(cuts, boxes, strict=True))
+    ], holes
+
+
+def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View:
     if not (cut[..., 3] >= 128).any():
         raise SheetError(f"view {name}: its figure is nearly transparent; an opaque one is needed")
-    return View(cut, box, contour_width_px(cut), name), opened
+    return View(cut, box, contour_width_px(cut), name)
 
 
 def _warnings(
