@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
-from toonset.palette.names import hex_of, name_of
+from toonset.palette.names import hex_of
 from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor
 from toonset.reading import read_whole
 
@@ -32,6 +32,8 @@ def parse_colors(text_or_path: str) -> UInt8[np.ndarray, "colors 3"]:
         PaletteError: not a colour, no colour, more than 255, or a file that cannot be read.
     """
     words = re.split(r"[,;\s]+", text_or_path.strip().strip(",;"))
+    if not any(words):
+        raise PaletteError("colours: none given; write them as '#aabbcc,#123' or name a file")
     typed = "#" in text_or_path or all(HEX.fullmatch(word) for word in words)
     path = Path(text_or_path)
     if path.suffix.lower() in EXTENSIONS or not typed:
@@ -179,20 +181,6 @@ def _checked(colors: list[tuple[int, int, int]], where: str) -> UInt8[np.ndarray
     if not 1 <= len(unique) <= MAX_COLORS:
         raise PaletteError(f"{where}: {len(unique)} colours; 1 to {MAX_COLORS} are needed")
     return np.array(unique, dtype=np.uint8)
-
-
-def palette_of_colors(
-    rgb: UInt8[np.ndarray, "colors 3"], shares: list[float], rule: str
-) -> Palette:
-    """Return hand-picked colours as a palette, in the order given, with plain names."""
-    triples = [(int(red), int(green), int(blue)) for red, green, blue in rgb]
-    return Palette(
-        tuple(
-            PaletteColor(triple, share, name_of(triple))
-            for triple, share in zip(triples, shares, strict=True)
-        ),
-        rule,
-    )
 
 
 def _text(path: Path) -> str:
