@@ -1,0 +1,146 @@
+"""From labels and depth to a drawing: contour lines, flat colours, anti-aliasing.
+
+Lines are centred on the edge they draw. All work happens on a picture `supersample` times larger;
+colours are averaged there with premultiplied alpha.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from toonset.dataset.gl_render import LabelPicture
+from toonset.dataset.scene import UNLABELLED
+
+INNER_LINE = 0.6  # of the silhouette line's width: inner lines are drawn thinner
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Distance in pixels from every pixel's centre to the nearest line.
+
+    Attributes:
+        silhouette: to the border of the figure.
+        inner: to depth jumps and label boundaries within the figure.
+    """
+
+    silhouette: Float[np.ndarray, "height width"]
+    inner: Float[np.ndarray, "height width"]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A drawn cell.
+
+    Attributes:
+        rgba: (height, width, 4) sRGB, straight alpha.
+        labels: (height, width) palette index; 255 on background, ink and mixed pixels.
+        ink: (height, width) coverage of the lines, 0 to 255.
+    """
+
+    rgba: UInt8[np.ndarray, "height width 4"]
+    labels: UInt8[np.ndarray, "height width"]
+    ink: UInt8[np.ndarray, "height width"]
+
+
+def find_lines(picture: LabelPicture, jump: float, *, label_lines: bool) -> Lines:
+    """Return the distances to the lines of a picture.
+
+    Args:
+        picture: labels and depth.
+        jump: world units; a larger step in depth between two pixels is a line.
+        label_lines: draw the boundaries between labels, too.
+    """
+    figure = picture.labels != UNLABELLED
+    depth = np.where(figure, picture.depth, 0.0)
+    silhouette, inner = np.zeros_like(figure), np.zeros_like(figure)
+    _mark(silhouette, inner, figure, picture.labels, depth, jump, label_lines)
+    _mark(silhouette.T, inner.T, figure.T, picture.labels.T, depth.T, jump, label_lines)
+    return Lines(_distance(silhouette), _distance(inner))
+
+
+def draw(
+    labels: UInt8[np.ndarray, "height width"],
+    lines: Lines,
+    palette: UInt8[np.ndarray, "colors 3"],
+    outline_px: float,
+    supersample: int,
+) -> Drawing:
+    """Return the finished cell, smaller than its input by `supersample`.
+
+    Args:
+        labels: large picture, 255 = background.
+        lines: large picture.
+        palette: sRGB.
+        outline_px: width of the silhouette line in pixels of the result; 0 = no lines.
+        supersample: samples per pixel and axis.
+    """
+    figure = (labels != UNLABELLED).astype(np.float64)
+    ink = np.zeros(labels.shape)
+    if outline_px > 0:
+        half = outline_px * supersample / 2
+        for distance, reach in ((lines.silhouette, half), (lines.inner, INNER_LINE * half)):
+            ink = np.maximum(ink, np.clip(reach - distance + 0.5, 0, 1))
+    flat = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[labels]
+    alpha = _shrink(np.maximum(figure, ink), supersample)
+    colors = _shrink(flat * (figure * (1 - ink))[..., None], supersample)
+    straight = colors / np.where(alpha > 0, alpha, 1)[..., None]
+    rgba = np.concatenate([straight, 255 * alpha[..., None]], axis=-1)
+    coverage = _shrink(ink, supersample)
+    pure = _unmixed(labels, supersample) & (coverage == 0)
+    sampled = labels[::supersample, ::supersample]
+    return Drawing(_bytes(rgba), np.where(pure, sampled, UNLABELLED), _bytes(255 * coverage))
+
+
+def _mark(
+    silhouette: np.ndarray,
+    inner: np.ndarray,
+    figure: np.ndarray,
+    labels: np.ndarray,
+    depth: np.ndarray,
+    jump: float,
+    label_lines: bool,
+) -> None:
+    """Mark, in the first two, both pixels of every pair of rows with a line between them."""
+    border = figure[:-1] != figure[1:]
+    both = figure[:-1] & figure[1:]
+    line = both & (_excess_step(depth) > jump)
+    if label_lines:
+        line |= both & (labels[:-1] != labels[1:])
+    for rows in (slice(None, -1), slice(1, None)):
+        silhouette[rows] |= border
+        inner[rows] |= line
+
+
+def _excess_step(depth: np.ndarray) -> np.ndarray:
+    """Return how much each step between rows exceeds those beside it: next to 0 on slopes."""
+    step = np.abs(np.diff(depth, axis=0))
+    padded = np.pad(step, ((1, 1), (0, 0)), mode="edge")
+    return step - np.maximum(padded[:-2], padded[2:])
+
+
+def _distance(marked: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    """Return the distance to the line that runs between the marked pixels of its two sides."""
+    if not marked.any():
+        return np.full(marked.shape, np.float32(max(marked.shape)))
+    blank = (~marked).astype(np.uint8)
+    return cv2.distanceTransform(blank, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) + np.float32(0.5)
+
+
+def _shrink(picture: np.ndarray, factor: int) -> np.ndarray:
+    height, width = (n // factor for n in picture.shape[:2])
+    blocks = picture.reshape(height, factor, width, factor, *picture.shape[2:])
+    return blocks.mean(axis=(1, 3))
+
+
+def _unmixed(labels: np.ndarray, factor: int) -> np.ndarray:
+    height, width = (n // factor for n in labels.shape)
+    blocks = labels.reshape(height, factor, width, factor)
+    return blocks.min(axis=(1, 3)) == blocks.max(axis=(1, 3))
+
+
+def _bytes(values: np.ndarray) -> np.ndarray:
+    return np.rint(np.clip(values, 0, 255)).astype(np.uint8)
