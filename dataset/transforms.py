@@ -121,6 +121,16 @@ def read_cameras(path: Path) -> tuple[tuple[str, Camera], ...]:
     )
 
 
+def picture_paths(path: Path) -> tuple[Path, ...]:
+    """Return the picture of every frame of a transforms.json or its folder; all exist.
+
+    Raises:
+        BundleError: the file is missing or broken, or a picture is missing or outside the folder.
+    """
+    records = _read_frames(_json_path(path), need_pictures=True)
+    return tuple(picture for _, _, picture in records if picture is not None)
+
+
 def read_scene(path: Path) -> Scene:
     """Return the posed pictures of a bundle, a transforms.json, or a folder that holds one.
 
