@@ -65,6 +65,7 @@ RECHECK_WIDTHS = np.geomspace(0.03, 0.015, 5)
 NEAR_HEIGHTS = 3.0  # camera distance of the second first guess
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 WIDTHS = np.geomspace(0.03, 0.01, 10)
+SKETCHED = np.geomspace(0.03, 0.012, 6)  # a joint fit that only has to rank selections
 
 
 def calibrate(
@@ -154,8 +155,8 @@ def _search_together(
 def _both_models(
     drawings: Sequence[Drawing], surface: Surface, poses: Sequence[Pose]
 ) -> list[JointFit]:
-    flat = fit_sheet(drawings, surface, _with_k(poses, 0.0), perspective=False, widths=WIDTHS)
-    deep = fit_sheet(drawings, surface, poses, perspective=True, widths=WIDTHS)
+    flat = fit_sheet(drawings, surface, _with_k(poses, 0.0), perspective=False, widths=SKETCHED)
+    deep = fit_sheet(drawings, surface, poses, perspective=True, widths=SKETCHED)
     return [choose_model(flat, deep, surface, len(drawings))[0]]
 
 
