@@ -43,8 +43,8 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> Soup:
     """
     lists = _Lists()
     for number, line in enumerate(text_of(data).split("\n"), start=1):
-        words = line.split()
-        if not words or words[0].startswith("#"):
+        words = list(itertools.takewhile(lambda word: word[0] != "#", line.split()))
+        if not words:
             continue
         try:
             _read_line(words, lists)

@@ -13,6 +13,7 @@ import numpy as np
 
 from toonset.dataset.mesh_soup import Soup, check_counts
 from toonset.errors import MeshError
+from toonset.reading import describe
 
 PLY_ELEMENT = re.compile(rb"^element\s+(\w+)\s+(\d+)\s*$", re.MULTILINE)
 OFF_COUNTS = re.compile(rb"^\s*(\d+)[ \t]+(\d+)[ \t]+\d+\s*$", re.MULTILINE)
@@ -36,15 +37,15 @@ def read_scan(data: bytes, kind: str, path: Path, max_faces: int) -> Soup:
             "it again"
         )
     loaded = _parse(data, kind, path)
-    faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
-    vertices = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64)
+    faces = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
+    vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=np.float64).reshape(-1, 3)
     check_counts(path, len(vertices), len(faces), max_faces)
     if len(vertices) < counts[0] or len(faces) < counts[1]:
         raise MeshError(
             f"{path}: has {len(vertices)} vertices and {len(faces)} faces, its header announces "
             f"{counts[0]} and {counts[1]}; the file is cut off, export it again"
         )
-    return Soup(vertices.reshape(-1, 3), faces, _colors(loaded))
+    return Soup(vertices, faces, _colors(loaded) if len(faces) else None)
 
 
 def _announced(data: bytes, kind: str) -> tuple[int, int]:
@@ -55,7 +56,7 @@ def _announced(data: bytes, kind: str) -> tuple[int, int]:
     if kind == "off":
         match = OFF_COUNTS.search(data[:HEADER_BYTES])
         return (int(match[1]), int(match[2])) if match else (0, 0)
-    if data[:5] != b"solid" and len(data) >= STL_HEADER_BYTES:
+    if describe(data) != "text" and len(data) >= STL_HEADER_BYTES:
         faces = struct.unpack_from("<I", data, 80)[0]
         return 3 * faces, faces
     return 0, 0

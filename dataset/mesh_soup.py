@@ -11,6 +11,7 @@ from jaxtyping import Float, Int, UInt8
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
 
+FARTHEST = 1e9  # world units; beyond, a sum of squares loses the figure
 VERTICES_PER_FACE = 3  # a soup of unconnected triangles has no more
 
 
@@ -49,6 +50,12 @@ def mesh_of_soup(soup: Soup, path: Path) -> Mesh:
         raise MeshError(
             f"{path}: {bad} of {count} vertices are NaN or infinite; repair the mesh and export "
             "it again"
+        )
+    largest = float(np.abs(vertices).max())
+    if largest > FARTHEST:
+        raise MeshError(
+            f"{path}: coordinates up to {largest:g} world units, at most {FARTHEST:g} are read; "
+            "rescale the mesh"
         )
     low, high = int(faces.min()), int(faces.max())
     if low < 0 or high >= count:
