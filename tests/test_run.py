@@ -32,7 +32,7 @@ def checkout(tmp_path: Path) -> Path:
     for name in COPIED:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
-    program(root / ".venv/bin/python", f'exec {shlex.quote(sys.executable)} "$@"')
+    python_that(root)
     stand_in(root, "exit 0")
     stamp = (root / name for name in COPIED[1:])
     data = b"".join(path.read_bytes() for path in stamp) + os.fsencode(root.resolve())
@@ -47,6 +47,12 @@ def program(path: Path, body: str) -> None:
     path.chmod(0o755)
 
 
+def python_that(root: Path, behaviour: str = "") -> None:
+    """Make the environment's Python a real one, after shell lines that may leave earlier."""
+    real = shlex.quote(sys.executable)
+    program(root / ".venv/bin/python", f'{behaviour}\nexec {real} "$@"')
+
+
 def stand_in(root: Path, body: str) -> None:
     log = shlex.quote(str(root / "log"))
     program(root / ".venv/bin/toonset", f'{{ pwd -P; printf "[%s]" "$@"; echo; }} >>{log}\n{body}')
@@ -55,7 +61,7 @@ def stand_in(root: Path, body: str) -> None:
 def run(
     root: Path, *words: str, cwd: Path | None = None, **variables: str
 ) -> subprocess.CompletedProcess[str]:
-    environment = {"PATH": os.environ["PATH"], "LC_ALL": "C", **variables}  # and no HOME
+    environment = {"PATH": os.environ["PATH"], "LC_ALL": "C"} | variables  # and no HOME
     return subprocess.run(
         [str(root / "run"), *words],
         cwd=cwd or root,
@@ -139,11 +145,7 @@ def test_an_unsuitable_python_is_refused_by_name(checkout: Path, tmp_path: Path)
 def test_a_changed_lock_is_installed_and_a_failure_is_shown(checkout: Path) -> None:
     with (checkout / "requirements.lock").open("a", encoding="utf-8") as lock:
         lock.write("# changed\n")
-    program(
-        checkout / ".venv/bin/python",
-        f'case " $* " in *" pip install "*) echo "no space"; exit 1 ;; esac\n'
-        f'exec {shlex.quote(sys.executable)} "$@"',
-    )
+    python_that(checkout, 'case " $* " in *" pip install "*) echo "no space"; exit 1 ;; esac')
     done = run(checkout, "calibrate", "x")
     assert done.returncode == 2
     assert "no space" in done.stderr
@@ -185,3 +187,52 @@ def test_a_second_call_waits_for_the_one_that_sets_up(checkout: Path) -> None:
     _, errors = second.communicate(timeout=60)
     assert (second.returncode, errors) == (0, b"")
     assert log_of(checkout)[-1] == "[palette]"
+
+
+@pytest.mark.parametrize(
+    ("words", "asked"),
+    [
+        (["test"], "[-P][-m][pytest][-m][not slow]"),
+        (["test", "--all"], "[-P][-m][pytest][-m][]"),
+        (["test", "-k", "a b", "--all", "-x"], "[-P][-m][pytest][-m][][-k][a b][-x]"),
+    ],
+)
+def test_all_adds_the_slow_tests(checkout: Path, words: list[str], asked: str) -> None:
+    python_that(
+        checkout,
+        'case "$*" in -) exit 0 ;; *pytest*) printf "[%s]" "$@"; exit 5 ;; esac',
+    )
+    done = run(checkout, *words, cwd=checkout.parent)
+    assert (done.returncode, done.stdout) == (5, asked)
+
+
+def test_lint_runs_every_tool_and_fails_if_one_does(checkout: Path) -> None:
+    python_that(checkout, 'case "$*" in *mypy) exit 1 ;; "-P -m "*) exit 0 ;; esac')
+    done = run(checkout, "lint")
+    assert done.returncode == 1
+    assert done.stdout == "$ ruff check\n$ ruff format --check\n$ mypy\n$ pyright\n"
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="apt-get is Debian's")
+@pytest.mark.parametrize(
+    ("user", "code", "line"),
+    [
+        (0, 0, "run: installing system libraries"),
+        (0, 1, "run: could not install them"),
+        (1000, 0, "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri"),
+    ],
+)
+def test_drawing_libraries_are_installed_or_named(
+    checkout: Path, tmp_path: Path, user: int, code: int, line: str
+) -> None:
+    python_that(checkout, '[ "$*" != - ] || exit 1')
+    tools = tmp_path / "tools"
+    program(tools / "apt-get", f'echo "$*" >>{shlex.quote(str(tmp_path / "apt"))}; exit {code}')
+    program(tools / "id", f"echo {user}")
+    path = f"{tools}{os.pathsep}{os.environ['PATH']}"
+    assert run(checkout, "calibrate", "x", PATH=path).stderr == ""  # needs no such library
+    done = run(checkout, "synth", "m.obj", PATH=path)
+    assert done.returncode == 0
+    assert line in done.stderr
+    assert (tmp_path / "apt").exists() == (user == 0)
+    assert log_of(checkout)[-1] == "[synth][m.obj]"
