@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-NEAR = 0.02  # of the figure's height: a part this near to the figure's box lies within it
+NEAR = 0.02  # of the figure's height: a part this near to the figure's box is the figure's
 FAR = 0.15  # of the figure's height: a part farther away belongs to nobody
 LEAST_PART = 0.01  # of the figure's area: smaller things beside a figure are specks or letters
 LEAST_SPECK_PX = 4  # pixels: smaller things within a figure's box are noise
@@ -61,7 +61,7 @@ def group_blobs(blobs: Blobs, least_share: float) -> Grouping:
     """Return which figure every patch belongs to.
 
     A patch of at least `least_share` of the largest one's area is a figure. A smaller one joins
-    the nearest figure if it lies within that figure's box, or close above, below or beside it (a
+    the nearest figure if it lies within that figure's box or touches it nearly, or close above, below or beside it (a
     floating hat, a sword tip, a hand apart) unless it is a speck or part of a caption.
     """
     mains = np.flatnonzero(blobs.areas >= least_share * blobs.areas.max())
@@ -74,13 +74,13 @@ def group_blobs(blobs: Blobs, least_share: float) -> Grouping:
     nearest = _nearest_main(blobs, mains, small)
     gaps = _gaps(blobs.boxes[small], blobs.boxes[mains[nearest]])
     heights = blobs.boxes[mains[nearest], 3]
-    within = gaps.max(axis=1) <= NEAR * heights
-    beside = small[~within]
+    inside = gaps.max(axis=1) <= 0
     texts = np.zeros(len(small), dtype=bool)
-    texts[~within] = _in_captions(blobs.boxes[beside])
+    texts[~inside] = _in_captions(blobs.boxes[small[~inside]])
+    near = gaps.max(axis=1) <= NEAR * heights
     close = (gaps.max(axis=1) <= FAR * heights) & (gaps.min(axis=1) <= 0)
     large = blobs.areas[small] >= LEAST_PART * blobs.areas[mains[nearest]]
-    joins = within | (close & large & ~texts)
+    joins = inside | (~texts & (near | (close & large)))
     figure[small[joins]] = nearest[joins]
     captions = int((texts & ~joins).sum())
     return Grouping(figure, len(mains), captions, int((~joins).sum()) - captions)
