@@ -64,8 +64,10 @@ class Drawing:
 COLORS = [RED, BLUE, SKIN, (30, 120, 60)]
 
 
-def row_of_four(ground: tuple[int, int, int] = WHITE, line: float = 0) -> Drawing:
-    drawing = Drawing(360, 130, ground)
+def row_of_four(
+    ground: tuple[int, int, int] = WHITE, line: float = 0, height: int = 130
+) -> Drawing:
+    drawing = Drawing(360, height, ground)
     for i, color in enumerate(COLORS):
         x = 50.3 + 85 * i
         drawing.ellipse(x, 75.4, 14 + 4 * i, 42, color, line)
@@ -184,12 +186,12 @@ def test_two_rows_of_uneven_heights() -> None:
 
 
 def test_apart_parts_join_and_captions_and_specks_do_not() -> None:
-    drawing = row_of_four()
+    drawing = row_of_four(height=150)
     drawing.ellipse(50, 4, 9, 2.5, BLUE)  # a hat that floats above the first figure
     drawing.ellipse(222, 120, 6, 2, BLUE)  # a hand beside the third
-    drawing.text("FRONT", 20, 129)
+    drawing.text("FRONT", 20, 137)
     drawing.ellipse(350, 5, 1, 1, RED)
-    sheet = split_sheet(np.pad(drawing.rgba, ((2, 2), (0, 0), (0, 0)), constant_values=255))
+    sheet = split_sheet(drawing.rgba)
     assert len(sheet.views) == 4
     assert (sheet.views[0].rgba[:10, :, 2] == 180).any()
     assert "5 letters beside the figures were left out" in sheet.warnings
