@@ -68,9 +68,11 @@ def difference(
     rgb: UInt8[np.ndarray, "*n 3"], background: tuple[int, int, int]
 ) -> UInt8[np.ndarray, " *n"]:
     """Return the largest difference of any channel from the background, in levels."""
-    flat = np.ascontiguousarray(rgb).reshape(-1, 1, 3)
-    apart = cv2.absdiff(flat, np.array([*background, 0], dtype=np.float64))
-    return apart.max(axis=2).reshape(rgb.shape[:-1])
+    apart = [
+        np.maximum(rgb[..., i], level) - np.minimum(rgb[..., i], level)
+        for i, level in enumerate(np.array(background, dtype=np.uint8))
+    ]
+    return np.maximum(np.maximum(apart[0], apart[1]), apart[2])
 
 
 def _ring(height: int, width: int) -> Bool[np.ndarray, "height width"]:
@@ -92,7 +94,8 @@ def _dominant(colors: UInt8[np.ndarray, "n 3"]) -> tuple[tuple[int, int, int], f
         if count.max() / len(colors) > share:
             share = float(count.max() / len(colors))
             best = np.median(colors[codes == code[count.argmax()]], axis=0)
-    away = np.abs(colors.astype(np.float64) - best).max(axis=1)
+    red, green, blue = (round(float(x)) for x in best)
+    away = difference(colors, (red, green, blue))
     near = away <= CLUSTER_RADIUS
     center = np.median(colors[near], axis=0)
     # 99 % of the border's noise, doubled: noise near figures (JPEG) is stronger than far away

@@ -36,15 +36,15 @@ def edge_softness_px(
     of the colours farther inside. Pixel art is hard, anti-aliased drawings have 1, scans 2 or 3.
     """
     depth = _depth(mask)
-    away = _away(rgb, background)
+    ground = np.array(background, dtype=np.float64)
     for softness in range(SOFTEST_EDGE_PX):
         layer = _pixels((depth > softness) & (depth <= softness + 1))
-        pure = away[_pure_pixels(layer, depth, away, tolerance)]
+        pure = rgb[_pure_pixels(layer, depth, rgb, ground, tolerance)] - ground
         contrast = np.linalg.norm(pure, axis=1)
         usable = contrast > HARD_CONTRAST
         if not usable.any():
             continue
-        ratio = np.linalg.norm(away[layer], axis=1)[usable] / contrast[usable]
+        ratio = np.linalg.norm(rgb[layer] - ground, axis=1)[usable] / contrast[usable]
         if np.percentile(ratio, 25) >= PURE:
             return softness
     return SOFTEST_EDGE_PX
@@ -71,20 +71,19 @@ def cut_out(
         `mask`; alpha 0 outside of it. Where figure and background are too alike to divide, or the
         pixel is no mixture of the two, alpha is 1.
     """
-    rgba = np.zeros((*mask.shape, 4), dtype=np.uint8)
-    rgba[mask, :3] = rgb[mask]
-    rgba[mask, 3] = 255
+    solid = mask.astype(np.uint8)
+    rgba = np.dstack([rgb * solid[..., None], 255 * solid])
     if softness_px == 0:
         return rgba
     depth = _depth(mask)
-    away = _away(rgb, background)
-    band = _pixels(mask & (depth <= softness_px + 1))
-    pure = away[_pure_pixels(band, depth, away, tolerance)]
     ground = np.array(background, dtype=np.float64)
-    alpha = _coverage(away[band], pure, ground, tolerance)
+    band = _pixels(mask & (depth <= softness_px + 1))
+    mixed = rgb[band] - ground
+    pure = rgb[_pure_pixels(band, depth, rgb, ground, tolerance)] - ground
+    alpha = _coverage(mixed, pure, ground, tolerance)
     levels = np.maximum(np.rint(255 * alpha), 1)
     rgba[band[0], band[1], 3] = levels
-    color = ground + away[band] * (255 / levels)[:, None]
+    color = ground + mixed * (255 / levels)[:, None]
     rgba[band[0], band[1], :3] = np.clip(np.rint(color), 0, 255)
     return rgba
 
@@ -100,11 +99,9 @@ def _pixels(mask: Bool[np.ndarray, "height width"]) -> Pixels:
     return rows, columns
 
 
-def _away(rgb: np.ndarray, background: tuple[int, int, int]) -> np.ndarray:
-    return rgb.astype(np.float64) - np.array(background, dtype=np.float64)
-
-
-def _pure_pixels(start: Pixels, depth: np.ndarray, away: np.ndarray, tolerance: int) -> Pixels:
+def _pure_pixels(
+    start: Pixels, depth: np.ndarray, rgb: np.ndarray, ground: np.ndarray, tolerance: int
+) -> Pixels:
     """Return for every pixel of the edge the pixel inwards whose colour is unmixed.
 
     One step goes to the deepest neighbour. It is taken while that neighbour is farther from the
@@ -112,13 +109,14 @@ def _pure_pixels(start: Pixels, depth: np.ndarray, away: np.ndarray, tolerance: 
     after the first step, lest the walk goes from light skin on to dark hair.
     """
     here = (start[0].copy(), start[1].copy())
-    mixed = away[start]
+    mixed = rgb[start] - ground
     walking = np.ones(len(start[0]), dtype=bool)
     for step in range(SOFTEST_EDGE_PX):
         there = _step_inwards(here, depth)
-        now = np.linalg.norm(away[here], axis=1)
-        then = np.linalg.norm(away[there], axis=1)
-        _, off_line = _project(mixed, away[there])
+        next_away = rgb[there] - ground
+        now = np.linalg.norm(rgb[here] - ground, axis=1)
+        then = np.linalg.norm(next_away, axis=1)
+        _, off_line = _project(mixed, next_away)
         allowed = np.maximum(OFF_LINE + tolerance, SHADED * then if step == 0 else 0.0)
         walking &= (then > GROWTH * now + 1) & (off_line <= allowed)
         here = (np.where(walking, there[0], here[0]), np.where(walking, there[1], here[1]))

@@ -61,8 +61,9 @@ def group_blobs(blobs: Blobs, least_share: float) -> Grouping:
     """Return which figure every patch belongs to.
 
     A patch of at least `least_share` of the largest one's area is a figure. A smaller one joins
-    the nearest figure if it lies within that figure's box or touches it nearly, or close above, below or beside it (a
-    floating hat, a sword tip, a hand apart) unless it is a speck or part of a caption.
+    the nearest figure if it lies within that figure's box or touches it nearly, or close above,
+    below or beside it (a floating hat, a sword tip, a hand apart) unless it is a speck or part of
+    a caption.
     """
     mains = np.flatnonzero(blobs.areas >= least_share * blobs.areas.max())
     mains = mains[reading_order(blobs.boxes[mains], blobs.centers[mains])]

@@ -28,7 +28,6 @@ SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
 AS_INKED = 0.5  # of the outline's share of ink
 SLACK = 0.05  # of the border: the shares of a short border are rough
 SQUARE = np.ones((3, 3), np.uint8)
-LUMA = np.array([0.299, 0.587, 0.114])  # Source: ITU-R BT.601
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,12 @@ def outline_look(
     background: tuple[int, int, int],
 ) -> BorderLook:
     """Return what a figure's outline looks like; see `open_holes` for the arguments."""
-    return _look(~mask, mask & ~enclosed, difference(rgb, background), rgb @ LUMA)
+    return _look(
+        ~mask,
+        mask & ~enclosed,
+        difference(rgb, background),
+        cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY),
+    )
 
 
 def open_holes(
@@ -94,7 +98,10 @@ def open_holes(
     area = int(mask.sum())
     if not enclosed.any() or int(enclosed.sum()) > LINE_ART * area:
         return mask, 0
-    contrast, luma = difference(rgb, background), rgb @ LUMA
+    contrast, luma = (
+        difference(rgb, background),
+        cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY),
+    )
     _, labels, stats, _ = cv2.connectedComponentsWithStats(
         enclosed.astype(np.uint8), connectivity=4
     )

@@ -10,8 +10,8 @@ DARKEST_CONTOUR = 100.0  # luma of 255: a lighter border is no ink
 LEAST_INKED = 0.7  # of the border that must be dark to speak of a contour
 MOST_DEEP = 0.5  # of the border's darkness: if so much goes on inside, the figure itself is dark
 NOT_INK = 24  # levels above the ink: another colour
-LUMA = np.array([0.299, 0.587, 0.114])  # Source: ITU-R BT.601
 WIDEST = 0.05  # of the figure's height
+MOST_LAYERS = 24
 
 
 def contour_width_px(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
@@ -22,20 +22,21 @@ def contour_width_px(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
     width is the area under that curve above its floor.
     """
     mask = np.pad(rgba[..., 3] >= 128, 1)
-    luma = np.pad(rgba[..., :3] @ LUMA, 1, constant_values=255)
+    luma = np.pad(cv2.cvtColor(rgba, cv2.COLOR_RGBA2GRAY), 1, constant_values=255)
     depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     rows = np.flatnonzero(mask.any(axis=1))
-    layers = int(np.clip(WIDEST * (rows[-1] - rows[0] + 1), 6, 40))
+    layers = int(np.clip(WIDEST * (rows[-1] - rows[0] + 1), 6, MOST_LAYERS))
     layers = min(layers, int(depth.max()))
     dark = mask & (luma < _threshold(luma[(depth > 0) & (depth <= 2)], luma[depth > 2]))
-    run = ~mask
-    shares = []
-    for layer in range(1, layers + 1):
-        ring = (depth > layer - 0.5) & (depth <= layer + 0.5)
+    layer_of = np.minimum(np.rint(depth), layers + 1).astype(np.uint8)
+    sizes = np.bincount(layer_of.ravel(), minlength=layers + 1)
+    run = (layer_of == 1) & dark
+    shares = [float(run.sum() / max(sizes[1], 1))]
+    for layer in range(2, layers + 1):
         reached = cv2.dilate(run.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        inked = ring & dark & reached
-        shares.append(float(inked.sum() / max(ring.sum(), 1)))
-        run = inked if layer == 1 else run | inked
+        inked = reached & dark & (layer_of == layer)
+        shares.append(float(inked.sum() / max(sizes[layer], 1)))
+        run |= inked
     return _width(np.array(shares))
 
 

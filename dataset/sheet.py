@@ -171,7 +171,7 @@ def _warnings(
     if ground.sure < SURE_ENOUGH:
         found.append(f"only {ground.sure:.0%} of the sheet's border is background")
     if grouping.captions:
-        found.append(f"{grouping.captions} letters beside the figures were left out")
+        found.append(f"text beside the figures was left out ({grouping.captions} patches)")
     if grouping.strays:
         found.append(f"{grouping.strays} small patches that belong to no figure were left out")
     if holes:
