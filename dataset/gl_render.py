@@ -130,8 +130,7 @@ def _gl_mesh(vertices: np.ndarray, faces: np.ndarray) -> Any:
     gl = _pyrender()
     primitive = gl.Primitive(
         positions=vertices.astype(np.float32),
-        indices=faces.astype(np.uint32),
-        material=gl.MetallicRoughnessMaterial(doubleSided=True),
+        indices=np.concatenate([faces, faces[:, ::-1]]).astype(np.uint32),  # SEG culls back faces
     )
     return gl.Mesh(primitives=[primitive])
 
