@@ -113,7 +113,8 @@ def _flood(
     tolerance: int,
 ) -> Background:
     """Divide background-coloured pixels into those that the border reaches and the others."""
-    _, labels = cv2.connectedComponents(like.astype(np.uint8), connectivity=4)
+    _, found = cv2.connectedComponents(like.astype(np.uint8), connectivity=4)
+    labels = np.asarray(found, dtype=np.int32)
     reached = np.zeros(int(labels.max()) + 1, dtype=bool)
     reached[np.unique(labels[ring & like])] = True
     reached[0] = False

@@ -115,9 +115,10 @@ def _nearest_main(blobs: Blobs, mains: np.ndarray, small: np.ndarray) -> np.ndar
     is_main = np.zeros(len(blobs.areas) + 1, dtype=bool)
     is_main[mains + 1] = True
     zero_at_main = (~is_main[blobs.labels]).astype(np.uint8)
-    away, zones = cv2.distanceTransformWithLabels(
+    away, found = cv2.distanceTransformWithLabels(
         zero_at_main, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_CCOMP
     )
+    zones = np.asarray(found, dtype=np.int32)
     zone_of_main = zones[_a_pixel_of_each(blobs, mains)]
     main_of_zone = np.full(int(zones.max()) + 1, 0)
     main_of_zone[zone_of_main] = np.arange(len(mains))

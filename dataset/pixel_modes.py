@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
@@ -82,7 +83,8 @@ def _to_srgb(
     """Convert through the embedded profile; a picture that is sRGB already keeps every value."""
     try:
         source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
-        space = str(source.profile.xcolor_space).strip()
+        inner: Any = source.profile
+        space = str(inner.xcolor_space).strip()
         if grey and space == "GRAY":
             image = image.convert("L")
         if space != {"L": "GRAY", "RGB": "RGB", "CMYK": "CMYK"}[image.mode]:

@@ -91,9 +91,9 @@ def _cells(histogram: Histogram) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _peaks(places: np.ndarray, counts: np.ndarray, reach: float) -> np.ndarray:
     """Return for every cell the peak that its chain of pointers ends at."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    tree = cKDTree(places)
+    tree = KDTree(places)
     near = tree.query_pairs(reach / 2, output_type="ndarray")
     density = counts.astype(np.float64)
     np.add.at(density, near[:, 0], counts[near[:, 1]])

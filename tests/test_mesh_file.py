@@ -21,6 +21,11 @@ CUBE.apply_translation((0.1, 1 / 3, -2.0))
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
 
+def exported(mesh: Any, kind: str, **options: Any) -> bytes:
+    data = mesh.export(file_type=kind, **options)
+    return data.encode() if isinstance(data, str) else bytes(data)
+
+
 def load(tmp_path: Path, name: str, data: bytes | str) -> Mesh:
     file = tmp_path / name
     file.write_bytes(data.encode() if isinstance(data, str) else data)
@@ -69,8 +74,8 @@ ONE_NODE: dict[str, Any] = {
 
 @pytest.mark.parametrize("kind", ["obj", "ply", "stl", "glb", "off"])
 def test_every_format_gives_the_same_welded_surface(kind: str, tmp_path: Path) -> None:
-    exported = CUBE.export(file_type=kind, **({"digits": 17} if kind in ("obj", "off") else {}))
-    mesh = load(tmp_path, f"cube.{kind}", exported)
+    options = {"digits": 17} if kind in ("obj", "off") else {}
+    mesh = load(tmp_path, f"cube.{kind}", exported(CUBE, kind, **options))
     assert len(mesh.vertices) == len(CUBE.vertices)
     np.testing.assert_allclose(corners(mesh), CUBE.triangles, atol=2e-7)  # stl, glb: float32
     edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -149,9 +154,9 @@ def test_obj_opens_no_material_outside_its_folder(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["ply", "glb"])
 def test_vertex_colours_become_face_colours(kind: str, tmp_path: Path) -> None:
-    colored = trimesh.Trimesh(CUBE.vertices, CUBE.faces, process=False)
+    colored: Any = trimesh.Trimesh(CUBE.vertices, CUBE.faces, process=False)
     colored.visual.vertex_colors = np.tile([0, 255, 0, 255], (len(CUBE.vertices), 1))
-    mesh = load(tmp_path, f"a.{kind}", colored.export(file_type=kind))
+    mesh = load(tmp_path, f"a.{kind}", exported(colored, kind))
     assert mesh.face_colors is not None
     assert (mesh.face_colors == (0, 255, 0)).all()
 
@@ -260,10 +265,8 @@ def edited(change: dict[str, Any], extra: dict[str, Any] | None = None) -> str:
     return json.dumps(document)
 
 
-GLB = CUBE.export(file_type="glb")
-PLY = CUBE.export(file_type="ply")
-STL = CUBE.export(file_type="stl")
-ASCII_PLY = CUBE.export(file_type="ply", encoding="ascii")
+GLB, PLY, STL = (exported(CUBE, kind) for kind in ("glb", "ply", "stl"))
+ASCII_PLY = exported(CUBE, "ply", encoding="ascii")
 HUGE_PLY = (
     b"ply\nformat binary_little_endian 1.0\nelement vertex 2000000000\nproperty float x\n"
     b"property float y\nproperty float z\nelement face 1\n"
@@ -303,7 +306,7 @@ BAD_FILES: dict[str, tuple[str, bytes | str, str]] = {
     "huge ply": ("a.ply", HUGE_PLY, "announces 2,000,000,000 vertices, at most 15,000,000"),
     "cut ply": ("a.ply", PLY[: len(PLY) // 2], "PLY file is damaged or cut off"),
     "cut ascii ply": ("a.ply", ASCII_PLY[: len(ASCII_PLY) // 2], "cut off"),
-    "cloud ply": ("a.ply", CLOUD.export(file_type="ply"), "but no faces"),
+    "cloud ply": ("a.ply", exported(CLOUD, "ply"), "but no faces"),
     "empty ply": ("a.ply", "ply\n", "PLY file is damaged|has no faces"),
     "cut stl": ("a.stl", STL[:500], r"STL file is cut off \(500 bytes for 48 faces\)"),
     "short stl": ("a.stl", STL[:60], "STL file is cut off"),
@@ -382,12 +385,12 @@ def test_nan_in_ply(tmp_path: Path) -> None:
     points[0, 0] = np.nan
     broken = trimesh.Trimesh(points, CUBE.faces, process=False, validate=False)
     with pytest.raises(MeshError, match=r"1 of .* vertices are NaN"):
-        load(tmp_path, "a.ply", broken.export(file_type="ply"))
+        load(tmp_path, "a.ply", exported(broken, "ply"))
 
 
 def test_caps(tmp_path: Path) -> None:
     file = tmp_path / "a.obj"
-    file.write_bytes(CUBE.export(file_type="obj").encode())
+    file.write_bytes(exported(CUBE, "obj"))
     with pytest.raises(MeshError, match="announces 11 faces, at most 10 are read"):
         load_mesh(file, max_faces=10)
     with pytest.raises(MeshError, match="at most 0 MB is read"):
@@ -403,8 +406,7 @@ def test_places_that_are_no_files(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["glb", "ply", "stl", "obj", "off"])
 def test_damaged_bytes_end_in_an_error_or_a_mesh(kind: str, tmp_path: Path) -> None:
-    data = CUBE.export(file_type=kind)
-    data = data.encode() if isinstance(data, str) else data
+    data = exported(CUBE, kind)
     rng = np.random.default_rng(7)
     outcomes = set()
     for _ in range(60):

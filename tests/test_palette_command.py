@@ -1,0 +1,143 @@
+"""`toonset palette` as a function: what it writes, into what, and what it refuses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toonset.camera import Camera
+from toonset.cli.palette import palette
+from toonset.dataset.picture import encode_png, load_indexed_png
+from toonset.dataset.transforms import read_scene, transforms_dict
+from toonset.errors import ToonsetError
+from toonset.files import write_bytes, write_json
+
+RED, BLUE = (200, 30, 40), (20, 60, 180)
+
+
+def figure() -> np.ndarray:
+    """Return a red and blue figure, 40 x 60, with alpha."""
+    rgba = np.zeros((60, 40, 4), dtype=np.uint8)
+    rgba[5:55, 10:30] = (*RED, 255)
+    rgba[40:55, 10:30] = (*BLUE, 255)
+    return rgba
+
+
+def make_bundle(folder: Path) -> Path:
+    middle = np.zeros(3)
+    cameras = [
+        (f"images/{i:03d}.png", Camera.looking_at(middle, i, 0.1, 20, (40, 60))) for i in range(2)
+    ]
+    write_json(folder / "transforms.json", transforms_dict(cameras, 2.0, 1.0))
+    for name, _ in cameras:
+        write_bytes(folder / name, encode_png(figure()))
+    return folder
+
+
+def tree(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def test_a_bundle_gets_its_palette_and_labels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make_bundle(tmp_path / "bundle")
+    monkeypatch.chdir(tmp_path)
+    palette()
+    shown = capsys.readouterr().out.splitlines()
+    assert shown == ["#c81e28   70.0 %  red", "#143cb4   30.0 %  royal blue", "bundle"]
+    scene = read_scene(tmp_path / "bundle")
+    assert scene.palette is not None
+    assert scene.palette.tolist() == [list(RED), list(BLUE)]
+    for frame in scene.frames:
+        assert frame.labels is not None
+        assert np.array_equal(frame.labels == 255, frame.rgba[..., 3] == 0)
+        assert np.array_equal(frame.labels == 1, (frame.rgba[..., :3] == BLUE).all(axis=2))
+
+
+def test_a_second_run_replaces_the_first(tmp_path: Path) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    palette([bundle])
+    before = tree(bundle)
+    palette([bundle], colors="#00ff00")
+    assert tree(bundle) == before
+    content = json.loads((bundle / "palette.json").read_text())
+    assert [color["hex"] for color in content["colors"]] == ["#00ff00"]
+    assert set(np.unique(load_indexed_png(bundle / "labels" / "000.png"))) == {0, 255}
+
+
+def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    palette([bundle])
+    first = {path: path.read_bytes() for path in bundle.rglob("*") if path.is_file()}
+    palette([bundle])
+    assert {path: path.read_bytes() for path in bundle.rglob("*") if path.is_file()} == first
+
+
+def test_pictures_go_into_a_folder_of_their_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opaque = np.full((60, 40, 4), 255, dtype=np.uint8)
+    opaque[figure()[..., 3] > 0] = figure()[figure()[..., 3] > 0]
+    write_bytes(tmp_path / "front.png", encode_png(opaque))  # on white: the ground is cut away
+    write_bytes(tmp_path / "back.png", encode_png(figure()))
+    out = tmp_path / "colours"
+    palette([tmp_path / "front.png", tmp_path / "back.png"], out=out, as_json=True)
+    result = json.loads(capsys.readouterr().out)
+    assert [color["hex"] for color in result["colors"]] == ["#c81e28", "#143cb4"]
+    assert tree(out) == {
+        "labels",
+        "labels/000.png",
+        "labels/001.png",
+        "palette.gpl",
+        "palette.json",
+    }
+    assert (load_indexed_png(out / "labels" / "000.png")[0] == 255).all()
+    with pytest.raises(ToonsetError, match="exists already; pass --force"):
+        palette([tmp_path / "front.png"], out=out)
+    palette([tmp_path / "front.png"], out=out, force=True)
+    assert "labels/001.png" not in tree(out)
+
+
+def test_what_is_dropped_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    palette([bundle], min_share=0.5)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith("left out")
+    assert lines[2].startswith("#143cb4   30.0 %  royal blue  0.")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "fragment"),
+    [
+        (["none.png"], {}, "none.png: no such file; check the name of the picture"),
+        (["empty"], {}, "empty: holds no transforms.json; run `toonset calibrate` first"),
+        (["bundle", "front.png"], {}, "a bundle stands alone"),
+        (["text.png"], {}, "is text, no picture that can be read"),
+        (["bundle"], {"colors": "blurple"}, "blurple: neither colours such as"),
+        (["bundle"], {"min_share": 7.0}, "min share 7"),
+        (["bundle"], {"out": Path("/proc/nowhere/x")}, "not writable|cannot be written"),
+        (["outside"], {}, "lies outside of the folder"),
+    ],
+)
+def test_mistakes_write_nothing(
+    arguments: list[str],
+    options: dict[str, object],
+    fragment: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    make_bundle(Path("bundle"))
+    Path("empty").mkdir()
+    Path("text.png").write_text("hello")
+    write_bytes(Path("front.png"), encode_png(figure()))
+    outside = transforms_dict(
+        [("../front.png", Camera.looking_at(np.zeros(3), 0, 0, 20, (40, 60)))], 2.0, 1.0
+    )
+    write_json(Path("outside/transforms.json"), outside)
+    before = tree(tmp_path)
+    with pytest.raises(ToonsetError, match=fragment):
+        palette([Path(argument) for argument in arguments], **options)  # type: ignore[arg-type]
+    assert tree(tmp_path) == before
