@@ -1,0 +1,68 @@
+"""Which hull the drawings themselves ask for: leave one view out and predict its mask."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from toonset.camera import Camera
+from toonset.errors import BundleError
+from toonset.nerf.hull import LEVEL, Hull, carve
+from toonset.nerf.march import march, rays_of
+
+RESOLUTION = 64  # voxels: coarse, since only the ranking matters
+MOST_LEFT_OUT = 8  # views tried
+FEWEST_VIEWS = 4  # with fewer there is no majority to trust
+
+
+@dataclass(frozen=True)
+class HullEvidence:
+    """How well hulls of the other views predict a view's mask.
+
+    Attributes:
+        missing: the choice: views that may say "background" at a point inside.
+        left_out_iou: mean intersection over union of the left-out masks, per choice from 0.
+    """
+
+    missing: int
+    left_out_iou: tuple[float, ...]
+
+
+def choose_missing(
+    cameras: Sequence[Camera], alphas: Sequence[Float[Tensor, "height width"]]
+) -> HullEvidence:
+    """Return the tolerance (0 or 1 views) whose hulls predict left-out masks best."""
+    views = len(cameras)
+    if views < FEWEST_VIEWS:
+        return HullEvidence(0, ())
+    left_out = [round(i * views / MOST_LEFT_OUT) for i in range(MOST_LEFT_OUT)]
+    left_out = list(range(views)) if views <= MOST_LEFT_OUT else left_out
+    scores = []
+    for missing in (0, 1):
+        each = [_left_out_iou(cameras, alphas, view, missing) for view in left_out]
+        scores.append(sum(each) / len(each))
+    return HullEvidence(int(scores[1] > scores[0]), tuple(scores))
+
+
+def mask_iou(hull: Hull, camera: Camera, alpha: Float[Tensor, "height width"]) -> float:
+    """Return the intersection over union of the hull's outline and a mask in one view."""
+    samples = march(rays_of(camera, camera.pixel_grid().reshape(-1, 2), hull), hull, hull.voxel, 1)
+    seen = torch.zeros(samples.rays, dtype=torch.bool)
+    seen[samples.ray] = True
+    drawn = (alpha >= LEVEL).reshape(-1)
+    return float((seen & drawn).sum() / (seen | drawn).sum())
+
+
+def _left_out_iou(
+    cameras: Sequence[Camera], alphas: Sequence[Tensor], view: int, missing: int
+) -> float:
+    others = [i for i in range(len(cameras)) if i != view]
+    try:
+        hull = carve([cameras[i] for i in others], [alphas[i] for i in others], RESOLUTION, missing)
+    except BundleError:  # these views share nothing: the choice predicts nothing
+        return 0.0
+    return mask_iou(hull, cameras[view], alphas[view])

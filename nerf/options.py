@@ -1,0 +1,32 @@
+"""What can be set about training. Imports nothing heavy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """Settings of `toonset.nerf.training.train`; `None` means chosen from the scene.
+
+    Attributes:
+        steps: optimiser steps; quality flattens out after 300 on sheets of eight 150 px views.
+        budget_s: stop after this many seconds of training; results then depend on the machine.
+        seed: of initial weights and ray order. Same seed, same result, bit for bit, on a CPU.
+        device: "auto" (a GPU where there is one), "cpu" or "cuda".
+        resolution: cells of the planes along the character's longest side; None: 3/4 cell per
+            pixel of the tallest figure, 48 to 160 (finer planes fit each drawing's own pixels and
+            predict new views worse).
+        smoothness: weight of the planes' total variation at eight views; fewer views get more.
+        palette_weight: weight of the classifier's cross-entropy.
+        missing_views: views that may call a point of the hull background; None: by evidence.
+    """
+
+    steps: int = 300
+    budget_s: float | None = None
+    seed: int = 0
+    device: str = "auto"
+    resolution: int | None = None
+    smoothness: float = 5e-3
+    palette_weight: float = 0.01
+    missing_views: int | None = None

@@ -1,0 +1,48 @@
+"""Replacing palette colours of a trained run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from toonset.errors import PaletteError
+from toonset.nerf.trained import TrainedField
+from toonset.palette.files import parse_colors
+from toonset.palette.names import hex_of
+
+
+def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
+    """Return the run with palette colours replaced; all changes happen at once.
+
+    Args:
+        trained: the run.
+        changes: "OLD=NEW", each a hex colour; OLD must be a colour of the run's palette.
+
+    Raises:
+        PaletteError: no palette, no such colour, or text that is no such pair.
+    """
+    if not changes:
+        return trained
+    if trained.palette is None:
+        raise PaletteError("run: was trained without palette; train again without --no-palette")
+    old = [tuple(color) for color in trained.palette.tolist()]
+    palette = trained.palette.copy()
+    for change in changes:
+        words = change.split("=")
+        if len(words) != 2:
+            raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
+        source, wanted = (_color(word, change) for word in words)
+        if source not in old:
+            known = ", ".join(hex_of((r, g, b)) for r, g, b in old)
+            raise PaletteError(f"--recolor {change!r}: the palette has {known}; choose one of them")
+        palette[old.index(source)] = wanted
+    return replace(trained, palette=palette)
+
+
+def _color(word: str, change: str) -> tuple[int, int, int]:
+    colors = np.asarray(parse_colors(word.strip()))
+    if len(colors) != 1:
+        raise PaletteError(f"--recolor {change!r}: {word!r} is not one colour")
+    return int(colors[0, 0]), int(colors[0, 1]), int(colors[0, 2])

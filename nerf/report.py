@@ -1,0 +1,84 @@
+"""The files beside a trained field: metrics.json, history.csv, preview.png."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from toonset import __version__
+from toonset.dataset.picture import encode_png
+from toonset.dataset.scene import Scene
+from toonset.files import write_bytes, write_json
+from toonset.nerf.layers import color_picture
+from toonset.nerf.metrics import compare, over_white
+from toonset.nerf.run_folder import write_field
+from toonset.nerf.trained import Step, TrainedField, Training
+from toonset.nerf.turntable import turntable
+from toonset.nerf.views import render
+
+PREVIEW_VIEWS, PREVIEW_ELEVATION = 4, math.radians(10)
+
+
+def write_run(folder: Path, training: Training, scene: Scene) -> dict[str, Any]:
+    """Write all files of a run into an existing folder; return the content of metrics.json."""
+    about = {
+        "options": asdict(training.options),
+        "scene": {"views": [frame.name for frame in scene.frames]},
+        "versions": {"toonset": __version__, "torch": torch.__version__, "numpy": np.__version__},
+        "threads": torch.get_num_threads(),
+    }
+    write_json(folder / "config.json", write_field(folder, training.result, about))
+    metrics = metrics_of(training, scene)
+    write_json(folder / "metrics.json", metrics)
+    write_bytes(folder / "history.csv", _csv(training.history).encode())
+    write_bytes(folder / "preview.png", encode_png(preview(training.result)))
+    return metrics
+
+
+def metrics_of(training: Training, scene: Scene) -> dict[str, Any]:
+    """Return how training went: fit to the training views, hull evidence, seconds, counts."""
+    result = training.result
+    rows = []
+    for frame in scene.frames:
+        view = render(result, frame.camera)
+        rows.append(compare(color_picture(view.rgb, view.alpha), frame.rgba))
+    last = training.history[-1] if training.history else None
+    return {
+        "stopped": training.stopped,
+        "steps": len(training.history),
+        "loss": None if last is None else last.loss,
+        "train": means(rows),
+        "hull": asdict(training.evidence),
+        "counts": training.counts,
+        "seconds": {k: round(v, 3) for k, v in training.seconds.items()},
+    }
+
+
+def means(rows: list[dict[str, float | None]]) -> dict[str, float | None]:
+    """Return the mean of every metric over the views that have it, None where none has."""
+    result: dict[str, float | None] = {}
+    for name in rows[0] if rows else ():
+        values = [v for v in (row[name] for row in rows) if v is not None]
+        result[name] = float(np.mean(values)) if values else None
+    return result
+
+
+def preview(trained: TrainedField) -> np.ndarray:
+    """Return four views side by side over white, (height, 4 height, 3) bytes."""
+    cameras = turntable(trained, PREVIEW_VIEWS, PREVIEW_ELEVATION)
+    views = [render(trained, camera) for camera in cameras]
+    pictures = [over_white(color_picture(view.rgb, view.alpha)) for view in views]
+    return (np.concatenate(pictures, axis=1) * 255 + 0.5).astype(np.uint8)
+
+
+def _csv(history: tuple[Step, ...]) -> str:
+    rows = [
+        f"{s.step},{s.loss:.8g},{s.photometric:.8g},{s.cross_entropy:.8g},{s.seconds:.3f}"
+        for s in history
+    ]
+    return "\n".join(["step,loss,photometric,cross_entropy,seconds", *rows]) + "\n"

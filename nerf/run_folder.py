@@ -1,0 +1,175 @@
+"""A trained run on disk, and back.
+
+    model.safetensors   parameters of field and classifier, the hull as bytes
+    config.json         what is needed to build them, and the resolved options
+    metrics.json        how training went
+    history.csv         every step's losses
+    preview.png         four views of the result
+
+Nothing is pickled. Loading checks every name, shape, type and value before use.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from toonset.dataset.transforms import read_json, validation_reason
+from toonset.errors import BundleError
+from toonset.files import write_bytes
+from toonset.nerf.classifier import PaletteClassifier
+from toonset.nerf.field import TriplaneField
+from toonset.nerf.hull import Hull
+from toonset.nerf.trained import TrainedField
+
+FORMAT = 1
+MOST_CELLS = 512  # along one side, of planes and hull alike
+MAX_MODEL_BYTES = 512 * 2**20
+
+
+class FieldRecord(BaseModel):
+    """What builds a `TrainedField` around the tensors of model.safetensors."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    resolution: int = Field(ge=1, le=MOST_CELLS)
+    channels: int = Field(ge=1, le=256)
+    hidden: int = Field(ge=1, le=1024)
+    hull_low: tuple[float, float, float]
+    hull_voxel: float = Field(gt=0, le=1e9)
+    hull_shape: tuple[int, int, int]
+    step: float = Field(gt=0, le=1e9)
+    samples: int = Field(ge=1, le=4096)
+    palette: list[tuple[int, int, int]] | None = Field(default=None, max_length=255)
+    k: float = Field(ge=0, le=1e9)
+    size_px: int = Field(ge=1, le=16384)
+
+    @classmethod
+    def of(cls, trained: TrainedField, resolution: int) -> FieldRecord:
+        """Return the record of a field."""
+        field = trained.field
+        low = trained.hull.low.tolist()
+        shape = tuple(trained.hull.support.shape)
+        palette = None if trained.palette is None else [tuple(c) for c in trained.palette.tolist()]
+        return cls(
+            resolution=resolution,
+            channels=field.hidden.in_features,
+            hidden=field.hidden.out_features,
+            hull_low=(low[0], low[1], low[2]),
+            hull_voxel=trained.hull.voxel,
+            hull_shape=(shape[0], shape[1], shape[2]),
+            step=trained.step,
+            samples=trained.samples,
+            palette=palette,
+            k=trained.k,
+            size_px=trained.size_px,
+        )
+
+
+class _Config(BaseModel):
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    format: int
+    field: FieldRecord
+
+
+def write_field(folder: Path, trained: TrainedField, about: dict[str, Any]) -> dict[str, Any]:
+    """Write model.safetensors; return the content of config.json.
+
+    Args:
+        folder: an existing folder.
+        trained: the field.
+        about: further entries of config.json (options, versions).
+    """
+    record = FieldRecord.of(trained, trained.field.resolution)
+    write_bytes(folder / "model.safetensors", save(_tensors(trained)))
+    return {"format": FORMAT, "field": record.model_dump(mode="json"), **about}
+
+
+def read_field(folder: Path) -> TrainedField:
+    """Return the field of a run folder.
+
+    Raises:
+        BundleError: a file is missing or damaged, or holds what no training writes.
+    """
+    config_file, model_file = folder / "config.json", folder / "model.safetensors"
+    for file in (config_file, model_file):
+        if not file.is_file():
+            raise BundleError(f"{file}: does not exist; `toonset train` writes run folders")
+    record = _record(config_file)
+    tensors = _load(model_file)
+    trained = _empty(record)
+    expected = _tensors(trained)
+    _check(model_file, tensors, expected)
+    for name, values in expected.items():
+        values.copy_(tensors[name])
+    trained.hull.support.copy_(tensors["hull"].float() / 255)
+    return trained
+
+
+def _record(file: Path) -> FieldRecord:
+    try:
+        config = _Config.model_validate(read_json(file))
+    except ValidationError as error:
+        raise BundleError(f"{file}: {validation_reason(error)}") from error
+    if config.format != FORMAT:
+        raise BundleError(
+            f"{file}: format {config.format}, this toonset reads {FORMAT}; train again"
+        )
+    record = config.field
+    if not all(1 <= n <= MOST_CELLS for n in record.hull_shape):
+        raise BundleError(f"{file}: hull_shape {record.hull_shape}, 1 to {MOST_CELLS} is needed")
+    if record.palette is not None and not all(0 <= v <= 255 for c in record.palette for v in c):
+        raise BundleError(f"{file}: a palette value is not in 0..255; train again")
+    return record
+
+
+def _empty(record: FieldRecord) -> TrainedField:
+    low = np.array(record.hull_low)
+    hull = Hull(low, record.hull_voxel, torch.zeros(record.hull_shape))
+    field = TriplaneField(hull.box, record.resolution, record.channels, record.hidden)
+    palette = None if record.palette is None else np.array(record.palette, dtype=np.uint8)
+    classifier = None if palette is None else PaletteClassifier(len(palette))
+    return TrainedField(
+        field, hull, record.step, record.samples, classifier, palette, record.k, record.size_px
+    )
+
+
+def _tensors(trained: TrainedField) -> dict[str, Tensor]:
+    result = {f"field.{k}": v.detach() for k, v in trained.field.named_parameters()}
+    if trained.classifier is not None:
+        named = trained.classifier.named_parameters()
+        result |= {f"classifier.{k}": v.detach() for k, v in named}
+    result["hull"] = (trained.hull.support * 255).round().to(torch.uint8)
+    return result
+
+
+def _load(file: Path) -> dict[str, Tensor]:
+    try:
+        if file.stat().st_size > MAX_MODEL_BYTES:
+            raise BundleError(f"{file}: larger than {MAX_MODEL_BYTES >> 20} MiB; not a toonset run")
+        return load(file.read_bytes())
+    except OSError as error:
+        raise BundleError(f"{file}: cannot be read ({error.strerror})") from error
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise BundleError(f"{file}: is damaged ({error}); train again") from error
+
+
+def _check(file: Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
+    if found.keys() != expected.keys():
+        odd = ", ".join(sorted(found.keys() ^ expected.keys()))
+        raise BundleError(f"{file}: tensors missing or unknown: {odd}; train again")
+    for name, tensor in found.items():
+        want = expected[name]
+        if tensor.shape != want.shape or tensor.dtype != want.dtype:
+            raise BundleError(
+                f"{file}: {name} is {tuple(tensor.shape)} {tensor.dtype}, config.json asks for "
+                f"{tuple(want.shape)} {want.dtype}; train again"
+            )
+        if not bool(torch.isfinite(tensor).all()):
+            raise BundleError(f"{file}: {name} holds values that are not finite; train again")

@@ -1,0 +1,73 @@
+"""What training returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.nerf.classifier import PaletteClassifier
+from toonset.nerf.evidence import HullEvidence
+from toonset.nerf.field import TriplaneField
+from toonset.nerf.hull import Hull
+from toonset.nerf.options import TrainOptions
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedField:
+    """A field that can be rendered.
+
+    Attributes:
+        field: density and colour.
+        hull: where the field is evaluated.
+        step: distance of samples along rays, world units.
+        samples: most samples per ray.
+        classifier: colour to palette label; None without palette.
+        palette: (colors, 3) sRGB; None without palette.
+        k: 1 / distance of a typical training camera, 0 = orthographic; for turntables.
+        size_px: longest side of the training pictures, for turntables.
+    """
+
+    field: TriplaneField
+    hull: Hull
+    step: float
+    samples: int
+    classifier: PaletteClassifier | None
+    palette: UInt8[np.ndarray, "colors 3"] | None
+    k: float
+    size_px: int
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the training history: losses are means over the step's rays."""
+
+    step: int
+    loss: float
+    photometric: float
+    cross_entropy: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Training:
+    """A trained field and how it came about.
+
+    Attributes:
+        result: the field.
+        options: as given.
+        history: every step.
+        stopped: why it ended: "steps", "budget", or what went wrong at which step.
+        evidence: for the hull's tolerance.
+        seconds: of every part.
+        counts: views, rays, samples, parameters.
+    """
+
+    result: TrainedField
+    options: TrainOptions
+    history: tuple[Step, ...]
+    stopped: str
+    evidence: HullEvidence
+    seconds: dict[str, float]
+    counts: dict[str, int]
