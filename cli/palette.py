@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from toonset.palette.palette import Palette
 
-    Picture = UInt8[np.ndarray, "height width 4"]
+    Picture = UInt8[np.ndarray, "_ _ 4"]
 
 BUNDLE, OUT = Path("bundle"), Path("palette")
 HUNDRED = 100.0

@@ -14,7 +14,7 @@ from toonset.files import new_folder, write_bytes, write_json
 from toonset.palette.files import to_gpl, to_json
 from toonset.palette.palette import Palette
 
-Labels = Sequence[tuple[str, UInt8[np.ndarray, "height width"]]]
+Labels = Sequence[tuple[str, UInt8[np.ndarray, "_ _"]]]
 
 
 def write_palette(folder: Path, palette: Palette, labels: Labels) -> None:

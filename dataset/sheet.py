@@ -88,7 +88,7 @@ def split_sheet(
 
 
 Box = tuple[int, int, int, int]
-Crop = tuple[Box, Bool[np.ndarray, "height width"]]
+Crop = tuple[Box, Bool[np.ndarray, "_ _"]]
 
 
 def _check_blobs(blobs: Blobs, ground: Background) -> None:

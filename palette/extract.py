@@ -50,7 +50,7 @@ class PaletteOptions:
 
 
 def extract_palette(
-    images: Sequence[UInt8[np.ndarray, "height width 4"]], options: PaletteOptions | None = None
+    images: Sequence[UInt8[np.ndarray, "_ _ 4"]], options: PaletteOptions | None = None
 ) -> Palette:
     """Return the colours of a character, the most frequent first.
 
@@ -86,7 +86,7 @@ def extract_palette(
 
 
 def pick_palette(
-    images: Sequence[UInt8[np.ndarray, "height width 4"]], rgb: UInt8[np.ndarray, "colors 3"]
+    images: Sequence[UInt8[np.ndarray, "_ _ 4"]], rgb: UInt8[np.ndarray, "colors 3"]
 ) -> Palette:
     """Return hand-picked colours with their shares in the pictures, in the order given.
 
@@ -137,7 +137,7 @@ def nearest_colors(
     return best
 
 
-def _histogram(images: Sequence[UInt8[np.ndarray, "height width 4"]]) -> Histogram:
+def _histogram(images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Histogram:
     if not images:
         raise PaletteError("palette: no picture given; name a bundle or pictures")
     histogram = count_colors(

@@ -49,7 +49,7 @@ class Family:
     count: int
 
 
-def count_colors(pixels: Iterable[UInt8[np.ndarray, "n 3"]]) -> Histogram:
+def count_colors(pixels: Iterable[UInt8[np.ndarray, "_ 3"]]) -> Histogram:
     """Return how often every colour occurs in several pictures' pixels."""
     codes, counts = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     for colors in pixels:

@@ -179,9 +179,9 @@ def test_nothing_to_see_is_an_error() -> None:
     with pytest.raises(PaletteError, match="no opaque flat pixel"):
         extract_palette([np.zeros((9, 9, 4), dtype=np.uint8)])
     with pytest.raises(PaletteError, match="min share 5; it is a share from 0 to 1"):
-        PaletteOptions(min_share=5)
+        PaletteOptions(min_share=5.0)
     with pytest.raises(PaletteError, match="merge distance 0"):
-        PaletteOptions(merge_distance=0)
+        PaletteOptions(merge_distance=0.0)
     with pytest.raises(PaletteError, match="0 colours; 1 to 255 are needed"):
         Palette((), "none")
     with pytest.raises(PaletteError, match="256 colours; 1 to 255 are needed"):

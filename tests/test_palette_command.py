@@ -27,7 +27,8 @@ def figure() -> np.ndarray:
 def make_bundle(folder: Path) -> Path:
     middle = np.zeros(3)
     cameras = [
-        (f"images/{i:03d}.png", Camera.looking_at(middle, i, 0.1, 20, (40, 60))) for i in range(2)
+        (f"images/{i:03d}.png", Camera.looking_at(middle, float(i), 0.1, 20.0, (40, 60)))
+        for i in range(2)
     ]
     write_json(folder / "transforms.json", transforms_dict(cameras, 2.0, 1.0))
     for name, _ in cameras:
@@ -134,7 +135,7 @@ def test_mistakes_write_nothing(
     Path("text.png").write_text("hello")
     write_bytes(Path("front.png"), encode_png(figure()))
     outside = transforms_dict(
-        [("../front.png", Camera.looking_at(np.zeros(3), 0, 0, 20, (40, 60)))], 2.0, 1.0
+        [("../front.png", Camera.looking_at(np.zeros(3), 0.0, 0.0, 20.0, (40, 60)))], 2.0, 1.0
     )
     write_json(Path("outside/transforms.json"), outside)
     before = tree(tmp_path)
