@@ -54,11 +54,11 @@ def character() -> Mesh:
 
 
 def mannequin() -> Mesh:
-    """The same body in plain form: no ponytail, no bag, no scarf's tail, no face."""
+    """The same body in plain form, with the volume of hair and clothes but no detail of them."""
     legs = both_sides(blended(0.05, LEG, BOOT))
-    arms = both_sides(blended(0.03, SLEEVE, HAND))
-    body = blended(0.03, COAT_BODY, arms, legs, cone((0, 0.95, 0), (0, 1.05, 0), 0.1, 0.1))
-    top = blended(0.02, SKULL, HAIR_CAP, NOSE_BALL, EARS)
+    arms = both_sides(blended(0.03, grown(SLEEVE, 0.006), PALM))
+    body = blended(0.03, COAT_BODY, arms, legs, SCARF_ROUND)
+    top = blended(0.02, SKULL, HAIR_CAP, FRINGE, NOSE_BALL, EARS)
     return mesh_of((Part("body", (204, 204, 204), blended(0.02, body, top), 0.038),), "mannequin")
 
 
@@ -96,6 +96,26 @@ HAIR_CAP = blended(
     ellipsoid((0, 1.345, -0.025), (0.325, 0.305, 0.305)),
     ellipsoid((0, 1.21, -0.11), (0.3, 0.2, 0.215)),
 )
+PARTING = (-0.1, 1.585, 0.12)
+FRINGE = blended(
+    0.012,
+    chain(
+        [PARTING, (0.05, 1.54, 0.21), (0.17, 1.46, 0.21), (0.245, 1.36, 0.16)],
+        [0.05, 0.07, 0.055, 0.012],
+        0.04,
+    ),
+    chain(
+        [PARTING, (-0.03, 1.52, 0.235), (0.05, 1.445, 0.245), (0.12, 1.40, 0.24)],
+        [0.05, 0.065, 0.045, 0.01],
+        0.04,
+    ),
+    chain(
+        [PARTING, (-0.17, 1.5, 0.19), (-0.225, 1.42, 0.17), (-0.25, 1.35, 0.15)],
+        [0.05, 0.065, 0.045, 0.012],
+        0.04,
+    ),
+)
+SCARF_ROUND = flattened(ring((0, 0.985, 0.01), (0, 1, 0.08), 0.118, 0.064), 0.95)
 COAT_BODY = common(
     flattened(
         blended(
@@ -105,23 +125,24 @@ COAT_BODY = common(
         ),
         0.84,
     ),
-    below((0, 0.5, 0), (0, -1, 0)),
+    below((0, 0.535, 0), (0, -1, 0)),
 )
+SLEEVE_LONG = cone((0.13, 0.9, 0), (0.37, 0.63, 0.02), 0.062, 0.098)
 SLEEVE = common(
-    cone((0.13, 0.9, 0), (0.37, 0.63, 0.02), 0.062, 0.098),
+    SLEEVE_LONG,
     below((0.345, 0.66, 0.02), (0.66, -0.75, 0.05)),
 )
-HAND = blended(
+PALM = blended(
     0.02,
     cone((0.33, 0.68, 0.02), (0.385, 0.605, 0.025), 0.045, 0.06),
     ellipsoid((0.395, 0.585, 0.03), (0.058, 0.066, 0.06)),
-    cone((0.375, 0.6, 0.06), (0.355, 0.575, 0.1), 0.026, 0.022),
 )
-LEG = cone((0.1, 0.52, 0), (0.112, 0.2, 0), 0.086, 0.066)
+HAND = blended(0.02, PALM, cone((0.375, 0.6, 0.06), (0.355, 0.575, 0.1), 0.026, 0.022))
+LEG = cone((0.102, 0.54, 0), (0.113, 0.18, 0), 0.092, 0.072)
 BOOT = common(
     blended(
         0.06,
-        cone((0.113, 0.24, 0), (0.115, 0.09, -0.005), 0.08, 0.075),
+        cone((0.113, 0.19, 0), (0.115, 0.09, -0.005), 0.08, 0.075),
         turned(ellipsoid((0.122, 0.06, 0.05), (0.088, 0.075, 0.145)), (0.122, 0.06, 0), 0.18),
     ),
     below((0, 0, 0), (0, -1, 0)),
@@ -162,33 +183,14 @@ def hair() -> tuple[Part, ...]:
         ellipsoid((0, 1.225, 0.3), (0.247, 0.232, 0.27)),
         ellipsoid((0, 1.08, 0.28), (0.22, 0.2, 0.27)),
     )
-    part = (-0.1, 1.585, 0.12)
-    fringe = blended(
-        0.012,
-        chain(
-            [part, (0.05, 1.54, 0.21), (0.17, 1.46, 0.21), (0.245, 1.36, 0.16)],
-            [0.05, 0.07, 0.055, 0.012],
-            0.04,
-        ),
-        chain(
-            [part, (-0.03, 1.52, 0.235), (0.05, 1.445, 0.245), (0.12, 1.40, 0.24)],
-            [0.05, 0.065, 0.045, 0.01],
-            0.04,
-        ),
-        chain(
-            [part, (-0.17, 1.5, 0.19), (-0.225, 1.42, 0.17), (-0.25, 1.35, 0.15)],
-            [0.05, 0.065, 0.045, 0.012],
-            0.04,
-        ),
-    )
     locks = both_sides(
         chain(
             [(0.27, 1.4, 0.1), (0.285, 1.26, 0.12), (0.255, 1.11, 0.15)], [0.07, 0.055, 0.012], 0.03
         )
     )
     tuft = chain(
-        [(-0.09, 1.58, 0.0), (-0.07, 1.675, 0.01), (-0.01, 1.735, 0.02), (0.08, 1.735, 0.03)],
-        [0.06, 0.045, 0.03, 0.008],
+        [(-0.09, 1.58, 0.04), (-0.07, 1.67, 0.02), (-0.01, 1.73, -0.04), (0.07, 1.735, -0.12)],
+        [0.06, 0.047, 0.034, 0.02],
         0.03,
     )
     tail = chain(
@@ -203,22 +205,21 @@ def hair() -> tuple[Part, ...]:
         [0.05, 0.09, 0.115, 0.1, 0.06, 0.008],
         0.05,
     )
-    cap = blended(0.02, without(HAIR_CAP, opening), fringe, locks, tuft)
+    cap = blended(0.02, without(HAIR_CAP, opening), FRINGE, locks, tuft)
     return (
         Part("hair", HAIR, cap, 0.027),
         Part("ponytail", HAIR, tail, 0.034),
         Part(
-            "hair band", SCARF, ring((0.315, 1.47, -0.145), (1, 0.05, -0.25), 0.05, 0.034), MIDDLE
+            "hair band", SCARF, ring((0.315, 1.47, -0.145), (1, 0.05, -0.25), 0.052, 0.042), MIDDLE
         ),
     )
 
 
 def clothes() -> tuple[Part, ...]:
-    scarf = flattened(ring((0, 0.985, 0.01), (0, 1, 0.08), 0.115, 0.055), 0.95)
     end = chain(
-        [(0.05, 0.97, 0.24), (0.09, 0.86, 0.29), (0.11, 0.73, 0.36)], [0.04, 0.048, 0.062], 0.02
+        [(0.05, 0.97, 0.24), (0.09, 0.86, 0.29), (0.11, 0.73, 0.36)], [0.045, 0.058, 0.078], 0.02
     )
-    hem = rounded_common(0.012, grown(COAT_BODY, 0.016), slab((0, 0.515, 0), (0, 1, 0), 0.034))
+    hem = rounded_common(0.012, grown(COAT_BODY, 0.016), slab((0, 0.555, 0), (0, 1, 0), 0.044))
     buttons = blended(
         1e-4,
         ellipsoid((0.02, 0.83, 0.125), (0.026, 0.026, 0.03)),
@@ -231,16 +232,13 @@ def clothes() -> tuple[Part, ...]:
         Part("buttons", SCARF, buttons, FINE),
         Part("sleeves", COAT, both_sides(SLEEVE), 0.03),
         Part("cuffs", CREAM, both_sides(cuff), MIDDLE),
-        Part("scarf", SCARF, scarf, 0.028),
+        Part("scarf", SCARF, SCARF_ROUND, 0.028),
         Part("scarf end", SCARF, flattened(end, 0.5), MIDDLE),
     )
 
 
-SLEEVE_LONG = cone((0.13, 0.9, 0), (0.37, 0.63, 0.02), 0.062, 0.098)
-
-
 def limbs() -> tuple[Part, ...]:
-    fur = both_sides(ring((0.113, 0.245, 0), (0.05, 1, 0), 0.062, 0.032))
+    fur = both_sides(ring((0.113, 0.215, 0), (0.05, 1, 0), 0.062, 0.042))
     sole = common(grown(BOOT, 0.012), slab((0, 0.012, 0), (0, 1, 0), 0.02))
     return (
         Part("hands", SKIN, both_sides(HAND), MIDDLE),
@@ -255,9 +253,9 @@ def baggage() -> tuple[Part, ...]:
     strap = rounded_common(
         0.012, grown(COAT_BODY, 0.02), slab((0.0, 0.79, 0), (0.72, -0.69, 0), 0.03)
     )
-    middle = (-0.262, 0.555, -0.02)
+    middle = (-0.262, 0.57, -0.02)
     bag = turned(box(middle, (0.054, 0.095, 0.118), 0.03), middle, 0.0, -0.25)
-    lid = turned(box((-0.266, 0.605, -0.02), (0.066, 0.05, 0.128), 0.03), middle, 0.0, -0.25)
+    lid = turned(box((-0.266, 0.625, -0.02), (0.066, 0.045, 0.128), 0.03), middle, 0.0, -0.25)
     clasp = turned(box((-0.33, 0.565, -0.02), (0.014, 0.026, 0.026), 0.01), middle, 0.0, -0.25)
     return (
         Part("strap", LEATHER, strap, 0.021),
