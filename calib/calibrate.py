@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toonset.calib.align import Drawing, ElevationPrior, Fit, tilt
+from toonset.calib.align import Drawing, Fit
 from toonset.calib.contour import drawn_contour
 from toonset.calib.hypotheses import (
-    SHEET_ELEVATION,
     Candidates,
     choose_together,
     probabilities,
@@ -95,7 +94,7 @@ def calibrate(
             progress("search", i / len(views))
             starts = [h.pose for h in find_hypotheses(view, templates, options.starts)]
             starts = [*starts, starts[0].twin()]
-            candidates.append(refine(coarse[i], surface, starts, COARSE_WIDTHS, ElevationPrior()))
+            candidates.append(refine(coarse[i], surface, starts, COARSE_WIDTHS))
     with _timed(seconds, "together"):
         progress("together", 0.0)
         joint, candidates = _search_together(coarse, surface, candidates, options.rounds)
@@ -106,9 +105,10 @@ def calibrate(
         joint, model = choose_model(flat, deep, surface, len(views))
     with _timed(seconds, "judge"):
         progress("judge", 0.0)
-        prior = _elevation_prior(joint)
         final = [
-            refine(drawing, surface, [pose, *(f.pose for f in c.fits[:4])], FINE_WIDTHS, prior)
+            refine(
+                drawing, surface, [*with_twins([pose]), *(f.pose for f in c.fits[:4])], FINE_WIDTHS
+            )
             for drawing, pose, c in zip(fine, joint.poses, candidates, strict=True)
         ]
         sure = probabilities(final)
@@ -132,7 +132,7 @@ def _search_together(
     two to three body heights moves outlines so much that the wrong candidate can win without it.
     """
     near = 1 / (NEAR_HEIGHTS * surface.height)
-    nearby = _at_camera(drawings, surface, candidates, near, ElevationPrior())
+    nearby = _at_camera(drawings, surface, candidates, near)
     selections = [_selected(candidates), _selected(nearby)]
     best, found = None, list(candidates)
     for _ in range(rounds):
@@ -141,12 +141,11 @@ def _search_together(
         if best is not None and contender.score >= best.score - 0.5:
             break
         best = contender
-        prior = _elevation_prior(best)
         again = [
             Candidates((Fit(pose, 0.0, 0.0, 0.0), *view.fits[:4]), view.energies)
             for pose, view in zip(best.poses, candidates, strict=True)
         ]
-        found = _at_camera(drawings, surface, again, best.poses[0].k, prior)
+        found = _at_camera(drawings, surface, again, best.poses[0].k)
         selections = [_selected(found)]
     assert best is not None
     return best, found
@@ -174,24 +173,17 @@ def _at_camera(
     surface: Surface,
     candidates: Sequence[Candidates],
     k: float,
-    prior: ElevationPrior,
 ) -> list[Candidates]:
-    """Refine the best candidates and their twins again at a given k and elevation."""
+    """Refine the best candidates and their twins again at a given k."""
     return [
         refine(
             drawing,
             surface,
             _with_k(with_twins([fit.pose for fit in found.fits[:4]]), k),
             RECHECK_WIDTHS,
-            prior,
         )
         for drawing, found in zip(drawings, candidates, strict=True)
     ]
-
-
-def _elevation_prior(joint: JointFit) -> ElevationPrior:
-    elevations = [tilt(pose)[0][1] for pose in joint.poses]
-    return ElevationPrior(float(np.median(elevations)), SHEET_ELEVATION.sigma)
 
 
 @contextmanager

@@ -43,10 +43,9 @@ def refine(
     surface: Surface,
     starts: Sequence[Pose],
     widths: Float[np.ndarray, " iterations"],
-    prior: ElevationPrior,
 ) -> Candidates:
     """Return the distinct optima that contour alignment reaches from `starts`."""
-    fits = [align(drawing, surface, start, widths, prior) for start in starts]
+    fits = [align(drawing, surface, start, widths) for start in starts]
     distinct: list[Fit] = []
     for fit in sorted(fits, key=lambda fit: fit.cost):
         apart = (rotation_distance(fit.pose.rotation, f.pose.rotation) for f in distinct)

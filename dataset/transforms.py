@@ -65,11 +65,11 @@ class NativeCamera(BaseModel):
             CameraError: the record is no camera.
         """
         try:
-            arrays = [np.array(v, dtype=np.float64) for v in (self.rotation, self.target)]
+            rotation = np.array(self.rotation, dtype=np.float64)
         except ValueError as error:
             raise CameraError("camera: rotation rows differ in length") from error
-        center = np.array(self.center, dtype=np.float64)
-        return Camera(*arrays, self.scale, center, self.size_wh, self.k, self.pixel_aspect)
+        target, center = np.array(self.target), np.array(self.center)
+        return Camera(rotation, target, self.scale, center, self.size_wh, self.k, self.pixel_aspect)
 
 
 class _Intrinsics(BaseModel):

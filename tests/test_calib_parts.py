@@ -26,7 +26,7 @@ def pose_at(yaw=0.7, elevation=0.2, roll=0.1, k=0.0, scale=100.0) -> Pose:
     return Pose(rotation, np.array([150.0, 160.0]), scale, k)
 
 
-def as_mesh(shape: trimesh.Trimesh) -> Mesh:
+def as_mesh(shape) -> Mesh:
     return Mesh(np.array(shape.vertices), np.array(shape.faces))
 
 

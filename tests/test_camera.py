@@ -17,7 +17,9 @@ K = st.sampled_from([0.0, 1e-9, 1e-4, 0.02, 0.2])
 
 def make(yaw=0.3, elevation=0.1, roll=0.05, k=0.0, aspect=1.0) -> Camera:
     rotation = rotation_from_angles(yaw, elevation, roll)
-    return Camera(rotation, [0.1, 0.9, -0.2], 140.0, [101.5, 148.0], (200, 300), k, aspect)
+    return Camera(
+        rotation, np.array([0.1, 0.9, -0.2]), 140.0, np.array([101.5, 148.0]), (200, 300), k, aspect
+    )
 
 
 @settings(max_examples=60, deadline=None)

@@ -15,7 +15,7 @@ POINTS = np.random.default_rng(0).uniform(-0.8, 0.8, (60, 3))
 
 def camera(k=0.2, yaw=2.2):
     rotation = rotation_from_angles(yaw, 0.3, -0.1)
-    return Camera(rotation, [0.1, 0.5, 0.0], 120.0, [80.0, 90.0], (160, 180), k)
+    return Camera(rotation, np.array([0.1, 0.5, 0.0]), 120.0, np.array([80.0, 90.0]), (160, 180), k)
 
 
 def test_opengl_conversion_is_its_own_inverse_and_flips_y_and_z():
@@ -47,7 +47,7 @@ def test_colmap_projects_the_same_pixels(yaw):
     lens = pycolmap.Camera(
         model="PINHOLE", width=160, height=180, params=[K[0, 0], K[1, 1], K[0, 2], K[1, 2]]
     )
-    pixels = np.stack([lens.img_from_cam(rigid * point) for point in POINTS])
+    pixels = np.array([lens.img_from_cam(rigid * point) for point in POINTS], dtype=float)
     np.testing.assert_allclose(pixels.reshape(-1, 2), view.project(POINTS)[0], atol=1e-6)
     again = frames.pose_from_colmap(wxyz, translation)
     np.testing.assert_allclose(again, view.world_from_camera, atol=1e-12)

@@ -1,0 +1,128 @@
+"""What is measured: folders with ground truth, or synthetic turnarounds with fresh seeds.
+
+A case folder holds `sheet.png`, `mannequin.obj` and `gt.json` (world_from_camera, OpenGL axes) for
+calibration; `views/` and `test/` with a transforms.json each for training. The condition is the
+part of its name after the last hyphen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from toonset import frames
+from toonset.dataset.bodies import random_body
+from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.picture import load_rgba
+from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.sheet import split_sheet
+from toonset.dataset.synth_options import SynthOptions
+from toonset.dataset.synthetic import Turnaround, make_turnaround
+from toonset.dataset.transforms import read_json, read_scene
+from toonset.errors import BundleError
+from toonset.mesh import Mesh
+from toonset.view import View
+
+CONDITIONS: dict[str, SynthOptions] = {
+    "clean": SynthOptions(outline_px=0, elevation_deg=8),
+    "drawn": SynthOptions(yaw_jitter_deg=4, elevation_deg=8, warp_percent=0.8),
+    "near": SynthOptions(outline_px=0, elevation_deg=5, distance_heights=2.5),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class CalibCase:
+    """A sheet with its true camera_from_world rotations, (views, 3, 3)."""
+
+    name: str
+    group: str
+    views: tuple[View, ...]
+    mesh: Mesh
+    rotations: Float[np.ndarray, "views 3 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainCase:
+    """Posed training pictures and held-out ones."""
+
+    name: str
+    group: str
+    train: Scene
+    test: Scene
+
+
+def calib_cases(folder: Path | None, seed: int, count: int) -> Iterator[CalibCase]:
+    """Yield the folder's cases, or `count` synthetic sheets per condition.
+
+    Raises:
+        BundleError: the folder holds no case, or a sheet splits into a wrong number of views.
+    """
+    if folder is None:
+        for group, options in CONDITIONS.items():
+            for i in range(count):
+                turnaround = make_turnaround(random_body(seed + i), options, seed + i)
+                yield _synthetic_calib(turnaround, group, i)
+        return
+    for case in _folders(folder, "gt.json"):
+        truth = read_json(case / "gt.json")
+        views = split_sheet(load_rgba(case / "sheet.png")).views
+        poses = [frames.opencv_pose_from_opengl(np.array(m)) for m in truth["world_from_camera"]]
+        if len(views) != len(poses):
+            raise BundleError(f"{case}: split into {len(views)} views, {len(poses)} were drawn")
+        rotations = np.stack([pose[:3, :3].T for pose in poses])
+        yield CalibCase(
+            case.name, _group(case), views, load_mesh(case / "mannequin.obj"), rotations
+        )
+
+
+def train_cases(folder: Path | None, seed: int, count: int) -> Iterator[TrainCase]:
+    """Yield the folder's training cases, or `count` synthetic ones at 150 px.
+
+    Raises:
+        BundleError: the folder holds no case.
+    """
+    if folder is None:
+        for i in range(count):
+            body = random_body(seed + i)
+            drawn = SynthOptions(cell_px=150, outline_px=0, elevation_deg=8)
+            held_out = replace(drawn, views=16)
+            train = _scene(make_turnaround(body, drawn, seed + i))
+            test = _scene(make_turnaround(body, held_out, seed + i))
+            odd = Scene(test.frames[1::2], test.palette, test.name)  # between the training views
+            yield TrainCase(f"body {seed + i}", "clean", train, odd)
+        return
+    for case in _folders(folder, "views/transforms.json"):
+        train, test = read_scene(case / "views"), read_scene(case / "test")
+        yield TrainCase(case.name, _group(case), train, test)
+
+
+def _scene(turnaround: Turnaround) -> Scene:
+    made = tuple(
+        Frame(view.name, camera, view.rgba)
+        for view, camera in zip(turnaround.views, turnaround.cameras, strict=True)
+    )
+    return Scene(made, None, turnaround.mesh.name)
+
+
+def _synthetic_calib(turnaround: Turnaround, group: str, index: int) -> CalibCase:
+    views = split_sheet(turnaround.sheet).views
+    rotations = np.stack([camera.rotation for camera in turnaround.cameras])
+    if len(views) != len(rotations):
+        raise BundleError(f"synthetic {group} {index}: split into {len(views)} views")
+    return CalibCase(f"{group} {index}", group, views, turnaround.mesh, rotations)
+
+
+def _folders(folder: Path, needed: str) -> list[Path]:
+    found = sorted(path.parent for path in folder.glob(f"*/{needed.split('/')[0]}"))
+    found = [case for case in found if (case / needed).is_file()]
+    if not found:
+        raise BundleError(f"{folder}: holds no case (a folder with {needed}); give another --cases")
+    return found
+
+
+def _group(case: Path) -> str:
+    return case.name.rsplit("-", 1)[-1]
