@@ -14,6 +14,7 @@ BINS = 16  # levels per bin of the coarse histogram that finds the dominant colo
 CLUSTER_RADIUS = 32  # levels: border pixels this near to the dominant colour are background + noise
 LEAST_TOLERANCE = 2  # levels: a picture without noise still holds rounding
 MOST_TOLERANCE = 48  # levels: beyond it figures would be eaten, whatever the noise
+TRANSPARENT = 0.01  # of the sheet: less see-through area is an accident, not a background
 LEAST_SURE = 0.3  # of the border: less in one colour is no background
 LINE_SHARE = 0.8  # of a row or column in one colour: a ruled line or frame, not a figure
 
@@ -48,10 +49,9 @@ def find_background(rgba: UInt8[np.ndarray, "height width 4"]) -> Background:
         SheetError: the border has no dominant colour.
     """
     ring = _ring(rgba.shape[0], rgba.shape[1])
-    see_through = rgba[..., 3] < 128
-    if see_through[ring].mean() > LEAST_SURE:
-        nothing = np.zeros(see_through.shape, dtype=bool)
-        sure = float(see_through[ring].mean())
+    if is_transparent(rgba):
+        nothing = np.zeros(rgba.shape[:2], dtype=bool)
+        sure = float((rgba[ring][:, 3] < 128).mean())
         return Background(None, sure, 0, rgba[..., 3] == 0, nothing)
     rgb, sure, tolerance = _dominant(rgba[ring][:, :3])
     if sure < LEAST_SURE:
@@ -62,6 +62,20 @@ def find_background(rgba: UInt8[np.ndarray, "height width 4"]) -> Background:
     like = difference(rgba[..., :3], rgb) <= tolerance
     like |= _ruled_lines(rgba[..., :3], like)
     return _flood(like, ring, rgb, sure, tolerance)
+
+
+def is_transparent(rgba: UInt8[np.ndarray, "height width 4"]) -> bool:
+    """Return whether the sheet's own alpha tells the figures from the background."""
+    return bool((rgba[..., 3] < 128).mean() > TRANSPARENT)
+
+
+def flattened(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
+    """Return an opaque picture: what is see-through shows white paper."""
+    if (rgba[..., 3] == 255).all():
+        return rgba
+    alpha = rgba[..., 3:] / 255.0
+    rgb = np.rint(rgba[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
+    return np.dstack([rgb, np.full(rgb.shape[:2], 255, dtype=np.uint8)])
 
 
 def difference(

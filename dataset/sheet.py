@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.background import Background, find_background
+from toonset.dataset.background import Background, find_background, flattened, is_transparent
 from toonset.dataset.cutout import cut_out, edge_softness_px
 from toonset.dataset.figures import Blobs, Grouping, find_blobs, group_blobs
 from toonset.dataset.holes import BorderLook, open_holes, outline_look
@@ -72,6 +72,8 @@ def split_sheet(
         SheetError: blank, no plain background, nothing on it large enough, far too many figures.
     """
     options = options or SheetOptions()
+    if not is_transparent(rgba):
+        rgba = flattened(rgba)
     ground = find_background(rgba)
     blobs = find_blobs(~ground.outside)
     _check_blobs(blobs, ground)
@@ -168,7 +170,7 @@ def _warnings(
     ground: Background, grouping: Grouping, views: list[View], holes: int
 ) -> tuple[str, ...]:
     found = []
-    if ground.sure < SURE_ENOUGH:
+    if ground.rgb is not None and ground.sure < SURE_ENOUGH:
         found.append(f"only {ground.sure:.0%} of the sheet's border is background")
     if grouping.captions:
         found.append(f"text beside the figures was left out ({grouping.captions} patches)")

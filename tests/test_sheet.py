@@ -156,6 +156,21 @@ def test_a_transparent_sheet_is_cut_by_its_own_alpha() -> None:
     assert main_colors(sheet) == [0, 1, 2, 3]
 
 
+def test_transparency_counts_even_where_the_figure_fills_the_border() -> None:
+    picture = np.full((80, 60, 4), (*RED, 255), dtype=np.uint8)
+    picture[:20, :12] = (*BLUE, 0)  # hidden colour under no coverage
+    sheet = split_sheet(picture)
+    assert sheet.background is None
+    assert np.array_equal(sheet.views[0].rgba[..., 3], picture[..., 3])
+
+
+def test_a_stray_transparent_pixel_shows_paper() -> None:
+    picture = row_of_four().rgba
+    picture[3, 4] = (0, 0, 0, 0)
+    assert main_colors(split_sheet(picture)) == [0, 1, 2, 3]
+    assert split_sheet(picture).warnings == ()
+
+
 def test_views_come_in_reading_order() -> None:
     sheet = split_sheet(row_of_four().rgba)
     assert main_colors(sheet) == [0, 1, 2, 3]
