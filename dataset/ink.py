@@ -78,12 +78,12 @@ def draw(
         outline_px: width of the silhouette line in pixels of the result; 0 = no lines.
         supersample: samples per pixel and axis.
     """
-    figure = (labels != UNLABELLED).astype(np.float64)
-    ink = np.zeros(labels.shape)
+    figure = (labels != UNLABELLED).astype(np.float32)
+    ink = np.zeros_like(figure)
     if outline_px > 0:
         half = outline_px * supersample / 2
         for distance, reach in ((lines.silhouette, half), (lines.inner, INNER_LINE * half)):
-            ink = np.maximum(ink, np.clip(reach - distance + 0.5, 0, 1))
+            ink = np.maximum(ink, np.clip(np.float32(reach + 0.5) - distance, 0, 1))
     flat = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[labels]
     alpha = _shrink(np.maximum(figure, ink), supersample)
     colors = _shrink(flat * (figure * (1 - ink))[..., None], supersample)
@@ -131,15 +131,19 @@ def _distance(marked: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "he
 
 
 def _shrink(picture: np.ndarray, factor: int) -> np.ndarray:
-    height, width = (n // factor for n in picture.shape[:2])
-    blocks = picture.reshape(height, factor, width, factor, *picture.shape[2:])
-    return blocks.mean(axis=(1, 3))
+    """Return the mean of every block of pixels."""
+    height, width = picture.shape[:2]
+    return cv2.resize(picture, (width // factor, height // factor), interpolation=cv2.INTER_AREA)
 
 
 def _unmixed(labels: np.ndarray, factor: int) -> np.ndarray:
-    height, width = (n // factor for n in labels.shape)
-    blocks = labels.reshape(height, factor, width, factor)
-    return blocks.min(axis=(1, 3)) == blocks.max(axis=(1, 3))
+    """Return in which blocks all labels are the same."""
+    first = labels[::factor, ::factor]
+    same = np.ones(first.shape, dtype=bool)
+    for row in range(factor):
+        for column in range(factor):
+            same &= labels[row::factor, column::factor] == first
+    return same
 
 
 def _bytes(values: np.ndarray) -> np.ndarray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +23,7 @@ from toonset.dataset.scene import UNLABELLED
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
 from toonset.dataset.synthetic_files import write_turnaround
-from toonset.dataset.transforms import read_cameras
+from toonset.dataset.transforms import NativeCamera, read_cameras
 from toonset.errors import CameraError, MeshError, SetupError, SheetError
 from toonset.mesh import Mesh
 
@@ -294,3 +296,33 @@ def test_missing_driver_is_named(case: str, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(gl_render, "_pyrender", lambda: SimpleNamespace(OffscreenRenderer=fail))
     with pytest.raises(SetupError, match=INSTALL):
         gl_render._renderer.__wrapped__()
+
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_example_sheet_mannequin_and_cameras_belong_together() -> None:
+    sheet = load_rgba(EXAMPLES / "sheet.png")
+    mannequin = load_mesh(EXAMPLES / "mannequin.obj")
+    views = json.loads((EXAMPLES / "truth.json").read_text())["views"]
+    bodies = []
+    for view in views:
+        camera = NativeCamera(**view["camera"]).camera()
+        seen = render_labels(mannequin, np.zeros(len(mannequin.faces), dtype=int), camera)
+        bodies.append(seen.labels == 0)
+    for i, view in enumerate(views):
+        x, y, w, h = view["cell_box"]
+        drawn = (sheet[y : y + h, x : x + w, :3] < 250).any(axis=-1)
+        covered = [float((drawn & body).sum() / body.sum()) for body in bodies]
+        assert covered[i] > 0.98  # the plain body lies within the drawing of it with its bag
+        assert covered[i] > covered[(i + 1) % len(views)]
+
+
+@pytest.mark.slow
+def test_example_is_what_its_script_makes(tmp_path: Path) -> None:
+    script = EXAMPLES / "make_character.py"
+    subprocess.run([sys.executable, str(script), str(tmp_path)], check=True)
+    for name in ("mannequin.obj", "truth.json"):
+        assert (tmp_path / name).read_bytes() == (EXAMPLES / name).read_bytes()
+    made, kept = (load_rgba(folder / "sheet.png") for folder in (tmp_path, EXAMPLES))
+    assert (np.abs(made.astype(int) - kept) > 32).mean() < 1e-3  # drivers may round differently
