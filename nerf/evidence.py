@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -12,7 +13,7 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.errors import BundleError
 from toonset.nerf.hull import LEVEL, Hull, carve
-from toonset.nerf.march import march, rays_of
+from toonset.nerf.march import march, pixels_near, rays_of
 
 RESOLUTION = 64  # voxels: coarse, since only the ranking matters
 MOST_LEFT_OUT = 8  # views tried
@@ -50,9 +51,11 @@ def choose_missing(
 
 def mask_iou(hull: Hull, camera: Camera, alpha: Float[Tensor, "height width"]) -> float:
     """Return the intersection over union of the hull's outline and a mask in one view."""
-    samples = march(rays_of(camera, camera.pixel_grid().reshape(-1, 2), hull), hull, hull.voxel, 1)
-    seen = torch.zeros(samples.rays, dtype=torch.bool)
-    seen[samples.ray] = True
+    near = pixels_near(camera, hull).reshape(-1)
+    pixels = camera.pixel_grid().reshape(-1, 2)[near]
+    samples = march(rays_of(camera, pixels, hull), hull, hull.voxel, 1)
+    seen = torch.zeros(len(near), dtype=torch.bool)
+    seen[torch.as_tensor(np.flatnonzero(near))[samples.ray]] = True
     drawn = (alpha >= LEVEL).reshape(-1)
     return float((seen & drawn).sum() / (seen | drawn).sum())
 

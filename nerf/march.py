@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.nerf.hull import BLOCK, LEVEL, Hull
 
-RAYS_PER_CHUNK = 1 << 14
+RAYS_PER_CHUNK = 1 << 12  # intermediate arrays stay in cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,32 @@ def rays_of(camera: Camera, pixels: Float[np.ndarray, "n 2"], hull: Hull) -> Ray
     return Rays(*(torch.as_tensor(a, dtype=torch.float32) for a in (origins, directions, start)))
 
 
+def pixels_near(camera: Camera, hull: Hull) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels whose rays may meet the hull; those left out certainly miss it.
+
+    Every voxel that can hold a sample lies in a block, within 0.87 block edges of its centre.
+    The picture is cut into tiles at least as large as a block appears, so the voxel appears in
+    the tile of that centre or in one next to it.
+    """
+    width, height = camera.size_wh
+    cells = np.argwhere(hull.blocks.numpy())
+    edge = BLOCK * hull.voxel
+    pixels, depth, in_front = camera.project(hull.low + edge * (cells + 0.5))
+    relative = 1 + camera.k * (depth - edge)
+    if not in_front.all() or relative.min(initial=1.0) <= 0:
+        return np.ones((height, width), dtype=bool)  # the camera stands inside: nothing is sure
+    scale = camera.scale * max(1.0, camera.pixel_aspect)
+    tile = max(1.0, float((edge * scale / relative).max(initial=0.0)))
+    shape = (int(height / tile) + 3, int(width / tile) + 3)  # one more tile on every side
+    at = np.floor(pixels[:, ::-1] / tile).astype(int) + 1
+    at = at[((at >= 0) & (at < shape)).all(axis=1)]
+    tiles = np.zeros(shape, dtype=np.float32)
+    tiles[at[:, 0], at[:, 1]] = 1
+    near = F.max_pool2d(torch.as_tensor(tiles)[None], 3, stride=1, padding=1)[0].numpy() > 0
+    rows, columns = (np.floor((np.arange(n) + 0.5) / tile).astype(int) + 1 for n in (height, width))
+    return near[np.ix_(rows, columns)]
+
+
 def march(rays: Rays, hull: Hull, step: float, most: int) -> Samples:
     """Return the first `most` samples inside the hull of every ray.
 
@@ -79,11 +106,12 @@ def march(rays: Rays, hull: Hull, step: float, most: int) -> Samples:
     bounds = range(0, total, RAYS_PER_CHUNK)
     parts = [_march_chunk(rays, slice(i, i + RAYS_PER_CHUNK), hull, step) for i in bounds]
     ray = torch.cat([part[0] + i for part, i in zip(parts, bounds, strict=True)])
-    distance = torch.cat([part[1] for part in parts])
+    distance, points = (torch.cat([part[i] for part in parts]) for i in (1, 2))
     order = order_in_ray(ray, total)
-    kept = order < most
-    ray, distance, order = ray[kept], distance[kept], order[kept]
-    return Samples(_points(rays, ray, distance), ray, order, distance, total)
+    if bool((order >= most).any()):
+        kept = order < most
+        ray, distance, points, order = ray[kept], distance[kept], points[kept], order[kept]
+    return Samples(points, ray, order, distance, total)
 
 
 def order_in_ray(ray: Int[Tensor, " n"], rays: int) -> Int[Tensor, " n"]:
@@ -95,7 +123,7 @@ def order_in_ray(ray: Int[Tensor, " n"], rays: int) -> Int[Tensor, " n"]:
 
 def _march_chunk(
     rays: Rays, part: slice, hull: Hull, step: float
-) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"]]:
+) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"], Float[Tensor, "n 3"]]:
     rays = Rays(rays.origins[part], rays.directions[part], rays.start[part])
     near, far = _clip(rays, hull)
     stride = max(1, int(BLOCK * hull.voxel / step + 1e-6))  # steps that stay next to one block
@@ -108,16 +136,19 @@ def _march_chunk(
     ray = ray.repeat_interleave(stride)
     number = (number[:, None] + torch.arange(stride)).reshape(-1)
     distance = near[ray] + step * (number + 0.5)
-    close = hull.lookup(hull.near, _points(rays, ray, distance), 1)
-    ray, distance = ray[close], distance[close]
-    inside = hull.support_at(_points(rays, ray, distance)) >= LEVEL
-    return ray[inside], distance[inside]
+    points = _points(rays, ray, distance)
+    close = hull.lookup(hull.near, points, 1).nonzero()[:, 0]
+    points = points[close]
+    inside = (hull.support_at(points) >= LEVEL).nonzero()[:, 0]
+    close = close[inside]
+    return ray[close], distance[close], points[inside]
 
 
 def _points(
     rays: Rays, ray: Int[Tensor, " n"], distance: Float[Tensor, " n"]
 ) -> Float[Tensor, "n 3"]:
-    return torch.addcmul(rays.origins[ray], rays.directions[ray], distance[:, None])
+    origins, directions = rays.origins.index_select(0, ray), rays.directions.index_select(0, ray)
+    return origins.addcmul_(directions, distance[:, None])
 
 
 def _clip(rays: Rays, hull: Hull) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"]]:

@@ -17,7 +17,7 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.dataset.scene import UNLABELLED
 from toonset.nerf.losses import straight
-from toonset.nerf.march import Rays, Samples, march, rays_of
+from toonset.nerf.march import Rays, Samples, march, pixels_near, rays_of
 from toonset.nerf.rendering import compositing_weights, padded
 from toonset.nerf.trained import TrainedField
 
@@ -55,8 +55,8 @@ def render(trained: TrainedField, camera: Camera) -> Rendering:
     """Return the view of `camera`, orthographic or pinhole, of any size."""
     width, height = camera.size_wh
     fine = camera.resized(RAYS_PER_SIDE)
-    pixels = fine.pixel_grid().reshape(-1, 2)
-    rays = rays_of(fine, pixels, trained.hull)
+    near = pixels_near(fine, trained.hull).reshape(-1)
+    rays = rays_of(fine, fine.pixel_grid().reshape(-1, 2)[near], trained.hull)
     color, opacity, distance = _render_rays(trained, rays)
     shares = _label_shares(trained, color, opacity)
     forward = torch.as_tensor(np.array(camera.rotation[2]), dtype=torch.float32)
@@ -64,7 +64,9 @@ def render(trained: TrainedField, camera: Camera) -> Rendering:
     # distance is opacity-weighted, hence the opacity before the constant parts
     depth = opacity * (rays.origins @ forward - offset) + distance * (rays.directions @ forward)
     columns = [color, opacity[:, None], depth[:, None], *([] if shares is None else [shares])]
-    table = torch.cat(columns, dim=1)
+    seen_table = torch.cat(columns, dim=1)
+    table = torch.zeros(len(near), seen_table.shape[1])
+    table[torch.as_tensor(near)] = seen_table
     s = RAYS_PER_SIDE
     mean = table.view(height, s, width, s, -1).mean(dim=(1, 3)).numpy()
     alpha = mean[..., 3].clip(0, 1)
