@@ -202,13 +202,13 @@ def hair() -> tuple[Part, ...]:
             (0.48, 1.06, -0.15),
             (0.53, 0.97, -0.13),
         ],
-        [0.05, 0.09, 0.115, 0.1, 0.06, 0.008],
+        [0.05, 0.09, 0.115, 0.1, 0.058, 0.014],
         0.05,
     )
     cap = blended(0.02, without(HAIR_CAP, opening), FRINGE, locks, tuft)
     return (
         Part("hair", HAIR, cap, 0.027),
-        Part("ponytail", HAIR, tail, 0.034),
+        Part("ponytail", HAIR, tail, 0.027),
         Part(
             "hair band", SCARF, ring((0.315, 1.47, -0.145), (1, 0.05, -0.25), 0.052, 0.042), MIDDLE
         ),
@@ -220,16 +220,10 @@ def clothes() -> tuple[Part, ...]:
         [(0.05, 0.97, 0.24), (0.09, 0.86, 0.29), (0.11, 0.73, 0.36)], [0.045, 0.058, 0.078], 0.02
     )
     hem = rounded_common(0.012, grown(COAT_BODY, 0.016), slab((0, 0.555, 0), (0, 1, 0), 0.044))
-    buttons = blended(
-        1e-4,
-        ellipsoid((0.02, 0.83, 0.125), (0.026, 0.026, 0.03)),
-        ellipsoid((0.02, 0.72, 0.155), (0.026, 0.026, 0.03)),
-    )
     cuff = common(grown(SLEEVE_LONG, 0.014), slab((0.335, 0.67, 0.02), (0.66, -0.75, 0.05), 0.03))
     return (
         Part("coat", COAT, COAT_BODY, COARSE),
         Part("hem", CREAM, hem, 0.026),
-        Part("buttons", SCARF, buttons, FINE),
         Part("sleeves", COAT, both_sides(SLEEVE), 0.03),
         Part("cuffs", CREAM, both_sides(cuff), MIDDLE),
         Part("scarf", SCARF, SCARF_ROUND, 0.028),
