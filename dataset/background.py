@@ -15,6 +15,9 @@ CLUSTER_RADIUS = 32  # levels: border pixels this near to the dominant colour ar
 LEAST_TOLERANCE = 2  # levels: a picture without noise still holds rounding
 MOST_TOLERANCE = 48  # levels: beyond it figures would be eaten, whatever the noise
 TRANSPARENT = 0.01  # of the sheet: less see-through area is an accident, not a background
+HALO_WIDTH = 8  # levels: noise of the file falls off within about so many
+CLEAR_HALO = 4.0  # times as many pixels as a little farther from the background: noise at all
+HALO = 2.0  # times as many pixels as a little farther: still noise
 LEAST_SURE = 0.3  # of the border: less in one colour is no background
 LINE_SHARE = 0.8  # of a row or column in one colour: a ruled line or frame, not a figure
 
@@ -59,7 +62,9 @@ def find_background(rgba: UInt8[np.ndarray, "height width 4"]) -> Background:
             f"the background is not one colour (the commonest takes {sure:.0%} of the border); put "
             "the figures on a plain or a transparent background"
         )
-    like = difference(rgba[..., :3], rgb) <= tolerance
+    away = difference(rgba[..., :3], rgb)
+    tolerance = max(tolerance, _halo(away))
+    like = away <= tolerance
     like |= _ruled_lines(rgba[..., :3], like)
     return _flood(like, ring, rgb, sure, tolerance)
 
@@ -117,6 +122,22 @@ def _dominant(colors: UInt8[np.ndarray, "n 3"]) -> tuple[tuple[int, int, int], f
     tolerance = int(np.clip(np.ceil(2 * noise), LEAST_TOLERANCE, MOST_TOLERANCE))
     red, green, blue = (round(float(x)) for x in center)
     return (red, green, blue), float(near.mean()), tolerance
+
+
+def _halo(away: UInt8[np.ndarray, "height width"]) -> int:
+    """Return how far, in levels, compression has spread the background's colour near figures.
+
+    A soft edge passes all differences from the background equally often; ringing around edges
+    (JPEG) adds small ones, the smaller the more. The level is where that decay ends.
+    """
+    often = np.bincount(away.ravel(), minlength=256).astype(np.float64)
+    for level in range(1, MOST_TOLERANCE):
+        here = often[level : level + 3].mean()
+        beyond = np.median(often[level + HALO_WIDTH : level + 3 * HALO_WIDTH])
+        surplus = CLEAR_HALO if level == 1 else HALO  # chance makes small surpluses
+        if here <= surplus * beyond + 3 * np.sqrt(beyond) + 1:
+            return level
+    return MOST_TOLERANCE
 
 
 def _flood(

@@ -250,16 +250,17 @@ def test_a_dark_figure_has_no_contour() -> None:
     assert view.line_width_px == 0
 
 
-@pytest.mark.parametrize("quality", [60, 85, 95])
-def test_jpeg_noise_makes_no_figures(quality: int) -> None:
-    drawing = row_of_four(line=2)
+@pytest.mark.parametrize("line", [0, 2])
+@pytest.mark.parametrize("quality", [60, 75, 85, 95])
+def test_jpeg_noise_neither_makes_figures_nor_fattens_them(quality: int, line: float) -> None:
+    drawing = row_of_four(line=line)
     buffer = io.BytesIO()
     Image.fromarray(drawing.rgba[..., :3]).save(buffer, "JPEG", quality=quality)
     picture = np.asarray(Image.open(buffer).convert("RGBA"))
     sheet = split_sheet(picture)
     assert main_colors(sheet) == [0, 1, 2, 3]
     overlap = (pasted(sheet, picture.shape) >= 128) ^ (drawing.coverage >= 128)
-    assert overlap.sum() < 0.02 * (drawing.coverage >= 128).sum()
+    assert overlap.sum() < 0.01 * (drawing.coverage >= 128).sum()
 
 
 def test_frame_and_guide_lines_are_no_figures() -> None:
