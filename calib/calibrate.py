@@ -28,7 +28,7 @@ from toonset.calib.hypotheses import (
     with_twins,
 )
 from toonset.calib.joint import JointFit, choose_model, fit_sheet
-from toonset.calib.judge import judge_sheet, judge_view
+from toonset.calib.judge import judge_sheet, judge_view, with_sheet_in_mind
 from toonset.calib.pose import Pose
 from toonset.calib.result import Calibration
 from toonset.calib.rim import Surface, prepare_surface
@@ -112,9 +112,11 @@ def calibrate(
             for drawing, pose, c in zip(fine, joint.poses, candidates, strict=True)
         ]
         sure = probabilities(final)
-        judged = tuple(
-            judge_view(view, fine[i], surface, joint, i, final[i], sure[i])
-            for i, view in enumerate(views)
+        judged = with_sheet_in_mind(
+            [
+                judge_view(view, fine[i], surface, joint, i, final[i], sure[i])
+                for i, view in enumerate(views)
+            ]
         )
     verdict, reason = judge_sheet(judged)
     return Calibration(judged, model, joint.offset, joint.noise, verdict, reason, seconds)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import EFFECTIVE_POINTS, Drawing, ElevationPrior, Fit, align, tilt
+from toonset.calib.align import INDEPENDENT_POINTS, Drawing, ElevationPrior, Fit, align, tilt
 from toonset.calib.pose import Pose
 from toonset.calib.rim import Surface
 from toonset.camera import rotation_distance
@@ -52,7 +52,7 @@ def refine(
         if all(angle > SAME_POSE for angle in apart):
             distinct.append(fit)
     costs = np.array([fit.cost for fit in distinct])
-    return Candidates(tuple(distinct), 0.5 * EFFECTIVE_POINTS * np.log(costs / costs[0]))
+    return Candidates(tuple(distinct), 0.5 * INDEPENDENT_POINTS * np.log(costs / costs[0]))
 
 
 def with_twins(poses: Sequence[Pose]) -> list[Pose]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import Drawing, measure
+from toonset.calib.align import EFFECTIVE_POINTS, INDEPENDENT_POINTS, Drawing, measure
 from toonset.calib.hypotheses import Candidates, is_twin
 from toonset.calib.joint import JointFit
 from toonset.calib.pose import PARAMETERS, Pose
@@ -16,6 +17,7 @@ from toonset.calib.rim import Surface
 from toonset.camera import angles_from_rotation, rotation_distance
 from toonset.view import View
 
+DEFLATION = EFFECTIVE_POINTS / INDEPENDENT_POINTS  # of the solver's covariance
 SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
 WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
 FAILED_COVERAGE = 0.70
@@ -37,7 +39,7 @@ def judge_view(
     size_wh = (view.rgba.shape[1], view.rgba.shape[0])
     fit = measure(drawing, surface, drawing.pose_in(pose))
     own = slice(PARAMETERS * index, PARAMETERS * (index + 1))
-    covariance = _in_view_pixels(joint.covariance[own, own], drawing.factor)
+    covariance = _in_view_pixels(DEFLATION * joint.covariance[own, own], drawing.factor)
     far = [
         (float(p), f.pose)
         for p, f in zip(probability, candidates.fits, strict=True)
@@ -62,6 +64,24 @@ def judge_view(
         fit.coverage,
         verdict,
         reason,
+    )
+
+
+def with_sheet_in_mind(views: Sequence[ViewCalibration]) -> tuple[ViewCalibration, ...]:
+    """Return the views; none is ok where the mannequin's shape is wrong in the typical view.
+
+    A wrong body can match a side view's outline well, at a wrong angle.
+    """
+    typical = float(np.median([view.coverage for view in views]))
+    if typical >= WEAK_COVERAGE:
+        return tuple(views)
+    reason = (
+        f"in the sheet's typical view {100 * (1 - typical):.0f} % of the outlines are more than "
+        "5 % of the height apart: the mannequin's shape differs from the drawings'"
+    )
+    return tuple(
+        replace(view, verdict="weak", reason=reason) if view.verdict == "ok" else view
+        for view in views
     )
 
 

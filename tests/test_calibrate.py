@@ -1,0 +1,139 @@
+"""Calibration end to end, on synthetic turnarounds with known cameras."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from toonset.bench.calib import view_error
+from toonset.calib.calibrate import calibrate
+from toonset.calib.overlay import draw_overlay
+from toonset.calib.report import calibration_dict
+from toonset.dataset.bodies import random_body
+from toonset.dataset.sheet import split_sheet
+from toonset.dataset.synth_options import SynthOptions
+from toonset.dataset.synthetic import make_turnaround
+from toonset.mesh import Mesh
+
+CLEAN = SynthOptions(views=5, cell_px=220, outline_px=0, elevation_deg=8)
+DRAWN = dataclasses.replace(CLEAN, outline_px=2, warp_percent=0.6, yaw_jitter_deg=12)
+
+
+def solved(options, seed, *, symmetric=False, mannequin=None):
+    turnaround = make_turnaround(random_body(seed, symmetric=symmetric), options, seed)
+    found = calibrate(split_sheet(turnaround.sheet).views, mannequin or turnaround.mesh)
+    errors = [
+        view_error(view.camera, camera.rotation, view.verdict)
+        for view, camera in zip(found.views, turnaround.cameras, strict=True)
+    ]
+    return turnaround, found, errors
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return solved(CLEAN, 11)
+
+
+@pytest.mark.parametrize("seed", [21, 22])
+def test_drawn_sheets_are_solved_within_the_drawing_error(seed):
+    _, found, errors = solved(DRAWN, seed)
+    assert np.median([math.degrees(e.raw) for e in errors]) < 5
+    assert not [e for e in errors if e.verdict == "ok" and math.degrees(e.raw) > 15]
+    assert found.model.model == "orthographic"
+
+
+def test_clean_sheets_are_solved_to_a_fraction_of_a_degree(clean):
+    turnaround, found, errors = clean
+    assert max(math.degrees(e.raw) for e in errors) < 1.0
+    assert found.verdict == "ok"
+    assert found.model.model == "orthographic"
+    for view, camera, cell in zip(
+        found.views, turnaround.cameras, split_sheet(turnaround.sheet).views, strict=True
+    ):
+        # same pixels, once the crop's place in the sheet and the cell's are taken into account
+        points = turnaround.mesh.vertices[::50]
+        seen = view.camera.project(points)[0] + cell.box[:2]
+        index = found.views.index(view)
+        true = camera.project(points)[0] + turnaround.views[index].box[:2]
+        assert np.abs(seen - true).max() < 1.0
+
+
+def test_sigmas_are_small_for_clean_drawings_and_grow_with_the_drawing_error(clean):
+    _, drawn, _ = solved(DRAWN, 11)
+    for precise, rough in zip(clean[1].views, drawn.views, strict=True):
+        assert 0 < precise.sigmas.yaw < rough.sigmas.yaw < math.radians(20)
+
+
+def test_perspective_is_found_only_where_it_is():
+    near = dataclasses.replace(CLEAN, distance_heights=2.5)
+    _, found, errors = solved(near, 31)
+    assert found.model.model == "perspective"
+    assert found.model.distance_heights == pytest.approx(2.5, rel=0.05)
+    assert max(math.degrees(e.raw) for e in errors) < 1.0
+
+
+def test_a_symmetric_body_at_eye_level_is_called_ambiguous():
+    level = dataclasses.replace(CLEAN, elevation_deg=0, warp_percent=0.6)
+    _, found, errors = solved(level, 41, symmetric=True)
+    for view, error in zip(found.views, errors, strict=True):
+        assert view.verdict != "ok" or math.degrees(error.raw) < 15
+    assert found.verdict != "ok"
+    assert max(view.p_flip for view in found.views) > 0.05
+
+
+def test_a_vase_has_no_yaw_and_is_not_called_ok():
+    profile = [[0, 0], [0.3, 0], [0.2, 0.6], [0.35, 1.2], [0, 1.6]]
+    vase = trimesh.creation.revolve(profile, sections=40)
+    upright = np.array(vase.vertices)[:, [1, 2, 0]]
+    mesh = Mesh(upright, np.array(vase.faces))
+    turnaround = make_turnaround(mesh, CLEAN, 1)
+    found = calibrate(split_sheet(turnaround.sheet).views, mesh)
+    assert {view.verdict for view in found.views} <= {"weak", "ambiguous", "failed"}
+
+
+def test_another_body_is_not_called_ok():
+    _, found, errors = solved(DRAWN, 51, mannequin=random_body(58))
+    assert found.verdict != "ok"
+    assert not [e for e in errors if e.verdict == "ok" and math.degrees(e.raw) > 15]
+
+
+def test_one_drawing_alone_is_fitted_and_called_weak():
+    turnaround = make_turnaround(random_body(61), CLEAN, 61)
+    view = split_sheet(turnaround.sheet).views[1]
+    found = calibrate([view], turnaround.mesh)
+    error = view_error(found.views[0].camera, turnaround.cameras[1].rotation, "ok")
+    assert math.degrees(error.raw) < 2
+    assert found.verdict == "weak"
+    assert "single drawing" in found.reason
+
+
+def test_moving_and_enlarging_the_sheet_moves_only_shift_and_scale(clean):
+    turnaround, found, _ = clean
+    larger = np.kron(turnaround.sheet, np.ones((2, 2, 1), np.uint8))
+    framed = np.pad(larger, ((13, 7), (31, 5), (0, 0)), constant_values=255)
+    again = calibrate(split_sheet(framed).views, turnaround.mesh)
+    for a, b in zip(found.views, again.views, strict=True):
+        change = view_error(b.camera, a.camera.rotation, "ok").raw
+        assert math.degrees(change) < 0.7
+        assert b.camera.scale == pytest.approx(2 * a.camera.scale, rel=0.005)
+
+
+def test_the_same_input_gives_the_same_bits(clean):
+    turnaround, found, _ = clean
+    again = calibrate(split_sheet(turnaround.sheet).views, turnaround.mesh)
+    one, two = (calibration_dict(c) | {"seconds": None} for c in (found, again))
+    assert json.dumps(one) == json.dumps(two)
+
+
+def test_the_overlay_follows_the_drawing(clean):
+    turnaround, found, _ = clean
+    views = split_sheet(turnaround.sheet).views
+    picture = draw_overlay(views, turnaround.mesh, found).astype(int)
+    blue = (picture[..., 2] > picture[..., 0] + 60) & (picture[..., 2] > picture[..., 1] + 30)
+    assert blue.sum() > 3000  # the outline of every "ok" view is drawn in blue
+    rotated = dataclasses.replace(found, views=found.views[::-1])
+    other = draw_overlay(views, turnaround.mesh, rotated).astype(int)
+    assert np.abs(other - picture).sum() > 0
