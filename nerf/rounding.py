@@ -27,6 +27,9 @@ SIGMA = 1.5  # coarse voxels of blur per round, 2 % of the body's size
 ROUNDS = 6
 SOFTEN = 0.7  # coarse voxels: turns the last yes/no grid into a surface between the voxels
 NEAR_BEST = 0.98  # of a ray's best value: also kept, lest the ray hangs on a single voxel
+# The least of many noisy values is biased low, and training can empty a voxel that is inside by
+# mistake but not fill one that is outside: 1.4 gains 1.2 dB on left-out views, 2 loses again.
+GAIN = 1.4
 ALL = 1 << 20  # samples per ray: no limit
 
 
@@ -49,7 +52,8 @@ def rounded(hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor]) -> 
     smooth = F.interpolate(soft, size=hull.support.shape, mode="trilinear")[0, 0]
     last = _MaskRays.of(hull, cameras, alphas, hull.voxel).last_voxels(smooth, NEAR_BEST)
     kept = F.max_pool3d(last[None, None].float(), 3, stride=1, padding=1)[0, 0]
-    return replace(hull, support=torch.minimum(hull.support, torch.maximum(smooth, kept)))
+    support = torch.minimum(hull.support, torch.maximum(smooth, kept))
+    return replace(hull, support=(GAIN * support).clamp_max(1))
 
 
 def _coarse(hull: Hull) -> Hull:
