@@ -70,8 +70,8 @@ def train(scene: Scene, options: TrainOptions, progress: Progress | None = None)
     history, stopped = fit(model, moved, weights, options, generator, tell)
     model.to("cpu")
     clock.append(time.perf_counter())
-    names = ("hull", "rays", "steps")
-    seconds = dict(zip(names, np.diff(clock).tolist(), strict=True))
+    hull_s, rays_s, steps_s = np.diff(clock).tolist()
+    seconds = {"hull": hull_s, "rays": rays_s, "steps": steps_s}
     counts = {
         "views": len(scene.frames),
         "rays": sum(len(batch.rgb) for batch in batches),

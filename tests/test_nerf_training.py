@@ -17,6 +17,7 @@ from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError, PaletteError
 from toonset.nerf import fitting
 from toonset.nerf.animation import encode_gif
+from toonset.nerf.batches import Batch
 from toonset.nerf.evaluation import evaluate
 from toonset.nerf.labelling import labelled
 from toonset.nerf.layers import alpha_picture, color_picture, depth_picture, palette_picture
@@ -93,7 +94,7 @@ def test_new_views_are_predicted(training: Training) -> None:
     test = held_out()
     found = evaluate(training.result, test)
     # What wrong fields reach: nothing, and the picture of a neighbouring training view.
-    blank = [compare(np.zeros_like(f.rgba), f.rgba)["psnr"] for f in test.frames]
+    blank = [compare(np.zeros_like(f.rgba), f.rgba)["psnr"] or 0 for f in test.frames]
     copied = [
         max(compare(t.rgba, f.rgba)["psnr"] or 0 for t in train_scene().frames) for f in test.frames
     ]
@@ -125,11 +126,13 @@ def test_same_seed_same_bits_other_seed_other_bits() -> None:
 def test_a_loss_that_is_no_number_keeps_the_last_good_state(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    real: Callable[..., tuple[torch.Tensor, ...]] = fitting.loss_terms
+    real = fitting.loss_terms
     calls = iter(range(1000))
 
-    def poisoned(*arguments: object) -> tuple[torch.Tensor, ...]:
-        first, *rest = real(*arguments)
+    def poisoned(
+        model: fitting.Model, batch: Batch, weights: fitting.Weights
+    ) -> tuple[torch.Tensor, ...]:
+        first, *rest = real(model, batch, weights)
         return (first * (float("nan") if next(calls) == 25 else 1.0), *rest)
 
     monkeypatch.setattr(fitting, "loss_terms", poisoned)
@@ -198,7 +201,7 @@ def test_recolor_replaces_one_colour_and_nothing_else(training: Training) -> Non
     assert before.shares is not None
     untouched = before.shares[..., index] == 0
     np.testing.assert_array_equal(a[untouched], b[untouched])
-    full = (before.shares[..., index] > 0.97 * before.alpha) & (before.alpha > 0.5)
+    full = (before.shares[..., index] > 0.99 * before.alpha) & (before.alpha > 0.5)
     assert full.sum() > 20
     assert np.abs(b[full][:, :3].astype(int) - [0, 255, 0]).max() <= 3
     with pytest.raises(PaletteError, match="choose one of them"):
