@@ -79,8 +79,16 @@ def calib_cases(folder: Path | None, seed: int, count: int) -> Iterator[CalibCas
         )
 
 
-def train_cases(folder: Path | None, seed: int, count: int) -> Iterator[TrainCase]:
+def train_cases(
+    folder: Path | None, seed: int, count: int, *, half: bool = False
+) -> Iterator[TrainCase]:
     """Yield the folder's training cases, or `count` synthetic ones at 150 px.
+
+    Args:
+        folder: case folders; None for synthetic ones.
+        seed: first seed of the synthetic ones.
+        count: of the synthetic ones.
+        half: reduce a folder's pictures to half their size.
 
     Raises:
         BundleError: the folder holds no case.
@@ -97,7 +105,24 @@ def train_cases(folder: Path | None, seed: int, count: int) -> Iterator[TrainCas
         return
     for case in _folders(folder, "views/transforms.json"):
         train, test = read_scene(case / "views"), read_scene(case / "test")
+        if half:
+            train, test = _halved(train), _halved(test)
         yield TrainCase(case.name, _group(case), train, test)
+
+
+def _halved(scene: Scene) -> Scene:
+    """Return the scene at half size: area average of premultiplied colour."""
+    halves = []
+    for frame in scene.frames:
+        height, width = (n // 2 * 2 for n in frame.rgba.shape[:2])
+        rgba = frame.rgba[:height, :width].astype(np.float64)
+        rgba[..., :3] *= rgba[..., 3:] / 255
+        small = rgba.reshape(height // 2, 2, width // 2, 2, 4).mean(axis=(1, 3))
+        small[..., :3] *= 255 / np.maximum(small[..., 3:], 1e-6)
+        camera = frame.camera.moved((0, 0), (width, height)).resized(0.5)
+        picture = np.clip(small + 0.5, 0, 255).astype(np.uint8)
+        halves.append(Frame(frame.name, camera, picture))
+    return Scene(tuple(halves), scene.palette, scene.name)
 
 
 def _scene(turnaround: Turnaround) -> Scene:

@@ -1,9 +1,14 @@
-"""Which of a view's local optima is right: probabilities under the sheet's common elevation.
+"""Which of a view's local optima is right: probabilities under what the views of a sheet share.
 
 Every view has several refined candidates; mirror twins are always among them. A candidate's
-negative log-likelihood is n_eff / 2 * log(cost), noise profiled out, with the effective number of
-independent outline samples. Views of one sheet share their elevation up to a few degrees, which a
-twin (yaw -> 180 - yaw, elevation -> -elevation) breaks unless all flip together.
+negative log-likelihood is n / 2 * log(cost), noise profiled out, with the number n of independent
+outline errors. Two things tie the views together, both unknown and summed out on a grid:
+
+- one elevation, up to a few degrees: it separates twins (yaw -> 180 - yaw, elevation ->
+  -elevation) unless all views flip together;
+- an evenly spaced turn, yaw_i = start +- i * 360 / views, in either direction. Most sheets are one
+  (and most start at the front), but a sheet that is none stays possible: "no turn" is one of the
+  alternatives, and evidence decides.
 """
 
 from __future__ import annotations
@@ -17,12 +22,17 @@ from jaxtyping import Float
 from toonset.calib.align import INDEPENDENT_POINTS, Drawing, ElevationPrior, Fit, align, tilt
 from toonset.calib.pose import Pose
 from toonset.calib.rim import Surface
-from toonset.camera import rotation_distance
+from toonset.camera import angles_from_rotation, rotation_distance
 
 SAME_POSE = np.radians(8.0)  # candidates nearer than this are one
 MIRROR = np.radians(15.0)  # a candidate this near to the twin's rotation is the twin
 ELEVATION_GRID = np.radians(np.arange(-30.0, 61.0, 2.5))
-SHEET_ELEVATION = ElevationPrior(sigma=np.radians(4.0))  # of a view about its sheet's elevation
+ELEVATION_SIGMA = np.radians(4.0)  # of a view about its sheet's elevation
+TURN_VIEWS = 4  # fewer views make no turn
+TURN_STARTS = 24  # of the first view's yaw
+TURN_SIGMA = np.radians(8.0)  # of a view about its place in the turn
+P_TURN = 0.5  # before looking: half of all sheets are evenly spaced turns
+P_FRONT_FIRST = 0.5  # of the turns: start at the front; the others start anywhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +46,21 @@ class Candidates:
 
     fits: tuple[Fit, ...]
     energies: Float[np.ndarray, " n"]
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """What the views might share: a grid of hypotheses.
+
+    Attributes:
+        elevations: (h,) radians.
+        yaws: (h, views) radians; nan where the hypothesis says nothing about yaw.
+        log_prior: (h,).
+    """
+
+    elevations: Float[np.ndarray, " h"]
+    yaws: Float[np.ndarray, "h views"]
+    log_prior: Float[np.ndarray, " h"]
 
 
 def refine(
@@ -60,51 +85,71 @@ def with_twins(poses: Sequence[Pose]) -> list[Pose]:
     return [*poses, *(pose.twin() for pose in poses)]
 
 
-def choose_together(views: Sequence[Candidates]) -> list[int]:
-    """Return each view's candidate under the best common elevation."""
-    totals = []
-    for prior in _common_elevations():
-        best = [float(energies_with(view, prior).min()) for view in views]
-        totals.append(sum(best) - _log_prior(prior))
-    prior = _common_elevations()[int(np.argmin(totals))]
-    return [int(energies_with(view, prior).argmin()) for view in views]
-
-
-def probabilities(views: Sequence[Candidates]) -> list[Float[np.ndarray, " n"]]:
-    """Return every candidate's probability, the common elevation summed out.
-
-    P(c | sheet) = sum_e P(e | sheet) P(c | e); a flip of the whole sheet is the elevation -e.
-    """
-    given, evidence = [], []
-    for prior in _common_elevations():
-        energies = [energies_with(view, prior) for view in views]
-        given.append([np.exp(e.min() - e) / np.exp(e.min() - e).sum() for e in energies])
-        log_each = [-e.min() + np.log(np.exp(e.min() - e).sum()) for e in energies]
-        evidence.append(float(np.sum(log_each)) + _log_prior(prior))
-    weights = np.exp(np.array(evidence) - max(evidence))
-    weights /= weights.sum()
-    return [
-        np.sum([w * per_view[i] for w, per_view in zip(weights, given, strict=True)], axis=0)
-        for i in range(len(views))
-    ]
-
-
-def energies_with(view: Candidates, prior: ElevationPrior) -> Float[np.ndarray, " n"]:
-    """Return energies with an elevation prior; its tails are heavy, as one view may differ."""
-    elevations = np.array([tilt(fit.pose)[0][1] for fit in view.fits])
-    off = (elevations - prior.mean) / prior.sigma
-    return view.energies + 2.0 * np.log1p(off**2 / 4.0)
-
-
 def is_twin(pose: Pose, other: Pose) -> bool:
     """Return whether `other` is the mirror twin of `pose` up to refinement."""
     return rotation_distance(pose.twin().rotation, other.rotation) < MIRROR
 
 
-def _common_elevations() -> list[ElevationPrior]:
-    return [ElevationPrior(float(e), SHEET_ELEVATION.sigma) for e in ELEVATION_GRID]
+def choose_together(views: Sequence[Candidates]) -> list[int]:
+    """Return each view's candidate under the best shared hypothesis."""
+    shared = shared_hypotheses(len(views))
+    energies = [_energies(view, shared, i) for i, view in enumerate(views)]
+    total = np.sum([e.min(axis=1) for e in energies], axis=0) - shared.log_prior
+    best = int(np.argmin(total))
+    return [int(e[best].argmin()) for e in energies]
 
 
-def _log_prior(sheet: ElevationPrior) -> float:
+def probabilities(views: Sequence[Candidates]) -> list[Float[np.ndarray, " n"]]:
+    """Return every candidate's probability: P(c) = sum_h P(h | sheet) P(c | h)."""
+    shared = shared_hypotheses(len(views))
+    energies = [_energies(view, shared, i) for i, view in enumerate(views)]
+    lowest = [e.min(axis=1, keepdims=True) for e in energies]
+    weights = [np.exp(low - e) for low, e in zip(lowest, energies, strict=True)]
+    log_evidence = shared.log_prior + np.sum(
+        [np.log(w.sum(axis=1)) - low[:, 0] for w, low in zip(weights, lowest, strict=True)], axis=0
+    )
+    posterior = np.exp(log_evidence - log_evidence.max())
+    posterior /= posterior.sum()
+    return [posterior @ (w / w.sum(axis=1, keepdims=True)) for w in weights]
+
+
+def shared_hypotheses(views: int) -> Shared:
+    """Return the grid of common elevations and turns for a sheet of `views` drawings."""
     wide = ElevationPrior()
-    return -0.5 * ((sheet.mean - wide.mean) / wide.sigma) ** 2
+    log_elevation = -0.5 * ((ELEVATION_GRID - wide.mean) / wide.sigma) ** 2
+    log_elevation -= np.log(np.exp(log_elevation).sum())
+    turns = np.full((1, views), np.nan)
+    log_turn = np.zeros(1)
+    if views >= TURN_VIEWS:
+        starts = np.arange(TURN_STARTS) * 2 * np.pi / TURN_STARTS
+        steps = np.arange(views) * 2 * np.pi / views
+        places = np.concatenate([starts[:, None] + steps, starts[:, None] - steps])
+        p_start = np.full(TURN_STARTS, (1 - P_FRONT_FIRST) / TURN_STARTS)
+        p_start[0] += P_FRONT_FIRST
+        turns = np.concatenate([turns, places])
+        log_turn = np.log(np.concatenate([[1 - P_TURN], np.tile(P_TURN * p_start / 2, 2)]))
+    many, grid = len(turns), len(ELEVATION_GRID)
+    return Shared(
+        np.repeat(ELEVATION_GRID, many),
+        np.tile(turns, (grid, 1)),
+        np.repeat(log_elevation, many) + np.tile(log_turn, grid),
+    )
+
+
+def _energies(view: Candidates, shared: Shared, index: int) -> Float[np.ndarray, "h n"]:
+    """Return the candidates' energies under every shared hypothesis.
+
+    Tails are heavy (Student's t, 3 degrees of freedom): one view may differ from the rest. Without
+    a turn yaw is uniform; the density's constant makes both comparable.
+    """
+    elevation = np.array([tilt(fit.pose)[0][1] for fit in view.fits])
+    yaw = np.array([angles_from_rotation(fit.pose.rotation)[0] for fit in view.fits])
+    tilted = (elevation - shared.elevations[:, None]) / ELEVATION_SIGMA
+    turned = (yaw - shared.yaws[:, index, None] + np.pi) % (2 * np.pi) - np.pi
+    peak = np.log(2 * np.pi / (2.72 * TURN_SIGMA))  # t's density at its mode over the uniform's
+    turn = np.where(np.isnan(turned), 0.0, _tail(turned / TURN_SIGMA) - peak)
+    return view.energies + _tail(tilted) + turn
+
+
+def _tail(z: np.ndarray) -> np.ndarray:
+    return 2.0 * np.log1p(z**2 / 3.0)

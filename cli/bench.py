@@ -1,0 +1,115 @@
+"""`toonset bench`: speed against accuracy, as a table, a chart and records."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption
+
+if TYPE_CHECKING:
+    from toonset.bench.record import Record
+
+
+class Subject(StrEnum):
+    """What is measured."""
+
+    calib = "calib"
+    train = "train"
+
+
+def bench(
+    subject: Annotated[Subject, typer.Argument(help="What to measure.")],
+    cases: Annotated[
+        Path | None,
+        typer.Option("--cases", help="Folders with ground truth (default: synthetic sheets)."),
+    ] = None,
+    only: Annotated[
+        str, typer.Option("--only", help="Cases whose name contains this, e.g. exact.")
+    ] = "",
+    count: Annotated[
+        int, typer.Option("--count", min=1, help="Synthetic cases per condition.")
+    ] = 4,
+    half: Annotated[
+        bool, typer.Option("--half", help="Train on the cases' pictures at half size.")
+    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer settings.")] = False,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Output folder.")] = Path(
+        "bench-results"
+    ),
+    force: ForceFlag = False,
+    seed: SeedOption = 0,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Measure calibration or training: seconds against accuracy, per setting.
+
+    Prints a table and writes records.json and chart.png.
+    """
+    from toonset.bench.record import as_dicts, machine, table
+    from toonset.files import check_new_folder, new_folder, write_bytes, write_json
+
+    printer = Printer(as_json, quiet)
+    check_new_folder(out, force=force)
+    records = _measure(subject, cases, only, count, half, quick, seed, printer)
+    with new_folder(out, force=force) as folder:
+        write_json(folder / "records.json", as_dicts(records))
+        for name, picture in _charts(subject, records, seed).items():
+            write_bytes(folder / name, picture)
+    printer.say(f"machine: {machine()}, seed {seed}")
+    printer.say(f"charts in {out}")
+    printer.result({"records": as_dicts(records)}, table(records))
+
+
+def _measure(
+    subject: Subject,
+    cases: Path | None,
+    only: str,
+    count: int,
+    half: bool,
+    quick: bool,
+    seed: int,
+    printer: Printer,
+) -> list[Record]:
+    from toonset.bench.cases import calib_cases, train_cases
+    from toonset.errors import BundleError
+
+    if subject is Subject.calib:
+        from toonset.bench.calib import bench_calibration
+
+        sheets = [case for case in calib_cases(cases, seed, count) if only in case.name]
+        if not sheets:
+            raise BundleError(f"no case's name contains {only!r}; correct --only")
+        return bench_calibration(sheets, seed, quick=quick, progress=printer.progress)
+    from toonset.bench.train import bench_training
+
+    scenes = [c for c in train_cases(cases, seed, count, half=half) if only in c.name]
+    if not scenes:
+        raise BundleError(f"no case's name contains {only!r}; correct --only")
+    return bench_training(scenes, seed, quick=quick, progress=printer.progress)
+
+
+def _charts(subject: Subject, records: list[Record], seed: int) -> dict[str, bytes]:
+    from toonset.bench.chart import Point, draw_chart
+    from toonset.bench.record import machine
+
+    metric = "rotation error modulo twin" if subject is Subject.calib else "held-out PSNR"
+    unit = "deg" if subject is Subject.calib else "dB"
+    charts = {}
+    for group in sorted({record.group for record in records}):
+        own = [record for record in records if record.group == group]
+        seconds = {r.method: r.median for r in own if r.metric == "seconds"}
+        merits = [r for r in own if r.metric == metric]
+        points = [Point(r.method, max(seconds[r.method], 1e-3), r.median, r.p95) for r in merits]
+        charts[f"chart-{group}.png"] = draw_chart(
+            points,
+            title=f"toonset bench {subject.value}, {group}: median, whisker to p95",
+            cost_label="seconds per sheet" if subject is Subject.calib else "seconds of training",
+            merit_label=f"{metric} ({unit})",
+            caption=f"n = {merits[0].n}, seed {seed}, {machine()}",
+            lower_is_better=subject is Subject.calib,
+        )
+    return charts
