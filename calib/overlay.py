@@ -88,7 +88,7 @@ def _captioned(
     yaw, elevation, _ = (math.degrees(angle) for angle in found.camera.angles)
     lines = [
         (f"{found.name[:-4]}  {found.verdict}", INK[found.verdict]),
-        (f"yaw {yaw % 360:.1f}° ± {math.degrees(found.sigmas.yaw):.1f}°", (40, 40, 40)),
+        (f"yaw {round(yaw, 1) % 360:.1f}° ± {math.degrees(found.sigmas.yaw):.1f}°", (40, 40, 40)),
         (f"elev. {elevation:.1f}°  p_flip {found.p_flip:.2f}", (40, 40, 40)),
     ]
     for i, (text, color) in enumerate(lines):

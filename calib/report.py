@@ -52,7 +52,7 @@ def view_line(view: ViewCalibration) -> str:
     """Return one line about a view for people."""
     yaw, elevation, _ = (math.degrees(a) for a in view.camera.angles)
     text = (
-        f"{view.name}  yaw {yaw % 360:6.1f} +- {math.degrees(view.sigmas.yaw):4.1f}  "
+        f"{view.name}  yaw {round(yaw, 1) % 360:6.1f} +- {math.degrees(view.sigmas.yaw):4.1f}  "
         f"elevation {elevation:5.1f} +- {math.degrees(view.sigmas.elevation):4.1f}  "
         f"p_flip {view.p_flip:.2f}  {view.verdict}"
     )
