@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
 
 if TYPE_CHECKING:
     from toonset.bench.record import Record
+
+WRITTEN = ("records.json", "chart-*.png")
 
 
 class Subject(StrEnum):
@@ -50,10 +52,10 @@ def bench(
     Prints a table and writes records.json and chart.png.
     """
     from toonset.bench.record import as_dicts, machine, table
-    from toonset.files import check_new_folder, new_folder, write_bytes, write_json
+    from toonset.files import new_folder, write_bytes, write_json
 
     printer = Printer(as_json, quiet)
-    check_new_folder(out, force=force)
+    check_output(out, [cases], WRITTEN, force=force)
     records = _measure(subject, cases, only, count, half, quick, seed, printer)
     with new_folder(out, force=force) as folder:
         write_json(folder / "records.json", as_dicts(records))

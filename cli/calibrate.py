@@ -7,19 +7,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
 
 if TYPE_CHECKING:
     from toonset.calib.result import Calibration
+    from toonset.mesh import Mesh
     from toonset.view import View
 
+WRITTEN = (
+    *("transforms.json", "images", "calibration.json", "overlay.png"),
+    *("palette.json", "palette.gpl", "labels", "run"),
+)
+LEAST_HEIGHT = 0.01  # of the width; flatter, nothing can be told from its outline
 UNCERTAIN = 3  # exit code: files are written, but a view is not certain
 
 
 def calibrate(
     sheets: Annotated[
         list[Path],
-        typer.Argument(metavar="SHEET...", help="A character sheet, or one file per view."),
+        typer.Argument(metavar="SHEET", help="A character sheet, or one file per view."),
     ],
     mesh: Annotated[Path, typer.Option("--mesh", help="Posed mannequin: obj, ply, stl, glb, off.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Bundle folder.")] = Path("bundle"),
@@ -39,11 +45,11 @@ def calibrate(
     from toonset.calib.report import calibration_dict, model_line, view_line
     from toonset.dataset.bundle import write_bundle
     from toonset.dataset.mesh_file import load_mesh
-    from toonset.files import check_new_folder
 
     printer = Printer(as_json, quiet)
-    check_new_folder(out, force=force)
+    check_output(out, [*sheets, mesh], WRITTEN, force=force)
     mannequin = load_mesh(mesh)
+    _check_upright(mannequin)
     views = _load_views(sheets, printer)
     printer.say(f"{len(views)} views, mannequin of {len(mannequin.faces)} faces")
     options = CalibrationOptions()
@@ -62,6 +68,17 @@ def calibrate(
     printer.result({"bundle": out, **report}, str(out))
     if _uncertain(found):
         raise typer.Exit(UNCERTAIN)
+
+
+def _check_upright(mesh: Mesh) -> None:
+    from toonset.errors import MeshError
+
+    widths = mesh.bounds[1] - mesh.bounds[0]
+    if widths[1] < LEAST_HEIGHT * max(widths):
+        raise MeshError(
+            f"{mesh.name}: {widths[1]:.3g} high (+Y is up) but {max(widths):.3g} wide; turn the "
+            "mannequin upright and export it again"
+        )
 
 
 def _load_views(paths: list[Path], printer: Printer) -> list[View]:

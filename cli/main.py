@@ -6,6 +6,7 @@ Exit codes: 0 fine; 1 our bug; 2 bad input or usage; 3 done, but a view is weak 
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import sys
@@ -18,11 +19,18 @@ from toonset.errors import ToonsetError
 
 VERBS = ("calibrate", "palette", "train", "render", "evaluate", "synth", "bench")
 
+INTERRUPTED = 130
+PLACES_AT_FAULT = (  # what the system says of a place that the user has named, wherever it is used
+    *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP),
+    *(errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ESTALE),
+)
+
 app = typer.Typer(
     name="toonset",
     help="Turn a hand-drawn character sheet into cameras, a palette and a turning character.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # a paragraph flows to the width of the terminal
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
@@ -36,7 +44,10 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def toonset(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print it.")
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
     ] = False,
 ) -> None:
     """Turn a hand-drawn character sheet into cameras, a palette and a turning character."""
@@ -55,15 +66,26 @@ def main() -> None:
     except ToonsetError as error:
         print(f"toonset: {one_line(error)}", file=sys.stderr)
         sys.exit(2)
-    except KeyboardInterrupt:
-        print("toonset: interrupted", file=sys.stderr)
-        sys.exit(130)
+    except SystemExit as leaving:
+        if leaving.code == INTERRUPTED:  # typer has caught Ctrl-C
+            end_line = "\n" if sys.stderr.isatty() else ""
+            print(f"{end_line}toonset: interrupted", file=sys.stderr)
+        raise
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        if error.errno not in PLACES_AT_FAULT or not isinstance(error.filename, str):
+            raise
+        place, reason = one_line(error.filename), error.strerror
+        print(f"toonset: {place}: {reason}; free or choose another place", file=sys.stderr)
+        sys.exit(2)
+    except MemoryError as error:
+        print(f"toonset: out of memory ({one_line(error)}); use smaller input", file=sys.stderr)
+        sys.exit(2)
 
 
-def one_line(error: Exception) -> str:
+def one_line(error: object) -> str:
     """Return the message on one line, without control characters (file names are foreign text)."""
     text = " ".join(str(error).split())
     return "".join(c if c.isprintable() else "?" for c in text)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, check_output
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     Picture = UInt8[np.ndarray, "_ _ 4"]
 
+WRITTEN = ("palette.json", "palette.gpl", "labels")
 BUNDLE, OUT = Path("bundle"), Path("palette")
 HUNDRED = 100.0
 
@@ -46,7 +47,7 @@ def palette(
     for images, or with -o, into a folder of their own.
     """
     from toonset.dataset.palette_files import write_palette
-    from toonset.files import check_new_folder, new_folder
+    from toonset.files import new_folder
     from toonset.palette.extract import label_image
 
     printer = Printer(as_json, quiet)
@@ -54,7 +55,7 @@ def palette(
     bundle = _bundle_of(places)
     target = out or bundle or OUT
     if target != bundle:
-        check_new_folder(target, force=force)
+        check_output(target, places, WRITTEN, force=force)
     named = _pictures(places, bundle, printer)
     found = _choose([picture for _, picture in named], colors, min_share)
     labels = [(name, label_image(picture, found.rgb)) for name, picture in named]

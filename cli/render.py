@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, check_output
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Picture = UInt8[np.ndarray, "height width 4"]
     Named = list[tuple[str, Camera]]
 
+WRITTEN = ("*.png", "turntable.gif")
 LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha")
 
 
@@ -64,13 +65,13 @@ def render(
     layer = "palette" if recolor and layer == "rgb" else layer
     _check_arguments(cameras, views, layer, recolor)
 
-    from toonset.files import check_new_folder, new_folder, write_bytes
+    from toonset.files import new_folder, write_bytes
     from toonset.nerf.recolor import recolored
     from toonset.nerf.run_folder import read_field
     from toonset.nerf.threads import use_threads
 
     use_threads(threads)
-    check_new_folder(out, force=force)
+    check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
     named = _cameras(trained, cameras, views, math.radians(elevation), size)
     animate = gif if gif is not None else views is not None
@@ -89,7 +90,7 @@ def render(
     files = [name for name, _ in named]
     printer.result(
         {"out": out, "layer": layer, "files": files, "gif": animate},
-        f"{out}: {len(files)} pictures ({layer}){extra}",
+        f"{out}: {len(files)} {'picture' if len(files) == 1 else 'pictures'} ({layer}){extra}",
     )
 
 

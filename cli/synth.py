@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
 from toonset.dataset.synth_options import SynthOptions
 
+WRITTEN = ("sheet.png", "views", "labels", "mannequin.obj", "truth.json")
 DEFAULT = SynthOptions()
 
 
@@ -73,10 +74,9 @@ def synth(
     from toonset.dataset.mesh_file import load_mesh
     from toonset.dataset.synthetic import make_turnaround
     from toonset.dataset.synthetic_files import write_turnaround
-    from toonset.files import check_new_folder
 
     printer = Printer(as_json, quiet)
-    check_new_folder(out, force=force)
+    check_output(out, [mesh], WRITTEN, force=force)
     turnaround = make_turnaround(load_mesh(mesh), options, seed)
     write_turnaround(turnaround, out, force=force)
     height, width = turnaround.sheet.shape[:2]

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
 
 if TYPE_CHECKING:
     from toonset.dataset.scene import Scene
 
+WRITTEN = ("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png")
 FEW_VIEWS = 4
 
 
@@ -44,17 +45,19 @@ def train(
         raise typer.BadParameter(f"{device!r} is none of auto, cpu, cuda", param_hint="--device")
     target = out or (bundle.parent if bundle.suffix.lower() == ".json" else bundle) / "run"
     from toonset.dataset.transforms import read_scene
-    from toonset.files import check_new_folder, new_folder
+    from toonset.files import new_folder
 
-    check_new_folder(target, force=force)
+    check_output(target, [bundle], WRITTEN, force=force)
     scene = read_scene(bundle)
 
     from toonset.nerf.options import TrainOptions
     from toonset.nerf.report import write_run
     from toonset.nerf.threads import use_threads
+    from toonset.nerf.training import device_of
     from toonset.nerf.training import train as train_field
 
     use_threads(threads)
+    device_of(device)  # refused before anything is computed or said
     scene = _with_palette(scene, no_palette, printer)
     if len(scene.frames) < FEW_VIEWS:
         printer.say(f"only {len(scene.frames)} views: what no drawing shows is a guess")

@@ -67,6 +67,10 @@ def mesh_of_soup(soup: Soup, path: Path) -> Mesh:
     keep = (welded != np.roll(welded, 1, axis=1)).all(axis=1)  # three different corners
     if not keep.any():
         raise MeshError(f"{path}: every face is a line or a point; export the mesh's triangles")
+    corners = vertices[welded[keep]]
+    edges = corners[:, 1:] - corners[:, :1]
+    if not np.cross(edges[:, 0], edges[:, 1]).any():
+        raise MeshError(f"{path}: every face is a line or a point; export the mesh's triangles")
     used, compact = np.unique(welded[keep], return_inverse=True)
     return Mesh(
         vertices=vertices[used],

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from toonset import frames as conventions
 from toonset.camera import Camera
-from toonset.dataset.picture import load_indexed_png, load_rgba, picture_size
+from toonset.dataset.picture import MAX_PIXELS, load_indexed_png, load_rgba, picture_size
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError, CameraError
 from toonset.palette.files import read_palette_json
@@ -26,6 +26,7 @@ from toonset.palette.files import read_palette_json
 FAR_HEIGHTS = 100.0  # body heights to the far pinhole that stands for an orthographic view
 MAX_JSON_BYTES = 32 * 2**20
 MAX_FRAMES = 10_000
+LARGEST = 1e9  # world units, pixels, and pixels per unit either way: float32 still tells
 DISTORTION_KEYS = ("k1", "k2", "k3", "k4", "p1", "p2")
 
 
@@ -201,8 +202,9 @@ def _read_frames(
         picture = _picture_path(file.parent, frame.file_path, where, must_exist=need_pictures)
         try:
             camera = _camera_of(parsed, frame, picture)
+            _check_range(camera)
         except (CameraError, BundleError) as error:
-            raise BundleError(f"{where}: {error}") from error
+            raise BundleError(f"{where}: {error}; correct the file") from error
         result.append((frame, camera, picture))
     return result
 
@@ -227,7 +229,8 @@ def validation_reason(error: ValidationError) -> str:
     """Return where and what the first problem of a schema check is."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])
-    return f"field {place}: {first['msg']} ({error.error_count()} problem(s)); correct the file"
+    where = f"field {place}" if place else "the whole"
+    return f"{where}: {first['msg']} ({error.error_count()} problem(s)); correct the file"
 
 
 def _picture_path(root: Path, file_path: str, where: str, *, must_exist: bool) -> Path | None:
@@ -235,12 +238,17 @@ def _picture_path(root: Path, file_path: str, where: str, *, must_exist: bool) -
     if not Path(file_path).suffix:
         candidates.append(root / f"{file_path}.png")
     for candidate in candidates:
-        if not candidate.resolve().is_relative_to(root.resolve()):
+        try:
+            inside = candidate.resolve().is_relative_to(root.resolve())
+            is_file = candidate.is_file()
+        except (OSError, ValueError) as error:  # too long, a loop of links, a NUL
+            raise BundleError(f"{where}: is no file name; correct file_path") from error
+        if not inside:
             raise BundleError(f"{where}: lies outside of the folder; pictures must be inside it")
-        if candidate.is_file():
+        if is_file:
             return candidate
     if must_exist:
-        raise BundleError(f"{where}: the picture does not exist")
+        raise BundleError(f"{where}: the picture does not exist; put it there")
     return None
 
 
@@ -255,9 +263,10 @@ def _camera_of(defaults: _Intrinsics, frame: _FrameRecord, picture: Path | None)
         name: getattr(frame, name) if getattr(frame, name) is not None else getattr(defaults, name)
         for name in _Intrinsics.model_fields
     }
-    matrix = np.array(frame.transform_matrix, dtype=np.float64)
-    if matrix.shape != (4, 4) or np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
+    rows = frame.transform_matrix
+    if [len(row) for row in rows] != [4] * 4 or not np.allclose(rows[3], [0, 0, 0, 1], 0, 1e-6):
         raise BundleError("transform_matrix must be 4 x 4 with last row 0 0 0 1")
+    matrix = np.array(rows, dtype=np.float64)
     size = _size_wh(values, picture)
     fx = _focal_px(values, size[0])
     fy = values["fl_y"] or fx
@@ -265,6 +274,17 @@ def _camera_of(defaults: _Intrinsics, frame: _FrameRecord, picture: Path | None)
     cy = size[1] / 2 if values["cy"] is None else values["cy"]
     K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
     return Camera.from_pinhole(conventions.opencv_pose_from_opengl(matrix), K, size)
+
+
+def _check_range(camera: Camera) -> None:
+    numbers = np.abs([*camera.target, *camera.center, camera.scale, camera.k, 1 / camera.scale])
+    if numbers.max() > LARGEST:
+        raise BundleError(f"camera: {numbers.max():.3g}, at most {LARGEST:g} is computed with")
+    width, height = camera.size_wh
+    if width * height > MAX_PIXELS:
+        raise BundleError(
+            f"size {width:.3g} x {height:.3g} px, at most {MAX_PIXELS / 1e6:g} megapixels are drawn"
+        )
 
 
 def _size_wh(values: dict[str, Any], picture: Path | None) -> tuple[int, int]:
@@ -277,6 +297,8 @@ def _size_wh(values: dict[str, Any], picture: Path | None) -> tuple[int, int]:
 
 def _focal_px(values: dict[str, Any], width: int) -> float:
     if values["fl_x"] is not None:
+        if values["fl_x"] <= 0:
+            raise BundleError(f"fl_x is {values['fl_x']:g}, a positive number is needed")
         return float(values["fl_x"])
     angle = values["camera_angle_x"]
     if angle is None or not 0 < angle < math.pi:

@@ -51,7 +51,7 @@ def train(scene: Scene, options: TrainOptions, progress: Progress | None = None)
     """
     tell = progress or (lambda _: None)
     clock = [time.perf_counter()]
-    device = _device(options.device)
+    device = device_of(options.device)
     torch.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
     tell("carving the hull")
@@ -134,7 +134,12 @@ def _typical_camera(scene: Scene, hull: Hull) -> tuple[float, int]:
     return float(np.median(ks)), max(max(c.size_wh) for c in cameras)
 
 
-def _device(name: str) -> torch.device:
+def device_of(name: str) -> torch.device:
+    """Return the device of "auto", "cpu" or "cuda".
+
+    Raises:
+        SetupError: a GPU is asked for and there is none.
+    """
     if name == "auto":
         name = "cuda" if torch.cuda.is_available() else "cpu"
     if name == "cuda" and not torch.cuda.is_available():

@@ -76,5 +76,5 @@ def test_a_file_in_the_way_is_refused(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(OutputError, match="is a file, a folder is needed"):
         check_new_folder(tmp_path / "out", force=True)
-    with pytest.raises(OutputError, match="not writable"):
+    with pytest.raises(OutputError, match="is a file, not a folder"):
         check_new_folder(tmp_path / "out" / "deeper")

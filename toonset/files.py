@@ -79,15 +79,25 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
             its parent cannot be written.
     """
     path = Path(os.path.abspath(path))
+    try:
+        existing = next(p for p in (path, *path.parents) if p.exists())
+    except OSError as error:  # a name that is too long, a loop of links
+        raise _output_error(path, error) from error
     if path.exists() and not path.is_dir():
         raise OutputError(f"{path}: is a file, a folder is needed; choose another -o")
     if path.is_dir() and any(path.iterdir()) and not force:
         raise OutputError(
             f"{path}: exists already; pass --force to replace it, or choose another -o"
         )
-    existing = next(p for p in (path, *path.parents) if p.exists())
-    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
-        raise OutputError(f"{path}: {existing} is not writable; choose another -o")
+    if not existing.is_dir():
+        raise OutputError(f"{path}: {existing} is a file, not a folder; choose another -o")
+    try:  # by trying: permission bits say nothing to root, nor about read-only disks
+        os.rmdir(tempfile.mkdtemp(prefix=f".{path.name[:64]}.", suffix=".tmp", dir=existing))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(
+            f"{path}: {existing} is not writable ({reason}); choose another -o"
+        ) from error
 
 
 def _swap_in(temporary: Path, path: Path) -> None:
