@@ -11,6 +11,7 @@ with A, B such that the nearest and farthest vertex lie just inside clip_z / cli
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 from dataclasses import dataclass
@@ -138,6 +139,9 @@ def _gl_mesh(vertices: np.ndarray, faces: np.ndarray) -> Any:
 @cache
 def _pyrender() -> Any:
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")  # read at import
+    # Mesa's LLVM and Triton's in one process: only this order does not crash when torch trains.
+    with contextlib.suppress(ImportError):
+        importlib.import_module("triton")
     try:
         pyrender: Any = importlib.import_module("pyrender")
     except ImportError as error:  # no libEGL

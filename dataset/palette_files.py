@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,10 +11,11 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.picture import encode_indexed_png
-from toonset.errors import OutputError
-from toonset.files import new_folder, write_bytes, write_json
+from toonset.files import new_folder, write_bytes
 from toonset.palette.files import to_gpl, to_json
 from toonset.palette.palette import Palette
+
+PALETTE_GPL, PALETTE_JSON = "palette.gpl", "palette.json"
 
 Labels = Sequence[tuple[str, UInt8[np.ndarray, "_ _"]]]
 
@@ -20,7 +23,8 @@ Labels = Sequence[tuple[str, UInt8[np.ndarray, "_ _"]]]
 def write_palette(folder: Path, palette: Palette, labels: Labels) -> None:
     """Write palette.json, palette.gpl and labels/ into an existing folder, replacing older ones.
 
-    palette.json is taken away first and written last: whenever it is there, the labels fit it.
+    Everything is written beside the old files first and renamed at the end, palette.json last: a
+    full disk leaves the older palette as it was, and whenever palette.json is there, labels fit it.
 
     Args:
         folder: a bundle, or a new folder.
@@ -30,14 +34,16 @@ def write_palette(folder: Path, palette: Palette, labels: Labels) -> None:
     Raises:
         OutputError: the folder cannot be written.
     """
-    try:
-        (folder / "palette.json").unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"{folder}: cannot be written ({error.strerror}); check its permissions"
-        ) from error
-    with new_folder(folder / "labels", force=True) as temporary:
+    files = {
+        PALETTE_GPL: to_gpl(palette).encode(),
+        PALETTE_JSON: (json.dumps(to_json(palette), indent=2, allow_nan=False) + "\n").encode(),
+    }
+    placed = folder / "labels"
+    with new_folder(placed, force=True) as temporary:
         for name, values in labels:
             write_bytes(temporary / name, encode_indexed_png(values, palette.rgb))
-    write_bytes(folder / "palette.gpl", to_gpl(palette).encode())
-    write_json(folder / "palette.json", to_json(palette))
+        for name, data in files.items():
+            write_bytes(temporary / name, data)
+        (folder / PALETTE_JSON).unlink(missing_ok=True)
+    for name in files:
+        os.replace(placed / name, folder / name)
