@@ -71,7 +71,7 @@ def _bundle_of(places: list[Path]) -> Path | None:
     """Return the bundle's folder, or None where pictures are given."""
     from toonset.errors import BundleError
 
-    folders = [place for place in places if place.is_dir() or place.suffix.lower() == ".json"]
+    folders = [place for place in places if _is_meant_as_bundle(place)]
     if not folders and places != [BUNDLE]:
         return None
     if len(places) > 1:
@@ -79,6 +79,11 @@ def _bundle_of(places: list[Path]) -> Path | None:
             f"{(folders or places)[0]}: a bundle stands alone; name one bundle, or only pictures"
         )
     return places[0].parent if places[0].suffix.lower() == ".json" else places[0]
+
+
+def _is_meant_as_bundle(place: Path) -> bool:
+    missing = not place.suffix and not place.exists()  # the bundle's reader says so
+    return missing or place.is_dir() or place.suffix.lower() == ".json"
 
 
 def _pictures(

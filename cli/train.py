@@ -59,7 +59,7 @@ def train(
     use_threads(threads)
     device_of(device)  # refused before anything is computed or said
     scene = _with_palette(scene, no_palette, printer)
-    if len(scene.frames) < FEW_VIEWS:
+    if 1 < len(scene.frames) < FEW_VIEWS:
         printer.say(f"only {len(scene.frames)} views: what no drawing shows is a guess")
     options = TrainOptions(steps=steps, budget_s=budget, seed=seed, device=device)
     training = train_field(scene, options, printer.progress)

@@ -1,0 +1,329 @@
+"""The command line as a user types it: results, exit codes, what is printed where."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.transforms import read_cameras
+
+VERBS = ("calibrate", "palette", "train", "render", "evaluate", "synth", "bench")
+BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png"}
+VIEWS = 5
+FAST = ("--threads", 1, "--device", "cpu")
+# Runs verbs one after the other in one fresh process, then prints what they have imported.
+PROGRAM = """
+import json, sys
+from toonset.cli.main import main
+codes = []
+for arguments in json.loads(sys.argv[1]):
+    sys.argv = ["toonset", *arguments]
+    try:
+        main()
+        codes.append(0)
+    except SystemExit as leaving:
+        codes.append(leaving.code or 0)
+print("\\n" + json.dumps([codes, sorted({name.split(".")[0] for name in sys.modules})]))
+"""
+
+
+def imported_by(*commands: list[str]) -> tuple[list[int], set[str]]:
+    """Return the exit codes of commands and every top-level module imported by all of them."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, json.dumps(commands)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    codes, modules = json.loads(done.stdout.splitlines()[-1])
+    return codes, set(modules)
+
+
+# ---- help and usage
+
+
+def test_help_of_every_verb_imports_nothing_heavy():
+    codes, modules = imported_by(["-h"], ["--version"], *([verb, "--help"] for verb in VERBS))
+    assert codes == [0] * (len(VERBS) + 2)
+    heavy = {"torch", "cv2", "numpy", "scipy", "kornia", "trimesh", "pyrender", "PIL", "matplotlib"}
+    assert not modules & heavy
+
+
+def test_no_arguments_show_the_help_and_a_wrong_verb_the_right_one(shell):
+    bare = shell()
+    assert bare.code == 2
+    assert all(verb in bare.out + bare.err for verb in VERBS)
+    wrong = shell("calbrate")
+    assert (wrong.code, wrong.out) == (2, "")
+    assert "No such command 'calbrate'. Did you mean 'calibrate'" in wrong.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["calibrate"], ["Missing argument 'SHEET'"]),
+        (["calibrate", "a.png"], ["Missing option '--mesh'"]),
+        (["calibrate", "a.png", "--mesh", "m.obj", "--forse"], ["--forse", "--force"]),
+        (["calibrate", "a.png", "--mesh", "m.obj", "--seed", "x"], ["--seed", "integer"]),
+        (["train", "--steps", "0"], ["--steps", "1"]),
+        (["train", "--device", "tpu"], ["tpu", "auto, cpu, cuda"]),
+        (["render", "run"], ["Missing option '-o'"]),
+        (["render", "run", "-o", "x"], ["either --cameras", "--turntable"]),
+        (["render", "run", "-o", "x", "--turntable", "0"], ["--turntable", "1"]),
+        (["render", "run", "-o", "x", "--turntable", "2", "--layer", "z"], ["'z'", "palette"]),
+        (["evaluate", "run"], ["Missing option '--test'"]),
+        (["bench", "nerf"], ["nerf", "calib", "train"]),
+    ],
+)
+def test_usage_mistakes_name_the_argument(
+    arguments, words, toonset, snapshot, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    done = toonset(*arguments)
+    assert (done.code, done.out) == (2, "")
+    said = " ".join(done.err.replace("│", " ").split())
+    assert all(word in said for word in words), said
+    assert "Traceback" not in said
+    assert snapshot(tmp_path) == {}
+
+
+# ---- one sheet through every verb
+
+
+def test_calibrate_prints_one_json_object_and_nothing_else(calibrated):
+    bundle, done = calibrated
+    assert (done.code, done.err) == (0, "")
+    assert done.json["bundle"] == str(bundle)
+    assert done.json["verdict"] == "ok"
+    assert [view["name"] for view in done.json["views"]] == [f"{i:03d}.png" for i in range(VIEWS)]
+    assert {path.name for path in bundle.iterdir()} == BUNDLE_FILES
+    assert json.loads((bundle / "calibration.json").read_text()).items() <= done.json.items()
+    yaws = [view["camera"]["yaw_deg"] % 360 for view in done.json["views"]]
+    true = [72 * i for i in range(VIEWS)]
+    assert max(abs((a - b + 180) % 360 - 180) for a, b in zip(yaws, true, strict=True)) < 5
+
+
+def test_train_prints_one_json_object_and_progress_apart(trained):
+    run, done = trained
+    assert done.code == 0
+    assert done.json["run"] == str(run)
+    assert done.json["steps"] == 20
+    assert "palette, extracted" in done.err
+    assert {"model.safetensors", "config.json", "metrics.json", "history.csv"} <= {
+        path.name for path in run.iterdir()
+    }
+
+
+def test_a_moved_bundle_goes_through_every_verb(bundle: Path, toonset, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # the default names: ./bundle, bundle/run
+    found = toonset("palette", "--json")
+    assert (found.code, found.err) == (0, "")
+    assert len(found.json["colors"]) >= 4
+    made = toonset("train", "--steps", 2, *FAST, "--quiet")
+    assert (made.code, made.err) == (0, "")
+    assert (bundle / "run" / "model.safetensors").is_file()
+    shown = toonset("render", "bundle/run", "--cameras", "bundle", "-o", "views", "--json")
+    assert shown.code == 0
+    assert shown.json["files"] == [f"{i:03d}.png" for i in range(VIEWS)]
+    for name, camera in read_cameras(bundle):
+        assert Image.open(tmp_path / "views" / Path(name).name).size == camera.size_wh
+    turned = toonset(
+        *("render", "bundle/run", "--turntable", 3, "--size", 24, "-o", "turn", "--quiet"),
+        *("--layer", "palette"),
+    )
+    assert (turned.code, turned.err) == (0, "")
+    assert turned.out == "turn: 3 pictures (palette) and turntable.gif\n"
+    assert len(list((tmp_path / "turn").iterdir())) == 4
+    judged = toonset("evaluate", "bundle/run", "--test", "bundle", "--json")
+    assert judged.code == 0
+    assert set(judged.json["rgb"]) >= {"psnr", "psnr_mask", "ssim"}
+    assert len(judged.json["views"]) == VIEWS
+
+
+def test_a_single_figure_is_fitted_and_called_weak(drawn: Path, toonset, tmp_path):
+    done = toonset(
+        "calibrate", drawn / "single.png", "--mesh", drawn / "mannequin.obj", "-o", tmp_path / "b"
+    )
+    assert done.code == 3
+    assert done.out == f"{tmp_path / 'b'}\n"
+    assert "sheet: weak (" in done.err  # with the reason
+    assert {path.name for path in (tmp_path / "b").iterdir()} == BUNDLE_FILES
+    assert json.loads((tmp_path / "b" / "calibration.json").read_text())["verdict"] == "weak"
+
+
+def test_several_files_are_views_in_the_order_given(
+    drawn: Path, calibrated, toonset, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    sheet = Image.open(drawn / "sheet.png")
+    side = sheet.height
+    names = ["front view.png", "à gauche.png", "後.png"]  # spaces and letters of any script
+    for i, name in enumerate(names):
+        sheet.crop((side * i, 0, side * (i + 1), side)).save(tmp_path / name)
+    done = toonset("calibrate", *names, "--mesh", drawn / "mannequin.obj", "-o", "b ü", "--json")
+    assert done.code in (0, 3)  # three views tell less than five
+    assert set(done.json["inputs"]) == {*names, "mannequin.obj"}
+    for i in range(len(names)):
+        mine, whole = (
+            folder / "images" / f"{i:03d}.png" for folder in (Path("b ü"), calibrated[0])
+        )
+        assert np.array_equal(np.asarray(Image.open(mine)), np.asarray(Image.open(whole)))
+
+
+def without_seconds(bundle: Path) -> dict[str, Any]:
+    calibration = json.loads((bundle / "calibration.json").read_text())
+    del calibration["seconds"]
+    files = {
+        str(path.relative_to(bundle)): path.read_bytes()
+        for path in bundle.rglob("*")
+        if path.is_file() and path.name != "calibration.json"
+    }
+    return files | {"calibration.json": json.dumps(calibration)}
+
+
+def test_another_process_writes_the_same_bundle(drawn: Path, calibrated, shell, tmp_path):
+    done = shell("calibrate", drawn / "sheet.png", "--mesh", drawn / "mannequin.obj", cwd=tmp_path)
+    assert (done.code, done.out) == (0, "bundle\n")
+    assert without_seconds(tmp_path / "bundle") == without_seconds(calibrated[0])
+
+
+def test_transforms_json_means_what_nerfstudio_reads(drawn: Path, calibrated):
+    """Projected by nerfstudio's rules alone, the mannequin meets the native camera's pixels."""
+    bundle = calibrated[0]
+    content = json.loads((bundle / "transforms.json").read_text())
+    vertices = load_mesh(drawn / "mannequin.obj").vertices
+    native = dict(read_cameras(bundle))
+    assert content["camera_model"] == "OPENCV"
+    for number, frame in enumerate(content["frames"]):
+        assert frame["file_path"] == f"images/{number:03d}.png"
+        assert Image.open(bundle / frame["file_path"]).size == (frame["w"], frame["h"])
+        world_from_camera = np.array(frame["transform_matrix"])
+        axes = world_from_camera[:3, :3]
+        assert np.allclose(axes @ axes.T, np.eye(3))
+        x, y, z = ((vertices - world_from_camera[:3, 3]) @ axes).T
+        assert (z < 0).all()  # OpenGL: the camera looks along -z, y is up
+        pixels = np.stack(
+            [frame["cx"] + frame["fl_x"] * x / -z, frame["cy"] - frame["fl_y"] * y / -z], axis=1
+        )
+        error = np.linalg.norm(pixels - native[frame["file_path"]].project(vertices)[0], axis=1)
+        assert error.max() <= frame["toonset"]["pinhole_error_px"] + 1e-6
+        assert frame["toonset"]["pinhole_error_px"] < 1
+
+
+# ---- what must not be needed, and what must not be left
+
+
+def test_no_verb_of_a_user_needs_opengl(drawn: Path, tmp_path):
+    bundle, run, pair = tmp_path / "bundle", tmp_path / "bundle" / "run", tmp_path / "pair.png"
+    sheet = Image.open(drawn / "sheet.png")
+    sheet.crop((0, 0, 2 * sheet.height, sheet.height)).save(pair)
+    mesh = str(drawn / "mannequin.obj")
+    codes, modules = imported_by(
+        ["calibrate", str(pair), "--mesh", mesh, "-o", str(bundle), "-q"],
+        ["palette", str(bundle)],
+        ["train", str(bundle), "--steps", "1", "--threads", "1", "-q"],
+        ["render", str(run), "--turntable", "1", "--size", "16", "-o", str(tmp_path / "t"), "-q"],
+    )
+    assert codes[0] in (0, 3)  # two views may be too few to be sure
+    assert codes[1:] == [0, 0, 0]
+    assert {"torch", "cv2"} <= modules  # the probe sees imports
+    assert not modules & {"pyrender", "OpenGL"}
+
+
+@pytest.mark.parametrize(("verb", "sign"), [("calibrate", "search"), ("train", "training")])
+def test_ctrl_c_leaves_nothing_behind(verb, sign, drawn: Path, bundle: Path, tmp_path, snapshot):
+    arguments: dict[str, list[Any]] = {
+        "calibrate": [drawn / "sheet.png", "--mesh", drawn / "mannequin.obj", "-o", "new"],
+        "train": [bundle, *FAST],
+    }
+    before = snapshot(tmp_path)
+    command = [sys.executable, "-m", "toonset", verb, *map(str, arguments[verb])]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=tmp_path, **pipes) as process:
+        assert process.stderr is not None
+        assert any(sign in line for line in process.stderr)
+        process.send_signal(signal.SIGINT)
+        out, rest = process.communicate(timeout=120)
+    assert (process.returncode, out) == (130, "")
+    assert rest.endswith("toonset: interrupted\n")
+    assert "Traceback" not in rest
+    assert snapshot(tmp_path) == before
+
+
+def test_one_process_can_draw_and_then_train():
+    """Mesa's LLVM used to crash the import of Triton's, which torch's optimisers bring along."""
+    program = """
+from toonset.dataset.bodies import random_body
+from toonset.dataset.synth_options import SynthOptions
+from toonset.dataset.synthetic import make_turnaround
+make_turnaround(random_body(0), SynthOptions(views=1, cell_px=32), 0)
+import torch
+torch.optim.Adam([torch.zeros(1, requires_grad=True)])
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+# ---- --force
+
+
+def test_force_replaces_an_earlier_result_only(run: Path, toonset, snapshot, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def render(out: str, *more: str):
+        return toonset(
+            "render", run, "--turntable", 1, "--size", 16, "--no-gif", "-o", out, *more, "-q"
+        )
+
+    assert render("turn").code == 0
+    (tmp_path / "turn" / "old.png").write_text("an earlier picture")
+    before = snapshot(tmp_path)
+    assert "exists already; pass --force to replace it" in render("turn").reason
+    assert snapshot(tmp_path) == before
+    assert render("turn", "--force").code == 0
+    assert set(snapshot(tmp_path / "turn")) == {"000.png"}
+
+
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [
+        ("work", "holds 'notes.txt', which this command does not write"),
+        ("drawings", "drawings/sheet.png, --force would delete it"),
+        (".", "which this command does not write"),
+    ],
+)
+def test_force_never_takes_a_users_folder(
+    out, words, drawn: Path, toonset, snapshot, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    for name in ("work", "drawings/images", "drawings/run"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "work" / "notes.txt").write_text("mine")
+    sheet = "drawings/images/sheet.png" if out == "drawings" else "work/sheet.png"
+    shutil.copy(drawn / "single.png", sheet)
+    words = words.replace("drawings/sheet.png", sheet)
+    before = snapshot(tmp_path)
+    done = toonset("calibrate", sheet, "--mesh", drawn / "mannequin.obj", "-o", out, "--force")
+    assert words in done.reason
+    assert snapshot(tmp_path) == before
+
+
+def test_force_never_takes_the_folder_one_stands_in(
+    drawn: Path, bundle: Path, toonset, snapshot, monkeypatch
+):
+    monkeypatch.chdir(bundle / "images")
+    before = snapshot(bundle)
+    done = toonset(
+        "calibrate", drawn / "single.png", "--mesh", drawn / "mannequin.obj", "-o", "..", "--force"
+    )
+    assert "holds the current folder, --force would delete it" in done.reason
+    assert snapshot(bundle) == before
