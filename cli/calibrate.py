@@ -111,7 +111,9 @@ def _provenance(inputs: list[Path], options: Any, seed: int) -> dict[str, Any]:
         "options": asdict(options),
         "seed": seed,
         "versions": {name: version(name) for name in packages},
-        "inputs": {path.name: sha256(path.read_bytes()).hexdigest() for path in inputs},
+        "inputs": [  # views may come from files of the same name in several folders
+            {"name": path.name, "sha256": sha256(path.read_bytes()).hexdigest()} for path in inputs
+        ],
     }
 
 
