@@ -51,10 +51,14 @@ def calibrate(
     mannequin = load_mesh(mesh)
     _check_upright(mannequin)
     views = _load_views(sheets, printer)
-    printer.say(f"{len(views)} views, mannequin of {len(mannequin.faces)} faces")
+    count = "1 view" if len(views) == 1 else f"{len(views)} views"
+    printer.say(f"{count}, mannequin of {len(mannequin.faces)} faces")
     options = CalibrationOptions()
     found = fit(
-        views, mannequin, options, lambda step, done: printer.progress(f"{step} {done:.0%}")
+        views,
+        mannequin,
+        options,
+        lambda step, done: printer.progress(f"{step} {done:.0%}" if done else step),
     )
     report = calibration_dict(found) | _provenance([*sheets, mesh], options, seed)
     overlay = draw_overlay(views, mannequin, found)

@@ -10,7 +10,7 @@ import errno
 import importlib
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -64,12 +64,10 @@ def main() -> None:
     try:
         app()
     except ToonsetError as error:
-        print(f"toonset: {one_line(error)}", file=sys.stderr)
-        sys.exit(2)
+        _refuse(one_line(error))
     except SystemExit as leaving:
         if leaving.code == INTERRUPTED:  # typer has caught Ctrl-C
-            end_line = "\n" if sys.stderr.isatty() else ""
-            print(f"{end_line}toonset: interrupted", file=sys.stderr)
+            _say("interrupted")
         raise
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -78,11 +76,19 @@ def main() -> None:
         if error.errno not in PLACES_AT_FAULT or not isinstance(error.filename, str):
             raise
         place, reason = one_line(error.filename), error.strerror
-        print(f"toonset: {place}: {reason}; free or choose another place", file=sys.stderr)
-        sys.exit(2)
+        _refuse(f"{place}: {reason}; free or choose another place")
     except MemoryError as error:
-        print(f"toonset: out of memory ({one_line(error)}); use smaller input", file=sys.stderr)
-        sys.exit(2)
+        _refuse(f"out of memory ({one_line(error)}); use smaller input")
+
+
+def _refuse(text: str) -> NoReturn:
+    _say(text)
+    sys.exit(2)
+
+
+def _say(text: str) -> None:
+    over_progress = "\r\x1b[K" if sys.stderr.isatty() else ""
+    print(f"{over_progress}toonset: {text}", file=sys.stderr)
 
 
 def one_line(error: object) -> str:
