@@ -53,7 +53,7 @@ def mask_iou(hull: Hull, camera: Camera, alpha: Float[Tensor, "height width"]) -
     """Return the intersection over union of the hull's outline and a mask in one view."""
     near = pixels_near(camera, hull).reshape(-1)
     pixels = camera.pixel_grid().reshape(-1, 2)[near]
-    samples = march(rays_of(camera, pixels, hull), hull, hull.voxel, 1)
+    samples = march(rays_of(camera, pixels, hull), hull, hull.voxel, 1, LEVEL)
     seen = torch.zeros(len(near), dtype=torch.bool)
     seen[torch.as_tensor(np.flatnonzero(near))[samples.ray]] = True
     drawn = (alpha >= LEVEL).reshape(-1)

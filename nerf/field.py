@@ -22,7 +22,7 @@ from torch import Tensor, nn
 from toonset.nerf.bounds import Box
 
 PLANES = ((0, 1), (0, 2), (1, 2))  # axes of each plane: xy, xz, yz
-OPAQUE_AT_START = 0.5  # optical depth of one cell before training: the hull starts half opaque
+OPAQUE_AT_START = 0.1  # optical depth of one cell before training: the hull starts as a mist
 
 
 class TriplaneField(nn.Module):

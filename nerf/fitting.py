@@ -102,7 +102,7 @@ def loss_terms(
 ) -> tuple[Float[Tensor, ""], Float[Tensor, ""], Float[Tensor, ""]]:
     """Return the weighted photometric, cross-entropy and smoothness terms of a batch."""
     color, opacity = render_batch(model.field, batch, weights.step, weights.most)
-    photometric = losses.photometric(color, opacity, batch.rgb)
+    photometric = losses.photometric(color, opacity, batch.rgb, batch.alpha)
     entropy = photometric.new_zeros(())
     if model.classifier is not None:
         logits = model.classifier(losses.straight(color, opacity))
@@ -117,7 +117,8 @@ def render_batch(
     """Return premultiplied colour and opacity of a batch's rays."""
     density, rgb = field.decode(batch.operator(field.planes))
     rays = len(batch.rgb)
-    depth = density.new_zeros(rays * most).index_copy(0, batch.slots, density * step)
+    optical = density * batch.occupancy * step
+    depth = density.new_zeros(rays * most).index_copy(0, batch.slots, optical)
     weights = compositing_weights(depth.view(rays, most))
     weighted = weights.reshape(-1)[batch.slots, None] * rgb
     color = rgb.new_zeros(rays * most, 3).index_copy(0, batch.slots, weighted)

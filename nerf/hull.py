@@ -28,6 +28,7 @@ from toonset.errors import BundleError
 from toonset.nerf.bounds import Box, box_of_masks
 
 LEVEL = 0.5
+EDGE = 0.02  # support from which a point can be part of the figure's soft border
 BLOCK = 4  # voxels along a block's edge
 COARSE = 48  # voxels along the cube in the first carving, which only finds the tight box
 POINTS_PER_CHUNK = 1 << 17  # keeps a chunk's intermediate arrays in cache
@@ -59,8 +60,8 @@ class Hull:
 
     @cached_property
     def near(self) -> Bool[Tensor, "x y z"]:
-        """Return the voxels in which the trilinear support can reach LEVEL."""
-        return _grown(self.inside)
+        """Return the voxels in which the trilinear support can reach EDGE."""
+        return _grown(self.support >= EDGE)
 
     @cached_property
     def blocks(self) -> Bool[Tensor, "bx by bz"]:
@@ -91,6 +92,14 @@ class Hull:
         grid = unit.flip(-1)[None, None, None]  # grid_sample names the last axis first
         volume = self.support[None, None]
         return F.grid_sample(volume, grid, align_corners=False)[0, 0, 0, 0]
+
+
+def occupancy(support: Float[Tensor, " n"]) -> Float[Tensor, " n"]:
+    """Return how much of a point's density counts: 1 inside, falling to 0 across the border.
+
+    A hard border would be as coarse as the samples; a soft one lets outlines fall between pixels.
+    """
+    return (support / LEVEL).clamp(0, 1)
 
 
 def carve(

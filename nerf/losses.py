@@ -12,17 +12,28 @@ from torch import Tensor
 from toonset.dataset.scene import UNLABELLED
 
 BACKDROP = 0.5  # grey behind the figure in training: neither white nor black parts hide holes
-OPACITY_WEIGHT = 0.1  # a drawn pixel is opaque
+OPACITY_WEIGHT = 0.1
 REFERENCE_VIEWS = 8  # views for which `TrainOptions.smoothness` is stated
 OPAQUE_ENOUGH = 0.05  # opacity below which a rendered colour means nothing
 
 
 def photometric(
-    color: Float[Tensor, "rays 3"], opacity: Float[Tensor, " rays"], drawn: Float[Tensor, "rays 3"]
+    color: Float[Tensor, "rays 3"],
+    opacity: Float[Tensor, " rays"],
+    drawn: Float[Tensor, "rays 3"],
+    alpha: Float[Tensor, " rays"],
 ) -> Float[Tensor, ""]:
-    """Return the squared error of premultiplied colours over grey, plus missing opacity."""
-    error = color + (1 - opacity[:, None]) * BACKDROP - drawn
-    return error.square().sum(dim=-1).mean() + OPACITY_WEIGHT * (1 - opacity).square().mean()
+    """Return the squared error of colours over grey, plus that of opacity.
+
+    Args:
+        color: rendered, premultiplied.
+        opacity: rendered.
+        drawn: straight colour of the drawing.
+        alpha: coverage of the drawing.
+    """
+    missing = alpha - opacity
+    error = color - alpha[:, None] * drawn + missing[:, None] * BACKDROP
+    return error.square().sum(dim=-1).mean() + OPACITY_WEIGHT * missing.square().mean()
 
 
 def straight(

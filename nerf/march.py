@@ -1,7 +1,7 @@
 """Samples along rays, kept only inside the hull.
 
-Rays are cut into steps of one fixed length; a step's middle is a sample if the hull's support is at
-least one half there. Marching runs on the inside of two grids: blocks of voxels first, voxels then.
+Rays are cut into steps of one fixed length; a step's middle is a sample if the hull's support
+reaches a level there. Marching runs on two grids: blocks of voxels first, voxels then.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.nerf.hull import BLOCK, LEVEL, Hull
+from toonset.nerf.hull import BLOCK, EDGE, Hull
 
 RAYS_PER_CHUNK = 1 << 12  # intermediate arrays stay in cache
 
@@ -35,6 +35,10 @@ class Rays:
     directions: Float[Tensor, "n 3"]
     start: Float[Tensor, " n"]
 
+    def at(self, index: slice | Tensor) -> Rays:
+        """Return some of the rays."""
+        return Rays(self.origins[index], self.directions[index], self.start[index])
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -45,6 +49,7 @@ class Samples:
         ray: (n,) which ray a sample belongs to, ascending.
         order: (n,) 0 for a ray's first sample, 1 for its second...
         distance: (n,) along the ray, world units, from the ray's origin.
+        support: (n,) the hull's support there.
         rays: how many rays were asked for.
     """
 
@@ -52,6 +57,7 @@ class Samples:
     ray: Int[Tensor, " n"]
     order: Int[Tensor, " n"]
     distance: Float[Tensor, " n"]
+    support: Float[Tensor, " n"]
     rays: int
 
 
@@ -93,25 +99,27 @@ def pixels_near(camera: Camera, hull: Hull) -> Bool[np.ndarray, "height width"]:
     return near[np.ix_(rows, columns)]
 
 
-def march(rays: Rays, hull: Hull, step: float, most: int) -> Samples:
-    """Return the first `most` samples inside the hull of every ray.
+def march(rays: Rays, hull: Hull, step: float, most: int, level: float = EDGE) -> Samples:
+    """Return the first `most` samples of every ray at which the support is `level` or more.
 
     Args:
         rays: where to look.
         hull: where samples may lie.
         step: distance of samples, world units.
         most: samples kept per ray.
+        level: EDGE for the figure with its soft border, LEVEL for its inside alone.
     """
     total = len(rays.origins)
     bounds = range(0, total, RAYS_PER_CHUNK)
-    parts = [_march_chunk(rays, slice(i, i + RAYS_PER_CHUNK), hull, step) for i in bounds]
+    parts = [_march_chunk(rays, slice(i, i + RAYS_PER_CHUNK), hull, step, level) for i in bounds]
     ray = torch.cat([part[0] + i for part, i in zip(parts, bounds, strict=True)])
-    distance, points = (torch.cat([part[i] for part in parts]) for i in (1, 2))
+    distance, points, support = (torch.cat([part[i] for part in parts]) for i in (1, 2, 3))
     order = order_in_ray(ray, total)
     if bool((order >= most).any()):
         kept = order < most
         ray, distance, points, order = ray[kept], distance[kept], points[kept], order[kept]
-    return Samples(points, ray, order, distance, total)
+        support = support[kept]
+    return Samples(points, ray, order, distance, support, total)
 
 
 def order_in_ray(ray: Int[Tensor, " n"], rays: int) -> Int[Tensor, " n"]:
@@ -122,9 +130,9 @@ def order_in_ray(ray: Int[Tensor, " n"], rays: int) -> Int[Tensor, " n"]:
 
 
 def _march_chunk(
-    rays: Rays, part: slice, hull: Hull, step: float
-) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"], Float[Tensor, "n 3"]]:
-    rays = Rays(rays.origins[part], rays.directions[part], rays.start[part])
+    rays: Rays, part: slice, hull: Hull, step: float, level: float
+) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"], Float[Tensor, "n 3"], Float[Tensor, " n"]]:
+    rays = rays.at(part)
     near, far = _clip(rays, hull)
     stride = max(1, int(BLOCK * hull.voxel / step + 1e-6))  # steps that stay next to one block
     strides = ((far - near) / (stride * step)).ceil().clamp_min(0).long()
@@ -139,9 +147,10 @@ def _march_chunk(
     points = _points(rays, ray, distance)
     close = hull.lookup(hull.near, points, 1).nonzero()[:, 0]
     points = points[close]
-    inside = (hull.support_at(points) >= LEVEL).nonzero()[:, 0]
+    support = hull.support_at(points)
+    inside = (support >= level).nonzero()[:, 0]
     close = close[inside]
-    return ray[close], distance[close], points[inside]
+    return ray[close], distance[close], points[inside], support[inside]
 
 
 def _points(

@@ -17,7 +17,7 @@ import torch
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError, SetupError
 from toonset.nerf import losses
-from toonset.nerf.batches import OPAQUE, make_batches
+from toonset.nerf.batches import make_batches
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.evidence import HullEvidence, choose_missing
 from toonset.nerf.field import TriplaneField
@@ -27,6 +27,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.rounding import rounded
 from toonset.nerf.trained import TrainedField, Training
 
+OPAQUE = 128  # alpha from which a pixel belongs to the figure
 CHANNELS, HIDDEN = 16, 32
 CELLS_PER_PX, CELLS = 0.75, (48, 160)
 VOXELS_PER_PX, VOXELS = 1.25, (64, 208)

@@ -11,19 +11,18 @@ from itertools import pairwise
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.dataset.scene import UNLABELLED
+from toonset.nerf.hull import occupancy
 from toonset.nerf.losses import straight
 from toonset.nerf.march import Rays, Samples, march, pixels_near, rays_of
 from toonset.nerf.rendering import compositing_weights, padded
 from toonset.nerf.trained import TrainedField
 
 RAYS_PER_SIDE = 2  # of a pixel; 3 gains 0.04 dB and doubles the time
-FILTER_SIGMA = 0.5  # px; outlines between drawn views are sure to about a pixel, not less
 FIRST_SAMPLES = 8  # of every ray; most rays are opaque by then
 OPAQUE_FROM = 0.99  # opacity at which a ray ends
 RAYS_PER_CHUNK = 1 << 13
@@ -70,7 +69,7 @@ def render(trained: TrainedField, camera: Camera) -> Rendering:
     table = torch.zeros(len(near), seen_table.shape[1])
     table[torch.as_tensor(near)] = seen_table
     s = RAYS_PER_SIDE
-    mean = _filtered(table.view(height, s, width, s, -1).mean(dim=(1, 3))).numpy()
+    mean = table.view(height, s, width, s, -1).mean(dim=(1, 3)).numpy()
     alpha = mean[..., 3].clip(0, 1)
     seen = alpha >= SEEN_FROM
     depth_map = np.where(seen, mean[..., 4] / np.where(seen, alpha, 1), np.nan)
@@ -78,18 +77,6 @@ def render(trained: TrainedField, camera: Camera) -> Rendering:
         return Rendering(mean[..., :3], alpha, depth_map, None, None)
     labels = np.where(seen, mean[..., 5:].argmax(axis=-1), UNLABELLED).astype(np.uint8)
     return Rendering(mean[..., :3], alpha, depth_map, labels, mean[..., 5:])
-
-
-def _filtered(
-    values: Float[Tensor, "height width columns"],
-) -> Float[Tensor, "height width columns"]:
-    """Return premultiplied values under the pixel filter: a Gaussian on top of the box."""
-    kernel = torch.exp(-0.5 * (torch.arange(-1, 2) / FILTER_SIGMA) ** 2)
-    kernel /= kernel.sum()
-    planes = values.permute(2, 0, 1)[:, None]
-    planes = F.conv2d(planes, kernel.view(1, 1, 3, 1), padding=(1, 0))
-    planes = F.conv2d(planes, kernel.view(1, 1, 1, 3), padding=(0, 1))
-    return planes[:, 0].permute(1, 2, 0).contiguous()
 
 
 def _render_rays(trained: TrainedField, rays: Rays) -> tuple[Tensor, Tensor, Tensor]:
@@ -106,6 +93,7 @@ def _render_rays(trained: TrainedField, rays: Rays) -> tuple[Tensor, Tensor, Ten
             ray[part] - start,
             samples.order[part],
             samples.distance[part],
+            samples.support[part],
             min(RAYS_PER_CHUNK, len(hit) - start),
         )
         table[hit[start : start + RAYS_PER_CHUNK]] = _two_passes(trained, local)
@@ -130,6 +118,7 @@ def _composite(
 ) -> Float[Tensor, "rays 5"]:
     which = chosen.nonzero()[:, 0]
     density, rgb = trained.field(samples.points[which])
+    density = density * occupancy(samples.support[which])
     distance = samples.distance[which]
     packed = torch.cat([(density * trained.step)[:, None], rgb, distance[:, None]], dim=1)
     order = samples.order[which] - first

@@ -16,7 +16,7 @@ from toonset.nerf import losses
 from toonset.nerf.bounds import Box, box_of_masks
 from toonset.nerf.evidence import choose_missing, mask_iou
 from toonset.nerf.field import PLANES, TriplaneField
-from toonset.nerf.hull import LEVEL, Hull, carve, project
+from toonset.nerf.hull import EDGE, LEVEL, Hull, carve, project
 from toonset.nerf.interpolation import Operator
 from toonset.nerf.march import march, pixels_near, rays_of
 from toonset.nerf.metrics import BEST_PSNR, compare, ssim
@@ -206,21 +206,24 @@ def test_masks_that_share_nothing_are_refused() -> None:
         carve(cameras, apart, 32, 0)
 
 
+@pytest.mark.parametrize("level", [EDGE, LEVEL])
 @pytest.mark.parametrize("k", [0.0, 0.2])
-def test_march_finds_the_same_samples_as_testing_every_step(k: float) -> None:
+def test_march_finds_the_same_samples_as_testing_every_step(k: float, level: float) -> None:
     cameras, alphas = ball_views(np.array([0.0, 4.0, 0.0]), 1.0, 6, k)
     hull = carve(cameras, alphas, 40, 0)
     camera = cameras[1]
     rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2)[::7], hull)
     step = hull.voxel * 0.8
-    samples = march(rays, hull, step, 1000)
+    samples = march(rays, hull, step, 1000, level)
     reach = float(np.linalg.norm(hull.box.size))
     steps = torch.arange(-reach, reach, step / 8)
     points = rays.origins[:, None] + rays.directions[:, None] * steps[:, None]
-    length = (hull.support_at(points.reshape(-1, 3)) >= LEVEL).view(len(rays.origins), -1).sum(1)
+    support = hull.support_at(points.reshape(-1, 3))
+    length = (support >= level).view(len(rays.origins), -1).sum(1)
     counts = torch.bincount(samples.ray, minlength=samples.rays)
     assert (counts * 8 - length).abs().max() <= 20  # rounding at each entry and exit
-    assert bool((hull.support_at(samples.points) >= LEVEL).all())
+    assert bool((samples.support >= level).all())
+    torch.testing.assert_close(samples.support, hull.support_at(samples.points))
     assert bool((samples.distance.diff()[samples.ray.diff() == 0] > 0).all())
 
 
@@ -248,8 +251,11 @@ def test_support_is_zero_outside_and_exact_at_centres() -> None:
 
 def test_losses_are_zero_only_where_they_should() -> None:
     drawn = torch.rand(6, 3)
-    assert losses.photometric(drawn, torch.ones(6), drawn) == 0
-    assert losses.photometric(drawn * 0.5, torch.full((6,), 0.5), drawn) > 0
+    full, half = torch.ones(6), torch.full((6,), 0.5)
+    assert losses.photometric(drawn, full, drawn, full) == 0
+    assert losses.photometric(drawn * 0.5, half, drawn, half) == 0
+    assert losses.photometric(drawn * 0.5, half, drawn, full) > 0
+    assert losses.photometric(drawn, full, drawn, half) > 0
     assert losses.total_variation([torch.ones(4, 5, 2)]) == 0
     assert losses.total_variation([torch.eye(4)[..., None]]) > 0
     logits = torch.randn(4, 3)
