@@ -109,7 +109,7 @@ def _outcome(case: TrainCase, picture_of: Callable[[Frame], np.ndarray], seconds
     found = [compare(p, f.rgba) for p, f in zip(pictures, case.test.frames, strict=True)]
 
     def mean(name: str) -> float:
-        return float(np.mean([figures[name] for figures in found if figures[name] is not None]))
+        return float(np.mean([v for v in (figures[name] for figures in found) if v is not None]))
 
     return Outcome(mean("psnr"), mean("psnr_mask"), mean("ssim"), seconds, each)
 
