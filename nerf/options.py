@@ -27,6 +27,6 @@ class TrainOptions:
     seed: int = 0
     device: str = "auto"
     resolution: int | None = None
-    smoothness: float = 5e-3
+    smoothness: float = 1e-3
     palette_weight: float = 0.01
     missing_views: int | None = None
