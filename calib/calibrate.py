@@ -106,9 +106,7 @@ def calibrate(
     with _timed(seconds, "judge"):
         progress("judge", 0.0)
         final = [
-            refine(
-                drawing, surface, [*with_twins([pose]), *(f.pose for f in c.fits[:4])], FINE_WIDTHS
-            )
+            refine(drawing, surface, _rivals(pose, c), FINE_WIDTHS)
             for drawing, pose, c in zip(fine, joint.poses, candidates, strict=True)
         ]
         sure = probabilities(final)
@@ -151,6 +149,11 @@ def _search_together(
         selections = [_selected(found)]
     assert best is not None
     return best, found
+
+
+def _rivals(pose: Pose, candidates: Candidates) -> list[Pose]:
+    """Return the chosen pose, its twin and the best candidates, all with the chosen k."""
+    return _with_k(with_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)
 
 
 def _both_models(

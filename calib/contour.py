@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from skimage.measure import find_contours
 
+from toonset.errors import SheetError
 from toonset.view import View
 
 MIN_LOOP_OF_HEIGHT = 0.04  # shorter closed loops are pinholes of the matting, not outline
@@ -28,14 +29,12 @@ class Contour:
         normals: (n, 2) unit, pointing out of the figure.
         box: (left, top, width, height) of the figure in pixels.
         height_px: the figure's extent in v.
-        area_px: covered area in square pixels.
     """
 
     points: Float[np.ndarray, "n 2"]
     normals: Float[np.ndarray, "n 2"]
     box: tuple[float, float, float, float]
     height_px: float
-    area_px: float
 
     def scaled(self, factor: float) -> Contour:
         """Return the contour of the drawing scaled by `factor`."""
@@ -45,7 +44,6 @@ class Contour:
             self.normals,
             (left, top, width, height),
             self.height_px * factor,
-            self.area_px * factor**2,
         )
 
 
@@ -55,10 +53,15 @@ def drawn_contour(view: View, spacing_of_height: float = 1 / 256) -> Contour:
     Args:
         view: the drawing.
         spacing_of_height: distance between neighbouring points over the figure's height.
+
+    Raises:
+        SheetError: the drawing is too thin or faint to have an outline.
     """
     alpha = np.pad(view.rgba[..., 3].astype(np.float32) / 255, 2)
     alpha = cv2.GaussianBlur(alpha, (0, 0), SMOOTHING_PX)
     loops = find_contours(alpha, 0.5, positive_orientation="high")
+    if not loops:
+        raise SheetError(f"view {view.name}: too thin or faint for an outline; draw it larger")
     xy = [loop[:, ::-1] - 2 + 0.5 for loop in loops]  # unpad; sample (0, 0) is pixel centre .5
     everything = np.concatenate(xy)
     left, top = everything.min(axis=0)
@@ -69,7 +72,7 @@ def drawn_contour(view: View, spacing_of_height: float = 1 / 256) -> Contour:
     points = np.concatenate([points for points, _ in sampled])
     normals = np.concatenate([normals for _, normals in sampled])
     box = (float(left), float(top), float(width), float(height))
-    return Contour(points, normals, box, float(height), float(alpha.sum()))
+    return Contour(points, normals, box, float(height))
 
 
 def _length(loop: Float[np.ndarray, "n 2"]) -> float:

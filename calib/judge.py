@@ -91,7 +91,8 @@ def judge_sheet(views: Sequence[ViewCalibration]) -> tuple[Verdict, str]:
     One uncertain view makes the sheet weak. So does a single drawing: nothing confirms its scale
     and elevation.
     """
-    named = ", ".join(f"{x.name} {x.verdict}" for x in views if x.verdict != "ok")
+    counts = {level: sum(x.verdict == level for x in views) for level in SEVERITY[1:]}
+    named = ", ".join(f"{n} of {len(views)} {level}" for level, n in counts.items() if n)
     worst: Verdict = "ok"
     for level in SEVERITY:
         if 2 * sum(SEVERITY.index(x.verdict) >= SEVERITY.index(level) for x in views) >= len(views):

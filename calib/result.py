@@ -44,7 +44,7 @@ class ViewCalibration:
         sigmas: 1-sigma, deflated for correlated outline errors.
         covariance: (6, 6) of (rotation increment in camera axes, shift px, log scale).
         p_flip: probability that the mirror twin is right instead.
-        twin: the mirror twin's camera (refined to this drawing).
+        twin: the mirror twin's camera, refined to this drawing where it is an optimum of its own.
         alternatives: other refined cameras, most probable first.
         outline_error: robust outline distance over the figure's height.
         coverage: share of both outlines that lie within 5 % of the height of each other.

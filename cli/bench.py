@@ -33,7 +33,7 @@ def bench(
         str, typer.Option("--only", help="Cases whose name contains this, e.g. exact.")
     ] = "",
     count: Annotated[
-        int, typer.Option("--count", min=1, help="Synthetic cases per condition.")
+        int, typer.Option("--count", min=1, help="Synthetic cases per condition (without --cases).")
     ] = 4,
     half: Annotated[
         bool, typer.Option("--half", help="Train on the cases' pictures at half size.")
@@ -49,12 +49,14 @@ def bench(
 ) -> None:
     """Measure calibration or training: seconds against accuracy, per setting.
 
-    Prints a table and writes records.json and chart.png.
+    Prints a table and writes records.json and a chart per condition.
     """
     from toonset.bench.record import as_dicts, machine, table
     from toonset.files import new_folder, write_bytes, write_json
 
     printer = Printer(as_json, quiet)
+    if half and (subject is not Subject.train or cases is None):
+        raise typer.BadParameter("--half belongs to `train --cases`")
     check_output(out, [cases], WRITTEN, force=force)
     records = _measure(subject, cases, only, count, half, quick, seed, printer)
     with new_folder(out, force=force) as folder:

@@ -34,8 +34,9 @@ def render(
         int | None, typer.Option("--turntable", min=1, max=3600, help="N views all round.")
     ] = None,
     elevation: Annotated[
-        float, typer.Option("--elevation", min=-90, max=90, help="Degrees, > 0 looks down.")
-    ] = 0.0,
+        float | None,
+        typer.Option("--elevation", min=-90, max=90, help="Turntable: degrees, > 0 looks down."),
+    ] = None,
     size: Annotated[
         int | None, typer.Option("--size", min=8, max=4096, help="Side in px of a turntable view.")
     ] = None,
@@ -64,6 +65,8 @@ def render(
     printer = Printer(as_json, quiet)
     layer = "palette" if recolor and layer == "rgb" else layer
     _check_arguments(cameras, views, layer, recolor)
+    if cameras is not None and (elevation is not None or size is not None):
+        raise typer.BadParameter("--elevation and --size belong to --turntable")
 
     from toonset.files import new_folder, write_bytes
     from toonset.nerf.recolor import recolored
@@ -73,7 +76,7 @@ def render(
     use_threads(threads)
     check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
-    named = _cameras(trained, cameras, views, math.radians(elevation), size)
+    named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     animate = gif if gif is not None else views is not None
     pictures = []
     with new_folder(out, force=force) as folder:

@@ -88,12 +88,12 @@ def _summary(target: Path, metrics: dict[str, Any]) -> str:
     seconds = sum(metrics["seconds"].values())
     hull = metrics["hull"]
     tried = ", ".join(f"{100 * iou:.1f} %" for iou in hull["left_out_iou"])
-    evidence = f" (left-out outlines met with 0, 1: {tried})" if tried else ""
+    evidence = f" (left-out views' outlines met with 0, 1 against: {tried})" if tried else ""
     return "\n".join(
         [
             f"{counts['views']} views, {counts['rays']} rays, {counts['parameters']} parameters; "
             f"{metrics['steps']} steps in {seconds:.1f} s",
-            f"hull: {hull['missing']} views may disagree{evidence}",
+            f"hull: filled where at most {hull['missing']} views say background{evidence}",
             f"fit to the drawings: PSNR {fit['psnr']:.2f} dB, inside the masks "
             f"{fit['psnr_mask']:.2f} dB",
             f"{target}: preview.png shows it; next: toonset render {target} --turntable 36",

@@ -27,6 +27,8 @@ FAR_HEIGHTS = 100.0  # body heights to the far pinhole that stands for an orthog
 MAX_JSON_BYTES = 32 * 2**20
 MAX_FRAMES = 10_000
 LARGEST = 1e9  # world units, pixels, and pixels per unit either way: float32 still tells
+PINHOLE_MODELS = (None, "OPENCV", "PINHOLE", "SIMPLE_PINHOLE")
+SAME_VIEW_PX = 0.5  # a pinhole may differ this much from the exact camera beside it
 DISTORTION_KEYS = ("k1", "k2", "k3", "k4", "p1", "p2")
 
 
@@ -253,8 +255,27 @@ def _picture_path(root: Path, file_path: str, where: str, *, must_exist: bool) -
 
 
 def _camera_of(defaults: _Intrinsics, frame: _FrameRecord, picture: Path | None) -> Camera:
-    if frame.toonset is not None:
-        return frame.toonset.camera()
+    camera = _pinhole_of(defaults, frame, picture)
+    if frame.toonset is None:
+        return camera
+    native = frame.toonset.camera()
+    if not _same_view(native, camera, frame.toonset.pinhole_error_px):
+        raise BundleError(
+            "transform_matrix and its `toonset` camera disagree; remove the `toonset` key of a "
+            "frame whose matrix you changed"
+        )
+    return native
+
+
+def _same_view(native: Camera, pinhole: Camera, error_px: float) -> bool:
+    """Return whether a far pinhole shows what the native camera does, around the target."""
+    reach = 0.1 * max(native.size_wh) / native.scale
+    points = native.target + reach * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    off = np.abs(native.project(points)[0] - pinhole.project(points)[0])
+    return bool(np.nan_to_num(off, nan=np.inf).max() <= error_px + SAME_VIEW_PX)
+
+
+def _pinhole_of(defaults: _Intrinsics, frame: _FrameRecord, picture: Path | None) -> Camera:
     for record in (defaults, frame):
         bent = [k for k in DISTORTION_KEYS if (record.model_extra or {}).get(k)]
         if bent:
@@ -263,13 +284,19 @@ def _camera_of(defaults: _Intrinsics, frame: _FrameRecord, picture: Path | None)
         name: getattr(frame, name) if getattr(frame, name) is not None else getattr(defaults, name)
         for name in _Intrinsics.model_fields
     }
+    if values["camera_model"] not in PINHOLE_MODELS:
+        raise BundleError(
+            f"camera_model {values['camera_model']!r} is not supported; undistort to PINHOLE"
+        )
     rows = frame.transform_matrix
     if [len(row) for row in rows] != [4] * 4 or not np.allclose(rows[3], [0, 0, 0, 1], 0, 1e-6):
         raise BundleError("transform_matrix must be 4 x 4 with last row 0 0 0 1")
     matrix = np.array(rows, dtype=np.float64)
     size = _size_wh(values, picture)
     fx = _focal_px(values, size[0])
-    fy = values["fl_y"] or fx
+    fy = fx if values["fl_y"] is None else float(values["fl_y"])
+    if fx <= 0 or fy <= 0:
+        raise BundleError(f"fl_x {fx:g} and fl_y {fy:g} must be positive")
     cx = size[0] / 2 if values["cx"] is None else values["cx"]
     cy = size[1] / 2 if values["cy"] is None else values["cy"]
     K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])

@@ -8,8 +8,6 @@ from jaxtyping import Float, UInt8
 from toonset.errors import PaletteError
 from toonset.nerf.views import Rendering
 
-LAYERS = ("rgb", "palette", "depth", "labels", "alpha")
-
 
 def color_picture(
     premultiplied: Float[np.ndarray, "height width 3"], alpha: Float[np.ndarray, "height width"]

@@ -110,7 +110,7 @@ def march(rays: Rays, hull: Hull, step: float, most: int, level: float = EDGE) -
         level: EDGE for the figure with its soft border, LEVEL for its inside alone.
     """
     total = len(rays.origins)
-    bounds = range(0, total, RAYS_PER_CHUNK)
+    bounds = range(0, max(total, 1), RAYS_PER_CHUNK)  # no rays: one empty chunk
     parts = [_march_chunk(rays, slice(i, i + RAYS_PER_CHUNK), hull, step, level) for i in bounds]
     ray = torch.cat([part[0] + i for part, i in zip(parts, bounds, strict=True)])
     distance, points, support = (torch.cat([part[i] for part in parts]) for i in (1, 2, 3))

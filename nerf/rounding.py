@@ -46,7 +46,10 @@ def rounded(hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor]) -> 
         smooth = _blurred(filled, SIGMA) * inside
         filled = torch.maximum((smooth >= LEVEL).float(), pins.last_voxels(smooth, 0.999).float())
     soft = _blurred(filled, SOFTEN)[None, None]
-    smooth = F.interpolate(soft, size=hull.support.shape, mode="trilinear")[0, 0]
+    x, y, z = hull.support.shape
+    factor = round(coarse.voxel / hull.voxel)
+    full = [factor * n for n in coarse.support.shape]
+    smooth = F.interpolate(soft, size=full, mode="trilinear")[0, 0, :x, :y, :z]
     last = _MaskRays.of(hull, cameras, alphas, hull.voxel).last_voxels(smooth, NEAR_BEST)
     kept = F.max_pool3d(last[None, None].float(), 3, stride=1, padding=1)[0, 0]
     return replace(hull, support=torch.minimum(hull.support, torch.maximum(smooth, kept)))

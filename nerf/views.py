@@ -1,7 +1,6 @@
 """Rendering new views of a trained field.
 
-A pixel is the average of a grid of rays under a narrow Gaussian: every ray is either inside the
-hull or not, and coverage comes from the average. The filter gains 0.6 dB on left-out views.
+A pixel is the mean of a grid of rays; outlines are soft through the hull's occupancy.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from toonset.calib.pose import Pose, project, project_with_jacobian
 from toonset.calib.rim import find_rim, prepare_surface, silhouette_mask
 from toonset.calib.templates import build_templates, find_hypotheses
 from toonset.camera import rotation_distance, rotation_from_angles
+from toonset.errors import SheetError
 from toonset.mesh import Mesh
 from toonset.projection import project as torch_project
 from toonset.projection import rotate
@@ -193,3 +194,10 @@ def test_one_sure_view_settles_the_elevation_of_the_others():
     np.testing.assert_allclose(probabilities([sure, torn])[1], [0, 1], atol=0.05)
     alone = probabilities([torn])[0]
     assert alone[0] > 0.2  # alone the torn view stays torn
+
+
+def test_a_drawing_too_faint_for_an_outline_is_refused_by_name():
+    rgba = np.zeros((40, 40, 4), np.uint8)
+    rgba[10:30, 20] = (0, 0, 0, 140)
+    with pytest.raises(SheetError, match=r"000\.png: too thin or faint"):
+        drawn_contour(View(rgba, (0, 0, 40, 40), 0.0, "000.png"))

@@ -227,6 +227,14 @@ def test_march_finds_the_same_samples_as_testing_every_step(k: float, level: flo
     assert bool((samples.distance.diff()[samples.ray.diff() == 0] > 0).all())
 
 
+def test_rays_that_all_miss_have_no_samples() -> None:
+    cameras, alphas = ball_views(np.zeros(3), 1.0, 6, 0.0)
+    hull = carve(cameras, alphas, 40, 0)
+    rays = rays_of(cameras[0], np.zeros((0, 2)), hull)
+    samples = march(rays, hull, hull.voxel, 8)
+    assert len(samples.ray) == len(samples.points) == samples.rays == 0
+
+
 def test_pixels_left_out_certainly_miss() -> None:
     cameras, alphas = ball_views(np.zeros(3), 1.0, 6, 0.1)
     hull = carve(cameras, alphas, 40, 0)

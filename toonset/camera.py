@@ -129,7 +129,7 @@ class Camera:
         rotation, centre = pose[:3, :3].T, pose[:3, 3]
         point = np.zeros(3) if near is None else np.asarray(near, dtype=np.float64)
         distance = float(rotation[2] @ (point - centre))
-        if distance <= 0:
+        if distance <= 1e-9 * max(float(np.linalg.norm(point - centre)), 1.0):
             distance = max(float(np.linalg.norm(point - centre)), 1.0)
         target = centre + distance * rotation[2]
         fx, fy = float(K[0, 0]), float(K[1, 1])

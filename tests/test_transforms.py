@@ -1,0 +1,102 @@
+"""transforms.json: what is written is read back; what lies or cannot be honoured is refused."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from toonset.camera import Camera
+from toonset.dataset.picture import encode_png
+from toonset.dataset.transforms import read_cameras, read_scene, transforms_dict
+from toonset.errors import BundleError
+from toonset.files import write_bytes, write_json
+
+SIZE = (60, 80)
+
+
+def cameras():
+    flat = Camera.looking_at(np.array([0.1, 0.9, 0.0]), 0.4, 0.1, 35.0, SIZE)
+    deep = Camera.looking_at(np.array([0.1, 0.9, 0.0]), 2.0, -0.1, 35.0, SIZE, k=0.2)
+    return [("images/000.png", flat), ("images/001.png", deep)]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_json(tmp_path / "transforms.json", transforms_dict(cameras(), 1.8, 1.0))
+    picture = np.zeros((SIZE[1], SIZE[0], 4), np.uint8)
+    picture[20:60, 20:40] = (200, 30, 20, 255)
+    for name, _ in cameras():
+        write_bytes(tmp_path / name, encode_png(picture))
+    return tmp_path
+
+
+def change(folder, edit):
+    file = folder / "transforms.json"
+    content = json.loads(file.read_text())
+    edit(content)
+    write_json(file, content)
+
+
+def test_cameras_come_back_exactly(folder):
+    points = np.random.default_rng(0).uniform(-1, 2, (50, 3))
+    scene = read_scene(folder)
+    for frame, (_, camera) in zip(scene.frames, cameras(), strict=True):
+        np.testing.assert_allclose(frame.camera.project(points)[0], camera.project(points)[0])
+        assert frame.camera.is_orthographic == camera.is_orthographic
+
+
+def test_without_the_native_key_the_far_pinhole_is_within_its_bound(folder):
+    bounds = [
+        f["toonset"]["pinhole_error_px"] for f in transforms_dict(cameras(), 1.8, 1.0)["frames"]
+    ]
+    change(folder, lambda content: [frame.pop("toonset") for frame in content["frames"]])
+    points = np.array([0.1, 0.9, 0.0]) + np.random.default_rng(1).uniform(-0.5, 0.5, (50, 3))
+    for (_, read), (_, camera), bound in zip(read_cameras(folder), cameras(), bounds, strict=True):
+        off = np.abs(read.project(points)[0] - camera.project(points)[0])
+        assert off.max() <= bound + 1e-6
+
+
+def test_blender_style_files_are_read(folder):
+    def blender(content):
+        angle = 2 * math.atan(SIZE[0] / 2 / content["frames"][1]["fl_x"])
+        frame = content["frames"][1]
+        frame = {"file_path": "./images/001", "transform_matrix": frame["transform_matrix"]}
+        content.clear()
+        content.update(camera_angle_x=angle, frames=[frame])
+
+    change(folder, blender)
+    points = np.random.default_rng(2).uniform(-1, 1, (20, 3))
+    read = read_scene(folder).frames[0].camera
+    np.testing.assert_allclose(
+        read.project(points)[0], cameras()[1][1].project(points)[0], atol=1e-6
+    )
+
+
+def turn(content):
+    content["frames"][0]["transform_matrix"][0][3] += 3.0
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (turn, "disagree; remove the `toonset` key"),
+        (lambda c: c["frames"][1].update(fl_x=7.0), "disagree"),
+        (lambda c: c.update(camera_model="EQUIRECTANGULAR"), "'EQUIRECTANGULAR' is not supported"),
+        (lambda c: c["frames"][0].update(fl_y=0), "must be positive"),
+        (lambda c: c["frames"][0].update(k1=0.1), "lens distortion k1"),
+        (lambda c: c["frames"][0].update(file_path="../../x.png"), "outside of the folder"),
+        (lambda c: c["frames"][0].update(file_path="images/9.png"), "does not exist"),
+        (lambda c: c.update(frames=[]), "field frames"),
+    ],
+)
+def test_what_cannot_be_honoured_is_refused(folder, edit, words):
+    change(folder, edit)
+    with pytest.raises(BundleError, match=words):
+        read_scene(folder)
+
+
+def test_a_picture_of_another_size_is_refused(folder):
+    write_bytes(folder / "images/001.png", encode_png(np.full((9, 9, 4), 255, np.uint8)))
+    with pytest.raises(BundleError, match="is 9 x 9 px"):
+        read_scene(folder)
