@@ -28,9 +28,9 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 CONDITIONS: dict[str, SynthOptions] = {
-    "clean": SynthOptions(outline_px=0, elevation_deg=8),
-    "drawn": SynthOptions(yaw_jitter_deg=4, elevation_deg=8, warp_percent=0.8),
-    "near": SynthOptions(outline_px=0, elevation_deg=5, distance_heights=2.5),
+    "clean": SynthOptions(yaw_jitter_deg=8, outline_px=0, elevation_deg=10),
+    "drawn": SynthOptions(yaw_jitter_deg=8, elevation_deg=10, warp_percent=0.8),
+    "near": SynthOptions(yaw_jitter_deg=8, outline_px=0, elevation_deg=10, distance_heights=2.5),
 }
 
 

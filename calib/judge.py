@@ -21,8 +21,8 @@ DEFLATION = EFFECTIVE_POINTS / INDEPENDENT_POINTS  # of the solver's covariance
 SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
 WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
 FAILED_COVERAGE = 0.70
-WEAK_ANGLE = np.radians(6.0)  # one sigma of yaw or elevation
 OTHER = np.radians(15.0)  # an alternative this far away is another camera
+WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
 
 def judge_view(
