@@ -231,3 +231,7 @@ def test_demo_commands_exist() -> None:
 @pytest.mark.parametrize("words", [["paint", "x.png"], ["calibrate", "x.png", "--mush", "m.obj"]])
 def test_wrong_commands_are_seen(words: list[str]) -> None:
     assert complaint(words)
+
+
+def test_readme_has_no_placeholders() -> None:
+    assert not re.search(r"@[A-Z]+@", (ROOT / "README.md").read_text(encoding="utf-8"))
