@@ -31,7 +31,7 @@ DEPTH_MARGIN = 0.01  # of the depth range, in front of and behind the mesh
 NEAR, FAR = 1.0, 3.0  # only to invert pyrender's own reading of the depth buffer
 INSTALL = (
     "off-screen drawing needs EGL and Mesa, which are missing here ({reason}); "
-    "install them: apt-get install -y libegl1 libgl1-mesa-dri"
+    "install them: apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
 )
 
 

@@ -276,7 +276,7 @@ MISSING = {
     "no Mesa vendor": ValueError("Invalid device ID (0)"),
     "no driver": type("EGLError", (Exception,), {})("eglInitialize failed\nlong story"),
 }
-INSTALL = "apt-get install -y libegl1 libgl1-mesa-dri"
+INSTALL = "apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
 
 
 def test_missing_library_at_import_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
