@@ -204,7 +204,6 @@ def _read_frames(
         picture = _picture_path(file.parent, frame.file_path, where, must_exist=need_pictures)
         try:
             camera = _camera_of(parsed, frame, picture)
-            _check_range(camera)
         except (CameraError, BundleError) as error:
             raise BundleError(f"{where}: {error}; correct the file") from error
         result.append((frame, camera, picture))
@@ -257,8 +256,10 @@ def _picture_path(root: Path, file_path: str, where: str, *, must_exist: bool) -
 def _camera_of(defaults: _Intrinsics, frame: _FrameRecord, picture: Path | None) -> Camera:
     camera = _pinhole_of(defaults, frame, picture)
     if frame.toonset is None:
+        _check_range(camera)
         return camera
     native = frame.toonset.camera()
+    _check_range(native)
     if not _same_view(native, camera, frame.toonset.pinhole_error_px):
         raise BundleError(
             "transform_matrix and its `toonset` camera disagree; remove the `toonset` key of a "
