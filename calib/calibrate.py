@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toonset.calib.align import Drawing, Fit
+from toonset.calib.align import EFFECTIVE_POINTS, INDEPENDENT_POINTS, Drawing, Fit
 from toonset.calib.contour import drawn_contour
 from toonset.calib.hypotheses import (
     Candidates,
     choose_together,
+    level_twins,
     probabilities,
     refine,
     with_twins,
@@ -109,6 +110,10 @@ def calibrate(
             refine(drawing, surface, _rivals(pose, c), FINE_WIDTHS)
             for drawing, pose, c in zip(fine, joint.poses, candidates, strict=True)
         ]
+        # perspective tells twins apart, but only where independent outline errors prove it, too
+        proven = model.bic_gain > model.margin * EFFECTIVE_POINTS / INDEPENDENT_POINTS
+        seen = joint.poses if proven else _with_k(joint.poses, 0.0)
+        final = [level_twins(c, surface, p) for c, p in zip(final, seen, strict=True)]
         sure = probabilities(final)
         judged = with_sheet_in_mind(
             [
