@@ -109,7 +109,6 @@ def align(
     surface: Surface,
     start: Pose,
     widths: Float[np.ndarray, " iterations"],
-    prior: ElevationPrior = ElevationPrior(),
 ) -> Fit:
     """Return `start` (full-size pixels) refined by one Gauss-Newton step per entry of `widths`.
 
@@ -118,12 +117,11 @@ def align(
         surface: the mannequin.
         start: first pose; its k is kept.
         widths: the robust width of each step over the figure's height.
-        prior: of the elevation.
     """
     pose = drawing.pose_in(start)
     for width in widths:
         matches = match(drawing, surface, pose)
-        step = _gauss_newton_step(matches, pose, width * drawing.height, drawing.height, prior)
+        step = _gauss_newton_step(matches, pose, width * drawing.height, drawing.height)
         pose = pose.moved(step)
         if np.abs(step[:3]).max() < 1e-4 and width == widths[-1]:
             break
@@ -173,7 +171,7 @@ def _thinned(rim: Rim, wanted: int) -> Rim:
 
 
 def _gauss_newton_step(
-    matches: Matches, pose: Pose, width_px: float, height_px: float, prior: ElevationPrior
+    matches: Matches, pose: Pose, width_px: float, height_px: float
 ) -> Float[np.ndarray, " 6"]:
     pixels, jacobian = project_with_jacobian(pose, matches.points)
     residual = (matches.normals * (pixels - matches.targets)).sum(axis=1)
@@ -185,7 +183,7 @@ def _gauss_newton_step(
     weights = weights * EFFECTIVE_POINTS / (2 * counts) / (NOISE_OF_HEIGHT * height_px) ** 2
     normal = (rows * weights[:, None]).T @ rows
     gradient = rows.T @ (weights * residual)
-    prior_matrix, prior_gradient = upright_prior(pose, prior)
+    prior_matrix, prior_gradient = upright_prior(pose, ElevationPrior())
     normal += prior_matrix + 1e-3 * np.diag(np.diag(normal)) + 1e-9 * np.eye(PARAMETERS)
     step = -np.linalg.solve(normal, gradient + prior_gradient)
     turn = float(np.linalg.norm(step[:3]))

@@ -141,7 +141,7 @@ def _search_together(
     selections = [_selected(candidates), _selected(nearby)]
     best, found = None, list(candidates)
     for _ in range(rounds):
-        fits = [fit for poses in selections for fit in _both_models(drawings, surface, poses)]
+        fits = [_sketched_fit(drawings, surface, poses) for poses in selections]
         contender = min(fits, key=lambda fit: fit.score)
         if best is not None and contender.score >= best.score - 0.5:
             break
@@ -161,12 +161,10 @@ def _rivals(pose: Pose, candidates: Candidates) -> list[Pose]:
     return _with_k(with_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)
 
 
-def _both_models(
-    drawings: Sequence[Drawing], surface: Surface, poses: Sequence[Pose]
-) -> list[JointFit]:
+def _sketched_fit(drawings: Sequence[Drawing], surface: Surface, poses: Sequence[Pose]) -> JointFit:
     flat = fit_sheet(drawings, surface, _with_k(poses, 0.0), perspective=False, widths=SKETCHED)
     deep = fit_sheet(drawings, surface, poses, perspective=True, widths=SKETCHED)
-    return [choose_model(flat, deep, surface, len(drawings))[0]]
+    return choose_model(flat, deep, surface, len(drawings))[0]
 
 
 def _selected(candidates: Sequence[Candidates]) -> list[Pose]:

@@ -48,7 +48,7 @@ class JointFit:
         poses: per view, full-size pixels; all share k.
         offset: outline offset over the figure's height (> 0: drawn outside of the mesh).
         noise: robust outline error over the figure's height, over the sheet.
-        score: n_eff log(noise^2), the data term of BIC.
+        score: n_eff log(mean Geman-McClure loss), the data term of BIC.
         covariance: (6n + 2, 6n + 2) of (w, shift, log scale) per view in working pixels, then k
             and offset; deflated to the effective number of outline samples.
     """
