@@ -12,18 +12,18 @@ with iterative closest points instead of colour lines: a drawing has its outline
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import KDTree
 
-from toonset.calib.contour import Contour
+from toonset.calib.match import Drawing as Drawing
+from toonset.calib.match import Matches as Matches
+from toonset.calib.match import match as match
 from toonset.calib.pose import PARAMETERS, Pose, project, project_with_jacobian
-from toonset.calib.rim import Rim, Surface, find_rim
+from toonset.calib.rim import Surface
 
 MAX_TURN = np.radians(12.0)  # per iteration: beyond it the matches of this iteration mean nothing
-DIRECTION_OF_HEIGHT = 0.06  # a contour turned by 60 degrees counts as this far away
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
 EFFECTIVE_POINTS = 40.0  # weight of a view's outline against the priors, in points
@@ -41,25 +41,6 @@ class ElevationPrior:
 
 
 @dataclass(frozen=True, eq=False)
-class Matches:
-    """Corresponding points of rim and drawing.
-
-    Attributes:
-        points: (n, 3) rim points, surface coordinates.
-        targets: (n, 2) drawn points in pixels.
-        normals: (n, 2) outward normals of the drawn outline there.
-        distances: (n,) pixel distance before the step, direction included.
-        drawn: number of leading rows that come from drawn points (the rest from rim points).
-    """
-
-    points: Float[np.ndarray, "n 3"]
-    targets: Float[np.ndarray, "n 2"]
-    normals: Float[np.ndarray, "n 2"]
-    distances: Float[np.ndarray, " n"]
-    drawn: int
-
-
-@dataclass(frozen=True, eq=False)
 class Fit:
     """A refined hypothesis.
 
@@ -74,34 +55,6 @@ class Fit:
     cost: float
     error: float
     coverage: float
-
-
-class Drawing:
-    """A contour at a working scale with its search tree (built once, used by every start)."""
-
-    def __init__(self, contour: Contour, height_px: float, max_points: int) -> None:
-        """Scale `contour` to `height_px` and thin it to about `max_points`."""
-        self.factor = height_px / contour.height_px
-        scaled = contour.scaled(self.factor)
-        every = max(1, round(len(scaled.points) / max_points))
-        left, top, width, height = scaled.box
-        margin = 0.3 * height
-        self.offset = np.array([left - margin, top - margin])
-        self.points = scaled.points[::every] - self.offset
-        self.normals = scaled.normals[::every]
-        self.height = height
-        self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
-        self.direction_px = DIRECTION_OF_HEIGHT * height
-        self.tree = KDTree(np.hstack([self.points, self.direction_px * self.normals]))
-
-    def pose_in(self, pose: Pose) -> Pose:
-        """Return a full-size pose in working pixels."""
-        scaled = pose.scaled(self.factor)
-        return replace(scaled, shift=scaled.shift - self.offset)
-
-    def pose_out(self, pose: Pose) -> Pose:
-        """Return a working pose in full-size pixels."""
-        return replace(pose, shift=pose.shift + self.offset).scaled(1 / self.factor)
 
 
 def align(
@@ -141,33 +94,6 @@ def measure(drawing: Drawing, surface: Surface, pose: Pose, cap: float = 0.05) -
     cost = float(np.mean([np.mean(side**2) for side in sides if len(side)]))
     error = float(np.sqrt(np.mean(across[met] ** 2))) if met.any() else cap
     return Fit(drawing.pose_out(pose), cost, error, float(met.mean()))
-
-
-def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
-    """Return two-sided nearest neighbours of rim and drawn outline at a working pose."""
-    spacing = max(1.0, drawing.height / 128)
-    rim = find_rim(surface, project(pose, surface.vertices), drawing.size_wh, spacing)
-    if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
-        far = np.full(len(drawing.points), drawing.height)
-        zeros = np.zeros((len(far), 3))
-        return Matches(zeros, drawing.points, drawing.normals, far, len(far))
-    rim = _thinned(rim, len(drawing.points))
-    seen = np.hstack([project(pose, rim.points), drawing.direction_px * rim.normals])
-    wanted = drawing.tree.data
-    far_drawn, to_rim = KDTree(seen).query(wanted)
-    far_rim, to_drawn = drawing.tree.query(seen)
-    return Matches(
-        np.concatenate([rim.points[to_rim], rim.points]),
-        np.concatenate([drawing.points, drawing.points[to_drawn]]),
-        np.concatenate([drawing.normals, drawing.normals[to_drawn]]),
-        np.concatenate([far_drawn, far_rim]),
-        len(drawing.points),
-    )
-
-
-def _thinned(rim: Rim, wanted: int) -> Rim:
-    every = max(1, len(rim.points) // max(wanted, 1))
-    return Rim(rim.points[::every], rim.normals[::every])
 
 
 def _gauss_newton_step(

@@ -1,0 +1,94 @@
+"""Corresponding points of a drawing and the mannequin's outline at a pose.
+
+Every rim point is matched with the nearest drawn contour point and every drawn point with the
+nearest rim point. "Nearest" is measured over position and outline direction together, so that the
+two sides of a thin limb are not confused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from toonset.calib.contour import Contour
+from toonset.calib.pose import Pose, project
+from toonset.calib.rim import Rim, Surface, find_rim
+
+DIRECTION_OF_HEIGHT = 0.06  # a contour turned by 60 degrees counts as this far away
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Corresponding points of rim and drawing.
+
+    Attributes:
+        points: (n, 3) rim points, surface coordinates.
+        targets: (n, 2) drawn points in pixels.
+        normals: (n, 2) outward normals of the drawn outline there.
+        distances: (n,) pixel distance before the step, direction included.
+        drawn: number of leading rows that come from drawn points (the rest from rim points).
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    targets: Float[np.ndarray, "n 2"]
+    normals: Float[np.ndarray, "n 2"]
+    distances: Float[np.ndarray, " n"]
+    drawn: int
+
+
+class Drawing:
+    """A contour at a working scale with its search tree (built once, used by every start)."""
+
+    def __init__(self, contour: Contour, height_px: float, max_points: int) -> None:
+        """Scale `contour` to `height_px` and thin it to about `max_points`."""
+        self.factor = height_px / contour.height_px
+        scaled = contour.scaled(self.factor)
+        every = max(1, round(len(scaled.points) / max_points))
+        left, top, width, height = scaled.box
+        margin = 0.3 * height
+        self.offset = np.array([left - margin, top - margin])
+        self.points = scaled.points[::every] - self.offset
+        self.normals = scaled.normals[::every]
+        self.height = height
+        self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
+        self.direction_px = DIRECTION_OF_HEIGHT * height
+        self.tree = KDTree(np.hstack([self.points, self.direction_px * self.normals]))
+
+    def pose_in(self, pose: Pose) -> Pose:
+        """Return a full-size pose in working pixels."""
+        scaled = pose.scaled(self.factor)
+        return replace(scaled, shift=scaled.shift - self.offset)
+
+    def pose_out(self, pose: Pose) -> Pose:
+        """Return a working pose in full-size pixels."""
+        return replace(pose, shift=pose.shift + self.offset).scaled(1 / self.factor)
+
+
+def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
+    """Return two-sided nearest neighbours of rim and drawn outline at a working pose."""
+    spacing = max(1.0, drawing.height / 128)
+    rim = find_rim(surface, project(pose, surface.vertices), drawing.size_wh, spacing)
+    if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
+        far = np.full(len(drawing.points), drawing.height)
+        zeros = np.zeros((len(far), 3))
+        return Matches(zeros, drawing.points, drawing.normals, far, len(far))
+    rim = _thinned(rim, len(drawing.points))
+    seen = np.hstack([project(pose, rim.points), drawing.direction_px * rim.normals])
+    wanted = drawing.tree.data
+    far_drawn, to_rim = KDTree(seen).query(wanted)
+    far_rim, to_drawn = drawing.tree.query(seen)
+    return Matches(
+        np.concatenate([rim.points[to_rim], rim.points]),
+        np.concatenate([drawing.points, drawing.points[to_drawn]]),
+        np.concatenate([drawing.normals, drawing.normals[to_drawn]]),
+        np.concatenate([far_drawn, far_rim]),
+        len(drawing.points),
+    )
+
+
+def _thinned(rim: Rim, wanted: int) -> Rim:
+    every = max(1, len(rim.points) // max(wanted, 1))
+    return Rim(rim.points[::every], rim.normals[::every])
