@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from toonset.calib.contour import Contour
@@ -30,6 +30,7 @@ class Matches:
         normals: (n, 2) outward normals of the drawn outline there.
         distances: (n,) pixel distance before the step, direction included.
         drawn: number of leading rows that come from drawn points (the rest from rim points).
+        target_index: (n,) which drawn point each row's target is.
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -37,6 +38,7 @@ class Matches:
     normals: Float[np.ndarray, "n 2"]
     distances: Float[np.ndarray, " n"]
     drawn: int
+    target_index: Int[np.ndarray, " n"]
 
 
 class Drawing:
@@ -74,7 +76,8 @@ def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
     if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
         far = np.full(len(drawing.points), drawing.height)
         zeros = np.zeros((len(far), 3))
-        return Matches(zeros, drawing.points, drawing.normals, far, len(far))
+        everything = np.arange(len(far))
+        return Matches(zeros, drawing.points, drawing.normals, far, len(far), everything)
     rim = _thinned(rim, len(drawing.points))
     seen = np.hstack([project(pose, rim.points), drawing.direction_px * rim.normals])
     wanted = drawing.tree.data
@@ -86,6 +89,7 @@ def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
         np.concatenate([drawing.normals, drawing.normals[to_drawn]]),
         np.concatenate([far_drawn, far_rim]),
         len(drawing.points),
+        np.concatenate([np.arange(len(drawing.points)), to_drawn]),
     )
 
 
