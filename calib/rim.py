@@ -1,6 +1,6 @@
 """The mannequin's outline from any direction: contour generators and silhouette masks, no OpenGL.
 
-A contour generator is an edge whose two faces turn different sides to the camera (or an edge of an
+A contour generator is an edge whose two faces lie on one side of it in the image (or an edge of an
 open surface). Its points on the outer silhouette are kept by a low-resolution mask. In the image a
 rim point's normal is perpendicular to its edge, away from the faces. To first order in the pose a
 rim point may be treated as fixed on the mesh: its sliding moves it along the outline only.
@@ -16,36 +16,12 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.mesh import Mesh
+from toonset.calib.coverage import covered
+from toonset.calib.pose import Pose, project
+from toonset.calib.surface import Surface as Surface
+from toonset.calib.surface import prepare_surface as prepare_surface
 
 FAR = 9.0  # depth that means "nothing here" in the rasteriser
-OUTER_PX = 1.3  # a rim point nearer than this to the background lies on the outer silhouette
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """A mesh prepared for outlines.
-
-    Attributes:
-        vertices: (n, 3), shifted so that the middle of the bounding box is the origin.
-        faces: (m, 3) int32.
-        edges: (e, 2) vertex indices of every edge.
-        edge_faces: (e, 2) the faces at an edge; the same face twice where there is only one, or
-            where more than two meet (such an edge is always a candidate).
-        opposite: (e,) the vertex across the edge in its first face.
-        middle: (3,) world coordinates of the origin.
-        height: world units along +Y.
-        radius: farthest vertex from the origin.
-    """
-
-    vertices: Float[np.ndarray, "vertices 3"]
-    faces: Int[np.ndarray, "faces 3"]
-    edges: Int[np.ndarray, "edges 2"]
-    edge_faces: Int[np.ndarray, "edges 2"]
-    opposite: Int[np.ndarray, " edges"]
-    middle: Float[np.ndarray, " 3"]
-    height: float
-    radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,33 +35,6 @@ class Rim:
 
     points: Float[np.ndarray, "n 3"]
     normals: Float[np.ndarray, "n 2"]
-
-
-def prepare_surface(mesh: Mesh) -> Surface:
-    """Return the mesh with its edges and their faces."""
-    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-    corners = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    owner = np.tile(np.arange(len(faces)), 3)
-    across = np.concatenate([faces[:, 2], faces[:, 0], faces[:, 1]])
-    keys = np.sort(corners, axis=1)
-    order = np.lexsort((keys[:, 1], keys[:, 0]))
-    keys, owner, across = keys[order], owner[order], across[order]
-    first = np.concatenate([[True], (np.diff(keys, axis=0) != 0).any(axis=1)])
-    starts = np.flatnonzero(first)
-    counts = np.diff(np.append(starts, len(keys)))
-    second = np.where(counts == 2, starts + (counts > 1), starts)
-    edge_faces = np.stack([owner[starts], owner[second]], axis=1)
-    vertices = mesh.vertices - mesh.middle
-    return Surface(
-        vertices,
-        faces,
-        keys[starts],
-        edge_faces,
-        across[starts],
-        mesh.middle,
-        mesh.height,
-        mesh.radius,
-    )
 
 
 def silhouette_mask(
@@ -105,54 +54,94 @@ def silhouette_mask(
     return depth < FAR - 0.1
 
 
+def rim_at(surface: Surface, pose: Pose, size_wh: tuple[int, int], spacing_px: float) -> Rim:
+    """Return the points of the surface on its outer silhouette, seen from `pose`.
+
+    Args:
+        surface: the prepared mesh.
+        pose: of the camera; its pixels also set the resolution of the visibility test.
+        size_wh: image size that holds the figure.
+        spacing_px: distance of neighbouring rim points along an edge.
+    """
+    toward = np.append(pose.rotation[2], pose.k)  # the camera's centre, homogeneous, negated
+    turned = surface.planes @ toward > 0  # clockwise on the screen, u right and v down
+    folds, layers = _folds(surface, turned)
+    ends = surface.vertices[surface.edges[folds]]
+    pixels = project(pose, ends.reshape(-1, 3)).reshape(-1, 2, 2)
+    return _rim(ends, pixels, layers, size_wh, spacing_px)
+
+
 def find_rim(
     surface: Surface,
     pixels: Float[np.ndarray, "vertices 2"],
     size_wh: tuple[int, int],
     spacing_px: float,
 ) -> Rim:
-    """Return the points of the surface on its outer silhouette.
-
-    Args:
-        surface: the prepared mesh.
-        pixels: its projected vertices; pixels also set the resolution of the visibility test.
-        size_wh: image size that holds them.
-        spacing_px: distance of neighbouring rim points along an edge.
-    """
-    mask = silhouette_mask(pixels, surface.faces, size_wh)
+    """Return what `rim_at` returns, for any projection: `pixels` are the projected vertices."""
     a, b, c = (pixels[surface.faces[:, i]] for i in range(3))
     ab, ac = b - a, c - a
-    turned = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0
-    left, right = surface.edge_faces.T
-    candidates = np.flatnonzero((turned[left] != turned[right]) | (left == right))
-    edges = surface.edges[candidates]
-    start, along = pixels[edges[:, 0]], pixels[edges[:, 1]] - pixels[edges[:, 0]]
-    length = np.linalg.norm(along, axis=1)
-    count = np.maximum(1, np.ceil(length / spacing_px)).astype(np.intp)
-    which = np.repeat(np.arange(len(edges)), count)
+    folds, layers = _folds(surface, ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0)
+    edges = surface.edges[folds]
+    return _rim(surface.vertices[edges], pixels[edges], layers, size_wh, spacing_px)
+
+
+def _folds(
+    surface: Surface, turned: Bool[np.ndarray, " faces"]
+) -> tuple[Int[np.ndarray, " folds"], Int[np.ndarray, " folds"]]:
+    """Return the edges that are folds or borders in the image, and `covered`'s layers there."""
+    side = turned.astype(np.int8) * np.int8(2) - np.int8(1)
+    first, second = side[surface.edge_faces] * surface.edge_senses
+    layers = first + second
+    folds = np.flatnonzero(layers)
+    return folds, layers[folds]
+
+
+def _rim(
+    ends: Float[np.ndarray, "folds 2 3"],
+    pixels: Float[np.ndarray, "folds 2 2"],
+    layers: Int[np.ndarray, " folds"],
+    size_wh: tuple[int, int],
+    spacing_px: float,
+) -> Rim:
+    (u, v), (du, dv) = pixels[:, 0].T, (pixels[:, 1] - pixels[:, 0]).T
+    length = np.hypot(du, dv)
+    count = np.where(length > 1e-6, np.maximum(1, np.ceil(length / spacing_px)), 0).astype(np.intp)
+    which = np.repeat(np.arange(len(count)), count)
     step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-    fraction = ((step + 0.5) / count[which])[:, None]
-    at = start[which] + fraction * along[which]
-    keep = _on_outer_silhouette(mask, at) & (length[which] > 1e-6)
-    which, fraction = which[keep], fraction[keep]
-    edge_points = surface.vertices[edges[which]]
-    normal = np.stack([-along[which, 1], along[which, 0]], axis=1) / length[which, None]
-    inward = pixels[surface.opposite[candidates[which]]] - start[which]
-    normal *= -np.sign((normal * inward).sum(axis=1, keepdims=True) + 1e-12)
-    return Rim(edge_points[:, 0] * (1 - fraction) + edge_points[:, 1] * fraction, normal)
+    fraction = (step + 0.5) / count[which]
+    at_u, at_v = u[which] + fraction * du[which], v[which] + fraction * dv[which]
+    keep = np.flatnonzero(_is_outer(at_u, at_v, pixels, layers, size_wh))
+    which, fraction = which[keep], fraction[keep, None]
+    outward = np.sign(layers[which]) / length[which]
+    normals = np.stack([outward * dv[which], -outward * du[which]], axis=1)
+    points = ends[which, 0] * (1 - fraction) + ends[which, 1] * fraction
+    return Rim(points, normals)
 
 
-def _on_outer_silhouette(
-    mask: Bool[np.ndarray, "height width"], pixels: Float[np.ndarray, "n 2"]
+def _is_outer(
+    u: Float[np.ndarray, " n"],
+    v: Float[np.ndarray, " n"],
+    folds: Float[np.ndarray, "folds 2 2"],
+    layers: Int[np.ndarray, " folds"],
+    size_wh: tuple[int, int],
 ) -> Bool[np.ndarray, " n"]:
-    height, width = mask.shape
-    inside = cv2.distanceTransform(
-        np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-    )[1:-1, 1:-1]
-    column, row = np.floor(pixels).astype(np.intp).T
+    """Return which points lie in the picture, in or next to a pixel of the background."""
+    if len(u) == 0:
+        return np.zeros(0, dtype=bool)
+    flat = folds.reshape(-1, 2)
+    low = np.clip(np.floor(flat.min(axis=0)) - 1, 0, size_wh)
+    width, height = (np.clip(np.ceil(flat.max(axis=0)) + 1, 0, size_wh) - low).astype(int)
+    if width == 0 or height == 0:
+        return np.zeros(len(u), dtype=bool)
+    mask = covered(folds[:, 0] - low, folds[:, 1] - low, layers, (width, height))
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    inner = cv2.erode(
+        mask.view(np.uint8), cross, borderType=cv2.BORDER_CONSTANT, borderValue=0
+    ).ravel()
+    column, row = np.floor(u - low[0]).astype(np.intp), np.floor(v - low[1]).astype(np.intp)
     seen = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    near = inside[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)] <= OUTER_PX
-    return seen & near
+    place = np.where(seen, row * width + column, 0)
+    return seen & (inner[place] == 0)
 
 
 @cache

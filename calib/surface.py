@@ -1,0 +1,80 @@
+"""A mesh prepared for outlines: its edges, the faces at them and the faces' planes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from toonset.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A mesh prepared for outlines.
+
+    Attributes:
+        vertices: (n, 3), shifted so that the middle of the bounding box is the origin.
+        faces: (m, 3) int32.
+        planes: (m, 4) unnormalised normal and its dot product with a corner.
+        edges: (e, 2) vertex indices of every edge; an edge of more than two faces is repeated.
+        edge_faces: (2, e) the faces at an edge, the same face twice where there is only one.
+        edge_senses: (2, e) +1 where that face runs from the edge's first vertex to its second, -1
+            where it runs back, 0 for the repetition of a single face.
+        middle: (3,) world coordinates of the origin.
+        height: world units along +Y.
+        radius: farthest vertex from the origin.
+    """
+
+    vertices: Float[np.ndarray, "vertices 3"]
+    faces: Int[np.ndarray, "faces 3"]
+    planes: Float[np.ndarray, "faces 4"]
+    edges: Int[np.ndarray, "edges 2"]
+    edge_faces: Int[np.ndarray, "2 edges"]
+    edge_senses: Int[np.ndarray, "2 edges"]
+    middle: Float[np.ndarray, " 3"]
+    height: float
+    radius: float
+
+
+def prepare_surface(mesh: Mesh) -> Surface:
+    """Return the mesh with its edges, their faces and the faces' planes."""
+    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+    vertices = mesh.vertices - mesh.middle
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    planes = np.hstack([normals, (normals * a).sum(axis=1, keepdims=True)])
+    edges, edge_faces, edge_senses = _edges(faces)
+    return Surface(
+        vertices,
+        faces,
+        planes,
+        edges,
+        edge_faces,
+        edge_senses,
+        mesh.middle,
+        mesh.height,
+        mesh.radius,
+    )
+
+
+def _edges(
+    faces: Int[np.ndarray, "faces 3"],
+) -> tuple[Int[np.ndarray, "e 2"], Int[np.ndarray, "2 e"], Int[np.ndarray, "2 e"]]:
+    """Return edges, their faces and senses; the faces of an edge are taken two by two."""
+    corners = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    keys = np.sort(corners, axis=1)
+    order = np.lexsort((keys[:, 1], keys[:, 0]))
+    sense = np.where(corners[:, 0] < corners[:, 1], 1, -1).astype(np.int8)[order]
+    owner = np.tile(np.arange(len(faces)), 3)[order]
+    keys = keys[order]
+    fresh = np.concatenate([[True], (np.diff(keys, axis=0) != 0).any(axis=1)])
+    place = np.arange(len(keys))
+    first = np.flatnonzero((place - np.maximum.accumulate(np.where(fresh, place, 0))) % 2 == 0)
+    second = np.minimum(first + 1, len(keys) - 1)
+    paired = (second > first) & ~fresh[second]
+    second = np.where(paired, second, first)
+    edge_faces = np.stack([owner[first], owner[second]])
+    senses = np.stack([sense[first], np.where(paired, sense[second], 0)])
+    return keys[first].astype(np.intp), edge_faces, senses.astype(np.int8)

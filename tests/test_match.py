@@ -1,0 +1,123 @@
+"""Outlines and matching: the fast ways equal the plain ones."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import KDTree
+
+from toonset.calib.contour import drawn_contour
+from toonset.calib.match import Drawing, match, nearest
+from toonset.calib.pose import Pose, project
+from toonset.calib.rim import find_rim, rim_at, silhouette_mask
+from toonset.calib.surface import Surface, prepare_surface
+from toonset.camera import rotation_from_angles
+from toonset.mesh import Mesh
+from toonset.view import View
+
+SIZE = (150, 140)
+
+
+def ball() -> Mesh:
+    shape = trimesh.creation.icosphere(subdivisions=3)
+    return Mesh(np.array(shape.vertices) * [1.0, 1.4, 0.6], np.array(shape.faces))
+
+
+def open_soup(seed: int) -> Mesh:
+    """Return triangles that share vertices at random: borders, fins, mixed winding."""
+    rng = np.random.default_rng(seed)
+    faces = np.array([rng.choice(30, 3, replace=False) for _ in range(60)])
+    return Mesh(rng.uniform(-1, 1, (30, 3)), faces)
+
+
+def pose_at(seed: int, k: float = 0.0) -> Pose:
+    rng = np.random.default_rng(seed)
+    rotation = rotation_from_angles(*rng.uniform(-1, 1, 3) * [3, 0.8, 0.2])
+    return Pose(rotation, np.array([75.0, 70.0]) + rng.uniform(-9, 9, 2), rng.uniform(20, 60), k)
+
+
+def covered_by_folds(surface: Surface, pixels: np.ndarray) -> np.ndarray:
+    from toonset.calib.coverage import covered
+    from toonset.calib.rim import _folds
+
+    a, b, c = (pixels[surface.faces[:, i]] for i in range(3))
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] > 0
+    folds, layers = _folds(surface, turned)
+    edges = surface.edges[folds]
+    return covered(pixels[edges[:, 0]], pixels[edges[:, 1]], layers, SIZE)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("shape", ["ball", "soup"])
+def test_folds_cover_what_the_triangles_cover(shape, seed):
+    surface = prepare_surface(ball() if shape == "ball" else open_soup(seed))
+    pixels = project(pose_at(seed, k=0.2), surface.vertices)  # parts leave the picture
+    plain = silhouette_mask(pixels, surface.faces, SIZE)
+    # a pixel centre within single precision of an edge may go either way
+    assert (covered_by_folds(surface, pixels) != plain).sum() <= 2
+    assert plain.any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_more_than_two_faces_at_an_edge_are_all_counted(seed):
+    spine = [[0, -1, 0], [0, 1, 0]]
+    tips = [[np.cos(a), 0, np.sin(a)] for a in np.arange(5) * 2 * np.pi / 5]
+    fan = Mesh(np.array(spine + tips, dtype=float), np.array([[0, 1, i] for i in range(2, 7)]))
+    surface = prepare_surface(fan)
+    pixels = project(pose_at(seed), surface.vertices)
+    plain = silhouette_mask(pixels, surface.faces, SIZE)
+    assert (covered_by_folds(surface, pixels) != plain).sum() <= 2
+
+
+@pytest.mark.parametrize("k", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(3))
+def test_rim_from_planes_equals_rim_from_pixels(seed, k):
+    surface, pose = prepare_surface(ball()), pose_at(seed, k)
+    fast = rim_at(surface, pose, SIZE, 1.0)
+    plain = find_rim(surface, project(pose, surface.vertices), SIZE, 1.0)
+    np.testing.assert_allclose(fast.points, plain.points)
+    np.testing.assert_allclose(fast.normals, plain.normals)
+    np.testing.assert_allclose(np.linalg.norm(fast.normals, axis=1), 1)
+    assert len(fast.points) > 50
+
+
+def test_a_mesh_turned_inside_out_has_the_same_rim():
+    mesh, pose = ball(), pose_at(1)
+    inside_out = Mesh(mesh.vertices, mesh.faces[:, ::-1])
+    fast = rim_at(prepare_surface(mesh), pose, SIZE, 1.0)
+    other = rim_at(prepare_surface(inside_out), pose, SIZE, 1.0)
+    np.testing.assert_allclose(fast.points, other.points)
+    np.testing.assert_allclose(fast.normals, other.normals)
+
+
+@pytest.mark.parametrize("sizes", [(1, 1), (1, 300), (63, 64), (65, 200), (400, 430)])
+def test_nearest_equals_a_search_tree(sizes):
+    rng = np.random.default_rng(sum(sizes))
+    spread = [300, 300, 15, 15]
+    a, b = (rng.uniform(size=(n, 4)) * spread + 500 for n in sizes)
+    far = np.linalg.norm(a - b[nearest(a, b)], axis=1)
+    np.testing.assert_allclose(far, KDTree(b).query(a)[0], atol=1e-2)
+
+
+def drawing_of(mesh: Mesh, pose: Pose) -> Drawing:
+    mask = silhouette_mask(project(pose, prepare_surface(mesh).vertices), mesh.faces, SIZE)
+    rgba = np.zeros((SIZE[1], SIZE[0], 4), np.uint8)
+    rgba[..., 3] = 255 * mask
+    return Drawing(drawn_contour(View(rgba, (0, 0, *SIZE), 0.0, "000.png")), 100, 160)
+
+
+def test_matches_of_a_drawing_with_itself_are_close_on_both_sides():
+    pose, surface = pose_at(5), prepare_surface(ball())
+    drawing = drawing_of(ball(), pose)
+    matches = match(drawing, surface, drawing.pose_in(pose))
+    assert matches.drawn == len(drawing.points)
+    assert np.median(matches.distances) < 1.0
+    off = project(drawing.pose_in(pose), matches.points) - matches.targets
+    assert np.median(np.abs((off * matches.normals).sum(axis=1))) < 0.3
+
+
+def test_a_figure_outside_of_the_picture_is_far_from_everything():
+    drawing = drawing_of(ball(), pose_at(5))
+    away = Pose(np.eye(3), np.array([-1e4, 0.0]), 40.0)
+    matches = match(drawing, prepare_surface(ball()), away)
+    assert (matches.distances == drawing.height).all()
+    assert matches.drawn == len(matches.points) == len(drawing.points)
