@@ -1,0 +1,121 @@
+"""`toonset export`: a bundle in another program's format."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
+
+if TYPE_CHECKING:
+    import numpy as np
+    from jaxtyping import Float
+
+    from toonset.camera import Camera
+    from toonset.dataset.colmap import FarPinhole
+    from toonset.dataset.colmap_points import TrackedPoints
+    from toonset.dataset.scene import Frame
+    from toonset.mesh import Mesh
+
+WRITTEN = ("images", "masks", "sparse", "toonset.json")
+RIM_SPACING_PX = 2.0
+SURFACE_POINTS = 10_000  # about what a splatting trainer starts a single object from
+
+
+class Format(StrEnum):
+    """What is written."""
+
+    colmap = "colmap"
+
+
+def export(
+    bundle: Annotated[Path, typer.Argument(help="A bundle, or a folder with transforms.json.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write.")],
+    to: Annotated[Format, typer.Option("--to", help="Format.")] = Format.colmap,
+    mesh: Annotated[
+        Path | None,
+        typer.Option("--mesh", help="The mannequin of the calibration, for points3D."),
+    ] = None,
+    text: Annotated[bool, typer.Option("--text", help="Write .txt files, not .bin.")] = False,
+    force: ForceFlag = False,
+    seed: SeedOption = 0,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Write a bundle as a COLMAP dataset: images over white, masks, sparse/0 and exact cameras.
+
+    COLMAP has no orthographic camera; such views become pinholes 100 body heights away, and how
+    far these may be off is printed. points3D is empty without --mesh.
+    """
+    from toonset.dataset.colmap import read_far_pinholes, write_colmap
+    from toonset.dataset.mesh_file import load_mesh
+    from toonset.dataset.transforms import read_scene
+
+    printer = Printer(as_json, quiet)
+    check_output(out, [bundle, mesh], WRITTEN, force=force)
+    frames = read_scene(bundle).frames
+    pinholes = read_far_pinholes(bundle)
+    points = None
+    if mesh is not None:
+        printer.progress("colouring points")
+        cameras = [pinhole.camera for pinhole in pinholes]
+        points = _points(load_mesh(mesh), frames, cameras, seed)
+    write_colmap(out, frames, pinholes, points, text=text, force=force)
+    error_px = max(pinhole.error_px for pinhole in pinholes)
+    printer.say(_summary(frames, pinholes, points))
+    count = 0 if points is None else len(points.xyz)
+    values = {"out": out, "format": to.value, "views": len(frames), "points": count}
+    printer.result({**values, "pinhole_error_px": error_px}, str(out))
+
+
+def _points(
+    mesh: Mesh, frames: tuple[Frame, ...], cameras: list[Camera], seed: int
+) -> TrackedPoints:
+    import numpy as np
+
+    from toonset.dataset.colmap_points import sample_surface, track_points
+    from toonset.errors import MeshError
+
+    candidates = [*_rims(mesh, cameras), sample_surface(mesh, SURFACE_POINTS, seed)]
+    points = track_points(np.concatenate(candidates), mesh, frames, cameras)
+    if len(points.xyz) == 0:
+        raise MeshError(
+            f"{mesh.name}: no point of it lies on the figure in every drawing; give the mannequin "
+            "of the calibration, or none"
+        )
+    return points
+
+
+def _rims(mesh: Mesh, cameras: list[Camera]) -> list[Float[np.ndarray, "n 3"]]:
+    """Return the points of the mannequin that are its outline in a view, per view."""
+    from toonset.calib.rim import find_rim, prepare_surface
+
+    surface = prepare_surface(mesh)
+    rims = []
+    for camera in cameras:
+        pixels, _, in_front = camera.project(mesh.vertices)
+        if in_front.all():
+            rim = find_rim(surface, pixels, camera.size_wh, RIM_SPACING_PX)
+            rims.append(rim.points + surface.middle)
+    return rims
+
+
+def _summary(
+    frames: tuple[Frame, ...],
+    pinholes: tuple[FarPinhole, ...],
+    points: TrackedPoints | None,
+) -> str:
+    far = sum(frame.camera.is_orthographic for frame in frames)
+    lines = [f"{len(frames)} {'view' if len(frames) == 1 else 'views'}"]
+    if far:
+        error_px = max(pinhole.error_px for pinhole in pinholes)
+        lines.append(f"{far} orthographic, written as far pinholes: at most {error_px:.2f} px off")
+    if points is None:
+        lines.append("points3D is empty; give --mesh to fill it")
+    else:
+        several = int((points.seen.sum(axis=0) > 1).sum())
+        lines.append(f"{len(points.xyz)} points, {several} of them seen by several views")
+    return "\n".join(lines)
