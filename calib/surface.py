@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,7 +18,6 @@ class Surface:
     Attributes:
         vertices: (n, 3), shifted so that the middle of the bounding box is the origin.
         faces: (m, 3) int32.
-        planes: (m, 4) unnormalised normal and its dot product with a corner.
         edges: (e, 2) vertex indices of every edge; an edge of more than two faces is repeated.
         edge_faces: (2, e) the faces at an edge, the same face twice where there is only one.
         edge_senses: (2, e) +1 where that face runs from the edge's first vertex to its second, -1
@@ -29,7 +29,6 @@ class Surface:
 
     vertices: Float[np.ndarray, "vertices 3"]
     faces: Int[np.ndarray, "faces 3"]
-    planes: Float[np.ndarray, "faces 4"]
     edges: Int[np.ndarray, "edges 2"]
     edge_faces: Int[np.ndarray, "2 edges"]
     edge_senses: Int[np.ndarray, "2 edges"]
@@ -37,19 +36,24 @@ class Surface:
     height: float
     radius: float
 
+    @cached_property
+    def planes(self) -> Float[np.ndarray, "faces 4"]:
+        """Return every face's normal, as long as the face is large, and its product with a corner.
+
+        A property, since the same edges serve other vertices (`dataclasses.replace`).
+        """
+        a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
+        normals = np.cross(b - a, c - a)
+        return np.hstack([normals, (normals * a).sum(axis=1, keepdims=True)])
+
 
 def prepare_surface(mesh: Mesh) -> Surface:
-    """Return the mesh with its edges, their faces and the faces' planes."""
+    """Return the mesh with its edges and their faces."""
     faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-    vertices = mesh.vertices - mesh.middle
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    planes = np.hstack([normals, (normals * a).sum(axis=1, keepdims=True)])
     edges, edge_faces, edge_senses = _edges(faces)
     return Surface(
-        vertices,
+        mesh.vertices - mesh.middle,
         faces,
-        planes,
         edges,
         edge_faces,
         edge_senses,

@@ -1,5 +1,7 @@
 """Outlines and matching: the fast ways equal the plain ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -121,3 +123,11 @@ def test_a_figure_outside_of_the_picture_is_far_from_everything():
     matches = match(drawing, prepare_surface(ball()), away)
     assert (matches.distances == drawing.height).all()
     assert matches.drawn == len(matches.points) == len(drawing.points)
+
+
+def test_other_vertices_on_the_same_edges_have_planes_of_their_own():
+    surface, pose = prepare_surface(ball()), pose_at(2)
+    assert len(rim_at(surface, pose, SIZE, 1.0).points)  # the planes are there
+    flat = replace(surface, vertices=surface.vertices * [1.0, 1.0, 0.1])
+    plain = find_rim(flat, project(pose, flat.vertices), SIZE, 1.0)
+    np.testing.assert_allclose(rim_at(flat, pose, SIZE, 1.0).points, plain.points)
