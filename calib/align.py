@@ -12,6 +12,8 @@ with iterative closest points instead of colour lines: a drawing has its outline
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +23,11 @@ from toonset.calib.match import Drawing as Drawing
 from toonset.calib.match import Matches as Matches
 from toonset.calib.match import match as match
 from toonset.calib.pose import PARAMETERS, Pose, project, project_with_jacobian
-from toonset.calib.rim import Surface
+from toonset.calib.surface import Surface
+from toonset.camera import rotation_distance
 
 MAX_TURN = np.radians(12.0)  # per iteration: beyond it the matches of this iteration mean nothing
+MERGED = np.radians(3.0)  # starts this near to each other go to the same optimum
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
 EFFECTIVE_POINTS = 40.0  # weight of a view's outline against the priors, in points
@@ -71,14 +75,38 @@ def align(
         start: first pose; its k is kept.
         widths: the robust width of each step over the figure's height.
     """
-    pose = drawing.pose_in(start)
+    return align_all(drawing, surface, [start], widths)[0]
+
+
+def align_all(
+    drawing: Drawing,
+    surface: Surface,
+    starts: Sequence[Pose],
+    widths: Float[np.ndarray, " iterations"],
+) -> list[Fit]:
+    """Return what `align` makes of the starts, without those that ran into a better one."""
+    poses = [drawing.pose_in(start) for start in starts]
     for width in widths:
-        matches = match(drawing, surface, pose)
-        step = _gauss_newton_step(matches, pose, width * drawing.height, drawing.height)
-        pose = pose.moved(step)
-        if np.abs(step[:3]).max() < 1e-4 and width == widths[-1]:
-            break
-    return measure(drawing, surface, pose)
+        before, poses = poses, []
+        costs = []
+        for pose in before:
+            matches = match(drawing, surface, pose)
+            weights = _robust_weights(matches, width * drawing.height)
+            step = _gauss_newton_step(matches, weights, pose, drawing.height)
+            poses.append(pose.moved(step))
+            costs.append(-float(weights.sum()))
+        poses = _apart(poses, costs)
+    return [measure(drawing, surface, pose) for pose in poses]
+
+
+def _apart(poses: Sequence[Pose], costs: Sequence[float]) -> list[Pose]:
+    """Return the poses less those within `MERGED` of a cheaper one, in their order."""
+    kept: list[int] = []
+    for i in sorted(range(len(poses)), key=lambda i: costs[i]):
+        turns = (rotation_distance(poses[i].rotation, poses[j].rotation) for j in kept)
+        if all(turn > MERGED for turn in turns):
+            kept.append(i)
+    return [poses[i] for i in sorted(kept)]
 
 
 def measure(drawing: Drawing, surface: Surface, pose: Pose, cap: float = 0.05) -> Fit:
@@ -96,17 +124,24 @@ def measure(drawing: Drawing, surface: Surface, pose: Pose, cap: float = 0.05) -
     return Fit(drawing.pose_out(pose), cost, error, float(met.mean()))
 
 
+def _robust_weights(matches: Matches, width_px: float) -> Float[np.ndarray, " n"]:
+    """Return Geman-McClure weights; the weights of perfect matches sum to 1.
+
+    Both directions count the same, however many points each has.
+    """
+    weights = (width_px**2 / (width_px**2 + matches.distances**2)) ** 2
+    weights[: matches.drawn] /= 2 * matches.drawn
+    weights[matches.drawn :] /= 2 * max(len(weights) - matches.drawn, 1)
+    return weights
+
+
 def _gauss_newton_step(
-    matches: Matches, pose: Pose, width_px: float, height_px: float
+    matches: Matches, weights: Float[np.ndarray, " n"], pose: Pose, height_px: float
 ) -> Float[np.ndarray, " 6"]:
     pixels, jacobian = project_with_jacobian(pose, matches.points)
     residual = (matches.normals * (pixels - matches.targets)).sum(axis=1)
     rows = np.einsum("ni,nij->nj", matches.normals, jacobian[..., :PARAMETERS])
-    weights = (width_px**2 / (width_px**2 + matches.distances**2)) ** 2
-    # both directions count the same, however many points each has
-    side = np.arange(len(weights)) < matches.drawn
-    counts = np.where(side, side.sum(), max((~side).sum(), 1))
-    weights = weights * EFFECTIVE_POINTS / (2 * counts) / (NOISE_OF_HEIGHT * height_px) ** 2
+    weights = weights * EFFECTIVE_POINTS / (NOISE_OF_HEIGHT * height_px) ** 2
     normal = (rows * weights[:, None]).T @ rows
     gradient = rows.T @ (weights * residual)
     prior_matrix, prior_gradient = upright_prior(pose, ElevationPrior())
@@ -120,14 +155,11 @@ def upright_prior(
     pose: Pose, prior: ElevationPrior
 ) -> tuple[Float[np.ndarray, "6 6"], Float[np.ndarray, " 6"]]:
     """Return the Gauss-Newton matrix and gradient of the roll and elevation priors."""
-    (roll, elevation), (d_roll, d_elevation) = tilt(pose)
+    (roll, elevation), slopes = tilt(pose)
+    precision = np.array([1 / ROLL_SIGMA**2, 1 / prior.sigma**2])
     matrix, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
-    for off, slope, sigma in (
-        (roll, d_roll, ROLL_SIGMA),
-        (elevation - prior.mean, d_elevation, prior.sigma),
-    ):
-        matrix[:3, :3] += np.outer(slope, slope) / sigma**2
-        gradient[:3] += off * slope / sigma**2
+    matrix[:3, :3] = (slopes.T * precision) @ slopes
+    gradient[:3] = (np.array([roll, elevation - prior.mean]) * precision) @ slopes
     return matrix, gradient
 
 
@@ -136,9 +168,8 @@ def tilt(pose: Pose) -> tuple[tuple[float, float], Float[np.ndarray, "2 3"]]:
 
     With up = R e_y: roll = atan2(up_x, -up_y), elevation = atan2(-up_z, |up_xy|), d up = w x up.
     """
-    x, y, z = pose.rotation[:, 1]
-    flat = max(float(np.hypot(x, y)), 1e-6)
-    d_up = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-    d_roll = (-y * d_up[0] + x * d_up[1]) / flat**2
-    angles = (float(np.arctan2(x, -y)), float(np.arctan2(-z, flat)))
-    return angles, np.stack([d_roll, -d_up[2] / flat])
+    x, y, z = pose.rotation[:, 1].tolist()
+    flat = max(math.hypot(x, y), 1e-6)
+    d_roll = [-x * z / flat**2, -y * z / flat**2, (x * x + y * y) / flat**2]
+    d_elevation = [-y / flat, x / flat, 0.0]
+    return (math.atan2(x, -y), math.atan2(-z, flat)), np.array([d_roll, d_elevation])
