@@ -71,10 +71,18 @@ def paint_log_likelihood(
 
     The rows should hold all that is possible: 1 / BROKEN is the most that one is preferred by.
     """
-    yaws = np.asarray(yaws, dtype=np.float64)
-    evidence = np.array([_evidence(paint, row) for row in yaws])
-    scaled = MEASUREMENTS_PER_VIEW * yaws.shape[1] * (evidence - evidence.max(initial=-np.inf))
-    return np.log((1 - BROKEN) * np.exp(scaled) + BROKEN)
+    evidence = paint_evidence(paint, yaws)
+    relative = np.exp(evidence - evidence.max(initial=-np.inf))
+    return np.log((1 - BROKEN) * relative + BROKEN)
+
+
+def paint_evidence(
+    paint: Paint, yaws: Float[np.ndarray, "hypotheses views"]
+) -> Float[np.ndarray, " hypotheses"]:
+    """Return the rows' log-likelihoods (nats) if the model holds, comparable between calls."""
+    rows, place = np.unique(np.asarray(yaws, float), axis=0, return_inverse=True)
+    each = np.array([_evidence(paint, row) for row in rows])
+    return MEASUREMENTS_PER_VIEW * rows.shape[1] * each[place.reshape(-1)]
 
 
 def _evidence(paint: Paint, yaws: Float[np.ndarray, " views"]) -> float:

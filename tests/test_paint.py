@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from toonset.calib import paint
-from toonset.calib.paint import Paint, paint_log_likelihood, read_paint
+from toonset.calib.paint import Paint, paint_evidence, paint_log_likelihood, read_paint
 from toonset.calib.sections import figure_height, read_sections
 from toonset.view import View
 
@@ -53,6 +53,12 @@ def test_no_yaws_are_excluded() -> None:
     likelihood = paint_log_likelihood(_read(EIGHT), np.stack([EIGHT, np.pi - EIGHT]))
     assert likelihood[0] == pytest.approx(0)
     assert likelihood[1] >= np.log(paint.BROKEN)
+
+
+def test_evidence_is_the_same_in_any_company() -> None:
+    hypotheses = np.random.default_rng(4).uniform(0, 2 * np.pi, (6, 8))[[0, 1, 1, 2, 0]]
+    alone = [paint_evidence(_read(EIGHT), row[None])[0] for row in hypotheses]
+    np.testing.assert_allclose(paint_evidence(_read(EIGHT), hypotheses), alone)
 
 
 def test_half_a_turn_of_all_views_changes_nothing() -> None:
