@@ -1,0 +1,373 @@
+"""Landmarks: poses from pairs, which pairs and which camera model to believe, and their files."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from toonset.calib.landmark_models import explain
+from toonset.calib.landmark_pose import depth_reversed, refined, solve_pinhole, squared_error
+from toonset.calib.landmarks import LandmarkFit, landmark_starts, solve_landmarks
+from toonset.calib.pose import Pose, project
+from toonset.calib.rim import Surface, prepare_surface
+from toonset.camera import rotation_distance, rotation_from_angles
+from toonset.dataset.landmark_file import Landmarks, read_known_points, read_landmarks
+from toonset.dataset.landmark_formats import LandmarkError
+from toonset.mesh import Mesh
+from toonset.view import View
+
+HEIGHT_PX = 300.0
+CORNERS = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (0.0, 1.0) for z in (-0.15, 0.15)])
+
+
+@pytest.fixture(scope="module")
+def surface() -> Surface:
+    """Return a body one unit high whose middle is not the origin."""
+    return prepare_surface(Mesh(CORNERS, np.array([[0, 1, 2], [1, 3, 2], [4, 5, 6], [5, 7, 6]])))
+
+
+def random_pose(rng, heights: float = np.inf) -> Pose:
+    rotation = rotation_from_angles(*rng.uniform([-np.pi, -0.5, -0.1], [np.pi, 0.5, 0.1]))
+    return Pose(rotation, rng.uniform(100, 300, 2), HEIGHT_PX, 1 / heights)
+
+
+def random_points(rng, count: int) -> np.ndarray:
+    return rng.uniform(-0.5, 0.5, (count, 3)) * [0.6, 1.0, 0.3]
+
+
+def clicked(
+    pose: Pose, points: np.ndarray, surface: Surface, off: float | np.ndarray = 0.0
+) -> Landmarks:
+    names = tuple(f"point {i}" for i in range(len(points)))
+    return Landmarks("000.png", names, points + surface.middle, project(pose, points) + off)
+
+
+def turned_deg(pose: Pose, other: Pose) -> float:
+    return float(np.degrees(rotation_distance(pose.rotation, other.rotation)))
+
+
+@pytest.mark.parametrize("count", [4, 5, 7, 12])
+@pytest.mark.parametrize("seed", range(4))
+def test_orthographic_camera_is_recovered_exactly(surface, count, seed):
+    rng = np.random.default_rng([seed, count])
+    pose, points = random_pose(rng), random_points(rng, count)
+    found = solve_landmarks(clicked(pose, points, surface), surface)
+    assert found.model == "orthographic"
+    assert found.misplaced == ()
+    assert turned_deg(found.poses[0], pose) < 1e-4
+    np.testing.assert_allclose(found.poses[0].shift, pose.shift, atol=1e-5)
+    assert found.poses[0].scale == pytest.approx(pose.scale, rel=1e-7)
+    assert found.rms_px < 1e-5
+
+
+@pytest.mark.parametrize("heights", [1.5, 2, 5, 20, 100, 500])
+@pytest.mark.parametrize("count", [5, 10])
+def test_perspective_camera_is_recovered_exactly(surface, heights, count):
+    rng = np.random.default_rng([count, int(heights)])
+    pose, points = random_pose(rng, heights), random_points(rng, count)
+    found = solve_landmarks(clicked(pose, points, surface), surface)
+    assert found.model == "perspective"
+    assert found.misplaced == ()
+    assert turned_deg(found.poses[0], pose) < 1e-3
+    assert found.poses[0].k == pytest.approx(pose.k, rel=1e-4)
+
+
+def test_optimum_is_global(surface):
+    rng = np.random.default_rng(5)
+    for count in (4, 6, 9):
+        pose, points = random_pose(rng), random_points(rng, count)
+        pixels = project(pose, points) + rng.normal(0, 0.03 * HEIGHT_PX, (count, 2))
+        best = explain(points, pixels, perspective=False).poses[0]
+        turns = Rotation.random(30, np.random.default_rng(count)).as_matrix()
+        others = [Pose(turn, pixels.mean(axis=0), 200.0) for turn in turns]
+        ends = [refined(other, points, pixels, perspective=False) for other in others]
+        least = min(squared_error(end, points, pixels) for end in ends)
+        assert squared_error(best, points, pixels) <= least * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("count", [3, 4, 8])
+def test_points_in_a_plane_have_two_orthographic_cameras(surface, count):
+    rng = np.random.default_rng(count)
+    pose, flat = random_pose(rng), random_points(rng, count) * [1, 1, 0]
+    points = flat @ Rotation.from_rotvec([0.3, 0.4, 0.1]).as_matrix().T
+    found = solve_landmarks(clicked(pose, points, surface), surface)
+    assert found.probabilities == pytest.approx((0.5, 0.5), abs=0.01)
+    assert min(turned_deg(p, pose) for p in found.poses) < 1e-3
+    for candidate in found.poses:
+        np.testing.assert_allclose(project(candidate, points), project(pose, points), atol=1e-4)
+
+
+def test_depth_reversal_is_its_own_inverse_and_a_rotation():
+    rng = np.random.default_rng(0)
+    pose, points = random_pose(rng), random_points(rng, 6)
+    reverse = depth_reversed(pose, points)
+    assert np.linalg.det(reverse.rotation) == pytest.approx(1)
+    again = depth_reversed(reverse, points)
+    np.testing.assert_allclose(project(again, points), project(pose, points))
+
+
+def test_plane_seen_head_on_has_a_finite_uncertainty(surface):
+    points = random_points(np.random.default_rng(1), 6) * [1, 1, 0]
+    pose = Pose(rotation_from_angles(0.0, 0.0, 0.0), np.array([150.0, 150]), HEIGHT_PX)
+    found = solve_landmarks(clicked(pose, points, surface), surface)
+    sigmas = np.sqrt(np.diag(found.covariance))
+    assert np.isfinite(sigmas).all()
+    assert sigmas[:2].min() > 0.5  # radians: nothing is known about the turn
+    assert sigmas[2] < 0.05
+
+
+def test_uncertainty_is_that_of_repeated_clicks(surface):
+    rng = np.random.default_rng(2)
+    scores = []
+    for _ in range(25):
+        pose, points = random_pose(rng), random_points(rng, 8)
+        noise = rng.normal(0, 0.01 * HEIGHT_PX, (8, 2))
+        found = solve_landmarks(clicked(pose, points, surface, noise), surface)
+        own = found.poses[0]
+        turn = Rotation.from_matrix(pose.rotation @ own.rotation.T).as_rotvec()
+        off = [*turn, *(pose.shift - own.shift), np.log(pose.scale / own.scale)]
+        scores.append(np.array(off) / np.sqrt(np.diag(found.covariance)))
+    spread = 1.4826 * np.median(np.abs(scores), axis=0)
+    assert 0.8 < np.sqrt(np.mean(spread**2)) < 1.25
+    assert (np.abs(scores) < 4).mean() > 0.98
+
+
+@pytest.mark.parametrize("heights", [2.0, np.inf])
+@pytest.mark.parametrize("count", [6, 12])
+def test_one_misplaced_pair_is_named_and_left_out(surface, heights, count):
+    rng = np.random.default_rng([count, int(heights == 2)])
+    pose, points = random_pose(rng, heights), random_points(rng, count)
+    off = rng.normal(0, 0.3, (count, 2))
+    off[2] += [0.25 * HEIGHT_PX, -0.1 * HEIGHT_PX]
+    found = solve_landmarks(clicked(pose, points, surface, off), surface)
+    assert found.misplaced == ("point 2",)
+    assert turned_deg(found.poses[0], pose) < 1.5
+
+
+def test_honest_clicks_are_kept_and_prove_no_perspective(surface):
+    rng = np.random.default_rng(3)
+    for count in (4, 5, 6, 10, 14):
+        off = rng.normal(0, 0.01 * HEIGHT_PX, (count, 2))
+        landmarks = clicked(random_pose(rng), random_points(rng, count), surface, off)
+        found = solve_landmarks(landmarks, surface)
+        assert found.misplaced == ()
+        assert found.model == "orthographic"
+
+
+def test_order_of_pairs_does_not_matter(surface):
+    rng = np.random.default_rng(4)
+    off = rng.normal(0, 3, (9, 2))
+    off[1] += 80
+    landmarks = clicked(random_pose(rng), random_points(rng, 9), surface, off)
+    order = rng.permutation(9)
+    shuffled = Landmarks(
+        landmarks.view,
+        tuple(landmarks.names[i] for i in order),
+        landmarks.world[order],
+        landmarks.pixels[order],
+    )
+    first, second = (solve_landmarks(each, surface) for each in (landmarks, shuffled))
+    assert first.misplaced == second.misplaced == ("point 1",)
+    assert turned_deg(first.poses[0], second.poses[0]) < 1e-3
+    np.testing.assert_allclose(first.covariance, second.covariance, rtol=1e-3, atol=1e-7)
+
+
+def test_scaled_and_shifted_drawing_has_the_same_turn(surface):
+    rng = np.random.default_rng(6)
+    landmarks = clicked(random_pose(rng), random_points(rng, 7), surface, rng.normal(0, 2, (7, 2)))
+    larger = replace(landmarks, pixels=2 * landmarks.pixels + [30, -40])
+    first, second = (solve_landmarks(each, surface).poses[0] for each in (landmarks, larger))
+    assert turned_deg(first, second) < 1e-3
+    assert second.scale == pytest.approx(2 * first.scale, rel=1e-6)
+    np.testing.assert_allclose(second.shift, 2 * first.shift + [30, -40], atol=1e-3)
+
+
+@pytest.mark.parametrize("method", [cv2.SOLVEPNP_EPNP, cv2.SOLVEPNP_SQPNP])
+@pytest.mark.parametrize("heights", [2, 10, 75, 225, 1000])
+def test_opencv_poses_are_before_the_camera_or_refused(method, heights):
+    rng = np.random.default_rng(heights)
+    for _ in range(10):
+        pose, points = random_pose(rng, heights), random_points(rng, 8)
+        pixels = project(pose, points) + rng.normal(0, 1, (8, 2))
+        found = solve_pinhole(points, pixels, pose.shift, pose.scale / pose.k, method)
+        if found is not None:
+            assert np.isfinite([*found.rotation.flat, *found.shift, found.scale, found.k]).all()
+            assert np.linalg.det(found.rotation) == pytest.approx(1)
+            assert (1 + found.k * points @ found.rotation[2]).min() > 0
+
+
+def test_exact_pinhole_of_opencv_is_the_pose():
+    rng = np.random.default_rng(7)
+    pose, points = random_pose(rng, 3), random_points(rng, 8)
+    focal = pose.scale / pose.k
+    found = solve_pinhole(points, project(pose, points), pose.shift, focal, cv2.SOLVEPNP_SQPNP)
+    assert found is not None
+    assert turned_deg(found, pose) < 0.01
+    assert found.k == pytest.approx(pose.k, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("points", "pixels", "message"),
+    [
+        (np.outer(range(4), [0.1, 0.2, 0.0]), np.eye(4)[:, :2] * 50, "one line of the mannequin"),
+        (np.zeros((3, 3)), np.eye(3)[:, :2] * 50, "one line of the mannequin"),
+        (CORNERS[:5] - [0, 0.5, 0], np.ones((5, 2)), "pixels are within 1 px"),
+        (CORNERS[:5] * 100, np.eye(5)[:, :2] * 50, "check its units"),
+    ],
+)
+def test_landmarks_that_determine_no_camera_are_refused(surface, points, pixels, message):
+    names = tuple("abcde"[: len(points)])
+    landmarks = Landmarks("003.png", names, points + surface.middle, pixels)
+    with pytest.raises(LandmarkError, match=rf"view 003\.png.*{message}"):
+        solve_landmarks(landmarks, surface)
+
+
+# ---- files ----
+
+KNOWN = {"nose": (0.0, 0.9, 0.1), "left_hand": (0.3, 0.5, 0.0), "right_hand": (-0.3, 0.5, 0.0)}
+PIXELS = {"nose": [30.5, 20.0], "left_hand": [45.0, 60.25], "right_hand": [15.0, 60.0]}
+
+
+def two_views() -> list[View]:
+    rgba = np.full((100, 60, 4), 255, np.uint8)
+    return [View(rgba, (10 + 100 * i, 5, 60, 100), 0.0, f"{i:03d}.png") for i in range(2)]
+
+
+def in_sheet(view: View) -> dict[str, list[float]]:
+    return {name: [u + view.box[0], v + view.box[1]] for name, (u, v) in PIXELS.items()}
+
+
+def written(folder: Path, content) -> Path:
+    path = folder / "marks.json"
+    if isinstance(content, dict):
+        content = json.dumps({"schema": "toonset-landmarks/1", **content})
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("key", ["1", "001", "001.png"])
+def test_sheet_and_view_pixels_are_the_same_pairs(tmp_path, key):
+    views = two_views()
+    for content in (
+        {"views": {key: in_sheet(views[1])}},
+        {"views": {key: PIXELS}, "pixels": "view"},
+        {"views": {key: [{"name": n, "pixel": p} for n, p in PIXELS.items()]}, "pixels": "view"},
+    ):
+        empty, found = read_landmarks(written(tmp_path, content), views, KNOWN)
+        assert empty is None
+        assert found is not None
+        assert found.names == tuple(KNOWN)
+        np.testing.assert_array_equal(found.pixels, list(PIXELS.values()))
+        np.testing.assert_array_equal(found.world, list(KNOWN.values()))
+
+
+def test_csv_with_and_without_coordinates(tmp_path):
+    views = two_views()
+    path = tmp_path / "marks.csv"
+    rows = [f"000.png,{name},{u},{v}" for name, (u, v) in in_sheet(views[0]).items()]
+    path.write_text("\ufeffview,name,u,v\r\n" + "\r\n".join(rows), encoding="utf-8")
+    (found, _) = read_landmarks(path, views, KNOWN)
+    assert found is not None
+    np.testing.assert_array_equal(found.pixels, list(PIXELS.values()))
+    rows = [f"0,,{20 + i},{30 + i},0.{i},0.5,0.1" for i in range(3)]
+    path.write_text("view, name, u, v, x, y, z\n" + "\n".join(rows), encoding="utf-8")
+    (found, _) = read_landmarks(path, views, {})
+    assert found is not None
+    np.testing.assert_array_equal(found.world[:, 0], [0.0, 0.1, 0.2])
+
+
+def test_points_of_the_file_go_before_those_of_the_mannequin(tmp_path, surface):
+    views, mesh = two_views(), tmp_path / "body.obj"
+    assert read_known_points(mesh) == {}
+    sidecar = {"schema": "toonset-landmarks/1", "units": "world", "points": KNOWN}
+    (tmp_path / "body.landmarks.json").write_text(json.dumps(sidecar))
+    content = {"points": {"nose": [0, 1, 0.2]}, "views": {"0": PIXELS}, "pixels": "view"}
+    found = read_landmarks(written(tmp_path, content), views, read_known_points(mesh))
+    assert found[0] is not None
+    np.testing.assert_array_equal(found[0].world[:2], [[0, 1, 0.2], KNOWN["left_hand"]])
+    first, second = landmark_starts(found, surface)
+    assert isinstance(first, LandmarkFit)
+    assert second is None
+    assert len(first.poses) == 2  # three points lie in a plane
+
+
+BROKEN = [
+    ("{", "no valid JSON"),
+    ("[" * 100_000, "no valid JSON"),
+    ("[]", "no landmark file"),
+    ('{"schema": "toonset-landmarks/9"}', "no landmark file"),
+    ('{"schema": "toonset-landmarks/1", "views": {}, "views": {}}', "'views' is given twice"),
+    ({"view": {}}, "unknown key 'view'; did you mean 'views'"),
+    ({"views": []}, "must be objects"),
+    ({"views": {}}, "holds no pairs"),
+    ({"points": KNOWN}, "holds no pairs"),
+    ({"views": {"0": PIXELS}, "pixels": "px"}, "\"pixels\" is 'px'"),
+    ({"views": {"2": PIXELS}}, "no such view among 2; choose one of: 000.png, 001.png"),
+    ({"views": {"02.png": PIXELS}}, "did you mean '00"),
+    ({"views": {"0": {}, "1": {}}}, "holds no pairs"),
+    ({"views": {"0": {"nose": [30, 20]}}}, "1 pairs, 3 are needed"),
+    ({"views": {"0": PIXELS, "000": PIXELS}, "pixels": "view"}, "given twice, under two names"),
+    ({"views": {"0": {**PIXELS, "noes": [30, 20]}}, "pixels": "view"}, "did you mean 'nose'"),
+    ({"views": {"0": {**PIXELS, "nose": [30]}}}, r"nose: found \[30\], 2 finite numbers"),
+    ({"views": {"0": {**PIXELS, "nose": [30, float("nan")]}}}, r"nose: found \[30, NaN\]"),
+    ({"views": {"0": {**PIXELS, "nose": [30, 1e999]}}}, "2 finite numbers are needed"),
+    ({"views": {"0": {**PIXELS, "nose": [True, 1]}}}, "2 finite numbers are needed"),
+    ({"views": {"0": {**PIXELS, "nose": "12"}}}, "2 finite numbers are needed"),
+    ({"views": {"0": {**PIXELS, "nose": [75, 20]}}, "pixels": "view"}, r"\(75, 20\) lies outside"),
+    ({"views": {"1": in_sheet(two_views()[0])}}, "sheet pixels 110 to 170, 5 to 105"),
+    ({"points": {"nose": [0, 1]}, "views": {}}, r"points: nose: found \[0, 1\], 3 finite"),
+    ({"views": {"0": 7}}, "list of pairs is needed"),
+    ({"views": {"0": [7]}}, "list of pairs is needed"),
+    ({"views": {"0": [{"pixel": [1, 2]}]}}, 'pair 1 needs a "name"'),
+    ({"views": {"0": [{"name": 3, "pixel": [1, 2]}]}}, 'pair 1 needs a "name"'),
+    ({"views": {"0": [{"name": "nose", "pixels": [1, 2]}]}}, "did you mean 'pixel'"),
+    ({"views": {"0": [{"name": "nose", "pixel": [1, 2]}] * 2}}, "'nose' is given twice"),
+    ({"views": {"0": [{"name": str(i), "pixel": [1, 2]} for i in range(1001)]}}, "1001 pairs"),
+]
+
+
+@pytest.mark.parametrize(("content", "message"), BROKEN)
+def test_broken_json_says_what_to_do(tmp_path, content, message):
+    with pytest.raises(LandmarkError, match=message) as caught:
+        read_landmarks(written(tmp_path, content), two_views(), KNOWN)
+    assert str(caught.value).startswith(str(tmp_path / "marks.json"))
+    assert "\n" not in str(caught.value)
+
+
+def test_names_need_a_mannequin_with_names(tmp_path):
+    path = written(tmp_path, {"views": {"0": PIXELS}, "pixels": "view"})
+    with pytest.raises(LandmarkError, match='no named points; add "points" to the file'):
+        read_landmarks(path, two_views(), {})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("view,name,x,y\n", "view,name,u,v"),
+        ("view,name,u,v\n0,nose,1\n", ":2: has another number of cells"),
+        ("view,name,u,v\n0,nose,1,2,3\n", ":2: has another number of cells"),
+        ("view,name,u,v\n0,nose,1,\n", ":2: u, v"),
+        ("view,name,u,v\n0,nose,1,inf\n", "2 finite numbers"),
+        ("view,name,u,v,x,y,z\n0,nose,1,2,3,,\n", ":2: x, y, z"),
+        ("view,name,u,v\n0,nose,20,30\n0,nose,20,30\n", "'nose' is given twice"),
+        ("view,name,u,v\n", "holds no pairs"),
+    ],
+)
+def test_broken_csv_says_where(tmp_path, text, message):
+    path = tmp_path / "marks.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(LandmarkError, match=message):
+        read_landmarks(path, two_views(), KNOWN)
+
+
+def test_bytes_that_are_no_text_and_missing_files(tmp_path):
+    path = tmp_path / "marks.json"
+    path.write_bytes(b"\x89PNG\r\n\xff\xfe")
+    with pytest.raises(LandmarkError, match="no UTF-8 text"):
+        read_landmarks(path, two_views(), KNOWN)
+    with pytest.raises(LandmarkError, match="no such file"):
+        read_landmarks(tmp_path / "none.json", two_views(), KNOWN)
