@@ -21,6 +21,7 @@ class Subject(StrEnum):
 
     calib = "calib"
     train = "train"
+    stability = "stability"
 
 
 def bench(
@@ -30,11 +31,17 @@ def bench(
         typer.Option("--cases", help="Folders with ground truth (default: synthetic sheets)."),
     ] = None,
     only: Annotated[
-        str, typer.Option("--only", help="Cases whose name contains this, e.g. exact.")
+        str, typer.Option("--only", help="Cases (or sweeps) whose name contains this, e.g. exact.")
     ] = "",
     count: Annotated[
-        int, typer.Option("--count", min=1, help="Synthetic cases per condition (without --cases).")
-    ] = 4,
+        int | None,
+        typer.Option(
+            "--count",
+            min=1,
+            help="Synthetic cases per condition (without --cases); default 4. "
+            "Stability: sheets per step; default 8, with --quick 2.",
+        ),
+    ] = None,
     half: Annotated[
         bool, typer.Option("--half", help="Train on the cases' pictures at half size.")
     ] = False,
@@ -49,7 +56,8 @@ def bench(
 ) -> None:
     """Measure calibration or training: seconds against accuracy, per setting.
 
-    Prints a table and writes records.json and a chart per condition.
+    Prints a table and writes records.json and a chart per condition. `stability` sweeps errors of a
+    sheet instead, to where calibration fails; the same command again continues a stopped run.
     """
     from toonset.bench.record import as_dicts, machine, table
     from toonset.files import new_folder, write_bytes, write_json
@@ -57,8 +65,13 @@ def bench(
     printer = Printer(as_json, quiet)
     if half and (subject is not Subject.train or cases is None):
         raise typer.BadParameter("--half belongs to `train --cases`")
+    if subject is Subject.stability:
+        if cases is not None:
+            raise typer.BadParameter("--cases belongs to `calib` and `train`")
+        _stability(out, only, seed, count, quick, force, printer)
+        return
     check_output(out, [cases], WRITTEN, force=force)
-    records = _measure(subject, cases, only, count, half, quick, seed, printer)
+    records = _measure(subject, cases, only, count or 4, half, quick, seed, printer)
     with new_folder(out, force=force) as folder:
         write_json(folder / "records.json", as_dicts(records))
         for name, picture in _charts(subject, records, seed).items():
@@ -66,6 +79,20 @@ def bench(
     printer.say(f"machine: {machine()}, seed {seed}")
     printer.say(f"charts in {out}")
     printer.result({"records": as_dicts(records)}, table(records))
+
+
+def _stability(
+    out: Path, only: str, seed: int, count: int | None, quick: bool, force: bool, printer: Printer
+) -> None:
+    from dataclasses import asdict
+
+    from toonset.bench.stability_table import as_text
+    from toonset.cli.bench_stability import sweep_into
+
+    progress = printer.progress
+    rows = sweep_into(out, only, seed, count, quick=quick, force=force, progress=progress)
+    printer.say(f"seed {seed}; picture in {out / 'stability.png'}")
+    printer.result({"folder": out, "rows": [asdict(row) for row in rows]}, as_text(rows))
 
 
 def _measure(

@@ -1,0 +1,151 @@
+"""What goes wrong with a drawing, as functions of a drawing and its exact camera.
+
+Every function returns the changed view with the camera that is true of it, so that a sweep can
+measure errors after any of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from toonset.camera import Camera
+from toonset.view import View
+
+Drawn = tuple[View, Camera]
+
+MIRROR = np.diag([-1.0, 1.0, 1.0])  # left and right swapped, in the world or in the image
+HOLE_OF_HEIGHT = 0.04  # radius of a missing piece: about as wide as an arm
+
+
+def padded(view: View, camera: Camera, margin_px: int) -> Drawn:
+    """Return the drawing with `margin_px` transparent pixels more on every side."""
+    rgba = np.pad(view.rgba, ((margin_px, margin_px), (margin_px, margin_px), (0, 0)))
+    x, y, width, height = view.box
+    box = (x - margin_px, y - margin_px, width + 2 * margin_px, height + 2 * margin_px)
+    size_wh = (rgba.shape[1], rgba.shape[0])
+    shown = camera.moved((-margin_px, -margin_px), size_wh)
+    return replace(view, rgba=rgba, box=box), shown
+
+
+def rolled(view: View, camera: Camera, roll: float) -> Drawn:
+    """Return the drawing turned clockwise by `roll` radians about its middle."""
+    height, width = view.rgba.shape[:2]
+    view, camera = padded(view, camera, math.ceil((math.hypot(width, height) - width) / 2))
+    cosine, sine = math.cos(roll), math.sin(roll)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    middle = np.array(camera.size_wh) / 2
+    at_integers = middle - 0.5  # OpenCV's pixel centres; ours are at .5
+    affine = np.hstack([turn, (at_integers - turn @ at_integers)[:, None]])
+    rgba = _straight(cv2.warpAffine(_premultiplied(view.rgba), affine, camera.size_wh))
+    spin = np.eye(3)
+    spin[:2, :2] = turn
+    center = turn @ (camera.center - middle) + middle
+    turned = replace(camera, rotation=spin @ camera.rotation, center=center)
+    return replace(view, rgba=rgba), turned
+
+
+def mirrored(view: View, camera: Camera) -> Drawn:
+    """Return the drawing flipped left to right, with the camera that sees a mirrored body so."""
+    flipped = replace(
+        camera,
+        rotation=MIRROR @ camera.rotation @ MIRROR,
+        target=MIRROR @ camera.target,
+        center=np.array([camera.size_wh[0] - camera.center[0], camera.center[1]]),
+    )
+    return replace(view, rgba=np.ascontiguousarray(view.rgba[:, ::-1])), flipped
+
+
+def without_feet(view: View, camera: Camera, share: float) -> Drawn:
+    """Return the drawing with the lowest `share` of the figure's height cut away."""
+    top, bottom = _rows(view.mask)
+    lost = round(share * (bottom - top))
+    if not lost:
+        return view, camera
+    kept = view.rgba.copy()
+    kept[bottom - lost :] = 0
+    return replace(view, rgba=kept), camera
+
+
+def without_pieces(
+    view: View, camera: Camera, share: float, generator: np.random.Generator
+) -> Drawn:
+    """Return the drawing with round pieces missing, `share` of the figure's area in all.
+
+    Pieces within the figure are holes, at its border bites; many of them leave fragments. A larger
+    share with the same generator state removes the same pieces and more.
+    """
+    top, bottom = _rows(view.mask)
+    height, width = view.mask.shape
+    v, u = np.mgrid[:height, :width] + 0.5
+    left = np.ones((height, width))
+    wanted = (1 - share) * view.mask.sum()
+    while (open_now := view.mask & (left >= 0.5)).sum() > wanted:
+        rows, columns = np.nonzero(open_now)
+        i = int(generator.integers(len(rows)))
+        away = np.hypot(u - columns[i] - 0.5, v - rows[i] - 0.5)
+        left = np.minimum(left, np.clip(away - HOLE_OF_HEIGHT * (bottom - top) + 0.5, 0, 1))
+    rgba = view.rgba.copy()
+    rgba[..., 3] = np.round(rgba[..., 3] * left)
+    return replace(view, rgba=rgba), camera
+
+
+def with_capsule(
+    view: View,
+    camera: Camera,
+    ends: Float[np.ndarray, "2 3"],
+    radius: float,
+    color: tuple[int, int, int],
+) -> Drawn:
+    """Return the drawing with a ball-ended stick in front of it that the mannequin lacks.
+
+    Args:
+        view: the drawing; it grows where the stick needs room.
+        camera: true of it.
+        ends: world coordinates of the stick's ends; the same point twice is a ball.
+        radius: world units; 0 leaves the drawing as it is.
+        color: sRGB.
+    """
+    if radius <= 0:
+        return view, camera
+    radius_px = radius * camera.scale
+    shown, _, _ = camera.project(ends)
+    beyond = np.maximum(-shown, shown - np.array(camera.size_wh)).max() + radius_px
+    if beyond > 0:
+        view, camera = padded(view, camera, math.ceil(beyond) + 1)
+        shown, _, _ = camera.project(ends)
+    away = _distance_to_segment(camera.pixel_grid(), shown)
+    cover = np.clip(radius_px - away + 0.5, 0, 1)[..., None]
+    stick = np.array([*color, 255], dtype=np.float64)
+    below = _premultiplied(view.rgba)
+    return replace(view, rgba=_straight(cover * stick + (1 - cover) * below)), camera
+
+
+def _distance_to_segment(
+    points: Float[np.ndarray, "height width 2"], ends: Float[np.ndarray, "2 2"]
+) -> Float[np.ndarray, "height width"]:
+    along = ends[1] - ends[0]
+    length2 = max(float(along @ along), 1e-12)  # a ball's ends coincide
+    at = np.clip((points - ends[0]) @ along / length2, 0, 1)
+    return np.linalg.norm(points - ends[0] - at[..., None] * along, axis=-1)
+
+
+def _rows(mask: Bool[np.ndarray, "height width"]) -> tuple[int, int]:
+    rows = np.flatnonzero(mask.any(axis=1))
+    return int(rows[0]), int(rows[-1]) + 1
+
+
+def _premultiplied(rgba: UInt8[np.ndarray, "h w 4"]) -> Float[np.ndarray, "h w 4"]:
+    values = rgba.astype(np.float64)
+    values[..., :3] *= values[..., 3:] / 255
+    return values
+
+
+def _straight(values: Float[np.ndarray, "h w 4"]) -> UInt8[np.ndarray, "h w 4"]:
+    alpha = values[..., 3:]
+    colors = np.where(alpha > 0, values[..., :3] * 255 / np.maximum(alpha, 1e-6), 0)
+    return np.clip(np.round(np.concatenate([colors, alpha], axis=-1)), 0, 255).astype(np.uint8)

@@ -1,0 +1,321 @@
+"""Stability sweeps: damage keeps its truth, figures count right, runs resume and repeat."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, replace
+
+import cv2
+import numpy as np
+import pytest
+
+from toonset.bench import stability
+from toonset.bench.calib import ViewError
+from toonset.bench.stability import Job, SheetResult, StepResult, align_from, run_sheet, run_steps
+from toonset.bench.stability_chart import draw_stability
+from toonset.bench.stability_damage import (
+    MIRROR,
+    mirrored,
+    padded,
+    rolled,
+    with_capsule,
+    without_feet,
+    without_pieces,
+)
+from toonset.bench.stability_files import RunKey, as_plain, from_plain, in_table_order
+from toonset.bench.stability_sweeps import BASE, SWEEPS, DrawnSheet, Sweep, chosen, draw_sheet, vase
+from toonset.bench.stability_table import as_csv, as_records, as_text, row
+from toonset.calib.rim import silhouette_mask
+from toonset.dataset.bodies import random_body
+from toonset.errors import BundleError, SheetError
+from toonset.mesh import Mesh
+
+PLAIN = replace(BASE, outline_px=0, cell_px=120, views=3)
+KEY = RunKey("1", 0, 1)
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    return draw_sheet(3, PLAIN)
+
+
+def overlap(view, camera, mesh: Mesh) -> float:
+    """Return intersection over union of the drawing and the mesh seen by the camera."""
+    pixels, _, _ = camera.project(mesh.vertices)
+    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+    seen = silhouette_mask(pixels, faces, camera.size_wh) > 0
+    assert seen.shape == view.mask.shape
+    return float((seen & view.mask).sum() / (seen | view.mask).sum())
+
+
+# ---- damage
+
+
+def test_padding_and_rolling_keep_the_camera_true(sheet: DrawnSheet):
+    for drawn in sheet.drawings:
+        plain = overlap(*drawn, sheet.mesh)
+        assert plain > 0.97
+        assert overlap(*padded(*drawn, 17), sheet.mesh) == plain
+        for roll in (-0.3, 0.5):
+            turned = rolled(*drawn, roll)
+            assert overlap(*turned, sheet.mesh) > 0.96
+            _, elevation, angle = turned[1].angles
+            np.testing.assert_allclose([elevation, angle], [drawn[1].angles[1], roll], atol=1e-9)
+
+
+def test_rolling_there_and_back_returns_the_camera(sheet):
+    view, camera = sheet.drawings[0]
+    back_view, back = rolled(*rolled(view, camera, 0.2), -0.2)
+    np.testing.assert_allclose(back.rotation, camera.rotation, atol=1e-12)
+    grown = (np.array(back.size_wh) - camera.size_wh) / 2
+    np.testing.assert_allclose(back.center - grown, camera.center, atol=1e-9)
+    dx, dy = grown.astype(int)
+    inner = back_view.mask[dy : dy + camera.size_wh[1], dx : dx + camera.size_wh[0]]
+    assert (inner == view.mask).mean() > 0.99
+
+
+def test_a_mirrored_drawing_is_the_mirrored_body(sheet: DrawnSheet):
+    other = replace(sheet.mesh, vertices=sheet.mesh.vertices @ MIRROR, faces=sheet.mesh.faces)
+    for drawn in sheet.drawings:
+        view, camera = mirrored(*drawn)
+        assert overlap(view, camera, other) > 0.97
+        assert np.linalg.det(camera.rotation) == pytest.approx(1)
+        again, back = mirrored(view, camera)
+        np.testing.assert_array_equal(again.rgba, drawn[0].rgba)
+        np.testing.assert_allclose(back.rotation, drawn[1].rotation)
+
+
+def test_cropping_takes_the_lowest_rows_and_nothing_else(sheet):
+    view, camera = sheet.drawings[1]
+    cut, same = without_feet(view, camera, 0.25)
+    rows, left = (np.flatnonzero(v.mask.any(axis=1)) for v in (view, cut))
+    assert same is camera
+    assert len(left) == pytest.approx(0.75 * len(rows), abs=1)
+    np.testing.assert_array_equal(cut.rgba[: left[-1] + 1], view.rgba[: left[-1] + 1])
+    assert without_feet(view, camera, 0)[0] is view
+
+
+def test_missing_pieces_reach_their_share_and_grow_from_step_to_step(sheet):
+    view, camera = sheet.drawings[0]
+    before, kept = view.mask.sum(), [view.mask]
+    for share in (0.0, 0.1, 0.4, 0.9):
+        less, _ = without_pieces(view, camera, share, np.random.default_rng(1))
+        gone = 1 - less.mask.sum() / before
+        assert share <= gone < share + 0.1
+        assert not (less.mask & ~kept[-1]).any()
+        kept.append(less.mask)
+    parts, _ = cv2.connectedComponents(kept[-1].astype(np.uint8))
+    assert parts > 2  # background and at least two fragments
+
+
+def test_a_ball_covers_its_disc_where_the_camera_sees_it(sheet):
+    view, camera = sheet.drawings[0]
+    top = sheet.mesh.vertices[sheet.mesh.vertices[:, 1].argmax()]
+    radius = 0.3
+    hairy, shown = with_capsule(view, camera, np.stack([top, top]), radius, (10, 20, 30))
+    at, _, _ = shown.project(top[None])
+    away = np.linalg.norm(shown.pixel_grid() - at[0], axis=-1)
+    assert hairy.mask[away < radius * camera.scale - 0.5].all()
+    own, _ = padded(view, camera, (hairy.mask.shape[0] - view.mask.shape[0]) // 2)
+    outside = away > radius * camera.scale + 0.5
+    np.testing.assert_array_equal(hairy.mask[outside], own.mask[outside])
+    assert (hairy.rgba[away < 3, :3] == (10, 20, 30)).all()
+
+
+def test_no_radius_is_no_ball(sheet):
+    view, camera = sheet.drawings[0]
+    same, _ = with_capsule(view, camera, np.zeros((2, 3)), 0.0, (0, 0, 0))
+    assert same is view
+
+
+# ---- sweeps
+
+
+def test_every_quick_step_is_one_of_the_full_run():
+    assert len({sweep.name for sweep in SWEEPS}) == len(SWEEPS)
+    for sweep in SWEEPS:
+        assert set(sweep.quick) <= set(sweep.steps), sweep.name
+        assert len(set(sweep.steps)) == len(sweep.steps)
+
+
+@pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
+def test_the_worst_step_can_be_drawn_twice_alike(sweep, monkeypatch):
+    small = replace(BASE, cell_px=80, views=2, supersample=1)
+    monkeypatch.setattr("toonset.bench.stability_sweeps.BASE", small)
+    first, second = (sweep.draw(sweep.steps[-1], 5) for _ in range(2))
+    for (view, camera), (again, same) in zip(first.drawings, second.drawings, strict=True):
+        np.testing.assert_array_equal(view.rgba, again.rgba)
+        np.testing.assert_array_equal(camera.rotation, same.rotation)
+
+
+def test_a_vase_looks_the_same_from_all_round():
+    mesh = vase()
+    turn = 2 * math.pi / 96 * 7
+    c, s = math.cos(turn), math.sin(turn)
+    turned = mesh.vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    gaps = np.linalg.norm(mesh.vertices[:, None] - turned[None], axis=-1)
+    assert gaps.min(axis=1).max() < 1e-6
+    assert mesh.height == pytest.approx(1.8)
+
+
+# ---- runs
+
+
+def test_alignment_from_the_truth_stays_and_from_behind_is_lost(sheet):
+    near = align_from(sheet, math.radians(5), 0)
+    far = align_from(sheet, math.radians(150), 0)
+    assert np.median([view.raw for view in near]) < math.radians(1)
+    assert min(view.raw for view in far) > math.radians(15)
+    assert {view.verdict for view in near} == {""}
+
+
+def test_a_refused_and_a_crashed_sheet_are_results(sheet, monkeypatch):
+    sweep = Sweep("x", "x", (0,), (0,), lambda step, seed: sheet)
+    for error, verdict in ((SheetError("too faint"), "failed"), (KeyError("k"), "crashed")):
+
+        def broken(*_arguments, error=error):
+            raise error
+
+        monkeypatch.setattr(stability, "calibrate", broken)
+        result = run_sheet(Job(sweep, 0, 0))
+        assert [view.verdict for view in result.views] == [verdict] * 3
+        assert "too faint" in result.note or result.note == "KeyError: 'k'"
+
+
+def tiny(step, seed):
+    return draw_sheet(seed, replace(PLAIN, views=1, cell_px=60))
+
+
+def test_the_same_seed_gives_the_same_table_and_another_seed_another():
+    sweep = Sweep("start", "x", (10, 20), (10,), tiny, from_start=True)
+    plan = [(sweep, step) for step in sweep.steps]
+
+    def table(seed):
+        return as_csv([row(result) for result in run_steps(plan, seed, 2)], seed)
+
+    once = table(0)
+    assert once == table(0)
+    assert once.splitlines()[1:] != table(7).splitlines()[1:]
+    assert [line.split(b",")[:4] for line in once.splitlines()[1:]] == [
+        [b"start", b"10", b"2", b"2"],
+        [b"start", b"20", b"2", b"2"],
+    ]
+
+
+# ---- figures
+
+
+def result_of(*views, sweep="warp", step="1") -> StepResult:
+    errors = tuple(ViewError(math.radians(r), math.radians(m), v) for r, m, v in views)
+    return StepResult(sweep, step, (SheetResult(errors, 1.0, ""),))
+
+
+def test_figures_count_what_they_say():
+    found = row(
+        result_of(
+            (1, 1, "ok"),
+            (2, 2, "weak"),  # solved, but called weak
+            (170, 2, "ok"),  # flipped in silence
+            (175, 3, "ambiguous"),  # flipped and said so
+            (60, 40, "failed"),
+            (10, 10, "ok"),  # neither solved nor wrong
+        )
+    )
+    assert found.solved_modulo_twin == pytest.approx(4 / 6)
+    assert found.solved == pytest.approx(2 / 6)
+    assert (found.median_deg, found.median_raw_deg) == (pytest.approx(2.5), pytest.approx(35))
+    assert (found.ok, found.weak, found.ambiguous, found.failed, found.crashed) == (3, 1, 1, 1, 0)
+    assert (found.wrong, found.silent_wrong, found.false_alarms) == (3, 1, 1)
+    assert found.announced == pytest.approx(2 / 3)
+
+
+def test_an_alignment_without_verdict_is_neither_silent_nor_an_alarm():
+    found = row(result_of((1, 1, ""), (90, 90, "")))
+    assert (found.wrong, found.silent_wrong, found.false_alarms) == (1, 0, 0)
+    assert found.announced is None
+
+
+def test_csv_does_not_know_the_seconds():
+    slow = replace(result_of((1, 1, "ok")), sheets=())
+    one = result_of((1, 1, "ok"))
+    slow = replace(one, sheets=(replace(one.sheets[0], seconds=99.0),))
+    assert as_csv([row(one)], 4) == as_csv([row(slow)], 4)
+    assert as_csv([row(one)], 4).endswith(b",4\n")
+    assert "warp" in as_text([row(one)])
+    metrics = {record.metric: record.value for record in as_records([slow], 4)}
+    assert metrics["seconds"] == 99.0
+
+
+def test_steps_survive_the_way_through_json_and_sort_as_listed():
+    steps = [
+        result_of((1 / 3, 0.1, "ok"), step="2"),
+        result_of((2, 2, ""), step="5", sweep="start"),
+        result_of((9, 9, "weak"), step="0.5"),
+    ]
+    text = json.dumps(as_plain(KEY, steps))
+    assert from_plain(json.loads(text), KEY, "x") == steps
+    assert [(s.sweep, s.step) for s in in_table_order([*steps, result_of(sweep="gone")])] == [
+        ("start", "5"),
+        ("warp", "0.5"),
+        ("warp", "2"),
+    ]
+
+
+@pytest.mark.parametrize("broken", [[], {}, {"format": 1}, None, {**asdict(KEY), "steps": [3]}])
+def test_foreign_steps_are_refused(broken):
+    with pytest.raises(BundleError, match="--force"):
+        from_plain(broken, KEY, "steps.json")
+
+
+def test_steps_of_another_seed_are_refused():
+    with pytest.raises(BundleError, match="seed=1"):
+        from_plain(as_plain(replace(KEY, seed=1), []), KEY, "steps.json")
+
+
+def test_a_picture_is_drawn_of_one_sweep_and_of_many():
+    rows = [row(result_of((1, 1, "ok"), sweep=s.name, step=str(s.steps[0]))) for s in SWEEPS]
+    for some in (rows[:1], rows[:5]):
+        assert draw_stability(some, "n = 1").startswith(b"\x89PNG")
+
+
+# ---- the command
+
+
+def test_a_second_run_takes_the_first_ones_steps(toonset, tmp_path, monkeypatch):
+    sweep = Sweep("start", "x", (0, 5), (0,), tiny, from_start=True)
+    for place in ("stability_sweeps", "stability_files", "stability_chart"):
+        monkeypatch.setattr(f"toonset.bench.{place}.SWEEPS", (sweep,))
+    monkeypatch.setattr("toonset.bench.workers.usable_workers", lambda: 1)
+    out = tmp_path / "out"
+    command = ("bench", "stability", "-o", out, "--count", 1, "--json", "--quiet")
+    first = toonset(*command, "--quick")
+    assert first.code == 0, first
+    assert [found["step"] for found in first.json["rows"]] == ["0"]
+    assert {path.name for path in out.iterdir()} == {
+        "steps.json",
+        "stability.csv",
+        "stability.png",
+        "records.json",
+    }
+    kept = json.loads((out / "steps.json").read_text())["steps"][0]
+    more = toonset(*command)
+    assert [found["step"] for found in more.json["rows"]] == ["0", "5"]
+    assert json.loads((out / "steps.json").read_text())["steps"][0] == kept  # seconds, too
+    assert "seed=0" in toonset(*command, "--seed", 1).reason
+    afresh = toonset(*command, "--seed", 1, "--quick", "--force")
+    assert [found["step"] for found in afresh.json["rows"]] == ["0"]
+
+
+def test_mistakes_are_refused_before_any_work(toonset, tmp_path):
+    wrong = toonset("bench", "stability", "--only", "hat", "-o", tmp_path / "out")
+    assert "takes one of start, warp" in wrong.reason
+    (tmp_path / "drawing.png").write_bytes(b"x")
+    assert "--force" in toonset("bench", "stability", "-o", tmp_path).reason
+    assert "drawing.png" in toonset("bench", "stability", "-o", tmp_path, "--force").reason
+    assert toonset("bench", "stability", "--cases", tmp_path).code == 2
+
+
+def test_a_body_of_a_seed_is_the_sheets_body():
+    np.testing.assert_array_equal(draw_sheet(3, PLAIN).mesh.vertices, random_body(3).vertices)
+    assert [step for _, step in chosen("mirror", quick=True)] == [0, 1, 2]
