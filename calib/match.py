@@ -41,6 +41,19 @@ class Matches:
     target_index: Int[np.ndarray, " n"]
 
 
+class Table:
+    """Points, or points with features, prepared for `nearest`.
+
+    Single precision tells neighbours apart whose distances differ by more than about 1e-3 px.
+    """
+
+    def __init__(self, points: Float[np.ndarray, "n features"]) -> None:
+        """Prepare points whose coordinates are not much larger than their distances."""
+        single = points.astype(np.float32)
+        self.rows = np.hstack([single, np.ones((len(single), 1), np.float32)])
+        self.columns = np.vstack([-single.T, (single**2).sum(axis=1) / 2])
+
+
 class Drawing:
     """A contour at a working scale, thinned (built once, used by every start)."""
 
@@ -58,6 +71,7 @@ class Drawing:
         self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
         self.direction_px = DIRECTION_OF_HEIGHT * height
         self.features = np.hstack([self.points, self.direction_px * self.normals])
+        self.table = Table(self.features)
 
     def pose_in(self, pose: Pose) -> Pose:
         """Return a full-size pose in working pixels."""
@@ -80,7 +94,8 @@ def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
         return Matches(zeros, drawing.points, drawing.normals, far, len(far), everything)
     rim = _thinned(rim, len(drawing.points))
     seen = np.hstack([project(pose, rim.points), drawing.direction_px * rim.normals])
-    to_rim, to_drawn = nearest(drawing.features, seen), nearest(seen, drawing.features)
+    table = Table(seen)
+    to_rim, to_drawn = nearest(drawing.table, table), nearest(table, drawing.table)
     off = np.concatenate([drawing.features - seen[to_rim], seen - drawing.features[to_drawn]])
     return Matches(
         np.concatenate([rim.points[to_rim], rim.points]),
@@ -92,20 +107,16 @@ def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
     )
 
 
-def nearest(a: Float[np.ndarray, "n 4"], b: Float[np.ndarray, "m 4"]) -> Int[np.ndarray, " n"]:
-    """Return for every row of `a` the nearest row of `b`.
+def nearest(asking: Table, asked: Table) -> Int[np.ndarray, " n"]:
+    """Return for every point of `asking` the nearest point of `asked`.
 
     |a - b|^2 / 2 = |a|^2 / 2 + (-a b + |b|^2 / 2), the bracket as a matrix product: for some
-    hundred points faster than building and asking a search tree. Single precision, about the middle
-    of `b`, tells points apart whose distances differ by more than about 1e-3.
+    hundred points faster than building and asking a search tree.
     """
-    middle = b.mean(axis=0)
-    a, b = (a - middle).astype(np.float32), (b - middle).astype(np.float32)
-    rows = np.hstack([a, np.ones((len(a), 1), np.float32)])
-    columns = np.vstack([-b.T, (b**2).sum(axis=1) / 2])
-    # in blocks that stay in the cache
-    starts = range(0, len(rows), BLOCK)
-    return np.concatenate([(rows[i : i + BLOCK] @ columns).argmin(axis=1) for i in starts])
+    blocks = range(0, len(asking.rows), BLOCK)
+    return np.concatenate(
+        [(asking.rows[i : i + BLOCK] @ asked.columns).argmin(axis=1) for i in blocks]
+    )
 
 
 def _thinned(rim: Rim, wanted: int) -> Rim:

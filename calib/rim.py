@@ -8,6 +8,7 @@ rim point may be treated as fixed on the mesh: its sliding moves it along the ou
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -63,12 +64,16 @@ def rim_at(surface: Surface, pose: Pose, size_wh: tuple[int, int], spacing_px: f
         size_wh: image size that holds the figure.
         spacing_px: distance of neighbouring rim points along an edge.
     """
-    toward = np.append(pose.rotation[2], pose.k)  # the camera's centre, homogeneous, negated
-    turned = surface.planes @ toward > 0  # clockwise on the screen, u right and v down
-    folds, layers = _folds(surface, turned)
-    ends = surface.vertices[surface.edges[folds]]
-    pixels = project(pose, ends.reshape(-1, 3)).reshape(-1, 2, 2)
+    ends, pixels, layers = _seen_folds(surface, pose)
     return _rim(ends, pixels, layers, size_wh, spacing_px)
+
+
+def mask_at(
+    surface: Surface, pose: Pose, size_wh: tuple[int, int]
+) -> Bool[np.ndarray, "height width"]:
+    """Return which pixel centres the surface covers, seen from `pose`."""
+    _, pixels, layers = _seen_folds(surface, pose)
+    return covered(pixels[:, 0], pixels[:, 1], layers, size_wh)
 
 
 def find_rim(
@@ -83,6 +88,20 @@ def find_rim(
     folds, layers = _folds(surface, ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0)
     edges = surface.edges[folds]
     return _rim(surface.vertices[edges], pixels[edges], layers, size_wh, spacing_px)
+
+
+def _seen_folds(
+    surface: Surface, pose: Pose
+) -> tuple[
+    Float[np.ndarray, "folds 2 3"], Float[np.ndarray, "folds 2 2"], Int[np.ndarray, " folds"]
+]:
+    """Return the ends of the folds in space and in the picture, and `covered`'s layers."""
+    toward = np.append(pose.rotation[2], pose.k)  # the camera's centre, homogeneous, negated
+    turned = surface.planes @ toward > 0  # clockwise on the screen, u right and v down
+    folds, layers = _folds(surface, turned)
+    edges = surface.edges.take(folds, axis=0)  # several times as fast as an index in brackets
+    ends = surface.vertices.take(edges, axis=0)
+    return ends, project(pose, ends.reshape(-1, 3)).reshape(-1, 2, 2), layers
 
 
 def _folds(
@@ -128,20 +147,27 @@ def _is_outer(
     """Return which points lie in the picture, in or next to a pixel of the background."""
     if len(u) == 0:
         return np.zeros(0, dtype=bool)
-    flat = folds.reshape(-1, 2)
-    low = np.clip(np.floor(flat.min(axis=0)) - 1, 0, size_wh)
-    width, height = (np.clip(np.ceil(flat.max(axis=0)) + 1, 0, size_wh) - low).astype(int)
+    left, right = _span(folds[..., 0], size_wh[0])
+    top, bottom = _span(folds[..., 1], size_wh[1])
+    width, height = right - left, bottom - top
     if width == 0 or height == 0:
         return np.zeros(len(u), dtype=bool)
-    mask = covered(folds[:, 0] - low, folds[:, 1] - low, layers, (width, height))
+    near = folds - np.array([left, top])
+    mask = covered(near[:, 0], near[:, 1], layers, (width, height))
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     inner = cv2.erode(
         mask.view(np.uint8), cross, borderType=cv2.BORDER_CONSTANT, borderValue=0
     ).ravel()
-    column, row = np.floor(u - low[0]).astype(np.intp), np.floor(v - low[1]).astype(np.intp)
+    column, row = np.floor(u - left).astype(np.intp), np.floor(v - top).astype(np.intp)
     seen = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     place = np.where(seen, row * width + column, 0)
     return seen & (inner[place] == 0)
+
+
+def _span(values: Float[np.ndarray, "folds 2"], size: int) -> tuple[int, int]:
+    """Return the first and last pixel, exclusive, around `values` with one to spare each side."""
+    low, high = math.floor(values.min()) - 1, math.ceil(values.max()) + 1
+    return min(max(low, 0), size), min(max(high, 0), size)
 
 
 @cache

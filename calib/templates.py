@@ -13,7 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.pose import Pose, project
-from toonset.calib.rim import Surface, silhouette_mask
+from toonset.calib.rim import mask_at
+from toonset.calib.surface import Surface
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.view import View
 
@@ -51,24 +52,29 @@ class Hypothesis:
 
 def build_templates(surface: Surface) -> Templates:
     """Return the mesh's silhouettes on the grid of yaws and elevations."""
-    yaws = np.arange(0, 2 * np.pi - 1e-9, YAW_STEP)
-    rotations = np.stack([rotation_from_angles(y, e, 0.0) for e in ELEVATIONS for y in yaws])
+    rotations = grid()
     masks, boxes = [], []
+    size = CELL_PX * OVERSAMPLE
     for rotation in rotations:
         pixels = project(Pose(rotation, np.zeros(2), 1.0), surface.vertices)
         low, extent = pixels.min(axis=0), np.ptp(pixels, axis=0)
-        size = CELL_PX * OVERSAMPLE
         scale = FIGURE_OF_CELL * size / max(extent[1], 1e-9)
-        centred = (pixels - low - extent / 2) * scale + size / 2
-        mask = silhouette_mask(centred, surface.faces, (size, size))
+        centred = Pose(rotation, size / 2 - scale * (low + extent / 2), scale)
+        mask = mask_at(surface, centred, (size, size))
         masks.append(_shrink(mask.astype(np.float32)).ravel())
         boxes.append([*low, *extent])
     return Templates(rotations, np.stack(masks), np.array(boxes))
 
 
+def grid() -> Float[np.ndarray, "n 3 3"]:
+    """Return the templates' rotations."""
+    yaws = np.arange(0, 2 * np.pi - 1e-9, YAW_STEP)
+    return np.stack([rotation_from_angles(y, e, 0.0) for e in ELEVATIONS for y in yaws])
+
+
 def find_hypotheses(view: View, templates: Templates, count: int) -> list[Hypothesis]:
     """Return the best `count` poses, at least 14 degrees apart, best first."""
-    mask, box = _normalised(view)
+    mask, box = normalised(view)
     shared = templates.masks @ mask.ravel()
     union = templates.masks.sum(axis=1) + mask.sum() - shared
     overlap = shared / np.maximum(union, 1e-9)
@@ -82,10 +88,10 @@ def find_hypotheses(view: View, templates: Templates, count: int) -> list[Hypoth
             chosen.append(int(index))
         if len(chosen) == count:
             break
-    return [Hypothesis(_pose(templates, i, box), float(overlap[i])) for i in chosen]
+    return [Hypothesis(pose_on_box(templates, i, box), float(overlap[i])) for i in chosen]
 
 
-def _pose(templates: Templates, index: int, box: Float[np.ndarray, " 4"]) -> Pose:
+def pose_on_box(templates: Templates, index: int, box: Float[np.ndarray, " 4"]) -> Pose:
     """Return the pose that lays a template's box over the drawn one (same height, same middle)."""
     low, extent = templates.boxes[index, :2], templates.boxes[index, 2:]
     scale = float(box[3] / max(extent[1], 1e-9))
@@ -93,9 +99,10 @@ def _pose(templates: Templates, index: int, box: Float[np.ndarray, " 4"]) -> Pos
     return Pose(templates.rotations[index], shift, scale)
 
 
-def _normalised(
+def normalised(
     view: View,
 ) -> tuple[Float[np.ndarray, "cell cell"], Float[np.ndarray, " 4"]]:
+    """Return a drawing's coverage in the templates' cell, and its box in the picture."""
     mask = view.mask
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     box = np.array(

@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial import KDTree
 
 from toonset.calib.contour import drawn_contour
-from toonset.calib.match import Drawing, match, nearest
+from toonset.calib.match import Drawing, Table, match, nearest
 from toonset.calib.pose import Pose, project
 from toonset.calib.rim import find_rim, rim_at, silhouette_mask
 from toonset.calib.surface import Surface, prepare_surface
@@ -95,8 +95,8 @@ def test_a_mesh_turned_inside_out_has_the_same_rim():
 def test_nearest_equals_a_search_tree(sizes):
     rng = np.random.default_rng(sum(sizes))
     spread = [300, 300, 15, 15]
-    a, b = (rng.uniform(size=(n, 4)) * spread + 500 for n in sizes)
-    far = np.linalg.norm(a - b[nearest(a, b)], axis=1)
+    a, b = (rng.uniform(size=(n, 4)) * spread for n in sizes)
+    far = np.linalg.norm(a - b[nearest(Table(a), Table(b))], axis=1)
     np.testing.assert_allclose(far, KDTree(b).query(a)[0], atol=1e-2)
 
 
