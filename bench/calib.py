@@ -11,6 +11,8 @@ import numpy as np
 
 from toonset.bench.cases import CalibCase
 from toonset.bench.record import Record, summarise
+from toonset.bench.sfm import METHODS as SFM_METHODS
+from toonset.bench.sfm import SfmResult, aligned_errors, reconstruct
 from toonset.calib.calibrate import CalibrationOptions, calibrate
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
 
@@ -26,6 +28,7 @@ SETTINGS: dict[str, CalibrationOptions] = {
     "fine 500 px": CalibrationOptions(fine_height_px=500),
 }
 QUICK = ("default", "2 starts")
+QUICK_SFM = ("COLMAP", "COLMAP 1000 px")
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,30 @@ def bench_calibration(
                 errors.extend(found)
                 seconds.append(took)
             records.extend(_records(method, group, errors, seconds, seed))
+    return records
+
+
+def bench_colmap(
+    cases: Sequence[CalibCase],
+    seed: int,
+    *,
+    quick: bool,
+    progress: Callable[[str], None] = lambda text: None,
+) -> list[Record]:
+    """Return the same records of structure from motion, where it has placed a view at all.
+
+    Errors are after the best alignment with the truth; views that are not placed and runs that
+    failed are counted.
+    """
+    records: list[Record] = []
+    for method in QUICK_SFM if quick else SFM_METHODS:
+        for group in sorted({case.group for case in cases}):
+            own = [case for case in cases if case.group == group]
+            results = []
+            for case in own:
+                progress(f"{method}: {case.name}")
+                results.append(reconstruct(case.views, SFM_METHODS[method], seed))
+            records += _sfm_records(method, group, own, results, seed)
     return records
 
 
@@ -99,6 +126,8 @@ def _records(
             group=group,
         )
 
+    if not errors:  # no view has a camera
+        return [one("seconds", seconds, "s")]
     silent = [e.verdict == "ok" and e.raw > WRONG for e in errors]
     return [
         one("rotation error", [math.degrees(e.raw) for e in errors], "deg"),
@@ -109,12 +138,31 @@ def _records(
     ]
 
 
-def _count(metric: str, hits: Sequence[bool], method: str, group: str, seed: int) -> Record:
+def _sfm_records(
+    method: str, group: str, cases: list[CalibCase], results: list[SfmResult], seed: int
+) -> list[Record]:
+    errors: list[ViewError] = []
+    missing: list[bool] = []
+    for case, found in zip(cases, results, strict=True):
+        raw, modulo_twin = aligned_errors(found.rotations, case.rotations)
+        errors += [ViewError(a, b, "placed") for a, b in zip(raw, modulo_twin, strict=True)]
+        missing += [i not in found.rotations for i in range(len(case.views))]
+    failed = [bool(found.failed) for found in results]
+    return [
+        *_records(method, group, errors, [found.seconds for found in results], seed),
+        _count("views not placed", missing, method, group, seed),
+        _count("failed runs", failed, method, group, seed, "sheets"),
+    ]
+
+
+def _count(
+    metric: str, hits: Sequence[bool], method: str, group: str, seed: int, unit: str = "views"
+) -> Record:
     record = summarise(
         [float(hit) for hit in hits],
         method=method,
         metric=metric,
-        unit="views",
+        unit=unit,
         direction="lower",
         seed=seed,
         group=group,

@@ -24,6 +24,12 @@ class Subject(StrEnum):
     stability = "stability"
 
 
+class Baseline(StrEnum):
+    """What calibration is compared with, besides the nominal angles."""
+
+    colmap = "colmap"
+
+
 def bench(
     subject: Annotated[Subject, typer.Argument(help="What to measure.")],
     cases: Annotated[
@@ -45,6 +51,10 @@ def bench(
     half: Annotated[
         bool, typer.Option("--half", help="Train on the cases' pictures at half size.")
     ] = False,
+    baseline: Annotated[
+        Baseline | None,
+        typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer settings.")] = False,
     out: Annotated[Path, typer.Option("-o", "--out", help="Output folder.")] = Path(
         "bench-results"
@@ -65,13 +75,15 @@ def bench(
     printer = Printer(as_json, quiet)
     if half and (subject is not Subject.train or cases is None):
         raise typer.BadParameter("--half belongs to `train --cases`")
+    if baseline is not None and subject is not Subject.calib:
+        raise typer.BadParameter("--baseline belongs to `calib`")
     if subject is Subject.stability:
         if cases is not None:
             raise typer.BadParameter("--cases belongs to `calib` and `train`")
         _stability(out, only, seed, count, quick, force, printer)
         return
     check_output(out, [cases], WRITTEN, force=force)
-    records = _measure(subject, cases, only, count or 4, half, quick, seed, printer)
+    records = _measure(subject, cases, only, count or 4, half, quick, seed, printer, baseline)
     with new_folder(out, force=force) as folder:
         write_json(folder / "records.json", as_dicts(records))
         for name, picture in _charts(subject, records, seed).items():
@@ -104,17 +116,21 @@ def _measure(
     quick: bool,
     seed: int,
     printer: Printer,
+    baseline: Baseline | None,
 ) -> list[Record]:
     from toonset.bench.cases import calib_cases, train_cases
     from toonset.errors import BundleError
 
     if subject is Subject.calib:
-        from toonset.bench.calib import bench_calibration
+        from toonset.bench.calib import bench_calibration, bench_colmap
 
         sheets = [case for case in calib_cases(cases, seed, count) if only in case.name]
         if not sheets:
             raise BundleError(f"no case's name contains {only!r}; correct --only")
-        return bench_calibration(sheets, seed, quick=quick, progress=printer.progress)
+        records = bench_calibration(sheets, seed, quick=quick, progress=printer.progress)
+        if baseline is Baseline.colmap:
+            records += bench_colmap(sheets, seed, quick=quick, progress=printer.progress)
+        return records
     from toonset.bench.train import bench_training
 
     scenes = [c for c in train_cases(cases, seed, count, half=half) if only in c.name]
