@@ -17,7 +17,17 @@ import typer
 from toonset import __version__
 from toonset.errors import ToonsetError
 
-VERBS = ("calibrate", "palette", "train", "render", "evaluate", "export", "synth", "bench")
+VERBS = (
+    "calibrate",
+    "palette",
+    "train",
+    "render",
+    "evaluate",
+    "export",
+    "mannequin",
+    "synth",
+    "bench",
+)
 
 INTERRUPTED = 130
 PLACES_AT_FAULT = (  # what the system says of a place that the user has named, wherever it is used
