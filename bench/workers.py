@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import TypeVar
@@ -38,7 +39,16 @@ def usable_workers() -> int:
 
 
 def _start() -> None:
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
     os.environ.update(dict.fromkeys(THREADS, "1"))
     import cv2
 
     cv2.setNumThreads(1)
+
+
+def _leave_with_parent() -> None:
+    """End this process when its parent is gone: killed, it cannot say so, and we would wait on."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

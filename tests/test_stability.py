@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import asdict, replace
 
 import cv2
@@ -26,6 +27,7 @@ from toonset.bench.stability_damage import (
 from toonset.bench.stability_files import RunKey, as_plain, from_plain, in_table_order
 from toonset.bench.stability_sweeps import BASE, SWEEPS, DrawnSheet, Sweep, chosen, draw_sheet, vase
 from toonset.bench.stability_table import as_csv, as_records, as_text, row
+from toonset.bench.workers import THREADS, in_order
 from toonset.calib.rim import silhouette_mask
 from toonset.dataset.bodies import random_body
 from toonset.errors import BundleError, SheetError
@@ -201,6 +203,11 @@ def test_the_same_seed_gives_the_same_table_and_another_seed_another():
         [b"start", b"10", b"2", b"2"],
         [b"start", b"20", b"2", b"2"],
     ]
+
+
+def test_workers_keep_the_order_and_use_one_thread_each():
+    assert list(in_order(math.sqrt, [4, 9, 16], 2)) == list(in_order(math.sqrt, [4, 9, 16], 1))
+    assert list(in_order(os.getenv, THREADS, 2)) == ["1"] * len(THREADS)
 
 
 # ---- figures
