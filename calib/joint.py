@@ -1,43 +1,49 @@
-"""The whole sheet at once: shared perspective and outline offset, elevation and scale nearly so.
+"""All views of a sheet at once: Gauss-Newton over every camera, what they share, and the body.
 
-Unknowns: six numbers per view (rotation increment, shift, log scale), k = 1 / distance and the
-outline offset (a drawn line is thicker than a silhouette), one each for the sheet. Residuals are
-the two-sided point-to-line distances of `calib.align`; priors tie the views' elevations and log
-scales to their own mean, keep roll near zero and the offset within a line's width. Derivatives are
-analytic (`calib.pose`); the normal equations are dense, 6n + 2 unknowns.
-
-Model choice: orthographic (k = 0) unless the perspective fit lowers BIC by a margin, with the
-*effective* number of outline samples; a k that data cannot tell from zero is zero.
+Unknowns: per view a rotation increment, shift and log scale; then k = 1 / distance (none, one for
+the sheet, or one per view), the outline offset (a drawn contour line lies outside of the
+silhouette) and, if asked, the mannequin's proportions. A drawing's own error is integrated out
+(`toonset.calib.drawing_error`), what views share is tied (`toonset.calib.ties`); both strengths are
+estimated on the sheet along the way. The covariance is the inverse of the final normal matrix.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import (
-    EFFECTIVE_POINTS,
-    MAX_TURN,
-    Drawing,
-    ElevationPrior,
-    Matches,
-    match,
-    tilt,
-    upright_prior,
-)
-from toonset.calib.pose import PARAMETERS, Pose, project_with_jacobian
-from toonset.calib.rim import Surface
+from toonset.calib.align import MAX_TURN
+from toonset.calib.drawing_error import Marginal, Noise, error_modes, marginalise, pooled
+from toonset.calib.match import Drawing, match
+from toonset.calib.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
+from toonset.calib.proportions import Body
+from toonset.calib.ties import Spreads, Turn, anchors, sheet_ties
 
-SHARED = 2  # k and the outline offset
-ELEVATION_SPREAD = np.radians(3.0)  # between the views of one sheet
-SCALE_SPREAD = 0.02  # relative, between the views of one sheet
 OFFSET_OF_HEIGHT = 0.006  # prior of the outline offset: a line's half width
-MIN_NOISE_OF_HEIGHT = 0.001  # matching error of a faultless drawing
 MAX_K_RADIUS = 0.6  # nearest camera: the mesh's radius is 0.6 of the distance
-BIC_MARGIN = 6.0  # "strong" evidence (Kass and Raftery 1995)
+FIRST_K_RADIUS = 0.02  # where the search for perspective starts
+SETTLED = 2  # steps before the spreads are estimated: the first matches are wrong
+
+Perspective = Literal["none", "shared", "per view"]
+
+
+@dataclass(frozen=True)
+class SheetModel:
+    """What the cameras of a sheet may be.
+
+    Attributes:
+        perspective: whose k is free.
+        spreads: expected differences between the views.
+        proportions: whether the mannequin's body is free.
+    """
+
+    perspective: Perspective = "none"
+    spreads: Spreads = field(default_factory=Spreads)
+    proportions: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,190 +51,215 @@ class JointFit:
     """The cameras of a sheet, fitted together.
 
     Attributes:
-        poses: per view, full-size pixels; all share k.
+        poses: per view, full-size pixels.
+        body: with the fitted proportions.
         offset: outline offset over the figure's height (> 0: drawn outside of the mesh).
-        noise: robust outline error over the figure's height, over the sheet.
-        score: n_eff log(mean Geman-McClure loss), the data term of BIC.
-        covariance: (6n + 2, 6n + 2) of (w, shift, log scale) per view in working pixels, then k
-            and offset; deflated to the effective number of outline samples.
+        noise: the drawings' error over the figure's height.
+        spreads: estimated differences between the views.
+        energy: -2 log likelihood of the drawings, up to a constant, at `noise`.
+        covariance: (u, u) of (w, shift, log scale) per view in working pixels, k, offset, body.
+        freedom: number of unknowns that the drawings and not the priors determine.
     """
 
     poses: tuple[Pose, ...]
+    body: Body
     offset: float
-    noise: float
-    score: float
-    covariance: Float[np.ndarray, "unknowns unknowns"]
+    noise: Noise
+    spreads: Spreads
+    energy: float
+    covariance: Float[np.ndarray, "u u"]
+    freedom: float
 
 
-@dataclass(frozen=True)
-class ModelChoice:
-    """Orthographic or pinhole, and why.
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Where the iteration stands; poses in working pixels."""
 
-    Attributes:
-        model: "orthographic" or "perspective".
-        distance_heights: camera distance in body heights; infinity for orthographic.
-        bic_gain: BIC(orthographic) - BIC(perspective); above the margin perspective is proven.
-        effective_samples: outline samples counted as independent.
-        margin: BIC gain that proves perspective.
-    """
-
-    model: str
-    distance_heights: float
-    bic_gain: float
-    effective_samples: float
-    margin: float = BIC_MARGIN
+    poses: tuple[Pose, ...]
+    body: Body
+    offset: float
+    noise: Noise
+    spreads: Spreads
+    covariance: Float[np.ndarray, "u u"] | None = None
 
 
-def fit_sheet(
-    drawings: Sequence[Drawing],
-    surface: Surface,
-    poses: Sequence[Pose],
-    *,
-    perspective: bool,
-    widths: Float[np.ndarray, " iterations"],
-) -> JointFit:
-    """Return all views refined together from `poses`.
-
-    Args:
-        drawings: outlines at the working scale, one per view.
-        surface: the mannequin.
-        poses: starts, full-size pixels.
-        perspective: free k (else every k stays as it is in `poses`).
-        widths: robust width over the figure's height, one per step.
-    """
-    working = [d.pose_in(p) for d, p in zip(drawings, poses, strict=True)]
-    if perspective and working[0].k == 0:
-        working = [replace(p, k=0.02 / surface.radius) for p in working]
-    offset, noise = 0.0, float(widths[0]) / 2
-    for width in widths:
-        matched = [match(d, surface, p) for d, p in zip(drawings, working, strict=True)]
-        system = _System(drawings, working, matched, offset, width)
-        noise = float(np.clip(system.noise, MIN_NOISE_OF_HEIGHT, width))
-        normal, gradient = system.equations(noise, free_k=perspective)
-        step = -np.linalg.solve(normal, gradient)
-        step *= min(1.0, MAX_TURN / max(np.abs(step[:-SHARED]).reshape(-1, 6)[:, :3].max(), 1e-12))
-        k = float(np.clip(working[0].k + step[-2], 0.0, MAX_K_RADIUS / surface.radius))
-        offset += float(step[-1])
-        per_view = step[:-SHARED].reshape(-1, PARAMETERS)
-        working = [
-            replace(p.moved(s), k=k if perspective else p.k)
-            for p, s in zip(working, per_view, strict=True)
-        ]
-    matched = [match(d, surface, p) for d, p in zip(drawings, working, strict=True)]
-    system = _System(drawings, working, matched, offset, float(widths[-1]))
-    noise = max(system.noise, MIN_NOISE_OF_HEIGHT)
-    normal, _ = system.equations(noise, free_k=perspective)
-    samples = EFFECTIVE_POINTS * len(drawings)
-    return JointFit(
-        tuple(d.pose_out(p) for d, p in zip(drawings, working, strict=True)),
-        offset,
-        noise,
-        samples * float(np.log(system.loss)),
-        np.linalg.inv(normal),
-    )
-
-
-def choose_model(
-    flat: JointFit, deep: JointFit, surface: Surface, views: int
-) -> tuple[JointFit, ModelChoice]:
-    """Return the orthographic fit unless the perspective one is proven by BIC."""
-    samples = EFFECTIVE_POINTS * views
-    gain = flat.score - deep.score - float(np.log(samples))
-    k = deep.poses[0].k
-    if gain > BIC_MARGIN and k > 0:
-        return deep, ModelChoice("perspective", 1 / (k * surface.height), gain, samples)
-    return flat, ModelChoice("orthographic", float("inf"), gain, samples)
-
-
+@dataclass(frozen=True, eq=False)
 class _System:
-    """The linearised problem at one set of poses and matches."""
+    """The linearised problem at a state."""
 
-    def __init__(
+    data: Float[np.ndarray, "u u"]
+    normal: Float[np.ndarray, "u u"]
+    gradient: Float[np.ndarray, " u"]
+    energy: float
+    noise: Noise
+    spreads: Spreads
+
+
+class JointProblem:
+    """The drawings of a sheet with what every fit of them needs once."""
+
+    def __init__(self, drawings: Sequence[Drawing], turn: Turn | None = None) -> None:
+        """Prepare the drawings' error modes."""
+        self.drawings = tuple(drawings)
+        self.modes = [error_modes(drawing) for drawing in drawings]
+        self.turn = turn
+
+    def fit(
         self,
-        drawings: Sequence[Drawing],
+        body: Body,
         poses: Sequence[Pose],
-        matched: Sequence[Matches],
-        offset: float,
-        width: float,
-    ) -> None:
-        self.poses = poses
-        self.height = drawings[0].height  # the same working height for every view
-        rows, residuals, weights = [], [], []
-        for pose, matches in zip(poses, matched, strict=True):
-            count = len(matches.points)
-            pixels, slopes = project_with_jacobian(pose, matches.points)
-            jacobian = np.einsum("ni,nij->nj", matches.normals, slopes)
-            off = (matches.normals * (pixels - matches.targets)).sum(axis=1)
-            rows.append(np.hstack([jacobian, np.full((count, 1), self.height)]))
-            residuals.append(off + offset * self.height)
-            relative = matches.distances / self.height
-            weight = (width**2 / (width**2 + relative**2)) ** 2
-            side = np.arange(count) < matches.drawn
-            weights.append(weight / (2 * np.where(side, side.sum(), max((~side).sum(), 1))))
-        self.rows, self.residuals, self.weights = rows, residuals, weights
-        self.offset = offset
-        robust = [
-            (w * (r / self.height) ** 2).sum() / w.sum()
-            for r, w in zip(residuals, weights, strict=True)
-        ]
-        self.noise = float(np.sqrt(np.mean(robust)))
-        # the Geman-McClure loss itself (not its quadratic model) is comparable between models
-        self.loss = float(
-            np.mean(
-                [
-                    ((r / self.height) ** 2 * width**2 / (width**2 + (r / self.height) ** 2)).mean()
-                    for r in residuals
-                ]
-            )
+        widths: Float[np.ndarray, " iterations"],
+        model: SheetModel = SheetModel(),
+        noise: Noise | None = None,
+        offset: float = 0.0,
+    ) -> JointFit:
+        """Return all views refined together.
+
+        Args:
+            body: the mannequin.
+            poses: starts, full-size pixels.
+            widths: robust width over the figure's height, one per step.
+            model: what is free.
+            noise: of the drawings, kept; None to estimate it.
+            offset: first outline offset.
+        """
+        working = [d.pose_in(p) for d, p in zip(self.drawings, poses, strict=True)]
+        free = model.perspective != "none"
+        first_k = FIRST_K_RADIUS / body.rest.radius if free else 0.0
+        working = [replace(p, k=(p.k or first_k) if free else 0.0) for p in working]
+        state = _State(tuple(working), body, offset, noise or Noise(), model.spreads)
+        for step, width in enumerate(widths):
+            system = self._system(state, model, width, settled=step >= SETTLED)
+            state = self._stepped(state, system, model, keep_noise=noise is not None)
+        system = self._system(state, model, float(widths[-1]), settled=True)
+        covariance = np.linalg.inv(system.normal)
+        return JointFit(
+            tuple(d.pose_out(p) for d, p in zip(self.drawings, state.poses, strict=True)),
+            state.body,
+            state.offset,
+            state.noise,
+            system.spreads,
+            system.energy,
+            covariance,
+            float(np.einsum("ij,ji->", covariance, system.data)),
         )
 
-    def equations(
-        self, noise: float, *, free_k: bool
-    ) -> tuple[Float[np.ndarray, "unknowns unknowns"], Float[np.ndarray, " unknowns"]]:
-        """Return the normal matrix and gradient of data and priors."""
-        views = len(self.poses)
-        size = PARAMETERS * views + SHARED
-        normal, gradient = np.zeros((size, size)), np.zeros(size)
-        for i, (rows, residuals, weights) in enumerate(
-            zip(self.rows, self.residuals, self.weights, strict=True)
-        ):
-            w = weights * EFFECTIVE_POINTS / (noise * self.height) ** 2
-            own = slice(PARAMETERS * i, PARAMETERS * (i + 1))
-            where = [*range(own.start, own.stop), size - 2, size - 1]
-            normal[np.ix_(where, where)] += (rows * w[:, None]).T @ rows
-            gradient[where] += rows.T @ (w * residuals)
-            matrix, slope = upright_prior(self.poses[i], ElevationPrior())
-            normal[own, own] += matrix
-            gradient[own] += slope
-        self._tie_views(normal, gradient)
-        normal[-1, -1] += 1 / OFFSET_OF_HEIGHT**2
-        gradient[-1] += self.offset / OFFSET_OF_HEIGHT**2
-        if not free_k:
-            normal[-2, :] = normal[:, -2] = 0
-            normal[-2, -2], gradient[-2] = 1.0, 0.0
-        normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(size)
-        return normal, gradient
+    def _size(self, state: _State, model: SheetModel) -> int:
+        return (
+            _first_shared(model, len(state.poses)) + 1 + model.proportions * len(state.body.theta)
+        )
 
-    def _tie_views(
+    def _view(
+        self, state: _State, model: SheetModel, index: int, width: float
+    ) -> tuple[list[int], Marginal]:
+        """Return which unknowns view `index` has and its normal equations."""
+        drawing, pose = self.drawings[index], state.poses[index]
+        height = drawing.height
+        found = match(drawing, state.body.surface, pose)
+        pixels, jacobian = project_with_jacobian(pose, found.points)
+        across = np.einsum("ni,nij->nj", found.normals, jacobian)
+        residuals = (found.normals * (pixels - found.targets)).sum(axis=1) + state.offset * height
+        views = len(state.poses)
+        where = list(range(PARAMETERS * index, PARAMETERS * (index + 1)))
+        parts = [across[:, :PARAMETERS]]
+        if model.perspective != "none":
+            where.append(PARAMETERS * views + (index if model.perspective == "per view" else 0))
+            parts.append(across[:, PARAMETERS:])
+        first = _first_shared(model, views)
+        where.append(first)
+        parts.append(np.full((len(residuals), 1), height))
+        if model.proportions:
+            where.extend(range(first + 1, first + 1 + len(state.body.theta)))
+            by_point = np.einsum("ni,nij->nj", found.normals, pixel_slopes(pose, found.points))
+            slopes = state.body.slopes(state.body.at_rest(found.points))
+            parts.append(np.einsum("nj,njp->np", by_point, slopes))
+        relative = found.distances / height
+        side = np.arange(len(residuals)) < found.drawn
+        counts = np.where(side, found.drawn, max(len(side) - found.drawn, 1))
+        return where, marginalise(
+            self.modes[index],
+            state.noise,
+            height,
+            found.target_index,
+            np.hstack(parts),
+            residuals,
+            1 / (2 * counts),
+            (width**2 / (width**2 + relative**2)) ** 2,
+            width,
+        )
+
+    def _system(self, state: _State, model: SheetModel, width: float, *, settled: bool) -> _System:
+        size = self._size(state, model)
+        data, gradient = np.zeros((size, size)), np.zeros(size)
+        views = []
+        for index in range(len(self.drawings)):
+            where, view = self._view(state, model, index, width)
+            data[np.ix_(where, where)] += view.normal
+            gradient[where] += view.gradient
+            views.append(view)
+        normal = data.copy()
+        spreads = self._add_ties(state, normal, gradient, model.spreads if settled else None)
+        first = _first_shared(model, len(views))
+        normal[first, first] += OFFSET_OF_HEIGHT**-2
+        gradient[first] += state.offset / OFFSET_OF_HEIGHT**2
+        if model.proportions:
+            normal[first + 1 :, first + 1 :] += state.body.precision
+            gradient[first + 1 :] += state.body.precision @ state.body.theta
+        normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(size)
+        energy = sum(view.energy for view in views)
+        noise = pooled([view.noise for view in views], width)
+        return _System(data, normal, gradient, energy, noise, spreads)
+
+    def _add_ties(
         self,
-        normal: Float[np.ndarray, "unknowns unknowns"],
-        gradient: Float[np.ndarray, " unknowns"],
-    ) -> None:
-        """Pull elevations and log scales to their mean over the sheet (hierarchical prior)."""
-        views = len(self.poses)
-        size = len(gradient)
-        centre = np.eye(views) - 1 / views
-        tilts = [tilt(pose) for pose in self.poses]
-        elevation = np.array([angles[1] for angles, _ in tilts])
-        log_scale = np.log([p.scale for p in self.poses])
-        slopes = np.zeros((2, views, size))
-        for i, (_, by_turn) in enumerate(tilts):
-            slopes[0, i, PARAMETERS * i : PARAMETERS * i + 3] = by_turn[1]
-            slopes[1, i, PARAMETERS * i + 5] = 1
-        for values, slope, sigma in (
-            (elevation, slopes[0], ELEVATION_SPREAD),
-            (log_scale, slopes[1], SCALE_SPREAD),
-        ):
-            tied = centre @ slope / sigma
-            normal += tied.T @ tied
-            gradient += tied.T @ (centre @ values / sigma)
+        state: _State,
+        normal: Float[np.ndarray, "u u"],
+        gradient: Float[np.ndarray, " u"],
+        expected: Spreads | None,
+    ) -> Spreads:
+        """Add the ties; return the spreads, estimated anew where an expectation is given."""
+        spreads = state.spreads
+        ties = sheet_ties(state.poses, self.turn, spreads.yaw, len(gradient))
+        if expected is not None and state.covariance is not None:
+            spreads = replace(
+                spreads,
+                **{n: t.spread(state.covariance, getattr(expected, n)) for n, t in ties.items()},
+            )
+        terms = [(tie, getattr(spreads, name)) for name, tie in ties.items()]
+        for tie, sigma in [*terms, *anchors(ties, self.turn)]:
+            matrix, slope = tie.equations(sigma)
+            normal += matrix
+            gradient += slope
+        return spreads
+
+    def _stepped(
+        self, state: _State, system: _System, model: SheetModel, *, keep_noise: bool
+    ) -> _State:
+        covariance = np.linalg.inv(system.normal)
+        step = -covariance @ system.gradient
+        views = len(state.poses)
+        per_view = step[: PARAMETERS * views].reshape(views, PARAMETERS)
+        shrink = min(1.0, MAX_TURN / max(np.abs(per_view[:, :3]).max(), 1e-12))
+        step = step * shrink
+        first = _first_shared(model, views)
+        k_steps = step[PARAMETERS * views : first]
+        k_steps = np.broadcast_to(k_steps, views) if len(k_steps) else np.zeros(views)
+        most = MAX_K_RADIUS / state.body.rest.radius
+        poses = tuple(
+            replace(pose.moved(own * shrink), k=float(np.clip(pose.k + change, 0.0, most)))
+            for pose, own, change in zip(state.poses, per_view, k_steps, strict=True)
+        )
+        return _State(
+            poses,
+            state.body.moved(step[first + 1 :]) if model.proportions else state.body,
+            state.offset + float(step[first]),
+            state.noise if keep_noise else system.noise,
+            system.spreads,
+            covariance,
+        )
+
+
+def _first_shared(model: SheetModel, views: int) -> int:
+    """Return the index of the outline offset, the first unknown after poses and distances."""
+    distances = {"none": 0, "shared": 1, "per view": views}[model.perspective]
+    return PARAMETERS * views + distances

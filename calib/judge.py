@@ -8,21 +8,33 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import EFFECTIVE_POINTS, INDEPENDENT_POINTS, Drawing, measure
+from toonset.calib.align import measure
 from toonset.calib.hypotheses import Candidates, is_twin
 from toonset.calib.joint import JointFit
+from toonset.calib.match import Drawing
 from toonset.calib.pose import PARAMETERS, Pose
 from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
 from toonset.calib.rim import Surface
 from toonset.camera import angles_from_rotation, rotation_distance
 from toonset.view import View
 
-DEFLATION = EFFECTIVE_POINTS / INDEPENDENT_POINTS  # of the solver's covariance
 SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
 WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
 FAILED_COVERAGE = 0.70
 OTHER = np.radians(15.0)  # an alternative this far away is another camera
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
+
+
+def typical_coverage(drawings: Sequence[Drawing], joint: JointFit) -> float:
+    """Return the share of the outlines that meet, in the sheet's typical view."""
+    return float(
+        np.median(
+            [
+                measure(drawing, joint.body.surface, drawing.pose_in(pose)).coverage
+                for drawing, pose in zip(drawings, joint.poses, strict=True)
+            ]
+        )
+    )
 
 
 def judge_view(
@@ -39,7 +51,7 @@ def judge_view(
     size_wh = (view.rgba.shape[1], view.rgba.shape[0])
     fit = measure(drawing, surface, drawing.pose_in(pose))
     own = slice(PARAMETERS * index, PARAMETERS * (index + 1))
-    covariance = _in_view_pixels(DEFLATION * joint.covariance[own, own], drawing.factor)
+    covariance = _in_view_pixels(joint.covariance[own, own], drawing.factor)
     far = [
         (float(p), f.pose)
         for p, f in zip(probability, candidates.fits, strict=True)

@@ -67,6 +67,14 @@ def project(pose: Pose, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "
     return pose.shift + pose.scale * local[:, :2] / (1 + pose.k * local[:, 2:])
 
 
+def pixel_slopes(pose: Pose, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2 3"]:
+    """Return the derivatives of the pixels by the points."""
+    local = points @ pose.rotation.T
+    divisor = (1 + pose.k * local[:, 2])[:, None, None]
+    pull = pose.k * local[:, :2, None] * pose.rotation[2]
+    return pose.scale * (pose.rotation[:2] - pull / divisor) / divisor
+
+
 def project_with_jacobian(
     pose: Pose, points: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 7"]]:

@@ -17,20 +17,25 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
     Callers add what only they know: options, seed, versions, input hashes.
     """
     model = calibration.model
-    perspective = math.isfinite(model.distance_heights)
     return {
         "schema": SCHEMA,
         "verdict": calibration.verdict,
         "reason": calibration.reason,
         "camera_model": {
             "chosen": model.model,
-            "distance_heights": model.distance_heights if perspective else None,
-            "bic_gain_of_perspective": model.bic_gain,
+            "distance_heights": [d if math.isfinite(d) else None for d in model.distances],
+            "tried": [
+                {"model": rung.name, "bic_gain": rung.bic_gain, "unknowns": rung.unknowns}
+                for rung in model.rungs
+            ],
             "bic_margin": model.margin,
             "effective_samples": model.effective_samples,
         },
         "outline_offset_of_height": calibration.outline_offset,
-        "outline_noise_of_height": calibration.noise,
+        "drawing_error_of_height": {
+            "smooth": calibration.noise.smooth,
+            "white": calibration.noise.white,
+        },
         "views": [_view_dict(view) for view in calibration.views],
         "seconds": {step: round(value, 4) for step, value in calibration.seconds.items()},
     }
@@ -39,13 +44,16 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
 def model_line(calibration: Calibration) -> str:
     """Return what camera model was chosen and why, for people."""
     model = calibration.model
-    evidence = (
-        f"BIC gain of perspective {model.bic_gain:.1f}, {model.margin:.0f} needed, "
-        f"{model.effective_samples:.0f} effective samples"
+    tried = ", ".join(f"{rung.name} {rung.bic_gain:+.0f}" for rung in model.rungs)
+    text = f"camera model: {model.model}"
+    near, far = min(model.distances), max(model.distances)
+    if math.isfinite(near):
+        text += f" from {near:.1f}" + (f" to {far:.1f}" if far > near * 1.01 else "")
+        text += " body heights"
+    return (
+        f"{text} (BIC gain of {tried}; {model.margin:.0f} needed; "
+        f"{model.effective_samples:.0f} effective samples)"
     )
-    if model.model == "orthographic":
-        return f"camera model: orthographic ({evidence})"
-    return f"camera model: perspective from {model.distance_heights:.1f} body heights ({evidence})"
 
 
 def view_line(view: ViewCalibration) -> str:

@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.joint import ModelChoice
+from toonset.calib.drawing_error import Noise
+from toonset.calib.ladder import ModelChoice
 from toonset.camera import Camera
 
 Verdict = Literal["ok", "weak", "ambiguous", "failed"]
@@ -73,7 +74,7 @@ class Calibration:
         views: in sheet order.
         model: orthographic or perspective, with the evidence.
         outline_offset: drawn outline outside of the mannequin's, over the figure's height.
-        noise: robust outline error of the sheet, over the figure's height.
+        noise: the drawings' error over the figure's height.
         verdict: the worst that holds for the sheet as a whole.
         reason: why, in words.
         seconds: per step.
@@ -82,7 +83,7 @@ class Calibration:
     views: tuple[ViewCalibration, ...]
     model: ModelChoice
     outline_offset: float
-    noise: float
+    noise: Noise
     verdict: Verdict
     reason: str
     seconds: dict[str, float]

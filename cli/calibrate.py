@@ -28,6 +28,13 @@ def calibrate(
         typer.Argument(metavar="SHEET", help="A character sheet, or one file per view."),
     ],
     mesh: Annotated[Path, typer.Option("--mesh", help="Posed mannequin: obj, ply, stl, glb, off.")],
+    labels: Annotated[
+        str,
+        typer.Option(
+            "--views",
+            help="What each view shows, in sheet order: front,3q,side,back ... or yaws in degrees.",
+        ),
+    ] = "",
     out: Annotated[Path, typer.Option("-o", "--out", help="Bundle folder.")] = Path("bundle"),
     force: ForceFlag = False,
     seed: SeedOption = 0,
@@ -41,6 +48,7 @@ def calibrate(
     """
     from toonset.calib.calibrate import CalibrationOptions
     from toonset.calib.calibrate import calibrate as fit
+    from toonset.calib.labels import parse_labels
     from toonset.calib.overlay import draw_overlay
     from toonset.calib.report import calibration_dict, model_line, view_line
     from toonset.dataset.bundle import write_bundle
@@ -53,7 +61,8 @@ def calibrate(
     views = _load_views(sheets, printer)
     count = "1 view" if len(views) == 1 else f"{len(views)} views"
     printer.say(f"{count}, mannequin of {len(mannequin.faces)} faces")
-    options = CalibrationOptions()
+    known = parse_labels(labels, len(views)) if labels else ()
+    options = CalibrationOptions(labels=known)
     found = fit(
         views,
         mannequin,

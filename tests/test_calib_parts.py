@@ -10,9 +10,10 @@ import trimesh
 
 from toonset.calib.align import Drawing, ElevationPrior, Fit, align, tilt, upright_prior
 from toonset.calib.contour import drawn_contour
-from toonset.calib.hypotheses import Candidates, choose_together, probabilities
+from toonset.calib.hypotheses import Candidates
 from toonset.calib.pose import Pose, project, project_with_jacobian
 from toonset.calib.rim import find_rim, prepare_surface, silhouette_mask
+from toonset.calib.shared import Sheet, possible_turns
 from toonset.calib.templates import build_templates, find_hypotheses
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.errors import SheetError
@@ -181,18 +182,22 @@ def candidates(*poses_and_energies) -> Candidates:
     return Candidates(fits, np.array([energy for _, energy in poses_and_energies]))
 
 
+def sheet(views: int) -> Sheet:
+    return Sheet(possible_turns(views))
+
+
 def test_equal_twins_at_eye_level_are_a_coin_toss():
     twins = candidates((pose_at(0.5, 0.0, 0.0), 0.0), (pose_at(math.pi - 0.5, 0.0, 0.0), 0.0))
-    for view in probabilities([twins, twins]):
+    for view in sheet(2).probabilities([twins, twins]):
         np.testing.assert_allclose(view, 0.5, atol=1e-9)
 
 
 def test_one_sure_view_settles_the_elevation_of_the_others():
     sure = candidates((pose_at(0.5, 0.3, 0.0), 0.0), (pose_at(math.pi - 0.5, -0.3, 0.0), 25.0))
     torn = candidates((pose_at(math.pi - 2, -0.3, 0.0), 0.0), (pose_at(2.0, 0.3, 0.0), 0.5))
-    assert choose_together([sure, torn]) == [0, 1]
-    np.testing.assert_allclose(probabilities([sure, torn])[1], [0, 1], atol=0.05)
-    alone = probabilities([torn])[0]
+    assert sheet(2).choose([sure, torn])[0] == [0, 1]
+    np.testing.assert_allclose(sheet(2).probabilities([sure, torn])[1], [0, 1], atol=0.05)
+    alone = sheet(1).probabilities([torn])[0]
     assert alone[0] > 0.2  # alone the torn view stays torn
 
 

@@ -71,7 +71,7 @@ def test_perspective_is_found_only_where_it_is():
     near = dataclasses.replace(CLEAN, distance_heights=2.5)
     _, found, errors = solved(near, 31)
     assert found.model.model == "perspective"
-    assert found.model.distance_heights == pytest.approx(2.5, rel=0.05)
+    assert found.model.distances == pytest.approx([2.5] * 5, rel=0.05)
     assert max(math.degrees(e.raw) for e in errors) < 1.0
 
 

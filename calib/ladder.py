@@ -1,0 +1,151 @@
+"""No more camera, and no more body, than the drawings ask for: a ladder of models, by BIC.
+
+1. orthographic, one scale
+2. orthographic, a scale per view
+3. perspective, one distance for the sheet
+4. perspective, a distance per view
+and, only where the mannequin's outline is visibly not the drawings', its proportions.
+
+All are one model in k = 1 / distance with more or fewer numbers free, so a richer model is judged
+by how far its extra numbers are from what the simpler one says, in their own covariance: BIC's gain
+is d^T C^-1 d - p log(samples), with the likelihood in its quadratic approximation (Wald's test).
+The covariance knows that points along a line err together (`toonset.calib.drawing_error`), so the
+sample size is the number of independent samples that it counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toonset.calib.drawing_error import WHITE_POINTS
+from toonset.calib.joint import JointFit, JointProblem, SheetModel
+from toonset.calib.pose import PARAMETERS, Pose
+from toonset.calib.proportions import Body
+from toonset.calib.ties import Spreads
+
+BIC_MARGIN = 6.0  # "strong" evidence (Kass and Raftery 1995)
+FREE_SCALE = 0.2  # relative spread of scales that are not tied
+WIDTHS = np.geomspace(0.02, 0.01, 8)
+WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
+BODY_WIDTHS = np.geomspace(0.04, 0.015, 8)
+
+ORTHOGRAPHIC, SCALES = "orthographic", "orthographic, a scale per view"
+SHARED, PER_VIEW = "perspective", "perspective, a distance per view"
+PROPORTIONS = "the mannequin's proportions"
+MODELS: dict[str, SheetModel] = {
+    ORTHOGRAPHIC: SheetModel("none"),
+    SCALES: SheetModel("none", Spreads(scale=FREE_SCALE)),
+    SHARED: SheetModel("shared"),
+    PER_VIEW: SheetModel("per view"),
+}
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A richer model that was tried.
+
+    Attributes:
+        name: what it frees.
+        bic_gain: over the model it extends; above the margin it is proven.
+        unknowns: how many numbers it frees.
+    """
+
+    name: str
+    bic_gain: float
+    unknowns: float
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """The chosen camera model, and why.
+
+    Attributes:
+        model: name of the chosen camera model.
+        distances: camera distance of every view in body heights; infinity for orthographic.
+        rungs: what was tried.
+        effective_samples: outline samples counted as independent.
+        margin: BIC gain that a richer model must show.
+    """
+
+    model: str
+    distances: tuple[float, ...]
+    rungs: tuple[Rung, ...]
+    effective_samples: float
+    margin: float = BIC_MARGIN
+
+    @property
+    def is_perspective(self) -> bool:
+        """Return whether the cameras are pinholes."""
+        return self.model in (SHARED, PER_VIEW)
+
+    @property
+    def bends_mannequin(self) -> bool:
+        """Return whether the mannequin's proportions were changed."""
+        return any(r.name == PROPORTIONS and r.bic_gain > self.margin for r in self.rungs)
+
+
+def climb(problem: JointProblem, body: Body, poses: Sequence[Pose]) -> tuple[JointFit, ModelChoice]:
+    """Return the sheet's fit under the simplest camera model that the drawings do not refute.
+
+    Args:
+        problem: the drawings at the working scale.
+        body: the mannequin.
+        poses: starts, full-size pixels; their k starts the search for perspective.
+    """
+    views = len(poses)
+    samples = WHITE_POINTS * views
+    fit = problem.fit(body, poses, WIDTHS, MODELS[SHARED])
+    first_k = PARAMETERS * views
+    gain = fit.poses[0].k ** 2 / fit.covariance[first_k, first_k] - np.log(samples)
+    rungs = [Rung(SHARED, float(gain), 1)]
+    model = SHARED if gain > BIC_MARGIN else ORTHOGRAPHIC
+    if model == ORTHOGRAPHIC:
+        fit = problem.fit(body, poses, WIDTHS, MODELS[ORTHOGRAPHIC])
+    if views > 1:
+        richer = PER_VIEW if model == SHARED else SCALES
+        rich = problem.fit(body, fit.poses, WARM_WIDTHS, MODELS[richer], offset=fit.offset)
+        gain = _differences(rich, richer) - (views - 1) * np.log(samples)
+        rungs.append(Rung(richer, float(gain), views - 1))
+        if gain > BIC_MARGIN:
+            model, fit = richer, rich
+    return fit, ModelChoice(model, _distances(fit), tuple(rungs), samples)
+
+
+def with_proportions(
+    problem: JointProblem, fit: JointFit, choice: ModelChoice
+) -> tuple[JointFit, ModelChoice]:
+    """Return the fit with the mannequin's proportions free, if the drawings prove them."""
+    model = replace(MODELS[choice.model], proportions=True)
+    bent = problem.fit(fit.body, fit.poses, BODY_WIDTHS, model, offset=fit.offset)
+    theta = bent.body.theta
+    block = bent.covariance[-len(theta) :, -len(theta) :]
+    unknowns = max(bent.freedom - fit.freedom, 1.0)
+    gain = theta @ np.linalg.solve(block, theta) - unknowns * np.log(choice.effective_samples)
+    choice = replace(choice, rungs=(*choice.rungs, Rung(PROPORTIONS, float(gain), unknowns)))
+    if gain <= BIC_MARGIN:
+        return fit, choice
+    return bent, replace(choice, distances=_distances(bent))
+
+
+def _differences(rich: JointFit, name: str) -> float:
+    """Return d^T C^-1 d of the views' distances (or log scales) about their mean."""
+    views = len(rich.poses)
+    if name == PER_VIEW:
+        values = np.array([pose.k for pose in rich.poses])
+        where = PARAMETERS * views + np.arange(views)
+    else:
+        values = np.log([pose.scale for pose in rich.poses])
+        where = PARAMETERS * np.arange(views) + 5
+    covariance = rich.covariance[np.ix_(where, where)]
+    others = np.column_stack([np.ones(views), np.eye(views)[:, 1:]])
+    contrasts = np.linalg.qr(others)[0][:, 1:]
+    off = contrasts.T @ values
+    return float(off @ np.linalg.solve(contrasts.T @ covariance @ contrasts, off))
+
+
+def _distances(fit: JointFit) -> tuple[float, ...]:
+    height = fit.body.rest.height
+    return tuple(1 / (p.k * height) if p.k > 0 else float("inf") for p in fit.poses)

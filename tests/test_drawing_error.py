@@ -1,0 +1,74 @@
+"""The drawing's error: integrated out as the covariance form says, smooth told from white."""
+
+import numpy as np
+import pytest
+
+from toonset.calib.contour import Contour
+from toonset.calib.drawing_error import Noise, error_modes, marginalise, pooled
+from toonset.calib.match import Drawing
+
+
+def circle(count: int = 120) -> Drawing:
+    turn = np.arange(count) * 2 * np.pi / count
+    normals = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    contour = Contour(50 + 40 * normals, normals, (10.0, 10.0, 80.0, 80.0), 80.0)
+    return Drawing(contour, 80.0, count)
+
+
+def problem(rng: np.random.Generator, drawing: Drawing):
+    count = len(drawing.points)
+    index = rng.integers(0, count, 2 * count)
+    rows, residuals = rng.normal(size=(2 * count, 3)), rng.normal(size=2 * count)
+    return index, rows, residuals, np.full(2 * count, 0.5 / count), rng.uniform(0.2, 1, 2 * count)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_integrating_out_equals_generalised_least_squares(seed):
+    drawing, noise = circle(), Noise(0.01, 0.004)
+    index, rows, residuals, shares, robust = problem(np.random.default_rng(seed), drawing)
+    modes = error_modes(drawing)
+    found = marginalise(
+        modes, noise, drawing.height, index, rows, residuals, shares, robust, width=0.02
+    )
+    white = (noise.white * drawing.height) ** 2 / (shares * robust * 80.0)
+    covariance = noise.smooth**2 * modes[index] @ modes[index].T + np.diag(white)
+    np.testing.assert_allclose(found.normal, rows.T @ np.linalg.solve(covariance, rows), rtol=1e-6)
+    np.testing.assert_allclose(
+        found.gradient, rows.T @ np.linalg.solve(covariance, residuals), rtol=1e-6, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(("smooth", "white"), [(0.01, 0.002), (0.003, 0.006)])
+def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
+    drawing = circle()
+    modes, count = error_modes(drawing), len(circle().points)
+    rng = np.random.default_rng(3)
+    index, shares = np.arange(count), np.full(count, 1 / count)
+    estimate = Noise()
+    for _ in range(60):
+        views = []
+        for view in range(6):
+            rng = np.random.default_rng(view)
+            residuals = modes @ rng.normal(0, smooth, modes.shape[1])
+            residuals += rng.normal(0, white * drawing.height, count)
+            rows = np.zeros((count, 0))
+            marginal = marginalise(
+                modes, estimate, drawing.height, index, rows, residuals, shares, np.ones(count), 1.0
+            )
+            views.append(marginal.noise)
+        estimate = pooled(views, 1.0)
+    assert estimate.smooth == pytest.approx(smooth, rel=0.25)
+    assert estimate.white == pytest.approx(white, rel=0.5)
+
+
+def test_a_bent_drawing_costs_information():
+    drawing = circle()
+    index, rows, residuals, shares, robust = problem(np.random.default_rng(5), drawing)
+    modes = error_modes(drawing)
+    rigid, bent = (
+        marginalise(
+            modes, Noise(s, 0.004), drawing.height, index, rows, residuals, shares, robust, 0.02
+        ).normal
+        for s in (1e-5, 0.02)
+    )
+    assert (np.linalg.eigvalsh(rigid - bent) > -1e-9).all()
