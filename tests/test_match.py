@@ -1,5 +1,6 @@
 """Outlines and matching: the fast ways equal the plain ones."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -7,12 +8,13 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
+from toonset.calib.align import align, align_all
 from toonset.calib.contour import drawn_contour
 from toonset.calib.match import Drawing, Table, match, nearest
 from toonset.calib.pose import Pose, project
 from toonset.calib.rim import find_rim, rim_at, silhouette_mask
 from toonset.calib.surface import Surface, prepare_surface
-from toonset.camera import rotation_from_angles
+from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -115,6 +117,35 @@ def test_matches_of_a_drawing_with_itself_are_close_on_both_sides():
     assert np.median(matches.distances) < 1.0
     off = project(drawing.pose_in(pose), matches.points) - matches.targets
     assert np.median(np.abs((off * matches.normals).sum(axis=1))) < 0.3
+
+
+WIDTHS = np.geomspace(0.06, 0.01, 8)
+
+
+def test_starts_that_meet_end_as_one_where_each_would_alone():
+    truth, surface = pose_at(5), prepare_surface(ball())
+    drawing = drawing_of(ball(), truth)
+    turned = truth.moved(np.array([0.05, 0.04, 0.0, 1.0, 0.0, 0.0]))
+    starts = [turned, replace(truth, scale=1.05 * truth.scale)]
+    together = align_all(drawing, surface, starts, WIDTHS)
+    assert len(together) == 1
+    for start in starts:
+        alone = align(drawing, surface, start, WIDTHS)
+        assert rotation_distance(alone.pose.rotation, together[0].pose.rotation) < 0.02
+
+
+def test_views_in_threads_equal_views_in_a_row_bit_for_bit():
+    surface = prepare_surface(ball())
+    poses = [pose_at(seed) for seed in range(4)]
+    drawings = [drawing_of(ball(), pose) for pose in poses]
+
+    def fit(i: int) -> bytes:
+        found = align_all(drawings[i], surface, [poses[i], poses[i].twin()], WIDTHS)
+        return b"".join(f.pose.rotation.tobytes() + f.pose.shift.tobytes() for f in found)
+
+    with ThreadPoolExecutor(2) as pool:
+        threaded = list(pool.map(fit, range(4)))
+    assert threaded == [fit(i) for i in range(4)]
 
 
 def test_a_figure_outside_of_the_picture_is_far_from_everything():
