@@ -17,24 +17,35 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from jaxtyping import Float
 
-from toonset.calib.align import INDEPENDENT_POINTS
+from toonset.calib.align import INDEPENDENT_POINTS, ElevationPrior, tilt
+from toonset.calib.bank import load_bank
+from toonset.calib.common_elevation import common_elevation
 from toonset.calib.contour import drawn_contour
 from toonset.calib.drawing_error import Noise
 from toonset.calib.face import read_faces
 from toonset.calib.hypotheses import SAME_POSE, Candidates, level_twins, refine, with_twins
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
-from toonset.calib.judge import judge_sheet, judge_view, typical_coverage, with_sheet_in_mind
-from toonset.calib.labels import Label
-from toonset.calib.ladder import climb, with_proportions
+from toonset.calib.judge import (
+    TELLING_VIEWS,
+    judge_sheet,
+    judge_view,
+    sheet_state,
+    typical_coverage,
+    with_sheet_in_mind,
+)
+from toonset.calib.known import Known, weighed_by_landmarks
+from toonset.calib.ladder import ModelChoice, climb, with_proportions
+from toonset.calib.landmarks import landmark_starts
 from toonset.calib.match import Drawing
 from toonset.calib.paint import read_paint
 from toonset.calib.pose import Pose
 from toonset.calib.proportions import Body, as_it_is
 from toonset.calib.result import Calibration
-from toonset.calib.rim import prepare_surface
+from toonset.calib.rim import Surface, prepare_surface
 from toonset.calib.shared import Sheet, possible_turns
-from toonset.calib.templates import build_templates, find_hypotheses
+from toonset.calib.templates import Templates, find_hypotheses
 from toonset.calib.ties import Turn
 from toonset.calib.turns import TurnStart, likely_turns
 from toonset.camera import rotation_distance
@@ -56,14 +67,12 @@ class CalibrationOptions:
         coarse_height_px: figure height while searching; 100 px see limbs, cost little.
         fine_height_px: figure height of the final fit.
         rounds: joint fits at most, when views change their candidate.
-        labels: what is known of each view's yaw (`toonset.calib.labels`); empty for nothing.
     """
 
     starts: int = 6
     coarse_height_px: float = 100.0
     fine_height_px: float = 250.0
     rounds: int = 3
-    labels: tuple[Label, ...] = ()
 
 
 COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
@@ -82,63 +91,173 @@ def calibrate(
     mesh: Mesh,
     options: CalibrationOptions = CalibrationOptions(),
     progress: Progress = lambda step, share: None,
+    known: Known | None = None,
 ) -> Calibration:
     """Return one camera per view with its uncertainty.
 
     Args:
         views: the drawings, at least one.
         mesh: the posed mannequin; world frame and units are its own.
-        options: search effort and what is known beforehand.
+        options: search effort.
         progress: called with the step's name and the share done.
+        known: what a person knows beforehand.
+
+    Raises:
+        CameraError, LandmarkError: what is known does not belong to the views or the mannequin.
     """
+    known = known or Known()
+    known.check(views)
     seconds: dict[str, float] = {}
     with _timed(seconds, "prepare"):
         surface = prepare_surface(mesh)
-        templates = build_templates(surface)
+        templates = load_bank(surface)
         contours = [drawn_contour(view) for view in views]
         coarse = [Drawing(c, options.coarse_height_px, COARSE_POINTS) for c in contours]
         fine = [Drawing(c, options.fine_height_px, FINE_POINTS) for c in contours]
-        turns = possible_turns(len(views), options.labels)
-        sheet = Sheet(turns, read_faces(views), read_paint(views))
-    candidates = []
+        sheet = Sheet(
+            possible_turns(len(views), known.labels), read_faces(views), read_paint(views)
+        )
+        problem = _Problem(views, surface, templates, coarse, fine, sheet, known, options, progress)
     with _timed(seconds, "search"):
-        together = likely_turns(views, templates, turns)
-        for i, view in enumerate(views):
-            progress("search", i / len(views))
-            starts = [h.pose for h in find_hypotheses(view, templates, options.starts)]
-            starts = [*starts, starts[0].twin(), *(turn.poses[i] for turn in together)]
-            candidates.append(refine(coarse[i], surface, starts, COARSE_WIDTHS))
+        candidates, together = problem.search()
     with _timed(seconds, "together"):
         progress("together", 0.0)
-        search = _Together(coarse, as_it_is(surface), sheet)
-        joint, turn, candidates = search.run(candidates, together, options.rounds)
+        joint, turn, candidates = problem.together(candidates, together)
     with _timed(seconds, "joint"):
         progress("joint", 0.0)
-        problem = JointProblem(fine, turn)
-        joint, model = climb(problem, joint.body, joint.poses)
-        differs = typical_coverage(fine, joint) < ASKS_FOR_PROPORTIONS
-        if differs:
-            joint, model = with_proportions(problem, joint, model)
+        joint, model, differs = problem.joint(joint, turn)
     with _timed(seconds, "judge"):
         progress("judge", 0.0)
-        bent = joint.body.surface
-        final = [
-            refine(drawing, bent, _rivals(pose, c), FINE_WIDTHS)
-            for drawing, pose, c in zip(fine, joint.poses, candidates, strict=True)
-        ]
-        seen = joint.poses if model.is_perspective else _with_k(joint.poses, 0.0)
-        final = [
-            level_twins(c, bent, pose, always=differs) for c, pose in zip(final, seen, strict=True)
-        ]
+        state = sheet_state(views, joint, surface, templates)
+        final = problem.rivals(joint, model, candidates, differs=differs)
         sure = sheet.probabilities(final)
         judged = with_sheet_in_mind(
             [
-                judge_view(view, fine[i], bent, joint, i, final[i], sure[i])
+                judge_view(view, fine[i], joint.body.surface, joint, i, final[i], sure[i], state)
                 for i, view in enumerate(views)
             ]
         )
-    verdict, reason = judge_sheet(judged)
-    return Calibration(judged, model, joint.offset, joint.noise, verdict, reason, seconds)
+    verdict, reason = judge_sheet(judged, state)
+    return Calibration(
+        judged,
+        model,
+        joint.offset,
+        joint.noise,
+        state.contradiction,
+        joint.body.surface.vertices + surface.middle,
+        verdict,
+        reason,
+        seconds,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """A sheet on its way from drawings to cameras."""
+
+    views: Sequence[View]
+    surface: Surface
+    templates: Templates
+    coarse: Sequence[Drawing]
+    fine: Sequence[Drawing]
+    sheet: Sheet
+    known: Known
+    options: CalibrationOptions
+    progress: Progress
+
+    def search(self) -> tuple[list[Candidates], list[TurnStart]]:
+        """Return every view's candidates, and the turns that explain the whole sheet."""
+        given = self.known.start_poses(self.surface.middle)
+        if given:
+            return [
+                refine(drawing, self.surface, [pose], FINE_WIDTHS)
+                for drawing, pose in zip(self.coarse, given, strict=True)
+            ], [TurnStart(given, 0.0)]
+        marked = landmark_starts(self.known.landmarks, self.surface)
+        together = likely_turns(self.views, self.templates, self.sheet.turns)
+        candidates = []
+        for i, view in enumerate(self.views):
+            self.progress("search", i / len(self.views))
+            found = find_hypotheses(view, self.templates, self.options.starts)
+            starts = [h.pose for h in found]
+            starts = [*starts, starts[0].twin(), *(turn.poses[i] for turn in together)]
+            own = marked[i] if marked else None
+            starts += _with_k(own.poses, 0.0) if own else []
+            reached = refine(self.coarse[i], self.surface, starts, COARSE_WIDTHS)
+            candidates.append(self._informed(reached, i))
+        return candidates, together
+
+    def together(
+        self, candidates: list[Candidates], starts: list[TurnStart]
+    ) -> tuple[JointFit, Turn, list[Candidates]]:
+        """Return the best selection of candidates as a joint fit, its turn, the candidates."""
+        body = as_it_is(self.surface)
+        if self.known.cameras:
+            turn = self.sheet.weigh([starts[0].poses])[1][0]
+            model = SheetModel("given")
+            fit = JointProblem(self.coarse, turn).fit(body, starts[0].poses, SKETCHED[-1:], model)
+            return replace(fit, poses=starts[0].poses), turn, candidates
+        search = _Together(self.coarse, body, self.sheet, self._informed)
+        return search.run(candidates, starts, self.options.rounds)
+
+    def joint(self, sketch: JointFit, turn: Turn) -> tuple[JointFit, ModelChoice, bool]:
+        """Return the fit at full resolution, its model, and whether the mannequin differs."""
+        problem = JointProblem(self.fine, turn, self._kept())
+        keep_fov = "fov" in self.known.locked
+        differs = typical_coverage(self.fine, sketch) < ASKS_FOR_PROPORTIONS
+        joint, model = climb(
+            problem, sketch.body, sketch.poses, doubtful=differs, keep_fov=keep_fov
+        )
+        if differs:
+            joint, model = with_proportions(self._level(problem, joint), joint, model)
+        return joint, model, differs
+
+    def rivals(
+        self,
+        joint: JointFit,
+        model: ModelChoice,
+        candidates: Sequence[Candidates],
+        *,
+        differs: bool,
+    ) -> list[Candidates]:
+        """Return what else every view could be, refined at full resolution."""
+        bent = joint.body.surface
+        found = []
+        for i, (pose, view) in enumerate(zip(joint.poses, candidates, strict=True)):
+            final = refine(self.fine[i], bent, _rivals(pose, view), FINE_WIDTHS)
+            seen = pose if model.is_perspective else replace(pose, k=0.0)
+            found.append(self._informed(level_twins(final, bent, seen, always=differs), i))
+        return found
+
+    def _informed(self, view: Candidates, index: int) -> Candidates:
+        if not self.known.landmarks:
+            return view
+        height = self.coarse[index].height / self.coarse[index].factor
+        landmarks = self.known.landmarks[index]
+        return weighed_by_landmarks(view, landmarks, self.surface.middle, height)
+
+    def _kept(self) -> dict[str, Float[np.ndarray, " views"]]:
+        poses = self.known.start_poses(self.surface.middle)
+        values = {
+            "yaw": lambda: self.known.yaws(),
+            "elevation": lambda: np.array([tilt(pose)[0][1] for pose in poses]),
+            "scale": lambda: np.log([pose.scale for pose in poses]),
+        }
+        return {name: values[name]() for name in sorted(self.known.locked - {"fov"})}
+
+    def _level(self, problem: JointProblem, joint: JointFit) -> JointProblem:
+        """Return the problem with the mean elevation that the drawings agree on best."""
+        if len(self.views) < TELLING_VIEWS or "elevation" in self.known.locked:
+            return problem
+        cameras = [
+            pose.camera(self.surface.middle, (view.rgba.shape[1], view.rgba.shape[0]))
+            for view, pose in zip(self.views, joint.poses, strict=True)
+        ]
+        found = common_elevation(self.views, cameras)
+        if not np.isfinite(found.sigma):
+            return problem
+        mean = float(np.mean([camera.angles[1] for camera in cameras]))
+        return problem.with_elevation(ElevationPrior(mean + found.offset, found.sigma))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +267,7 @@ class _Together:
     drawings: Sequence[Drawing]
     body: Body
     sheet: Sheet
+    informed: Callable[[Candidates, int], Candidates]
 
     def run(
         self, candidates: Sequence[Candidates], starts: Sequence[TurnStart], rounds: int
@@ -164,7 +284,7 @@ class _Together:
         fits: list[JointFit] = []
         found = list(candidates)
         for _ in range(rounds):
-            fits += [self._sketched(poses) for poses in selections]
+            fits += [self._sketched(poses) for poses in _distinct(selections)]
             flipped = self._best(fits)[0]
             fits.append(self._sketched([pose.twin() for pose in flipped.poses]))
             best, turn = self._best(fits)
@@ -200,15 +320,11 @@ class _Together:
     def _at_camera(self, candidates: Sequence[Candidates], k: float) -> list[Candidates]:
         """Refine the best candidates and their twins again at a given k."""
         surface = self.body.surface
-        return [
-            refine(
-                drawing,
-                surface,
-                _with_k(with_twins([fit.pose for fit in found.fits[:4]]), k),
-                RECHECK_WIDTHS,
-            )
-            for drawing, found in zip(self.drawings, candidates, strict=True)
-        ]
+        again = []
+        for i, (drawing, found) in enumerate(zip(self.drawings, candidates, strict=True)):
+            starts = _with_k(with_twins([fit.pose for fit in found.fits[:4]]), k)
+            again.append(self.informed(refine(drawing, surface, starts, RECHECK_WIDTHS), i))
+        return again
 
 
 def _nearest(candidates: Sequence[Candidates], starts: Sequence[Pose]) -> list[Pose]:
@@ -219,6 +335,14 @@ def _nearest(candidates: Sequence[Candidates], starts: Sequence[Pose]) -> list[P
         near = int(np.argmin(turns))
         poses.append(view.fits[near].pose if turns[near] < SAME_START else start)
     return poses
+
+
+def _distinct(selections: Sequence[list[Pose]]) -> list[list[Pose]]:
+    kept: list[list[Pose]] = []
+    for poses in selections:
+        if not any(_same(poses, other) for other in kept):
+            kept.append(poses)
+    return kept
 
 
 def _same(poses: Sequence[Pose], others: Sequence[Pose]) -> bool:

@@ -11,14 +11,15 @@ in v, projected on the outline's normals. Integrating c out is generalised least
 covariance smooth^2 Phi Phi^T + white^2 / weight, by Woodbury's identity in the size of c. It weighs
 every direction of x by what the drawing can tell about it, so that covariances come out true
 without a factor, and x moves only where bending the drawing is dearer. Both variances are
-estimated on the sheet by expectation maximisation (empirical Bayes).
+estimated on the sheet along the way (empirical Bayes).
 
 Sources: Gaussian process regression as a linear model of bumps (Rasmussen and Williams 2006,
-section 2.1); variance components by EM (Dempster, Laird and Rubin 1977).
+section 2.1); variances by MacKay's fixed point ("Bayesian interpolation", 1992, section 4).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,9 +28,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from toonset.calib.match import Drawing
 
-LENGTH_OF_HEIGHT = 0.1  # a bump's width and the grid's spacing; chosen on synthetic sheets
+LENGTH_OF_HEIGHT = 0.13  # a bump's width and the grid's spacing; chosen on synthetic sheets
 WHITE_POINTS = 80.0  # independent samples of what is not smooth: one per 1 to 2 % of the outline
-LEAST_WHITE, MOST_SMOOTH = 0.0007, 0.05  # of the height: a pixel of a large drawing; not a drawing
+PRIOR_MODES = 20.0  # how many of a sheet's determined modes the expected smooth error is worth
+LEAST_WHITE_PX = 0.2  # of the drawing as it is: what a pixel hides
+LEAST_SMOOTH, MOST_SMOOTH = 0.0007, 0.05  # of the height
 
 
 @dataclass(frozen=True)
@@ -48,13 +51,17 @@ class Marginal:
         normal: (u, u) information about the unknowns.
         gradient: (u,).
         energy: -2 log likelihood up to a constant, at the most probable drawing error.
-        noise: this view's share of the next estimate of the noise.
+        bent: sum of squares of the drawing error's coefficients.
+        determined: how many of them the drawing determines (MacKay's gamma).
+        rest: mean square of what is not smooth, over the height squared.
     """
 
     normal: Float[np.ndarray, "u u"]
     gradient: Float[np.ndarray, " u"]
     energy: float
-    noise: Noise
+    bent: float
+    determined: float
+    rest: float
 
 
 def error_modes(drawing: Drawing) -> Float[np.ndarray, "points modes"]:
@@ -108,23 +115,29 @@ def marginalise(
     system = both.T @ weighted - projected.T @ solved
     bent = solved[:, -1]
     rest = (residuals - (modes @ bent)[target_index]) / height_px
-    spread = float(np.trace(cho_solve(factor, np.eye(len(bent)))))
+    unsure = float(np.trace(cho_solve(factor, np.eye(len(bent))))) / noise.smooth**2
     capped = rest**2 * width**2 / (width**2 + rest**2)
     return Marginal(
         system[:-1, :-1],
         system[:-1, -1],
         float(bent @ bent / noise.smooth**2 + WHITE_POINTS * shares @ capped / noise.white**2),
-        Noise(
-            np.sqrt((bent @ bent + spread) / len(bent)),
-            np.sqrt((shares * robust) @ rest**2 / (shares @ robust)),
-        ),
+        float(bent @ bent),
+        max(len(bent) - unsure, 1e-3),
+        float((shares * robust) @ rest**2 / (shares @ robust)),
     )
 
 
-def pooled(noises: list[Noise], width: float) -> Noise:
-    """Return the noise of a sheet from its views'."""
-    smooth = np.sqrt(np.mean([noise.smooth**2 for noise in noises]))
-    white = np.sqrt(np.mean([noise.white**2 for noise in noises]))
+def least_white(drawings: Sequence[Drawing]) -> float:
+    """Return the white noise over the height that pixels cause."""
+    return float(np.mean([LEAST_WHITE_PX * d.factor / d.height for d in drawings]))
+
+
+def next_noise(views: Sequence[Marginal], least: float, most: float) -> Noise:
+    """Return the noise that the views of a sheet show together, its white part within limits."""
+    bent = PRIOR_MODES * Noise().smooth ** 2 + sum(view.bent for view in views)
+    smooth = bent / (PRIOR_MODES + sum(view.determined for view in views))
+    white = np.mean([view.rest for view in views])
     return Noise(
-        float(np.clip(smooth, LEAST_WHITE, MOST_SMOOTH)), float(np.clip(white, LEAST_WHITE, width))
+        float(np.clip(np.sqrt(smooth), LEAST_SMOOTH, MOST_SMOOTH)),
+        float(np.clip(np.sqrt(white), least, most)),
     )

@@ -9,26 +9,35 @@ estimated on the sheet along the way. The covariance is the inverse of the final
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import MAX_TURN
-from toonset.calib.drawing_error import Marginal, Noise, error_modes, marginalise, pooled
+from toonset.calib.align import MAX_TURN, ElevationPrior
+from toonset.calib.drawing_error import (
+    Marginal,
+    Noise,
+    error_modes,
+    least_white,
+    marginalise,
+    next_noise,
+)
 from toonset.calib.match import Drawing, match
 from toonset.calib.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
 from toonset.calib.proportions import Body
-from toonset.calib.ties import Spreads, Turn, anchors, sheet_ties
+from toonset.calib.ties import Spreads, Turn, anchors, locks, sheet_ties
 
 OFFSET_OF_HEIGHT = 0.006  # prior of the outline offset: a line's half width
 MAX_K_RADIUS = 0.6  # nearest camera: the mesh's radius is 0.6 of the distance
 FIRST_K_RADIUS = 0.02  # where the search for perspective starts
 SETTLED = 2  # steps before the spreads are estimated: the first matches are wrong
 
-Perspective = Literal["none", "shared", "per view"]
+Perspective = Literal["none", "given", "shared", "per view"]
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,7 @@ class SheetModel:
     """What the cameras of a sheet may be.
 
     Attributes:
-        perspective: whose k is free.
+        perspective: whose k is free; none: orthographic, given: every k stays as it is.
         spreads: expected differences between the views.
         proportions: whether the mannequin's body is free.
     """
@@ -98,11 +107,33 @@ class _System:
 class JointProblem:
     """The drawings of a sheet with what every fit of them needs once."""
 
-    def __init__(self, drawings: Sequence[Drawing], turn: Turn | None = None) -> None:
-        """Prepare the drawings' error modes."""
+    def __init__(
+        self,
+        drawings: Sequence[Drawing],
+        turn: Turn | None = None,
+        kept: Mapping[str, Float[np.ndarray, " views"]] = MappingProxyType({}),
+    ) -> None:
+        """Prepare the drawings' error modes.
+
+        Args:
+            drawings: outlines at the working scale, one per view.
+            turn: where the views are meant to be seen from.
+            kept: yaw, elevation (radians) or scale (log, px of the views) that stay as given.
+        """
         self.drawings = tuple(drawings)
         self.modes = [error_modes(drawing) for drawing in drawings]
         self.turn = turn
+        self.elevation = ElevationPrior()
+        self.kept = {
+            name: values + np.log([d.factor for d in drawings]) if name == "scale" else values
+            for name, values in kept.items()
+        }
+
+    def with_elevation(self, prior: ElevationPrior) -> JointProblem:
+        """Return the problem with more known of the sheet's mean elevation."""
+        other = copy(self)
+        other.elevation = prior
+        return other
 
     def fit(
         self,
@@ -124,9 +155,11 @@ class JointProblem:
             offset: first outline offset.
         """
         working = [d.pose_in(p) for d, p in zip(self.drawings, poses, strict=True)]
-        free = model.perspective != "none"
-        first_k = FIRST_K_RADIUS / body.rest.radius if free else 0.0
-        working = [replace(p, k=(p.k or first_k) if free else 0.0) for p in working]
+        if model.perspective == "none":
+            working = [replace(p, k=0.0) for p in working]
+        elif model.perspective != "given":
+            first_k = FIRST_K_RADIUS / body.rest.radius
+            working = [replace(p, k=p.k or first_k) for p in working]
         state = _State(tuple(working), body, offset, noise or Noise(), model.spreads)
         for step, width in enumerate(widths):
             system = self._system(state, model, width, settled=step >= SETTLED)
@@ -162,7 +195,7 @@ class JointProblem:
         views = len(state.poses)
         where = list(range(PARAMETERS * index, PARAMETERS * (index + 1)))
         parts = [across[:, :PARAMETERS]]
-        if model.perspective != "none":
+        if model.perspective in ("shared", "per view"):
             where.append(PARAMETERS * views + (index if model.perspective == "per view" else 0))
             parts.append(across[:, PARAMETERS:])
         first = _first_shared(model, views)
@@ -207,7 +240,7 @@ class JointProblem:
             gradient[first + 1 :] += state.body.precision @ state.body.theta
         normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(size)
         energy = sum(view.energy for view in views)
-        noise = pooled([view.noise for view in views], width)
+        noise = next_noise(views, least_white(self.drawings), width)
         return _System(data, normal, gradient, energy, noise, spreads)
 
     def _add_ties(
@@ -226,7 +259,8 @@ class JointProblem:
                 **{n: t.spread(state.covariance, getattr(expected, n)) for n, t in ties.items()},
             )
         terms = [(tie, getattr(spreads, name)) for name, tie in ties.items()]
-        for tie, sigma in [*terms, *anchors(ties, self.turn)]:
+        known = [*anchors(ties, self.turn, self.elevation), *locks(ties, state.poses, self.kept)]
+        for tie, sigma in [*terms, *known]:
             matrix, slope = tie.equations(sigma)
             normal += matrix
             gradient += slope
@@ -261,5 +295,5 @@ class JointProblem:
 
 def _first_shared(model: SheetModel, views: int) -> int:
     """Return the index of the outline offset, the first unknown after poses and distances."""
-    distances = {"none": 0, "shared": 1, "per view": views}[model.perspective]
+    distances = {"none": 0, "given": 0, "shared": 1, "per view": views}[model.perspective]
     return PARAMETERS * views + distances

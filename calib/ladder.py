@@ -27,6 +27,8 @@ from toonset.calib.proportions import Body
 from toonset.calib.ties import Spreads
 
 BIC_MARGIN = 6.0  # "strong" evidence (Kass and Raftery 1995)
+# Where the mannequin is visibly another body, what its shape gets wrong looks like perspective.
+DOUBTFUL_MARGIN = 300.0
 FREE_SCALE = 0.2  # relative spread of scales that are not tied
 WIDTHS = np.geomspace(0.02, 0.01, 8)
 WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
@@ -34,8 +36,10 @@ BODY_WIDTHS = np.geomspace(0.04, 0.015, 8)
 
 ORTHOGRAPHIC, SCALES = "orthographic", "orthographic, a scale per view"
 SHARED, PER_VIEW = "perspective", "perspective, a distance per view"
+GIVEN = "as given"
 PROPORTIONS = "the mannequin's proportions"
 MODELS: dict[str, SheetModel] = {
+    GIVEN: SheetModel("given"),
     ORTHOGRAPHIC: SheetModel("none"),
     SCALES: SheetModel("none", Spreads(scale=FREE_SCALE)),
     SHARED: SheetModel("shared"),
@@ -74,34 +78,47 @@ class ModelChoice:
     distances: tuple[float, ...]
     rungs: tuple[Rung, ...]
     effective_samples: float
-    margin: float = BIC_MARGIN
+    margin: float
 
     @property
     def is_perspective(self) -> bool:
         """Return whether the cameras are pinholes."""
-        return self.model in (SHARED, PER_VIEW)
+        return bool(np.isfinite(self.distances).any())
 
     @property
     def bends_mannequin(self) -> bool:
         """Return whether the mannequin's proportions were changed."""
-        return any(r.name == PROPORTIONS and r.bic_gain > self.margin for r in self.rungs)
+        return any(r.name == PROPORTIONS and r.bic_gain > BIC_MARGIN for r in self.rungs)
 
 
-def climb(problem: JointProblem, body: Body, poses: Sequence[Pose]) -> tuple[JointFit, ModelChoice]:
+def climb(
+    problem: JointProblem,
+    body: Body,
+    poses: Sequence[Pose],
+    *,
+    doubtful: bool,
+    keep_fov: bool = False,
+) -> tuple[JointFit, ModelChoice]:
     """Return the sheet's fit under the simplest camera model that the drawings do not refute.
 
     Args:
         problem: the drawings at the working scale.
         body: the mannequin.
         poses: starts, full-size pixels; their k starts the search for perspective.
+        doubtful: the mannequin is visibly another body.
+        keep_fov: every view's k stays as it is.
     """
     views = len(poses)
+    if keep_fov:
+        fit = problem.fit(body, poses, WIDTHS, SheetModel("given"))
+        return fit, ModelChoice(GIVEN, _distances(fit), (), WHITE_POINTS * views, BIC_MARGIN)
+    margin = DOUBTFUL_MARGIN if doubtful else BIC_MARGIN
     samples = WHITE_POINTS * views
     fit = problem.fit(body, poses, WIDTHS, MODELS[SHARED])
     first_k = PARAMETERS * views
     gain = fit.poses[0].k ** 2 / fit.covariance[first_k, first_k] - np.log(samples)
     rungs = [Rung(SHARED, float(gain), 1)]
-    model = SHARED if gain > BIC_MARGIN else ORTHOGRAPHIC
+    model = SHARED if gain > margin else ORTHOGRAPHIC
     if model == ORTHOGRAPHIC:
         fit = problem.fit(body, poses, WIDTHS, MODELS[ORTHOGRAPHIC])
     if views > 1:
@@ -109,9 +126,9 @@ def climb(problem: JointProblem, body: Body, poses: Sequence[Pose]) -> tuple[Joi
         rich = problem.fit(body, fit.poses, WARM_WIDTHS, MODELS[richer], offset=fit.offset)
         gain = _differences(rich, richer) - (views - 1) * np.log(samples)
         rungs.append(Rung(richer, float(gain), views - 1))
-        if gain > BIC_MARGIN:
+        if gain > margin:
             model, fit = richer, rich
-    return fit, ModelChoice(model, _distances(fit), tuple(rungs), samples)
+    return fit, ModelChoice(model, _distances(fit), tuple(rungs), samples, margin)
 
 
 def with_proportions(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -33,6 +34,7 @@ def draw_overlay(
     views: Sequence[View], mesh: Mesh, calibration: Calibration
 ) -> UInt8[np.ndarray, "height width 3"]:
     """Return the picture: drawings faded, mannequin outlines in the verdict's colour, captions."""
+    mesh = replace(mesh, vertices=calibration.mannequin)  # as it was bent
     cells = [_cell(view, mesh, found) for view, found in zip(views, calibration.views, strict=True)]
     rows = [cells[i : i + COLUMNS] for i in range(0, len(cells), COLUMNS)]
     width = max(sum(c.shape[1] + GAP for c in row) for row in rows) + GAP

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 from toonset.camera import Camera
 
@@ -42,11 +42,9 @@ class Pose:
 
     def moved(self, step: Float[np.ndarray, " 6"]) -> Pose:
         """Return the pose after an increment (w, shift, log scale)."""
-        rotation = Rotation.from_rotvec(step[:3]).as_matrix() @ self.rotation
-        u, _, vt = np.linalg.svd(rotation)  # stay on the manifold over hundreds of steps
         return replace(
             self,
-            rotation=u @ vt,
+            rotation=cv2.Rodrigues(step[:3])[0] @ self.rotation,
             shift=self.shift + step[3:5],
             scale=float(self.scale * np.exp(step[5])),
         )
@@ -58,7 +56,8 @@ class Pose:
 
     def camera(self, target: Float[np.ndarray, " 3"], size_wh: tuple[int, int]) -> Camera:
         """Return the camera in world coordinates."""
-        return Camera(self.rotation, target, self.scale, self.shift, size_wh, self.k)
+        u, _, vt = np.linalg.svd(self.rotation)  # rounding of hundreds of steps
+        return Camera(u @ vt, target, self.scale, self.shift, size_wh, self.k)
 
 
 def project(pose: Pose, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:

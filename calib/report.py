@@ -36,6 +36,9 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
             "smooth": calibration.noise.smooth,
             "white": calibration.noise.white,
         },
+        "drawings_contradiction_of_height": (
+            calibration.contradiction if math.isfinite(calibration.contradiction) else None
+        ),
         "views": [_view_dict(view) for view in calibration.views],
         "seconds": {step: round(value, 4) for step, value in calibration.seconds.items()},
     }

@@ -42,7 +42,7 @@ class ViewCalibration:
     Attributes:
         name: the view's file name.
         camera: in pixels of the view's crop.
-        sigmas: 1-sigma, deflated for correlated outline errors.
+        sigmas: 1-sigma, the drawing's smooth error integrated out.
         covariance: (6, 6) of (rotation increment in camera axes, shift px, log scale).
         p_flip: probability that the mirror twin is right instead.
         twin: the mirror twin's camera, refined to this drawing where it is an optimum of its own.
@@ -75,6 +75,8 @@ class Calibration:
         model: orthographic or perspective, with the evidence.
         outline_offset: drawn outline outside of the mannequin's, over the figure's height.
         noise: the drawings' error over the figure's height.
+        contradiction: of the drawings with each other, over the height; nan for a single one.
+        mannequin: (vertices, 3) of the mannequin with the proportions that were fitted.
         verdict: the worst that holds for the sheet as a whole.
         reason: why, in words.
         seconds: per step.
@@ -84,6 +86,8 @@ class Calibration:
     model: ModelChoice
     outline_offset: float
     noise: Noise
+    contradiction: float
+    mannequin: Float[np.ndarray, "vertices 3"]
     verdict: Verdict
     reason: str
     seconds: dict[str, float]

@@ -23,6 +23,7 @@ ELEVATIONS = np.radians([-20.0, 0.0, 20.0, 40.0])
 CELL_PX = 48
 OVERSAMPLE = 2
 FIGURE_OF_CELL = 0.75  # figure height over cell height; the rest is room for wide poses
+ROUND = 0.97  # overlap of all sides from which a body is one of revolution
 MIN_SEPARATION = np.radians(14.0)  # between two hypotheses
 
 
@@ -89,6 +90,15 @@ def find_hypotheses(view: View, templates: Templates, count: int) -> list[Hypoth
         if len(chosen) == count:
             break
     return [Hypothesis(pose_on_box(templates, i, box), float(overlap[i])) for i in chosen]
+
+
+def turns_visibly(templates: Templates) -> bool:
+    """Return whether the mesh looks different from different sides (a vase does not)."""
+    level = np.abs(templates.rotations[:, 2, 1]) < 1e-6  # seen at eye level
+    masks = templates.masks[level]
+    shared = np.minimum(masks, masks[0]).sum(axis=1)
+    union = np.maximum(masks, masks[0]).sum(axis=1)
+    return bool((shared / union).min() < ROUND)
 
 
 def pose_on_box(templates: Templates, index: int, box: Float[np.ndarray, " 4"]) -> Pose:

@@ -9,7 +9,7 @@ rough ones are pulled to what artists mean to draw.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,7 @@ from toonset.camera import angles_from_rotation
 
 PRIOR_VIEWS = 4.0  # how many views the expected spread is worth
 LABEL_SIGMA = np.radians(5.0)  # of a sheet's mean yaw about its labels
+LOCK_SIGMA = 1e-5  # of what a person keeps
 TAIL = 4.0  # degrees of freedom of a view's yaw about its place: one bad view pulls little
 
 
@@ -113,9 +114,10 @@ def sheet_ties(
     return ties
 
 
-def anchors(ties: dict[str, Tie], turn: Turn | None) -> list[tuple[Tie, float]]:
+def anchors(
+    ties: dict[str, Tie], turn: Turn | None, prior: ElevationPrior
+) -> list[tuple[Tie, float]]:
     """Return what is known of the sheet's means: (tie of one row, sigma)."""
-    prior = ElevationPrior()
     elevation = ties["elevation"]
     views = len(elevation.values)
     mean = np.full((1, views), 1 / views)
@@ -128,6 +130,25 @@ def anchors(ties: dict[str, Tie], turn: Turn | None) -> list[tuple[Tie, float]]:
         over = (placed / placed.sum())[None]
         known.append((Tie(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
     return known
+
+
+def locks(
+    ties: dict[str, Tie], poses: Sequence[Pose], values: Mapping[str, Float[np.ndarray, " views"]]
+) -> list[tuple[Tie, float]]:
+    """Return ties that keep every view's yaw, elevation or log scale at given values."""
+    kept = []
+    views = len(poses)
+    for name, wanted in values.items():
+        if name == "yaw":
+            slopes = np.zeros_like(ties["roll"].slopes)
+            for i, pose in enumerate(poses):
+                slopes[i, PARAMETERS * i : PARAMETERS * i + 3] = yaw_slope(pose)
+            now = np.array([angles_from_rotation(pose.rotation)[0] for pose in poses])
+            off = (now - wanted + np.pi) % (2 * np.pi) - np.pi
+        else:
+            slopes, off = ties[name].slopes, ties[name].values - wanted
+        kept.append((Tie(off, slopes, np.eye(views), np.ones(views)), LOCK_SIGMA))
+    return kept
 
 
 def yaw_slope(pose: Pose) -> Float[np.ndarray, " 3"]:

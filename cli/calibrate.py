@@ -48,6 +48,7 @@ def calibrate(
     """
     from toonset.calib.calibrate import CalibrationOptions
     from toonset.calib.calibrate import calibrate as fit
+    from toonset.calib.known import Known
     from toonset.calib.labels import parse_labels
     from toonset.calib.overlay import draw_overlay
     from toonset.calib.report import calibration_dict, model_line, view_line
@@ -61,13 +62,14 @@ def calibrate(
     views = _load_views(sheets, printer)
     count = "1 view" if len(views) == 1 else f"{len(views)} views"
     printer.say(f"{count}, mannequin of {len(mannequin.faces)} faces")
-    known = parse_labels(labels, len(views)) if labels else ()
-    options = CalibrationOptions(labels=known)
+    known = Known(labels=parse_labels(labels, len(views)) if labels else ())
+    options = CalibrationOptions()
     found = fit(
         views,
         mannequin,
         options,
         lambda step, done: printer.progress(f"{step} {done:.0%}" if done else step),
+        known,
     )
     report = calibration_dict(found) | _provenance([*sheets, mesh], options, seed)
     overlay = draw_overlay(views, mannequin, found)

@@ -20,6 +20,12 @@ import pytest
 VIEWS, CELL, SEED = 5, 120, 11
 
 
+@pytest.fixture(autouse=True, scope="session")
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keep the tests' cached template banks out of the user's folder."""
+    os.environ["TOONSET_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+
+
 @dataclass(frozen=True)
 class Outcome:
     """How a command ended: exit code and what it printed."""

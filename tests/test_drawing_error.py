@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from toonset.calib.contour import Contour
-from toonset.calib.drawing_error import Noise, error_modes, marginalise, pooled
+from toonset.calib.drawing_error import Noise, error_modes, marginalise, next_noise
 from toonset.calib.match import Drawing
 
 
@@ -45,7 +45,7 @@ def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
     rng = np.random.default_rng(3)
     index, shares = np.arange(count), np.full(count, 1 / count)
     estimate = Noise()
-    for _ in range(60):
+    for _ in range(20):
         views = []
         for view in range(6):
             rng = np.random.default_rng(view)
@@ -55,8 +55,8 @@ def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
             marginal = marginalise(
                 modes, estimate, drawing.height, index, rows, residuals, shares, np.ones(count), 1.0
             )
-            views.append(marginal.noise)
-        estimate = pooled(views, 1.0)
+            views.append(marginal)
+        estimate = next_noise(views, 0.0, 1.0)
     assert estimate.smooth == pytest.approx(smooth, rel=0.25)
     assert estimate.white == pytest.approx(white, rel=0.5)
 
