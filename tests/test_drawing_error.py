@@ -38,7 +38,7 @@ def test_integrating_out_equals_generalised_least_squares(seed):
     )
 
 
-@pytest.mark.parametrize(("smooth", "white"), [(0.01, 0.002), (0.003, 0.006)])
+@pytest.mark.parametrize(("smooth", "white"), [(0.01, 0.002), (0.005, 0.003)])
 def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
     drawing = circle()
     modes, count = error_modes(drawing), len(circle().points)
