@@ -106,7 +106,7 @@ def judge_view(
     mirrored = [item for item in far if is_twin(pose, item[1])]
     p_flip = sum(p for p, _ in mirrored)
     twin = mirrored[0][1] if mirrored else pose.twin()
-    sigmas = _sigmas(pose, covariance)
+    sigmas = angle_sigmas(pose, covariance)
     if not sheet.yaw_observable:
         sigmas = replace(sigmas, yaw=float(np.pi / np.sqrt(3)))
     others = [item for item in far if not is_twin(pose, item[1])]
@@ -166,6 +166,22 @@ def judge_sheet(views: Sequence[ViewCalibration], sheet: SheetState) -> tuple[Ve
     return worst, named
 
 
+def angle_sigmas(pose: Pose, covariance: Float[np.ndarray, "6 6"]) -> Sigmas:
+    """Return the uncertainty in angles of a pose from its covariance, (w, shift, log scale)."""
+    step = 1e-5
+    here = np.array(angles_from_rotation(pose.rotation))
+    slopes = np.zeros((3, 3))
+    for axis in range(3):
+        move = np.zeros(PARAMETERS)
+        move[axis] = step
+        change = np.array(angles_from_rotation(pose.moved(move).rotation)) - here
+        slopes[:, axis] = (change + np.pi) % (2 * np.pi) - np.pi
+    angles = np.sqrt(np.diag(slopes @ covariance[:3, :3] @ slopes.T)) / step
+    shift = float(np.sqrt(np.trace(covariance[3:5, 3:5]) / 2))
+    yaw, elevation, roll = (float(min(a, np.pi)) for a in angles)
+    return Sigmas(yaw, elevation, roll, float(np.sqrt(covariance[5, 5])), shift)
+
+
 def _verdict(
     coverage: float,
     sigmas: Sigmas,
@@ -201,18 +217,3 @@ def _in_view_pixels(
     """Return the covariance with shifts in pixels of the view instead of the working scale."""
     units = np.array([1, 1, 1, 1 / factor, 1 / factor, 1])
     return covariance * np.outer(units, units)
-
-
-def _sigmas(pose: Pose, covariance: Float[np.ndarray, "6 6"]) -> Sigmas:
-    step = 1e-5
-    here = np.array(angles_from_rotation(pose.rotation))
-    slopes = np.zeros((3, 3))
-    for axis in range(3):
-        move = np.zeros(PARAMETERS)
-        move[axis] = step
-        change = np.array(angles_from_rotation(pose.moved(move).rotation)) - here
-        slopes[:, axis] = (change + np.pi) % (2 * np.pi) - np.pi
-    angles = np.sqrt(np.diag(slopes @ covariance[:3, :3] @ slopes.T)) / step
-    shift = float(np.sqrt(np.trace(covariance[3:5, 3:5]) / 2))
-    yaw, elevation, roll = (float(min(a, np.pi)) for a in angles)
-    return Sigmas(yaw, elevation, roll, float(np.sqrt(covariance[5, 5])), shift)

@@ -18,7 +18,7 @@ from toonset.calib.landmark_pose import Points, on_a_line, squared_error
 from toonset.calib.pose import PARAMETERS, Pose, project_with_jacobian
 from toonset.calib.rim import Surface
 from toonset.dataset.landmark_file import Landmarks
-from toonset.dataset.landmark_formats import LandmarkError
+from toonset.errors import LandmarkError
 
 CLICK_OF_HEIGHT = 0.01  # error of a click or of the mannequin's proportions, before looking
 CLICK_WEIGHT = 2.0  # of that knowledge, in coordinates

@@ -24,13 +24,13 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.dataset.landmark_formats import (
-    LandmarkError,
     LandmarkFile,
     Numbers,
     Pair,
     closest,
     read_landmark_file,
 )
+from toonset.errors import LandmarkError
 from toonset.view import View
 
 LEAST_POINTS = 3  # fewer leave the camera's turn open

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from toonset.errors import ToonsetError
+from toonset.errors import LandmarkError
 from toonset.reading import read_whole
 
 SCHEMA = "toonset-landmarks/1"
@@ -24,10 +24,6 @@ MOST_POINTS = 1000  # per view; people click ten
 MAX_BYTES = 8 * 2**20
 
 Numbers = tuple[float, ...]
-
-
-class LandmarkError(ToonsetError):
-    """A landmark file that cannot be read, or landmarks that determine no camera."""
 
 
 @dataclass(frozen=True)

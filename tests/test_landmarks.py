@@ -16,7 +16,7 @@ from toonset.calib.pose import Pose, project
 from toonset.calib.rim import Surface, prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.landmark_file import Landmarks, read_known_points, read_landmarks
-from toonset.dataset.landmark_formats import LandmarkError
+from toonset.errors import LandmarkError
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -5,6 +5,7 @@ ToonsetError            exit code 2: bad input or usage, one line says where, wh
 |- PictureError         an image file that cannot be read or is not supported
 |- SheetError           a picture without usable figures
 |- MeshError            a mesh file that cannot be read or is not a surface
+|- LandmarkError        a landmark file that cannot be read, or landmarks without a camera
 |- BundleError          a bundle or transforms.json folder that is broken
 |- PaletteError         palette colours that cannot be used
 |- OutputError          a place that cannot be written
@@ -32,6 +33,10 @@ class SheetError(ToonsetError):
 
 class MeshError(ToonsetError):
     """A mesh file that cannot be read or is not a surface."""
+
+
+class LandmarkError(ToonsetError):
+    """A landmark file that cannot be read, or landmarks that determine no camera."""
 
 
 class BundleError(ToonsetError):
