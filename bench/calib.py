@@ -1,65 +1,102 @@
-"""Calibration: seconds against rotation error, per setting, with the nominal angles as baseline."""
+"""Calibration: seconds against rotation error, per method, with the nominal angles as baseline.
+
+A method is a setting of the search, or something that a person says beforehand. Seconds are those
+of `calibrate` alone, in this process, after imports; with the mannequin's templates in the cache
+as from its second sheet on, except where a method is about just that.
+"""
 
 from __future__ import annotations
 
 import math
+import os
+import tempfile
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
+from toonset.bench.calib_figures import (
+    MeasuredSheet,
+    MeasuredView,
+    Recorder,
+    ViewError,
+    angle_between,
+    error_records,
+    sheet_records,
+    view_error,
+)
 from toonset.bench.cases import CalibCase
-from toonset.bench.record import Record, summarise
+from toonset.bench.record import Record
 from toonset.bench.sfm import METHODS as SFM_METHODS
 from toonset.bench.sfm import SfmResult, aligned_errors, reconstruct
+from toonset.calib.bank import load_bank
 from toonset.calib.calibrate import CalibrationOptions, calibrate
-from toonset.camera import Camera, rotation_distance, rotation_from_angles
+from toonset.calib.known import Known
+from toonset.calib.labels import Label
+from toonset.calib.rim import prepare_surface
+from toonset.camera import Camera, angles_from_rotation, rotation_from_angles
+
+__all__ = ["ViewError", "bench_calibration", "bench_colmap", "view_error"]
 
 NOMINAL = "nominal angles"
 NOMINAL_ELEVATION = math.radians(5.0)
-WRONG = math.radians(15.0)
-
-SETTINGS: dict[str, CalibrationOptions] = {
-    "default": CalibrationOptions(),
-    "2 starts": CalibrationOptions(starts=2),
-    "12 starts": CalibrationOptions(starts=12),
-    "coarse 64 px, fine 120 px": CalibrationOptions(coarse_height_px=64, fine_height_px=120),
-    "fine 500 px": CalibrationOptions(fine_height_px=500),
-}
-QUICK = ("default", "2 starts")
-QUICK_SFM = ("COLMAP", "COLMAP 1000 px")
+NAMED = math.radians(45.0)  # people name directions in steps of this
+UNJUDGED = ""
 
 
 @dataclass(frozen=True)
-class ViewError:
-    """One view's rotation error in radians, raw and modulo the mirror twin, and its verdict."""
+class Method:
+    """How a sheet is calibrated.
 
-    raw: float
-    modulo_twin: float
-    verdict: str
+    Attributes:
+        options: search effort.
+        labels: the views' directions are told, to the nearest 45 degrees.
+        cached: the mannequin's templates are there already.
+    """
+
+    options: CalibrationOptions = CalibrationOptions()
+    labels: bool = False
+    cached: bool = True
+
+
+METHODS: dict[str, Method] = {
+    "default": Method(),
+    "labels": Method(labels=True),
+    "2 starts": Method(CalibrationOptions(starts=2)),
+    "12 starts": Method(CalibrationOptions(starts=12)),
+    "coarse 64, fine 120": Method(CalibrationOptions(coarse_height_px=64, fine_height_px=120)),
+    "fine 500 px": Method(CalibrationOptions(fine_height_px=500)),
+    "no cached templates": Method(cached=False),
+}
+QUICK = ("default", "labels", "no cached templates")
+QUICK_SFM = ("COLMAP", "COLMAP 1000 px")
 
 
 def bench_calibration(
-    cases: Sequence[CalibCase],
+    cases: Iterable[CalibCase],
     seed: int,
     *,
     quick: bool,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[Record]:
-    """Return records of error, flips, silent errors and seconds per setting and condition."""
-    records: list[Record] = []
-    groups = sorted({case.group for case in cases})
-    for method in [NOMINAL, *(QUICK if quick else SETTINGS)]:
-        for group in groups:
-            errors, seconds = [], []
-            for case in (c for c in cases if c.group == group):
-                progress(f"{method}: {case.name}")
-                found, took = _run(method, case)
-                errors.extend(found)
-                seconds.append(took)
-            records.extend(_records(method, group, errors, seconds, seed))
-    return records
+    """Return records of errors, verdicts, sigmas and seconds per condition and method."""
+    sheets: dict[tuple[str, str], list[MeasuredSheet]] = {}
+    for case in cases:
+        sheets.setdefault((case.group, NOMINAL), []).append(_guessed(case))
+        with own_cache():
+            load_bank(prepare_surface(case.mesh))
+            for method in QUICK if quick else METHODS:
+                progress(f"{case.name}: {method}")
+                measured = _calibrated(case, METHODS[method])
+                sheets.setdefault((case.group, method), []).append(measured)
+    return [
+        record
+        for (group, method), found in sheets.items()
+        for record in sheet_records(found, Recorder(method, group, seed))
+    ]
 
 
 def bench_colmap(
@@ -76,96 +113,81 @@ def bench_colmap(
     """
     records: list[Record] = []
     for method in QUICK_SFM if quick else SFM_METHODS:
-        for group in sorted({case.group for case in cases}):
+        for group in dict.fromkeys(case.group for case in cases):
             own = [case for case in cases if case.group == group]
             results = []
             for case in own:
-                progress(f"{method}: {case.name}")
+                progress(f"{case.name}: {method}")
                 results.append(reconstruct(case.views, SFM_METHODS[method], seed))
-            records += _sfm_records(method, group, own, results, seed)
+            records += _sfm_records(own, results, Recorder(method, group, seed))
     return records
 
 
-def view_error(camera: Camera, true_rotation: np.ndarray, verdict: str) -> ViewError:
-    """Return the error of one camera against the true camera_from_world rotation."""
-    raw = rotation_distance(camera.rotation, true_rotation)
-    mirrored = rotation_distance(camera.twin().rotation, true_rotation)
-    return ViewError(raw, min(raw, mirrored), verdict)
+def named_directions(yaws: Iterable[float]) -> tuple[Label, ...]:
+    """Return what a person would call these yaws (radians): the nearest 45 degrees, one each."""
+    return tuple((round(yaw / NAMED) * NAMED % (2 * math.pi),) for yaw in yaws)
 
 
-def _run(method: str, case: CalibCase) -> tuple[list[ViewError], float]:
+@contextmanager
+def own_cache() -> Iterator[None]:
+    """Give calibration an empty cache of its own: the user's one neither helps nor is filled."""
+    before = os.environ.get("TOONSET_CACHE")
+    with tempfile.TemporaryDirectory(prefix="toonset-bench-") as folder:
+        os.environ["TOONSET_CACHE"] = folder
+        try:
+            yield
+        finally:
+            del os.environ["TOONSET_CACHE"]
+            if before is not None:
+                os.environ["TOONSET_CACHE"] = before
+
+
+def _guessed(case: CalibCase) -> MeasuredSheet:
+    """Return the errors of who takes the drawings for even turns, a little from above."""
+    turns = np.arange(len(case.views)) * 2 * math.pi / len(case.views)
+    views = []
+    for turn, truth in zip(turns, case.rotations, strict=True):
+        rotation = rotation_from_angles(turn, NOMINAL_ELEVATION, 0.0)
+        camera = Camera(rotation, np.zeros(3), 1.0, np.zeros(2), (1, 1))
+        views.append(_measured(camera, truth, UNJUDGED, math.nan))
+    return MeasuredSheet(tuple(views), 0.0)
+
+
+def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
+    if not method.cached:
+        with own_cache():
+            return _calibrated(case, Method(method.options, method.labels))
+    yaws = [angles_from_rotation(rotation)[0] for rotation in case.rotations]
+    known = Known(labels=named_directions(yaws)) if method.labels else None
     start = time.perf_counter()
-    if method == NOMINAL:
-        turns = np.arange(len(case.views)) * 2 * math.pi / len(case.views)
-        flat = Camera(np.eye(3), np.zeros(3), 1.0, np.zeros(2), (1, 1))
-        cameras = [
-            replace(flat, rotation=rotation_from_angles(t, NOMINAL_ELEVATION, 0.0)) for t in turns
-        ]
-        verdicts = ["guess"] * len(cameras)
-    else:
-        result = calibrate(case.views, case.mesh, SETTINGS[method])
-        cameras = [view.camera for view in result.views]
-        verdicts = [view.verdict for view in result.views]
-    took = time.perf_counter() - start
-    return [
-        view_error(c, r, v) for c, r, v in zip(cameras, case.rotations, verdicts, strict=True)
-    ], took
+    result = calibrate(case.views, case.mesh, method.options, known=known)
+    seconds = time.perf_counter() - start
+    views = tuple(
+        _measured(view.camera, truth, view.verdict, view.sigmas.yaw)
+        for view, truth in zip(result.views, case.rotations, strict=True)
+    )
+    return MeasuredSheet(views, seconds)
 
 
-def _records(
-    method: str, group: str, errors: list[ViewError], seconds: list[float], seed: int
-) -> list[Record]:
-    def one(metric: str, samples: Sequence[float], unit: str) -> Record:
-        return summarise(
-            samples,
-            method=method,
-            metric=metric,
-            unit=unit,
-            direction="lower",
-            seed=seed,
-            group=group,
-        )
-
-    if not errors:  # no view has a camera
-        return [one("seconds", seconds, "s")]
-    silent = [e.verdict == "ok" and e.raw > WRONG for e in errors]
-    return [
-        one("rotation error", [math.degrees(e.raw) for e in errors], "deg"),
-        one("rotation error modulo twin", [math.degrees(e.modulo_twin) for e in errors], "deg"),
-        _count("flipped views", [e.raw > math.pi / 2 for e in errors], method, group, seed),
-        _count("wrong but ok", silent, method, group, seed),
-        one("seconds", seconds, "s"),
-    ]
+def _measured(
+    camera: Camera, truth: Float[np.ndarray, "3 3"], verdict: str, yaw_sigma: float
+) -> MeasuredView:
+    yaw_error = angle_between(camera.angles[0], angles_from_rotation(truth)[0])
+    return MeasuredView(view_error(camera, truth, verdict), yaw_error, yaw_sigma)
 
 
 def _sfm_records(
-    method: str, group: str, cases: list[CalibCase], results: list[SfmResult], seed: int
+    cases: Sequence[CalibCase], results: Sequence[SfmResult], recorder: Recorder
 ) -> list[Record]:
     errors: list[ViewError] = []
     missing: list[bool] = []
     for case, found in zip(cases, results, strict=True):
         raw, modulo_twin = aligned_errors(found.rotations, case.rotations)
-        errors += [ViewError(a, b, "placed") for a, b in zip(raw, modulo_twin, strict=True)]
+        errors += [ViewError(a, b, UNJUDGED) for a, b in zip(raw, modulo_twin, strict=True)]
         missing += [i not in found.rotations for i in range(len(case.views))]
-    failed = [bool(found.failed) for found in results]
     return [
-        *_records(method, group, errors, [found.seconds for found in results], seed),
-        _count("views not placed", missing, method, group, seed),
-        _count("failed runs", failed, method, group, seed, "sheets"),
+        *error_records(errors, recorder),
+        recorder.samples("seconds", [found.seconds for found in results], "s"),
+        recorder.total("views not placed", missing),
+        recorder.total("failed runs", [bool(found.failed) for found in results], "sheets"),
     ]
-
-
-def _count(
-    metric: str, hits: Sequence[bool], method: str, group: str, seed: int, unit: str = "views"
-) -> Record:
-    record = summarise(
-        [float(hit) for hit in hits],
-        method=method,
-        metric=metric,
-        unit=unit,
-        direction="lower",
-        seed=seed,
-        group=group,
-    )
-    total = float(sum(hits))
-    return replace(record, value=total, median=total, p95=total)

@@ -27,10 +27,33 @@ from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.view import View
 
-CONDITIONS: dict[str, SynthOptions] = {
-    "clean": SynthOptions(yaw_jitter_deg=8, outline_px=0, elevation_deg=10),
-    "drawn": SynthOptions(yaw_jitter_deg=8, elevation_deg=10, warp_percent=0.8),
-    "near": SynthOptions(yaw_jitter_deg=8, outline_px=0, elevation_deg=10, distance_heights=2.5),
+CLEAN = SynthOptions(yaw_jitter_deg=8, outline_px=0, elevation_deg=10)
+DRAWN = replace(CLEAN, outline_px=2.5, warp_percent=0.8)
+STRANGER = 1_000_000  # seeds this far from the drawn body's are other bodies
+
+
+@dataclass(frozen=True)
+class Condition:
+    """How synthetic sheets of one kind are made.
+
+    Attributes:
+        options: of the drawing.
+        symmetric: the body is, too: nothing tells its left from its right.
+        other_body: the mannequin is symmetric and of other proportions and arm angle: users have
+            no model of their character.
+    """
+
+    options: SynthOptions
+    symmetric: bool = False
+    other_body: bool = False
+
+
+CONDITIONS: dict[str, Condition] = {
+    "clean": Condition(CLEAN),
+    "drawn": Condition(DRAWN),
+    "near": Condition(replace(CLEAN, distance_heights=2.5)),
+    "other body": Condition(DRAWN, other_body=True),
+    "plain": Condition(replace(DRAWN, elevation_deg=5), symmetric=True),
 }
 
 
@@ -55,19 +78,25 @@ class TrainCase:
     test: Scene
 
 
-def calib_cases(folder: Path | None, seed: int, count: int) -> Iterator[CalibCase]:
+def calib_cases(folder: Path | None, seed: int, count: int, only: str = "") -> Iterator[CalibCase]:
     """Yield the folder's cases, or `count` synthetic sheets per condition.
+
+    Args:
+        folder: case folders; None for synthetic ones.
+        seed: of the first synthetic sheet; the others' follow.
+        count: synthetic sheets per condition.
+        only: leave out cases whose name does not contain this.
 
     Raises:
         BundleError: the folder holds no case, or a sheet splits into a wrong number of views.
     """
     if folder is None:
-        for group, options in CONDITIONS.items():
+        for group, condition in CONDITIONS.items():
             for i in range(count):
-                turnaround = make_turnaround(random_body(seed + i), options, seed + i)
-                yield _synthetic_calib(turnaround, group, i)
+                if only in f"{group} {i}":
+                    yield _synthetic_calib(f"{group} {i}", group, condition, seed + i)
         return
-    for case in _folders(folder, "gt.json"):
+    for case in (place for place in _folders(folder, "gt.json") if only in place.name):
         truth = read_json(case / "gt.json")
         views = split_sheet(load_rgba(case / "sheet.png")).views
         poses = [frames.opencv_pose_from_opengl(np.array(m)) for m in truth["world_from_camera"]]
@@ -133,12 +162,15 @@ def _scene(turnaround: Turnaround) -> Scene:
     return Scene(made, None, turnaround.mesh.name)
 
 
-def _synthetic_calib(turnaround: Turnaround, group: str, index: int) -> CalibCase:
-    views = split_sheet(turnaround.sheet).views
-    rotations = np.stack([camera.rotation for camera in turnaround.cameras])
+def _synthetic_calib(name: str, group: str, condition: Condition, seed: int) -> CalibCase:
+    body = random_body(seed, symmetric=condition.symmetric)
+    made = make_turnaround(body, condition.options, seed)
+    views = split_sheet(made.sheet).views
+    rotations = np.stack([camera.rotation for camera in made.cameras])
     if len(views) != len(rotations):
-        raise BundleError(f"synthetic {group} {index}: split into {len(views)} views")
-    return CalibCase(f"{group} {index}", group, views, turnaround.mesh, rotations)
+        raise BundleError(f"synthetic {name}: split into {len(views)} views")
+    other = random_body(seed + STRANGER, symmetric=True) if condition.other_body else body
+    return CalibCase(name, group, views, other, rotations)
 
 
 def _folders(folder: Path, needed: str) -> list[Path]:

@@ -76,8 +76,9 @@ class CalibrationOptions:
 
 
 COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
-COARSE_WIDTHS = np.geomspace(0.08, 0.02, 8)
-RECHECK_WIDTHS = np.geomspace(0.03, 0.015, 5)
+COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
+RECHECK_WIDTHS = np.geomspace(0.03, 0.015, 3)
+RECHECKED = 4  # best candidates of a view that are tried again at another camera distance
 NEAR_HEIGHTS = 3.0  # camera distance of the second first guess
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 SKETCHED = np.geomspace(0.04, 0.015, 6)  # a joint fit that only has to rank selections
@@ -281,22 +282,24 @@ class _Together:
         nearby = self._at_camera(candidates, 1 / (NEAR_HEIGHTS * self.body.rest.height))
         selections = [self._selected(candidates), self._selected(nearby)]
         selections += [_nearest(candidates, start.poses) for start in starts]
-        fits: list[JointFit] = []
-        found = list(candidates)
+        best, turn, found = None, Turn(np.full(len(candidates), np.nan)), list(candidates)
         for _ in range(rounds):
-            fits += [self._sketched(poses) for poses in _distinct(selections)]
-            flipped = self._best(fits)[0]
-            fits.append(self._sketched([pose.twin() for pose in flipped.poses]))
-            best, turn = self._best(fits)
+            fits = [self._sketched(poses) for poses in _distinct(selections)]
+            leader = self._best(fits)[0]
+            fits.append(self._sketched([pose.twin() for pose in leader.poses]))
+            contender, its_turn = self._best(fits if best is None else [best, *fits])
+            if contender is best:
+                break
+            best, turn = contender, its_turn
             again = [
-                replace(view, fits=(replace(view.fits[0], pose=pose), *view.fits[:4]))
+                replace(view, fits=(replace(view.fits[0], pose=pose), *view.fits[:RECHECKED]))
                 for pose, view in zip(best.poses, candidates, strict=True)
             ]
             found = self._at_camera(again, best.poses[0].k)
             selections = [self._selected(found)]
             if _same(selections[0], best.poses):
                 break
-            fits = [best]
+        assert best is not None
         return best, turn, found
 
     def _best(self, fits: Sequence[JointFit]) -> tuple[JointFit, Turn]:
@@ -322,7 +325,7 @@ class _Together:
         surface = self.body.surface
         again = []
         for i, (drawing, found) in enumerate(zip(self.drawings, candidates, strict=True)):
-            starts = _with_k(with_twins([fit.pose for fit in found.fits[:4]]), k)
+            starts = _with_k(with_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
             again.append(self.informed(refine(drawing, surface, starts, RECHECK_WIDTHS), i))
         return again
 

@@ -53,7 +53,7 @@ def calibrate_by_landmarks(
     pairs = _of_every_view(views, landmarks)
     fits = [solve_landmarks(own, surface) for own in pairs]
     solved = time.perf_counter()
-    drawings = [Drawing(drawn_contour(view), options.fine_height_px, FINE_POINTS) for view in views]
+    drawings = [Drawing(drawn_contour(v), OUTLINE_HEIGHT_PX, OUTLINE_POINTS) for v in views]
     judged = tuple(_judged(*each, surface) for each in zip(views, drawings, fits, strict=True))
     state = _sheet_state(views, judged)
     # one drawing's landmarks confirm its scale and elevation; its outline would not

@@ -4,6 +4,7 @@
     images/000.png     RGBA crops, straight alpha
     calibration.json   native cameras, uncertainty, verdicts
     overlay.png        every drawing with the mannequin's outline over it
+    mannequin.obj      the mannequin as it was fitted, in the cameras' world
 
 The folder appears whole or not at all.
 """
@@ -18,12 +19,15 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
+from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.picture import encode_png
 from toonset.dataset.transforms import transforms_dict
 from toonset.errors import BundleError
 from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
 from toonset.view import View
+
+MANNEQUIN = "mannequin.obj"
 
 
 def write_bundle(
@@ -42,7 +46,8 @@ def write_bundle(
         folder: where; replaced as a whole with `force`.
         views: the drawings in sheet order.
         cameras: one per view, in pixels of its crop.
-        mesh: the mannequin; its height and radius set the far pinholes and their error bound.
+        mesh: the mannequin as it was fitted; its height and radius set the far pinholes and their
+            error bound.
         calibration: content of calibration.json.
         overlay: the picture for people.
         force: replace an existing bundle.
@@ -59,3 +64,4 @@ def write_bundle(
         write_json(temporary / "transforms.json", transforms_dict(named, mesh.height, mesh.radius))
         write_json(temporary / "calibration.json", calibration)
         write_bytes(temporary / "overlay.png", encode_png(overlay))
+        write_bytes(temporary / MANNEQUIN, save_obj(mesh))

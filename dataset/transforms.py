@@ -118,7 +118,7 @@ def read_cameras(path: Path) -> tuple[tuple[str, Camera], ...]:
     Raises:
         BundleError: the file is missing, broken or describes no usable camera.
     """
-    file = _json_path(path)
+    file = transforms_file(path)
     return tuple(
         (frame.file_path, camera) for frame, camera, _ in _read_frames(file, need_pictures=False)
     )
@@ -130,7 +130,7 @@ def picture_paths(path: Path) -> tuple[Path, ...]:
     Raises:
         BundleError: the file is missing or broken, or a picture is missing or outside the folder.
     """
-    records = _read_frames(_json_path(path), need_pictures=True)
+    records = _read_frames(transforms_file(path), need_pictures=True)
     return tuple(picture for _, _, picture in records if picture is not None)
 
 
@@ -144,7 +144,7 @@ def read_scene(path: Path) -> Scene:
             of the folder.
         PictureError: a picture cannot be read.
     """
-    file = _json_path(path)
+    file = transforms_file(path)
     root = file.parent
     palette_file = root / "palette.json"
     palette = read_palette_json(palette_file).rgb if palette_file.is_file() else None
@@ -162,6 +162,23 @@ def read_scene(path: Path) -> Scene:
     return Scene(tuple(loaded), palette, str(path))
 
 
+def transforms_file(path: Path) -> Path:
+    """Return the transforms.json that a path names: itself, or the one in the folder.
+
+    Raises:
+        BundleError: there is none.
+    """
+    if path.is_dir():
+        names = ("transforms.json", "transforms_train.json")
+        found = next((path / name for name in names if (path / name).is_file()), None)
+        if found is None:
+            raise BundleError(f"{path}: holds no transforms.json; run `toonset calibrate` first")
+        return found
+    if not path.is_file():
+        raise BundleError(f"{path}: does not exist; give a bundle folder or a transforms.json")
+    return path
+
+
 def _frame_dict(path: str, camera: Camera, distance: float, radius: float) -> dict[str, Any]:
     pinhole = camera.as_pinhole(distance)
     error_px = camera.pinhole_error_px(distance, radius)
@@ -176,18 +193,6 @@ def _frame_dict(path: str, camera: Camera, distance: float, radius: float) -> di
         "h": camera.size_wh[1],
         "toonset": NativeCamera.of(camera, error_px).model_dump(mode="json"),
     }
-
-
-def _json_path(path: Path) -> Path:
-    if path.is_dir():
-        names = ("transforms.json", "transforms_train.json")
-        found = next((path / name for name in names if (path / name).is_file()), None)
-        if found is None:
-            raise BundleError(f"{path}: holds no transforms.json; run `toonset calibrate` first")
-        return found
-    if not path.is_file():
-        raise BundleError(f"{path}: does not exist; give a bundle folder or a transforms.json")
-    return path
 
 
 def _read_frames(
