@@ -2,24 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
+from toonset.cli.calibrate_inputs import Hints, load_body, load_known, load_views
+from toonset.cli.calibrate_provenance import provenance
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    SeedOption,
+    check_output,
+)
 
 if TYPE_CHECKING:
+    from toonset.calib.known import Known
+    from toonset.calib.landmarks import LandmarkFit
     from toonset.calib.result import Calibration
     from toonset.mesh import Mesh
     from toonset.view import View
 
 WRITTEN = (
-    *("transforms.json", "images", "calibration.json", "overlay.png"),
+    *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
     *("palette.json", "palette.gpl", "labels", "run"),
 )
-LEAST_HEIGHT = 0.01  # of the width; flatter, nothing can be told from its outline
 UNCERTAIN = 3  # exit code: files are written, but a view is not certain
+KNOWN_PANEL = "What you know"
+
+
+class Lock(StrEnum):
+    """What may stay as it is given."""
+
+    yaw = "yaw"
+    elevation = "elevation"
+    scale = "scale"
+    fov = "fov"
 
 
 def calibrate(
@@ -27,15 +50,64 @@ def calibrate(
         list[Path],
         typer.Argument(metavar="SHEET", help="A character sheet, or one file per view."),
     ],
-    mesh: Annotated[Path, typer.Option("--mesh", help="Posed mannequin: obj, ply, stl, glb, off.")],
+    mesh: Annotated[
+        Path | None,
+        typer.Option(
+            "--mesh",
+            metavar="FILE",
+            help="Posed mannequin: obj, ply, stl, glb, off (default: a plain body).",
+            rich_help_panel=KNOWN_PANEL,
+        ),
+    ] = None,
     labels: Annotated[
         str,
         typer.Option(
             "--views",
-            help="What each view shows, in sheet order: front,3q,side,back ... or yaws in degrees.",
+            metavar="LABELS",
+            help="What each view shows, in sheet order: front,3q,side,back ..., yaws in degrees, "
+            "? where unknown.",
+            rich_help_panel=KNOWN_PANEL,
         ),
     ] = "",
-    out: Annotated[Path, typer.Option("-o", "--out", help="Bundle folder.")] = Path("bundle"),
+    landmarks: Annotated[
+        Path | None,
+        typer.Option(
+            "--landmarks",
+            metavar="FILE",
+            help="Which pixels show which points of the mannequin: JSON or CSV.",
+            rich_help_panel=KNOWN_PANEL,
+        ),
+    ] = None,
+    landmarks_only: Annotated[
+        bool,
+        typer.Option(
+            "--landmarks-only",
+            help="Cameras from --landmarks alone: the outline is not the mannequin's.",
+            rich_help_panel=KNOWN_PANEL,
+        ),
+    ] = False,
+    init: Annotated[
+        Path | None,
+        typer.Option(
+            "--init",
+            metavar="PATH",
+            help="A bundle or transforms.json of these views: start from its cameras.",
+            rich_help_panel=KNOWN_PANEL,
+        ),
+    ] = None,
+    locked: Annotated[
+        list[Lock] | None,
+        typer.Option(
+            "--lock",
+            metavar="WHAT",
+            help="Keep yaw, elevation, scale or fov as --init has it (or yaw as --views has it); "
+            "repeatable.",
+            rich_help_panel=KNOWN_PANEL,
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Bundle folder.", rich_help_panel=OUTPUT_PANEL)
+    ] = Path("bundle"),
     force: ForceFlag = False,
     seed: SeedOption = 0,
     as_json: JsonFlag = False,
@@ -43,94 +115,95 @@ def calibrate(
 ) -> None:
     """Fit one camera per drawing by aligning its outline with a posed mannequin.
 
-    Writes a bundle: transforms.json, images/, calibration.json and overlay.png. Exit code 3 when a
-    view is weak or ambiguous; the files are written then too.
+    Writes a bundle: transforms.json, images/, calibration.json, overlay.png and mannequin.obj. Exit
+    code 3 when a view is weak, ambiguous or failed; the files are written then too.
     """
+    kept = tuple(lock.value for lock in locked or ())
+    hints = Hints(labels, landmarks, landmarks_only, init, kept)
+    hints.check_usage()
+    printer = Printer(as_json, quiet)
+    check_output(out, [*sheets, mesh, landmarks, init], WRITTEN, force=force)
+    body = load_body(mesh)
+    views = load_views(sheets, printer)
+    known = load_known(hints, views, body)
+    count = "1 view" if len(views) == 1 else f"{len(views)} views"
+    printer.say(f"{count}, {body}")
+    marks = _landmark_fits(known, body.mesh, printer)
+    found = _fit(views, body.mesh, known, printer, landmarks_only=landmarks_only)
+    report = _report(found, marks) | provenance(sheets, body, hints, seed)
+    _write(out, views, body.mesh, found, report, force=force)
+    _say_result(found, out, printer)
+    printer.result({"bundle": out, **report}, str(out))
+    if found.verdict != "ok" or any(view.verdict != "ok" for view in found.views):
+        raise typer.Exit(UNCERTAIN)
+
+
+def _landmark_fits(known: Known, mesh: Mesh, printer: Printer) -> list[LandmarkFit]:
+    """Return what the landmarks say of the views that have any; name the misplaced ones."""
+    from toonset.calib.landmarks import landmark_starts
+    from toonset.calib.rim import prepare_surface
+
+    fits = [fit for fit in landmark_starts(known.landmarks, prepare_surface(mesh)) if fit]
+    for fit in fits:
+        if fit.misplaced:
+            names = ", ".join(fit.misplaced)
+            printer.say(f"{fit.view}: landmarks that do not fit the others: {names}")
+    return fits
+
+
+def _fit(
+    views: Sequence[View], mesh: Mesh, known: Known, printer: Printer, *, landmarks_only: bool
+) -> Calibration:
+    if landmarks_only:
+        from toonset.calib.landmarks_alone import calibrate_by_landmarks
+
+        return calibrate_by_landmarks(views, mesh, known.landmarks)
     from toonset.calib.calibrate import CalibrationOptions
     from toonset.calib.calibrate import calibrate as fit
-    from toonset.calib.known import Known
-    from toonset.calib.labels import parse_labels
-    from toonset.calib.overlay import draw_overlay
-    from toonset.calib.report import calibration_dict, model_line, view_line
-    from toonset.dataset.bundle import write_bundle
-    from toonset.dataset.mesh_file import load_mesh
 
-    printer = Printer(as_json, quiet)
-    check_output(out, [*sheets, mesh], WRITTEN, force=force)
-    mannequin = load_mesh(mesh)
-    _check_upright(mannequin)
-    views = _load_views(sheets, printer)
-    count = "1 view" if len(views) == 1 else f"{len(views)} views"
-    printer.say(f"{count}, mannequin of {len(mannequin.faces)} faces")
-    known = Known(labels=parse_labels(labels, len(views)) if labels else ())
-    options = CalibrationOptions()
-    found = fit(
-        views,
-        mannequin,
-        options,
-        lambda step, done: printer.progress(f"{step} {done:.0%}" if done else step),
-        known,
-    )
-    report = calibration_dict(found) | _provenance([*sheets, mesh], options, seed)
-    overlay = draw_overlay(views, mannequin, found)
+    def progress(step: str, done: float) -> None:
+        printer.progress(f"{step} {done:.0%}" if done else step)
+
+    return fit(views, mesh, CalibrationOptions(), progress, known)
+
+
+def _report(found: Calibration, marks: Sequence[LandmarkFit]) -> dict[str, Any]:
+    from toonset.calib.report import calibration_dict
+
+    report = calibration_dict(found)
+    if marks:
+        report["landmarks"] = [
+            {"view": fit.view, "rms_px": fit.rms_px, "misplaced": list(fit.misplaced)}
+            for fit in marks
+        ]
+    return report
+
+
+def _write(
+    out: Path,
+    views: Sequence[View],
+    mesh: Mesh,
+    found: Calibration,
+    report: dict[str, Any],
+    *,
+    force: bool,
+) -> None:
+    from dataclasses import replace
+
+    from toonset.calib.overlay import draw_overlay
+    from toonset.dataset.bundle import write_bundle
+
+    fitted = replace(mesh, vertices=found.mannequin)
     cameras = [view.camera for view in found.views]
-    write_bundle(out, views, cameras, mannequin, report, overlay, force=force)
+    overlay = draw_overlay(views, mesh, found)
+    write_bundle(out, views, cameras, fitted, report, overlay, force=force)
+
+
+def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
+    from toonset.calib.report import model_line, view_line
+
     printer.say(model_line(found))
     for view in found.views:
         printer.say(view_line(view))
     printer.say(f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else ""))
     printer.say(f"look at {out / 'overlay.png'}")
-    printer.result({"bundle": out, **report}, str(out))
-    if _uncertain(found):
-        raise typer.Exit(UNCERTAIN)
-
-
-def _check_upright(mesh: Mesh) -> None:
-    from toonset.errors import MeshError
-
-    widths = mesh.bounds[1] - mesh.bounds[0]
-    if widths[1] < LEAST_HEIGHT * max(widths):
-        raise MeshError(
-            f"{mesh.name}: {widths[1]:.3g} high (+Y is up) but {max(widths):.3g} wide; turn the "
-            "mannequin upright and export it again"
-        )
-
-
-def _load_views(paths: list[Path], printer: Printer) -> list[View]:
-    from dataclasses import replace
-
-    from toonset.dataset.picture import load_rgba
-    from toonset.dataset.sheet import split_sheet
-    from toonset.errors import SheetError
-
-    views: list[View] = []
-    for path in paths:
-        picture = load_rgba(path)
-        try:
-            sheet = split_sheet(picture)
-        except SheetError as error:
-            raise SheetError(f"{path}: {error}") from error
-        for warning in sheet.warnings:
-            printer.say(f"{path.name}: {warning}")
-        views.extend(sheet.views)
-    return [replace(view, name=f"{i:03d}.png") for i, view in enumerate(views)]
-
-
-def _provenance(inputs: list[Path], options: Any, seed: int) -> dict[str, Any]:
-    from dataclasses import asdict
-    from hashlib import sha256
-    from importlib.metadata import version
-
-    packages = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless")
-    return {
-        "options": asdict(options),
-        "seed": seed,
-        "versions": {name: version(name) for name in packages},
-        "inputs": [  # views may come from files of the same name in several folders
-            {"name": path.name, "sha256": sha256(path.read_bytes()).hexdigest()} for path in inputs
-        ],
-    }
-
-
-def _uncertain(found: Calibration) -> bool:
-    return found.verdict != "ok" or any(view.verdict != "ok" for view in found.views)

@@ -15,10 +15,19 @@ import typer
 
 from toonset.errors import OutputError
 
-JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
-QuietFlag = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only.")]
+OUTPUT_PANEL = "Output"  # of the help
+JsonFlag = Annotated[
+    bool,
+    typer.Option("--json", help="Print one JSON object on stdout.", rich_help_panel=OUTPUT_PANEL),
+]
+QuietFlag = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Print results only.", rich_help_panel=OUTPUT_PANEL),
+]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
-ForceFlag = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
+ForceFlag = Annotated[
+    bool, typer.Option("--force", help="Replace an existing output.", rich_help_panel=OUTPUT_PANEL)
+]
 
 SECONDS_BETWEEN_LOG_LINES = 5.0
 LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")

@@ -1,0 +1,192 @@
+"""What `toonset calibrate` is given: drawings, a mannequin, and what is known of the cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from toonset.cli.output import Printer
+
+if TYPE_CHECKING:
+    from toonset.calib.known import Known
+    from toonset.camera import Camera
+    from toonset.dataset.landmark_file import Landmarks
+    from toonset.dataset.mannequin_options import MannequinOptions
+    from toonset.mesh import Mesh
+    from toonset.view import View
+
+LEAST_HEIGHT = 0.01  # of the width; flatter, nothing can be told from its outline
+SQUARE = 1e-3  # a pixel may be this much higher than wide: rounding of a file
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What the command line says of the views.
+
+    Attributes:
+        labels: of --views; empty for nothing.
+        landmarks: landmark file.
+        landmarks_only: no outline is fitted.
+        init: bundle or transforms.json with cameras to start from.
+        locked: what stays as given.
+    """
+
+    labels: str = ""
+    landmarks: Path | None = None
+    landmarks_only: bool = False
+    init: Path | None = None
+    locked: tuple[str, ...] = ()
+
+    def check_usage(self) -> None:
+        """Refuse what contradicts itself.
+
+        Raises:
+            BadParameter: --landmarks-only without --landmarks, or beside what it does not use.
+        """
+        if not self.landmarks_only:
+            return
+        if self.landmarks is None:
+            raise typer.BadParameter("--landmarks-only needs --landmarks FILE")
+        unused = {"--views": self.labels, "--init": self.init, "--lock": self.locked}
+        for name, value in unused.items():
+            if value:
+                raise typer.BadParameter(f"{name} does nothing beside --landmarks-only; drop one")
+
+    def as_options(self) -> dict[str, Any]:
+        """Return what calibration.json keeps besides the files."""
+        return {
+            "views": self.labels or None,
+            "landmarks_only": self.landmarks_only,
+            "locked": list(self.locked),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The mannequin to fit.
+
+    Attributes:
+        mesh: its surface.
+        path: its file; None for a made one.
+        looks: proportions and pose of a made one.
+        points: of a made one, by name.
+    """
+
+    mesh: Mesh
+    path: Path | None = None
+    looks: MannequinOptions | None = None
+    points: dict[str, tuple[float, ...]] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """Return what it is, for people."""
+        if self.looks is None:
+            return f"mannequin of {len(self.mesh.faces)} faces"
+        return (
+            f"no --mesh: the default mannequin, {self.looks.heads_tall:g} heads tall, "
+            f"{self.looks.pose} pose (`toonset mannequin` makes others)"
+        )
+
+    def as_options(self) -> dict[str, Any]:
+        """Return what calibration.json keeps of a made mannequin."""
+        return {"mannequin": asdict(self.looks)} if self.looks is not None else {}
+
+
+def load_body(path: Path | None) -> Body:
+    """Return the mannequin of a file, or the default one.
+
+    Raises:
+        MeshError: the file is no mesh, or the mannequin lies.
+    """
+    if path is None:
+        return _default_body()
+    from toonset.dataset.mesh_file import load_mesh
+
+    mesh = load_mesh(path)
+    _check_upright(mesh)
+    return Body(mesh, path)
+
+
+def load_views(paths: Sequence[Path], printer: Printer) -> list[View]:
+    """Return the drawings of all sheets, named in order.
+
+    Raises:
+        PictureError, SheetError: a file is no picture, or shows no figures.
+    """
+    from toonset.dataset.picture import load_rgba
+    from toonset.dataset.sheet import split_sheet
+    from toonset.errors import SheetError
+
+    views: list[View] = []
+    for path in paths:
+        picture = load_rgba(path)
+        try:
+            sheet = split_sheet(picture)
+        except SheetError as error:
+            raise SheetError(f"{path}: {error}") from error
+        for warning in sheet.warnings:
+            printer.say(f"{path.name}: {warning}")
+        views.extend(sheet.views)
+    return [replace(view, name=f"{i:03d}.png") for i, view in enumerate(views)]
+
+
+def load_known(hints: Hints, views: Sequence[View], body: Body) -> Known:
+    """Return what is known of the views before they are looked at.
+
+    Raises:
+        ToonsetError: a label, a landmark file or cameras that do not belong to the views.
+    """
+    from toonset.calib.known import Known
+    from toonset.calib.labels import parse_labels
+    from toonset.dataset.landmark_file import read_known_points, read_landmarks
+
+    labels = parse_labels(hints.labels, len(views)) if hints.labels else ()
+    landmarks: tuple[Landmarks | None, ...] = ()
+    if hints.landmarks is not None:
+        points = body.points if body.path is None else read_known_points(body.path)
+        landmarks = read_landmarks(hints.landmarks, views, points)
+    cameras = _cameras(hints.init, views) if hints.init else ()
+    known = Known(labels, landmarks, cameras, frozenset(hints.locked))
+    known.check(views)
+    return known
+
+
+def _check_upright(mesh: Mesh) -> None:
+    from toonset.errors import MeshError
+
+    widths = mesh.bounds[1] - mesh.bounds[0]
+    if widths[1] < LEAST_HEIGHT * max(widths):
+        raise MeshError(
+            f"{mesh.name}: {widths[1]:.3g} high (+Y is up) but {max(widths):.3g} wide; turn the "
+            "mannequin upright and export it again"
+        )
+
+
+def _default_body() -> Body:
+    from toonset.dataset.mannequin import default_mannequin
+    from toonset.dataset.mannequin_options import MannequinOptions
+
+    looks, made = MannequinOptions(), default_mannequin()
+    points = {name: tuple(point.tolist()) for name, point in made.landmarks.items()}
+    return Body(made.mesh, None, looks, points)
+
+
+def _cameras(path: Path, views: Sequence[View]) -> tuple[Camera, ...]:
+    """Return the cameras of --init; in the views' order where their names are the views'."""
+    from toonset.dataset.transforms import read_cameras
+    from toonset.errors import CameraError
+
+    named = [(Path(name).name, camera) for name, camera in read_cameras(path)]
+    names = [view.name for view in views]
+    if sorted(name for name, _ in named) == names:
+        named.sort(key=lambda frame: frame[0])
+    for name, camera in named:
+        if abs(camera.pixel_aspect - 1) > SQUARE:
+            raise CameraError(
+                f"--init: the camera of {name} has pixels {camera.pixel_aspect:.3g} times as high "
+                "as wide, square ones are needed; give other cameras"
+            )
+    return tuple(camera for _, camera in named)
