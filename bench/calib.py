@@ -13,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -57,7 +57,7 @@ class Method:
         cached: the mannequin's templates are there already.
     """
 
-    options: CalibrationOptions = CalibrationOptions()
+    options: CalibrationOptions = field(default_factory=CalibrationOptions)
     labels: bool = False
     cached: bool = True
 
@@ -87,7 +87,7 @@ def bench_calibration(
     for case in cases:
         sheets.setdefault((case.group, NOMINAL), []).append(_guessed(case))
         with own_cache():
-            load_bank(prepare_surface(case.mesh))
+            load_bank(prepare_surface(case.mesh))  # fills the cache
             for method in QUICK if quick else METHODS:
                 progress(f"{case.name}: {method}")
                 measured = _calibrated(case, METHODS[method])
@@ -156,7 +156,7 @@ def _guessed(case: CalibCase) -> MeasuredSheet:
 def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
     if not method.cached:
         with own_cache():
-            return _calibrated(case, Method(method.options, method.labels))
+            return _calibrated(case, replace(method, cached=True))
     yaws = [angles_from_rotation(rotation)[0] for rotation in case.rotations]
     known = Known(labels=named_directions(yaws)) if method.labels else None
     start = time.perf_counter()

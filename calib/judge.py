@@ -28,6 +28,7 @@ FAILED_COVERAGE = 0.70
 # Sheets with cameras that are right contradict themselves by 0.4 to 0.9 %, wrong ones by 1.8 % on
 MOST_CONTRADICTION = 0.012
 TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly anything
+SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 OTHER = np.radians(15.0)  # an alternative this far away is another camera
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
@@ -110,7 +111,9 @@ def judge_view(
     if not sheet.yaw_observable:
         sigmas = replace(sigmas, yaw=float(np.pi / np.sqrt(3)))
     others = [item for item in far if not is_twin(pose, item[1])]
-    verdict, reason = _verdict(fit.coverage, sigmas, p_flip, others, sheet, index)
+    sideways = abs(np.cos(angles_from_rotation(pose.rotation)[0])) < SIDEWAYS
+    twin_is = "seen from below for above" if sideways else "front and back swapped"
+    verdict, reason = _verdict(fit.coverage, sigmas, p_flip, others, sheet, index, twin_is)
     return ViewCalibration(
         view.name,
         pose.camera(surface.middle, size_wh),
@@ -189,6 +192,7 @@ def _verdict(
     others: list[tuple[float, Pose]],
     sheet: SheetState,
     index: int,
+    twin_is: str,
 ) -> tuple[Verdict, str]:
     apart = f"{100 * (1 - coverage):.0f} % of the outlines are more than 5 % of the height apart"
     if coverage < FAILED_COVERAGE and not sheet.drawings_agree:
@@ -196,7 +200,7 @@ def _verdict(
     if not sheet.yaw_observable:
         return "ambiguous", "the body is a surface of revolution: yaw is not observable"
     if p_flip > 1 - SURE:
-        return "ambiguous", f"the mirror twin (front and back swapped) has p = {p_flip:.2f}"
+        return "ambiguous", f"the mirror twin ({twin_is}) has p = {p_flip:.2f}"
     p_other = sum(p for p, _ in others)
     if p_other > 1 - SURE:
         yaw = np.degrees(angles_from_rotation(others[0][1].rotation)[0]) % 360

@@ -30,6 +30,7 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 OUTLINE_HEIGHT_PX, OUTLINE_POINTS = 250.0, 200  # scale at which outlines are compared
+TYPICAL = "perspective in the typical view"
 MOST_RMS = 0.05  # of the figure's height; farther off, the pairs are not this mannequin's
 
 
@@ -140,7 +141,7 @@ def _model(
     return ModelChoice(
         PER_VIEW if any(nearness) else ORTHOGRAPHIC,
         tuple(1 / near if near > 0 else float("inf") for near in nearness),
-        tuple(Rung(f"perspective in {fit.view}", fit.bic_gain, 1) for fit in fits),
+        (Rung(TYPICAL, float(np.median([fit.bic_gain for fit in fits])), 1),),
         float(2 * sum(len(own.names) for own in pairs)),
         MARGIN,
     )

@@ -17,7 +17,7 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 CELL_HEIGHT = 360  # pixels of a drawing in the overlay
-CAPTION = 62
+CAPTION = 82
 GAP = 14
 COLUMNS = 8
 FINE = 4  # outlines are traced at this multiple of a pixel
@@ -87,11 +87,14 @@ def _captioned(
 ) -> UInt8[np.ndarray, "height width 3"]:
     image = Image.fromarray(cell)
     pen = ImageDraw.Draw(image)
-    yaw, elevation, _ = (math.degrees(angle) for angle in found.camera.angles)
+    yaw, elevation, roll = (math.degrees(angle) for angle in found.camera.angles)
+    sigmas = found.sigmas
+    gray = (40, 40, 40)
     lines = [
         (f"{found.name[:-4]}  {found.verdict}", INK[found.verdict]),
-        (f"yaw {round(yaw, 1) % 360:.1f}° ± {math.degrees(found.sigmas.yaw):.1f}°", (40, 40, 40)),
-        (f"elev. {elevation:.1f}°  p_flip {found.p_flip:.2f}", (40, 40, 40)),
+        (f"yaw {round(yaw, 1) % 360:.1f}° ± {math.degrees(sigmas.yaw):.1f}°", gray),
+        (f"elev. {elevation:.1f}° ± {math.degrees(sigmas.elevation):.1f}°", gray),
+        (f"roll {roll:.1f}° ± {math.degrees(sigmas.roll):.1f}°", gray),
     ]
     for i, (text, color) in enumerate(lines):
         font = ImageFont.load_default(17 if i == 0 else 14)

@@ -147,7 +147,7 @@ def _landmark_fits(known: Known, mesh: Mesh, printer: Printer) -> list[LandmarkF
     for fit in fits:
         if fit.misplaced:
             names = ", ".join(fit.misplaced)
-            printer.say(f"{fit.view}: landmarks that do not fit the others: {names}")
+            printer.say(f"{fit.view}: landmarks that do not fit the others: {names}; check them")
     return fits
 
 
@@ -173,7 +173,12 @@ def _report(found: Calibration, marks: Sequence[LandmarkFit]) -> dict[str, Any]:
     report = calibration_dict(found)
     if marks:
         report["landmarks"] = [
-            {"view": fit.view, "rms_px": fit.rms_px, "misplaced": list(fit.misplaced)}
+            {
+                "view": fit.view,
+                "rms_px": fit.rms_px,
+                "misplaced": list(fit.misplaced),
+                "perspective_bic_gain": fit.bic_gain,
+            }
             for fit in marks
         ]
     return report

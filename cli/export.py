@@ -37,7 +37,7 @@ def export(
     to: Annotated[Format, typer.Option("--to", help="Format.")] = Format.colmap,
     mesh: Annotated[
         Path | None,
-        typer.Option("--mesh", help="The mannequin of the calibration, for points3D."),
+        typer.Option("--mesh", help="Mannequin for points3D (default: the bundle's own)."),
     ] = None,
     text: Annotated[bool, typer.Option("--text", help="Write .txt files, not .bin.")] = False,
     force: ForceFlag = False,
@@ -48,21 +48,30 @@ def export(
     """Write a bundle as a COLMAP dataset: images over white, masks, sparse/0 and exact cameras.
 
     COLMAP has no orthographic camera; such views become pinholes 100 body heights away, and how
-    far these may be off is printed. points3D is empty without --mesh.
+    far these may be off is printed. points3D are points of the mannequin.
     """
+    from toonset.dataset.bundle import MANNEQUIN
     from toonset.dataset.colmap import read_far_pinholes, write_colmap
     from toonset.dataset.mesh_file import load_mesh
-    from toonset.dataset.transforms import read_scene
+    from toonset.dataset.transforms import read_scene, transforms_file
+    from toonset.errors import MeshError
 
     printer = Printer(as_json, quiet)
     check_output(out, [bundle, mesh], WRITTEN, force=force)
     frames = read_scene(bundle).frames
     pinholes = read_far_pinholes(bundle)
+    own = transforms_file(bundle).parent / MANNEQUIN
+    body = mesh or (own if own.is_file() else None)
     points = None
-    if mesh is not None:
+    if body is not None:
         printer.progress("colouring points")
         cameras = [pinhole.camera for pinhole in pinholes]
-        points = _points(load_mesh(mesh), frames, cameras, seed)
+        points = _points(load_mesh(body), frames, cameras, seed)
+    if mesh is not None and points is None:
+        raise MeshError(
+            f"{mesh}: no point of it lies on the figure in every drawing; give the mannequin of "
+            "the calibration, or none"
+        )
     write_colmap(out, frames, pinholes, points, text=text, force=force)
     error_px = max(pinhole.error_px for pinhole in pinholes)
     printer.say(_summary(frames, pinholes, points))
@@ -73,20 +82,15 @@ def export(
 
 def _points(
     mesh: Mesh, frames: tuple[Frame, ...], cameras: list[Camera], seed: int
-) -> TrackedPoints:
+) -> TrackedPoints | None:
+    """Return coloured points of the mannequin; None where none lies on the figure in all views."""
     import numpy as np
 
     from toonset.dataset.colmap_points import sample_surface, track_points
-    from toonset.errors import MeshError
 
     candidates = [*_rims(mesh, cameras), sample_surface(mesh, SURFACE_POINTS, seed)]
     points = track_points(np.concatenate(candidates), mesh, frames, cameras)
-    if len(points.xyz) == 0:
-        raise MeshError(
-            f"{mesh.name}: no point of it lies on the figure in every drawing; give the mannequin "
-            "of the calibration, or none"
-        )
-    return points
+    return points if len(points.xyz) else None
 
 
 def _rims(mesh: Mesh, cameras: list[Camera]) -> list[Float[np.ndarray, "n 3"]]:
@@ -114,7 +118,7 @@ def _summary(
         error_px = max(pinhole.error_px for pinhole in pinholes)
         lines.append(f"{far} orthographic, written as far pinholes: at most {error_px:.2f} px off")
     if points is None:
-        lines.append("points3D is empty; give --mesh to fill it")
+        lines.append("points3D is empty; give a mannequin that the drawings show as --mesh")
     else:
         several = int((points.seen.sum(axis=0) > 1).sum())
         lines.append(f"{len(points.xyz)} points, {several} of them seen by several views")

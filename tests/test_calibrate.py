@@ -4,16 +4,22 @@ import dataclasses
 import json
 import math
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
 
 from toonset.bench.calib import view_error
 from toonset.calib.calibrate import calibrate
+from toonset.calib.contour import drawn_contour
 from toonset.calib.known import Known
 from toonset.calib.labels import parse_labels
+from toonset.calib.match import Drawing, match
 from toonset.calib.overlay import draw_overlay
+from toonset.calib.pose import Pose
 from toonset.calib.report import calibration_dict
+from toonset.calib.rim import prepare_surface
+from toonset.camera import rotation_distance
 from toonset.dataset.bodies import random_body
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
@@ -171,3 +177,25 @@ def test_the_overlay_follows_the_drawing(clean):
     rotated = dataclasses.replace(found, views=found.views[::-1])
     other = draw_overlay(views, turnaround.mesh, rotated).astype(int)
     assert np.abs(other - picture).sum() > 0
+
+
+def test_perspective_from_opencvs_pnp_on_the_same_outlines_agrees():
+    near = dataclasses.replace(CLEAN, distance_heights=2.5)
+    turnaround, found, _ = solved(near, 31)
+    surface = prepare_surface(turnaround.mesh)
+    for view, cell in zip(found.views, split_sheet(turnaround.sheet).views, strict=True):
+        camera = view.camera
+        drawing = Drawing(drawn_contour(cell), 250.0, 400)
+        pose = Pose(camera.rotation, camera.center, camera.scale, camera.k)
+        pairs = match(drawing, surface, drawing.pose_in(pose))
+        near_enough = pairs.distances < 0.02 * drawing.height
+        pixels = (pairs.targets[near_enough] + drawing.offset) / drawing.factor
+        world = pairs.points[near_enough] + surface.middle
+        solved_it, turn, shift = cv2.solvePnP(
+            world, pixels, camera.K, None, flags=cv2.SOLVEPNP_EPNP
+        )
+        turn, shift = cv2.solvePnPRefineLM(world, pixels, camera.K, None, turn, shift)
+        rotation = cv2.Rodrigues(turn)[0]
+        assert solved_it
+        assert (world @ rotation[2] + shift[2] > 0).all()
+        assert math.degrees(rotation_distance(rotation, camera.rotation)) < 1.5
