@@ -51,7 +51,7 @@ def calibrate_by_landmarks(
     """
     start = time.perf_counter()
     surface = prepare_surface(mesh)
-    pairs = _of_every_view(views, landmarks)
+    pairs = landmarks_of_every_view(views, landmarks)
     fits = [solve_landmarks(own, surface) for own in pairs]
     solved = time.perf_counter()
     drawings = [Drawing(drawn_contour(v), OUTLINE_HEIGHT_PX, OUTLINE_POINTS) for v in views]
@@ -76,7 +76,14 @@ def calibrate_by_landmarks(
     )
 
 
-def _of_every_view(views: Sequence[View], landmarks: Sequence[Landmarks | None]) -> list[Landmarks]:
+def landmarks_of_every_view(
+    views: Sequence[View], landmarks: Sequence[Landmarks | None]
+) -> list[Landmarks]:
+    """Return the landmarks of all views.
+
+    Raises:
+        LandmarkError: a view without any.
+    """
     without = [v.name for v, own in zip(views, landmarks, strict=True) if own is None]
     if without:
         raise LandmarkError(

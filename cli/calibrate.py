@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.calibrate_inputs import Hints, load_body, load_known, load_views
+from toonset.cli.calibrate_inputs import Body, Hints, load_body, load_known, load_views
 from toonset.cli.calibrate_provenance import provenance
 from toonset.cli.output import (
     OUTPUT_PANEL,
@@ -126,9 +126,8 @@ def calibrate(
     body = load_body(mesh)
     views = load_views(sheets, printer)
     known = load_known(hints, views, body)
-    count = "1 view" if len(views) == 1 else f"{len(views)} views"
-    printer.say(f"{count}, {body}")
-    marks = _landmark_fits(known, body.mesh, printer)
+    marks = _landmark_fits(known, body.mesh)
+    _say_inputs(views, body, marks, printer)
     found = _fit(views, body.mesh, known, printer, landmarks_only=landmarks_only)
     report = _report(found, marks) | provenance(sheets, body, hints, seed)
     _write(out, views, body.mesh, found, report, force=force)
@@ -138,17 +137,23 @@ def calibrate(
         raise typer.Exit(UNCERTAIN)
 
 
-def _landmark_fits(known: Known, mesh: Mesh, printer: Printer) -> list[LandmarkFit]:
-    """Return what the landmarks say of the views that have any; name the misplaced ones."""
+def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
+    """Return what the landmarks say of the views that have any."""
     from toonset.calib.landmarks import landmark_starts
     from toonset.calib.rim import prepare_surface
 
-    fits = [fit for fit in landmark_starts(known.landmarks, prepare_surface(mesh)) if fit]
-    for fit in fits:
+    return [fit for fit in landmark_starts(known.landmarks, prepare_surface(mesh)) if fit]
+
+
+def _say_inputs(
+    views: Sequence[View], body: Body, marks: Sequence[LandmarkFit], printer: Printer
+) -> None:
+    count = "1 view" if len(views) == 1 else f"{len(views)} views"
+    printer.say(f"{count}, {body}")
+    for fit in marks:
         if fit.misplaced:
             names = ", ".join(fit.misplaced)
             printer.say(f"{fit.view}: landmarks that do not fit the others: {names}; check them")
-    return fits
 
 
 def _fit(

@@ -141,6 +141,7 @@ def load_known(hints: Hints, views: Sequence[View], body: Body) -> Known:
     """
     from toonset.calib.known import Known
     from toonset.calib.labels import parse_labels
+    from toonset.calib.landmarks_alone import landmarks_of_every_view
     from toonset.dataset.landmark_file import read_known_points, read_landmarks
 
     labels = parse_labels(hints.labels, len(views)) if hints.labels else ()
@@ -148,6 +149,8 @@ def load_known(hints: Hints, views: Sequence[View], body: Body) -> Known:
     if hints.landmarks is not None:
         points = body.points if body.path is None else read_known_points(body.path)
         landmarks = read_landmarks(hints.landmarks, views, points)
+    if hints.landmarks_only:
+        landmarks_of_every_view(views, landmarks)
     cameras = _cameras(hints.init, views) if hints.init else ()
     known = Known(labels, landmarks, cameras, frozenset(hints.locked))
     known.check(views)

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.mesh_file import load_mesh, save_obj
 from toonset.dataset.transforms import read_cameras
 
-VERBS = ("calibrate", "palette", "train", "render", "evaluate", "synth", "bench")
-BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png"}
+VERBS = (
+    *("calibrate", "palette", "train", "render", "evaluate"),
+    *("export", "mannequin", "synth", "bench"),
+)
+BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"}
 VIEWS = 5
 FAST = ("--threads", 1, "--device", "cpu")
 # Runs verbs one after the other in one fresh process, then prints what they have imported.
@@ -72,7 +76,12 @@ def test_no_arguments_show_the_help_and_a_wrong_verb_the_right_one(shell):
     ("arguments", "words"),
     [
         (["calibrate"], ["Missing argument 'SHEET'"]),
-        (["calibrate", "a.png"], ["Missing option '--mesh'"]),
+        (["calibrate", "a.png", "--landmarks-only"], ["--landmarks-only needs --landmarks"]),
+        (
+            ["calibrate", "a.png", "--landmarks", "b", "--landmarks-only", "--lock", "yaw"],
+            ["--lock does nothing beside --landmarks-only"],
+        ),
+        (["calibrate", "a.png", "--lock", "roll"], ["--lock", "'elevation', 'scale', 'fov'"]),
         (["calibrate", "a.png", "--mesh", "m.obj", "--forse"], ["--forse", "--force"]),
         (["calibrate", "a.png", "--mesh", "m.obj", "--seed", "x"], ["--seed", "integer"]),
         (["train", "--steps", "0"], ["--steps", "1"]),
@@ -178,6 +187,26 @@ def test_several_files_are_views_in_the_order_given(
             folder / "images" / f"{i:03d}.png" for folder in (Path("b ü"), calibrated[0])
         )
         assert np.array_equal(np.asarray(Image.open(mine)), np.asarray(Image.open(whole)))
+
+
+def test_the_bundle_keeps_the_mannequin_and_export_finds_it(
+    drawn: Path, bundle: Path, toonset, tmp_path
+):
+    given, kept = load_mesh(drawn / "mannequin.obj"), load_mesh(bundle / "mannequin.obj")
+    assert np.allclose(kept.vertices, given.vertices)  # the drawings' own needs no bending
+    done = toonset("export", bundle, "-o", tmp_path / "colmap", "--json")
+    assert (done.code, done.json["points"] > 1000) == (0, True)
+
+
+def test_export_does_without_a_kept_mannequin_that_the_drawings_do_not_show(
+    bundle: Path, toonset, tmp_path
+):
+    mesh = load_mesh(bundle / "mannequin.obj")
+    away = replace(mesh, vertices=mesh.vertices + np.array([50.0, 0, 0]))
+    (bundle / "mannequin.obj").write_bytes(save_obj(away))
+    done = toonset("export", bundle, "-o", tmp_path / "colmap", "--json")
+    assert (done.code, done.json["points"]) == (0, 0)
+    assert "points3D is empty; give a mannequin that the drawings show" in done.err
 
 
 def without_seconds(bundle: Path) -> dict[str, Any]:
