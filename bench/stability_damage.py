@@ -61,14 +61,13 @@ def mirrored(view: View, camera: Camera) -> Drawn:
 
 
 def without_feet(view: View, camera: Camera, share: float) -> Drawn:
-    """Return the drawing with the lowest `share` of the figure's height cut away."""
+    """Return the picture cut so that the lowest `share` of the figure's height is missing."""
     top, bottom = _rows(view.mask)
     lost = round(share * (bottom - top))
     if not lost:
         return view, camera
-    kept = view.rgba.copy()
-    kept[bottom - lost :] = 0
-    return replace(view, rgba=kept), camera
+    kept = view.rgba[: bottom - lost]
+    return replace(view, rgba=kept), camera.moved((0, 0), (kept.shape[1], kept.shape[0]))
 
 
 def without_pieces(

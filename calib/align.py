@@ -115,13 +115,15 @@ def measure(drawing: Drawing, surface: Surface, pose: Pose, cap: float = 0.05) -
     Points without a counterpart within `cap` of the height (direction included) count `cap`.
     """
     matches = match(drawing, surface, pose)
-    off = matches.normals * (project(pose, matches.points) - matches.targets)
+    shown = drawing.free[matches.target_index]
+    side = np.arange(len(shown)) < matches.drawn
+    off = (matches.normals * (project(pose, matches.points) - matches.targets)).sum(axis=1)
     met = matches.distances < cap * drawing.height
-    across = np.where(met, np.abs(off.sum(axis=1)) / drawing.height, cap)
-    sides = (across[: matches.drawn], across[matches.drawn :])
-    cost = float(np.mean([np.mean(side**2) for side in sides if len(side)]))
+    across = np.where(met, np.abs(off) / drawing.height, cap)
+    sides = (across[side & shown], across[~side & shown])
+    cost = float(np.mean([np.mean(part**2) for part in sides if len(part)]))
     error = float(np.sqrt(np.mean(across[met] ** 2))) if met.any() else cap
-    return Fit(drawing.pose_out(pose), cost, error, float(met.mean()))
+    return Fit(drawing.pose_out(pose), cost, error, float(met[shown].mean()))
 
 
 def _robust_weights(matches: Matches, width_px: float) -> Float[np.ndarray, " n"]:

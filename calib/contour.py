@@ -10,13 +10,15 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from skimage.measure import find_contours
 
 from toonset.errors import SheetError
 from toonset.view import View
 
 MIN_LOOP_OF_HEIGHT = 0.04  # shorter closed loops are pinholes of the matting, not outline
+EDGE_PX = 1.5  # from the picture's edge: smoothing rounds an outline that runs along it
+CUT_OF_HEIGHT = 0.12  # a longer contact with the picture's edge is a cut
 SMOOTHING_PX = 0.7  # of alpha: a hard mask's staircase becomes a line, corners move < 0.2 px
 
 
@@ -29,12 +31,14 @@ class Contour:
         normals: (n, 2) unit, pointing out of the figure.
         box: (left, top, width, height) of the figure in pixels.
         height_px: the figure's extent in v.
+        free: (n,) whether a point is outline; not where the picture's edge cuts the figure.
     """
 
     points: Float[np.ndarray, "n 2"]
     normals: Float[np.ndarray, "n 2"]
     box: tuple[float, float, float, float]
     height_px: float
+    free: Bool[np.ndarray, " n"]
 
     def scaled(self, factor: float) -> Contour:
         """Return the contour of the drawing scaled by `factor`."""
@@ -44,6 +48,7 @@ class Contour:
             self.normals,
             (left, top, width, height),
             self.height_px * factor,
+            self.free,
         )
 
 
@@ -72,7 +77,29 @@ def drawn_contour(view: View, spacing_of_height: float = 1 / 256) -> Contour:
     points = np.concatenate([points for points, _ in sampled])
     normals = np.concatenate([normals for _, normals in sampled])
     box = (float(left), float(top), float(width), float(height))
-    return Contour(points, normals, box, float(height))
+    free = np.concatenate([_is_free(p, view.rgba.shape, height) for p, _ in sampled])
+    return Contour(points, normals, box, float(height), free)
+
+
+def _is_free(
+    loop: Float[np.ndarray, "n 2"], shape: tuple[int, ...], height: float
+) -> Bool[np.ndarray, " n"]:
+    """Return which points of an evenly sampled loop are outline, not a cut by the picture's edge.
+
+    Short contacts with the edge are those of a closely cropped figure.
+    """
+    edge = np.array([shape[1], shape[0]])
+    at_edge = ((loop < EDGE_PX) | (loop > edge - EDGE_PX)).any(axis=1)
+    if not at_edge.any() or at_edge.all():
+        return np.ones(len(loop), dtype=bool)
+    start = int(np.flatnonzero(~at_edge)[0])
+    rolled = np.roll(at_edge, -start)
+    changes = np.flatnonzero(np.diff(np.concatenate([[0], rolled.astype(np.int8), [0]])))
+    spacing = np.linalg.norm(loop[1] - loop[0])
+    for first, last in zip(changes[::2], changes[1::2], strict=True):
+        if (last - first) * spacing < CUT_OF_HEIGHT * height:
+            rolled[first:last] = False
+    return ~np.roll(rolled, start)
 
 
 def _length(loop: Float[np.ndarray, "n 2"]) -> float:

@@ -130,17 +130,21 @@ def judge_view(
 
 
 def with_sheet_in_mind(views: Sequence[ViewCalibration]) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where the mannequin's shape is wrong in the typical view.
+    """Return the views; none is ok where the typical view of the sheet is not.
 
     A wrong body can match a side view's outline well, at a wrong angle.
     """
     typical = float(np.median([view.coverage for view in views]))
-    if typical >= WEAK_COVERAGE:
+    doubtful = sum(view.verdict != "ok" for view in views)
+    if typical < WEAK_COVERAGE:
+        reason = (
+            f"in the sheet's typical view {100 * (1 - typical):.0f} % of the outlines are more "
+            "than 5 % of the height apart: the mannequin's shape differs from the drawings'"
+        )
+    elif 2 * doubtful > len(views):
+        reason = f"{doubtful} of the sheet's {len(views)} views are uncertain"
+    else:
         return tuple(views)
-    reason = (
-        f"in the sheet's typical view {100 * (1 - typical):.0f} % of the outlines are more than "
-        "5 % of the height apart: the mannequin's shape differs from the drawings'"
-    )
     return tuple(
         replace(view, verdict="weak", reason=reason) if view.verdict == "ok" else view
         for view in views

@@ -16,6 +16,7 @@ from toonset.calib.contour import Contour
 from toonset.calib.pose import Pose, project
 from toonset.calib.rim import Rim, Surface, rim_at
 
+FAR = 10.0  # heights
 DIRECTION_OF_HEIGHT = 0.06  # a contour turned by 60 degrees counts as this far away
 BLOCK = 64  # rows of a distance table at once
 
@@ -67,6 +68,7 @@ class Drawing:
         self.offset = np.array([left - margin, top - margin])
         self.points = scaled.points[::every] - self.offset
         self.normals = scaled.normals[::every]
+        self.free = scaled.free[::every]
         self.height = height
         self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
         self.direction_px = DIRECTION_OF_HEIGHT * height
@@ -97,13 +99,16 @@ def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
     table = Table(seen)
     to_rim, to_drawn = nearest(drawing.table, table), nearest(table, drawing.table)
     off = np.concatenate([drawing.features - seen[to_rim], seen - drawing.features[to_drawn]])
+    target = np.concatenate([np.arange(len(drawing.points)), to_drawn])
+    # where the picture's edge cuts the figure, nothing is met: as good as infinitely far
+    distances = np.where(drawing.free[target], np.sqrt((off**2).sum(axis=1)), FAR * drawing.height)
     return Matches(
         np.concatenate([rim.points[to_rim], rim.points]),
         np.concatenate([drawing.points, drawing.points[to_drawn]]),
         np.concatenate([drawing.normals, drawing.normals[to_drawn]]),
-        np.sqrt((off**2).sum(axis=1)),
+        distances,
         len(drawing.points),
-        np.concatenate([np.arange(len(drawing.points)), to_drawn]),
+        target,
     )
 
 

@@ -113,6 +113,19 @@ def test_contour_of_a_disc_is_a_circle_with_outward_normals():
     assert contour.height_px == pytest.approx(80, abs=0.3)
 
 
+@pytest.mark.parametrize(("cut", "share"), [(0, 0.0), (35, 0.1)])
+def test_where_the_pictures_edge_cuts_a_figure_is_no_outline(cut, share):
+    rows, columns = np.mgrid[:120, :120] + 0.5
+    rgba = np.zeros((120, 120, 4), np.uint8)
+    rgba[..., 3] = 255 * (np.hypot(rows - 60, columns - 60) < 50)
+    picture = rgba[10 : 110 - cut]  # a close crop touches the edge as well
+    found = drawn_contour(View(picture, (0, 0, 120, len(picture)), 0.0, "000.png"))
+    cut_off = ~found.free
+    assert cut_off.mean() >= share
+    assert cut_off.any() == (cut > 0)
+    assert (found.points[cut_off, 1] > len(picture) - 2).all()
+
+
 def test_silhouette_mask_covers_exactly_the_pixel_centres_inside():
     corners = np.array([[10.0, 10.0], [60.2, 20.0], [20.0, 70.7]])
     mask = silhouette_mask(corners, np.array([[0, 1, 2]], np.int32), (100, 80))

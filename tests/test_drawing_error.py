@@ -11,7 +11,9 @@ from toonset.calib.match import Drawing
 def circle(count: int = 120) -> Drawing:
     turn = np.arange(count) * 2 * np.pi / count
     normals = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    contour = Contour(50 + 40 * normals, normals, (10.0, 10.0, 80.0, 80.0), 80.0)
+    contour = Contour(
+        50 + 40 * normals, normals, (10.0, 10.0, 80.0, 80.0), 80.0, np.ones(count, bool)
+    )
     return Drawing(contour, 80.0, count)
 
 
