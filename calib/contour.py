@@ -17,7 +17,7 @@ from toonset.errors import SheetError
 from toonset.view import View
 
 MIN_LOOP_OF_HEIGHT = 0.04  # shorter closed loops are pinholes of the matting, not outline
-EDGE_PX = 1.5  # from the picture's edge: smoothing rounds an outline that runs along it
+EDGE_PX = 0.75  # from the picture's edge: smoothing pulls an outline's corners off it
 CUT_OF_HEIGHT = 0.12  # a longer contact with the picture's edge is a cut
 SMOOTHING_PX = 0.7  # of alpha: a hard mask's staircase becomes a line, corners move < 0.2 px
 
