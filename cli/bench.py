@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    SeedOption,
+    check_output,
+)
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:
@@ -95,9 +103,9 @@ def bench(
         typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer settings.")] = False,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Output folder.")] = Path(
-        "bench-results"
-    ),
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Output folder.", rich_help_panel=OUTPUT_PANEL)
+    ] = Path("bench-results"),
     force: ForceFlag = False,
     seed: SeedOption = 0,
     as_json: JsonFlag = False,

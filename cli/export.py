@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    SeedOption,
+    check_output,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,7 +41,9 @@ class Format(StrEnum):
 
 def export(
     bundle: Annotated[Path, typer.Argument(help="A bundle, or a folder with transforms.json.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
+    ],
     to: Annotated[Format, typer.Option("--to", help="Format.")] = Format.colmap,
     mesh: Annotated[
         Path | None,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
 from toonset.dataset.mannequin_options import HEADS_TALL, SCALES, MannequinOptions, Pose
 
 DEFAULT = MannequinOptions()
@@ -15,9 +15,9 @@ LOW, HIGH = SCALES
 
 
 def mannequin(
-    out: Annotated[Path, typer.Option("-o", "--out", help="OBJ file to write.")] = Path(
-        "mannequin.obj"
-    ),
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="OBJ file to write.", rich_help_panel=OUTPUT_PANEL)
+    ] = Path("mannequin.obj"),
     heads: Annotated[
         float,
         typer.Option(min=HEADS_TALL[0], max=HEADS_TALL[1], help="Height over the head's height."),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, check_output
+from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, check_output
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,7 +35,13 @@ def palette(
         float, typer.Option("--min-share", help="Least share of the character's pixels.")
     ] = 0.05,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder (default: the bundle; ./palette).")
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Folder (default: the bundle; ./palette).",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
     ] = None,
     force: ForceFlag = False,
     as_json: JsonFlag = False,

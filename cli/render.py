@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, check_output
+from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, check_output
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,7 +26,10 @@ LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha")
 
 def render(
     run: Annotated[Path, typer.Argument(help="A run folder, as `toonset train` writes it.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the pictures.")],
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--out", help="Folder for the pictures.", rich_help_panel=OUTPUT_PANEL),
+    ],
     cameras: Annotated[
         Path | None, typer.Option("--cameras", help="A transforms.json: one picture per frame.")
     ] = None,

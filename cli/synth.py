@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    SeedOption,
+    check_output,
+)
 from toonset.dataset.synth_options import SynthOptions
 
 WRITTEN = ("sheet.png", "views", "labels", "mannequin.obj", "truth.json")
@@ -16,7 +24,9 @@ DEFAULT = SynthOptions()
 
 def synth(
     mesh: Annotated[Path, typer.Argument(help="Character: obj, ply, stl, glb, off; colours kept.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
+    ],
     views: Annotated[int, typer.Option(help="Drawings, evenly round.")] = DEFAULT.views,
     yaw_jitter: Annotated[
         float, typer.Option(help="Each view is turned wrongly by up to this, degrees.")

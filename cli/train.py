@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag, SeedOption, check_output
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    SeedOption,
+    check_output,
+)
 
 if TYPE_CHECKING:
     from toonset.dataset.scene import Scene
@@ -21,7 +29,10 @@ def train(
         Path, typer.Argument(help="A bundle, or any folder with transforms.json and RGBA pictures.")
     ] = Path("bundle"),
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Run folder (default: BUNDLE/run).")
+        Path | None,
+        typer.Option(
+            "-o", "--out", help="Run folder (default: BUNDLE/run).", rich_help_panel=OUTPUT_PANEL
+        ),
     ] = None,
     steps: Annotated[int, typer.Option("--steps", min=1, help="Optimiser steps.")] = 300,
     budget: Annotated[
