@@ -1,0 +1,357 @@
+"""The calibration benchmark: figures that count what they say, fair conditions, a legible table."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from toonset.bench import calib, cases
+from toonset.bench.calib import METHODS, bench_calibration, named_directions, own_cache
+from toonset.bench.calib_figures import (
+    MeasuredSheet,
+    MeasuredView,
+    Recorder,
+    ViewError,
+    angle_between,
+    sheet_records,
+)
+from toonset.bench.calib_table import sheets_table, sprites_table
+from toonset.bench.cases import CONDITIONS, CalibCase, calib_cases
+from toonset.bench.record import Record
+from toonset.bench.sprites import MANNEQUIN, OWN_MESH, bench_sprites, sprite_cases
+from toonset.calib.result import SEVERITY
+from toonset.camera import Camera, rotation_from_angles
+from toonset.dataset.bodies import random_body
+from toonset.dataset.mesh_file import save_obj
+from toonset.dataset.picture import encode_png
+from toonset.dataset.synth_options import SynthOptions
+from toonset.dataset.synthetic import make_turnaround
+from toonset.errors import BundleError
+from toonset.view import View
+
+RECORDER = Recorder("default", "drawn", 0)
+
+
+def sheet(*views: tuple[float, float, str], sigma: float = 1.0) -> MeasuredSheet:
+    """Return a sheet of (error, error modulo twin, verdict) in degrees; yaw errs as the view."""
+    return MeasuredSheet(
+        tuple(
+            MeasuredView(
+                ViewError(math.radians(raw), math.radians(twin), verdict),
+                math.radians(raw),
+                math.radians(sigma),
+            )
+            for raw, twin, verdict in views
+        ),
+        2.0,
+    )
+
+
+def by_metric(records: list[Record]) -> dict[str, Record]:
+    found = {record.metric: record for record in records}
+    assert len(found) == len(records)
+    return found
+
+
+# ---- figures
+
+
+def test_figures_count_what_they_say() -> None:
+    found = by_metric(
+        sheet_records(
+            [
+                sheet((1, 1, "ok"), (4, 4, "weak"), (10, 10, "ok")),
+                sheet((60, 2, "ok"), (170, 3, "ambiguous"), (40, 40, "failed")),
+            ],
+            RECORDER,
+        )
+    )
+    assert found["rotation error"].median == pytest.approx(25)
+    assert found["rotation error modulo twin"].median == pytest.approx(3.5)
+    assert found["within 5 deg"].value == pytest.approx(2 / 6)
+    assert found["within 5 deg modulo twin"].value == pytest.approx(4 / 6)
+    assert found["flipped views"].value == 2
+    assert (found["wrong but ok"].value, found["wrong but ok"].n) == (1, 6)
+    announced = found["wrong and announced"]
+    assert (announced.value, announced.n, announced.direction) == (
+        pytest.approx(2 / 3),
+        3,
+        "higher",
+    )
+    assert [found[v].value * 6 for v in SEVERITY] == pytest.approx([3, 1, 1, 1])
+    assert (found["seconds"].n, found["seconds"].median) == (2, 2.0)
+
+
+def test_right_sigmas_have_unit_spread_and_far_views_do_not_count() -> None:
+    rng = np.random.default_rng(0)
+    errors = rng.normal(scale=2.0, size=400)
+    views = [(float(e), abs(float(e)), "ok") for e in errors]
+    for sigma, spread in ((2.0, 1.0), (0.5, 4.0)):
+        measured = sheet(*views, (80, 80, "ok"), sigma=sigma)
+        record = by_metric(sheet_records([measured], RECORDER))["yaw z-score"]
+        assert record.n == 400
+        assert record.value == pytest.approx(spread, rel=0.1)
+
+
+def test_what_was_not_judged_has_no_verdicts_and_nothing_placed_has_no_errors() -> None:
+    unjudged = replace(sheet((50, 50, "")), seconds=0.0)
+    assert set(by_metric(sheet_records([unjudged], RECORDER))).isdisjoint(
+        (*SEVERITY, "wrong but ok", "wrong and announced")
+    )
+    assert set(by_metric(sheet_records([sheet()], RECORDER))) == {"seconds"}
+
+
+def test_without_wrong_views_there_is_no_share_of_announced_ones() -> None:
+    assert "wrong and announced" not in by_metric(sheet_records([sheet((1, 1, "ok"))], RECORDER))
+
+
+@pytest.mark.parametrize(("a", "b"), [(6.2, 0.1), (0.1, 6.2), (-9.0, 9.0), (1.0, 1.0)])
+def test_differences_of_angles_are_the_short_way(a: float, b: float) -> None:
+    off = angle_between(a, b)
+    assert -math.pi <= off < math.pi
+    np.testing.assert_allclose([math.cos(b + off), math.sin(b + off)], [math.cos(a), math.sin(a)])
+
+
+def test_directions_are_named_to_the_nearest_eighth() -> None:
+    named = named_directions(np.radians([-3.0, 22.0, 23.0, 181.0, 338.0, 350.0]))
+    assert [round(math.degrees(yaw)) for (yaw,) in named] == [0, 0, 45, 180, 0, 0]
+
+
+# ---- methods
+
+
+def answer(rotations: np.ndarray) -> SimpleNamespace:
+    """Return what of a calibration is measured."""
+    sigmas = SimpleNamespace(yaw=0.1)
+    cameras = [Camera(r, np.zeros(3), 1.0, np.zeros(2), (4, 4)) for r in rotations]
+    views = [SimpleNamespace(camera=camera, verdict="ok", sigmas=sigmas) for camera in cameras]
+    return SimpleNamespace(views=views)
+
+
+def even_case(views: int = 4) -> CalibCase:
+    turns = np.arange(views) * 2 * math.pi / views
+    blank = View(np.full((4, 4, 4), 255, np.uint8), (0, 0, 4, 4), 0.0, "000.png")
+    rotations = np.stack([rotation_from_angles(t, math.radians(5), 0) for t in turns])
+    return CalibCase("even", "even", (blank,) * views, random_body(0), rotations)
+
+
+def test_even_turns_are_what_the_nominal_angles_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calib, "QUICK", ())
+    (nominal,) = [r for r in bench_calibration([even_case()], 0, quick=True) if "deg" == r.unit][:1]
+    assert (nominal.method, nominal.n) == ("nominal angles", 4)
+    assert nominal.p95 == pytest.approx(0, abs=1e-4)
+
+
+def test_methods_get_their_labels_and_their_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    case, seen = even_case(), []
+
+    def watched(views, mesh, options, known=None):
+        seen.append((len(os.listdir(os.environ["TOONSET_CACHE"])), known))
+        return answer(case.rotations)
+
+    monkeypatch.setattr(calib, "calibrate", watched)
+    records = bench_calibration([case], 0, quick=True)
+    (plain, labelled, cold) = seen
+    assert (plain[0], labelled[0], cold[0]) == (1, 1, 0)
+    assert (plain[1], cold[1]) == (None, None)
+    assert labelled[1].labels == named_directions(np.radians([0, 90, 180, 270]))
+    for method in calib.QUICK:
+        own = by_metric([r for r in records if r.method == method])
+        assert own["within 5 deg"].value == own["ok"].value == 1
+
+
+def test_the_users_cache_is_left_alone_whatever_happens(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("TOONSET_CACHE", str(tmp_path))
+    inside = []
+
+    def fail() -> None:
+        with own_cache():
+            inside.append(Path(os.environ["TOONSET_CACHE"]))
+            (inside[0] / "file").write_bytes(b"x")
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    assert os.environ["TOONSET_CACHE"] == str(tmp_path)
+    assert not inside[0].exists()
+    monkeypatch.delenv("TOONSET_CACHE")
+    with own_cache():
+        pass
+    assert "TOONSET_CACHE" not in os.environ
+
+
+# ---- conditions
+
+
+def test_ten_sheets_per_condition_are_over_forty_in_all() -> None:
+    assert 10 * len(CONDITIONS) >= 40
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = {
+        name: replace(c, options=replace(c.options, views=3, cell_px=120, supersample=1))
+        for name, c in CONDITIONS.items()
+    }
+    monkeypatch.setattr(cases, "CONDITIONS", few)
+
+
+@pytest.mark.usefixtures("small")
+def test_another_body_has_the_drawn_sheet_and_a_mannequin_without_its_bag() -> None:
+    drawn, other, plain = (next(calib_cases(None, 3, 1, n)) for n in ("drawn", "other", "plain"))
+    np.testing.assert_array_equal(drawn.rotations, other.rotations)
+    for one, same in zip(drawn.views, other.views, strict=True):
+        np.testing.assert_array_equal(one.rgba, same.rgba)
+    assert "bag" in drawn.mesh.part_names
+    for mesh in (other.mesh, plain.mesh):
+        assert "bag" not in mesh.part_names
+    assert other.mesh.height != drawn.mesh.height
+    assert next(calib_cases(None, 3, 1, "other")).mesh.height == other.mesh.height
+
+
+@pytest.mark.usefixtures("small")
+def test_only_the_asked_cases_are_drawn() -> None:
+    assert [case.name for case in calib_cases(None, 0, 2, "near 1")] == ["near 1"]
+    assert not list(calib_cases(None, 0, 2, "far"))
+
+
+# ---- table
+
+
+def worst_case(method: str) -> list[Record]:
+    bad = sheet(*[(179.0, 88.0, v) for v in SEVERITY for _ in range(30)])
+    good = sheet((0.01, 0.01, "ok"))
+    return sheet_records([replace(bad, seconds=1234.5), good], Recorder(method, "another body", 0))
+
+
+def test_the_table_has_a_row_per_method_and_fits_a_terminal() -> None:
+    methods = ["nominal angles", *METHODS, "COLMAP 1000 px, global"]
+    lines = sheets_table([r for m in methods for r in worst_case(m)]).splitlines()
+    assert max(map(len, lines)) <= 120
+    for method in methods:
+        assert sum(line.startswith(f"  {method}  ") for line in lines) == 1
+    assert "another body: 121 views, 2 sheets" in lines
+    (default,) = [line for line in lines if line.startswith("  default ")]
+    assert "26/25/25/25" in default
+    assert "90/120" in default
+
+
+def test_what_is_missing_is_a_dash_and_failed_runs_are_told() -> None:
+    recorder = Recorder("COLMAP", "photo", 0)
+    records = [
+        recorder.samples("seconds", [3.0], "s"),
+        recorder.total("views not placed", [True, True, False]),
+        recorder.total("failed runs", [False], "sheets"),
+    ]
+    text = sheets_table(records)
+    (row,) = [line for line in text.splitlines() if line.startswith("  COLMAP")]
+    assert row.split()[1:] == ["-"] * 11 + ["3.00", "3.00"]
+    assert "photo, COLMAP: views not placed 2 of 3" in text
+
+
+# ---- sprites
+
+
+@pytest.fixture(scope="module")
+def sprites(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a character of 4 sprites with its mesh, and one without."""
+    root = tmp_path_factory.mktemp("sprites")
+    options = SynthOptions(views=4, cell_px=64, outline_px=0, elevation_deg=30, supersample=2)
+    made = make_turnaround(random_body(5), options, 0)
+    (root / "body.obj").write_bytes(save_obj(made.mesh))
+    for name in ("exact", "free"):
+        place = root / "sprites" / name
+        place.mkdir(parents=True)
+        info: dict[str, object] = {"yaw_deg": [0, 90, 180, 270]}
+        if name == "exact":
+            info |= {"mesh": "body.obj", "alpha": "below 200 is the shadow"}
+        (place / "info.json").write_text(json.dumps(info))
+        for i, view in enumerate(made.views):
+            rgba = view.rgba.copy()
+            rgba[-4:, :, 3] = 150
+            (place / f"view_{i}.png").write_bytes(encode_png(rgba))
+    return root / "sprites"
+
+
+def test_a_shadow_is_cut_where_the_sprites_have_one(sprites: Path) -> None:
+    exact, free = sprite_cases(sprites)
+    assert (exact.group, free.group) == (OWN_MESH, MANNEQUIN)
+    assert not exact.views[0].rgba[-4:].any()
+    assert free.views[0].mask[-4:].all()
+    assert set(np.unique(exact.views[0].rgba[..., 3]) // 200) <= {0, 1}
+    assert exact.yaws == pytest.approx(np.radians([0, 90, 180, 270]))
+
+
+def test_sprites_with_their_mesh_are_measured_in_degrees(sprites: Path) -> None:
+    records = bench_sprites(sprite_cases(sprites, "exact"), 0)
+    assert {r.method for r in records} == {"default", "labels"}
+    exact = by_metric([r for r in records if r.method == "labels"])
+    assert exact["yaw error"].median < 3
+    assert exact["right 45 deg bin"].value == 1
+
+
+def test_sprites_without_a_mesh_are_asked_for_their_bin(
+    sprites: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = answer(np.stack([rotation_from_angles(math.radians(y), 0, 0) for y in (20, 70, 0, 0)]))
+    monkeypatch.setattr("toonset.bench.sprites.calibrate", lambda *_, **__: found)
+    records = bench_sprites(sprite_cases(sprites), 0)
+    free = by_metric([r for r in records if (r.group, r.method) == (MANNEQUIN, "default")])
+    assert (free["right 45 deg bin"].value, free["right 45 deg bin"].n) == (0.5, 4)
+    assert free["wrong but ok"].value == 2
+    assert "yaw error" not in free
+    text = sprites_table(records)
+    assert f"{OWN_MESH}: 4 views, 1 sheets" in text
+    assert max(map(len, text.splitlines())) <= 120
+
+
+@pytest.mark.parametrize("info", [{}, [], {"yaw_deg": ["left"]}, {"yaw_deg": []}, {"yaw_deg": 3}])
+def test_sprites_that_do_not_say_their_yaws_are_refused(tmp_path: Path, info: object) -> None:
+    (tmp_path / "cat").mkdir()
+    (tmp_path / "cat" / "info.json").write_text(json.dumps(info))
+    with pytest.raises(BundleError, match="yaw_deg"):
+        list(sprite_cases(tmp_path))
+
+
+def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
+    toonset, sprites, tmp_path, monkeypatch
+):
+    out = tmp_path / "out"
+    found = answer(np.stack([rotation_from_angles(math.radians(y), 0, 0) for y in (1, 88, 180, 9)]))
+    monkeypatch.setattr("toonset.bench.sprites.calibrate", lambda *_, **__: found)
+    command = ("bench", "calib", "--sprites", sprites, "--quiet", "-o", out)
+    done = toonset(*command, "--only", "exact")
+    assert done.code == 0, done
+    assert "right bin" in done.out
+    assert {p.name for p in out.iterdir()} == {
+        "records.json",
+        "chart-rendered-sprites-own-mesh.png",
+    }
+    assert {r["method"] for r in json.loads((out / "records.json").read_text())} == {
+        "default",
+        "labels",
+    }
+    assert "'dog'" in toonset(*command, "--force", "--only", "dog").reason
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ["train", "--sprites", "x"],
+        ["calib", "--sprites", "x", "--cases", "y"],
+        ["calib", "--sprites", "x", "--baseline", "colmap"],
+        ["stability", "--cases", "x"],
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(toonset, tmp_path, wrong):
+    assert toonset("bench", *wrong, "-o", tmp_path / "out").code == 2
+    assert not (tmp_path / "out").exists()
