@@ -16,7 +16,14 @@ from toonset.calib.coherence import coherence
 from toonset.calib.contour import drawn_contour
 from toonset.calib.drawing_error import Noise
 from toonset.calib.hypotheses import is_twin
-from toonset.calib.judge import SURE, WEAK_ANGLE, SheetState, angle_sigmas, judge_sheet
+from toonset.calib.judge import (
+    FAILED_COVERAGE,
+    SURE,
+    WEAK_ANGLE,
+    SheetState,
+    angle_sigmas,
+    judge_sheet,
+)
 from toonset.calib.ladder import ORTHOGRAPHIC, PER_VIEW, ModelChoice, Rung
 from toonset.calib.landmark_models import MARGIN
 from toonset.calib.landmarks import LandmarkFit, solve_landmarks
@@ -103,6 +110,9 @@ def _judged(view: View, drawing: Drawing, fit: LandmarkFit, surface: Surface) ->
     outline = measure(drawing, surface, drawing.pose_in(pose))
     sigmas = angle_sigmas(pose, fit.covariance)
     verdict, reason = _verdict(fit, sigmas, drawing.height / drawing.factor)
+    if verdict == "ok" and outline.coverage < FAILED_COVERAGE:
+        apart = f"{100 * (1 - outline.coverage):.0f} % of the outlines are more than 5 % apart"
+        verdict, reason = "weak", f"{apart}: are these the points of this mannequin?"
     return ViewCalibration(
         view.name,
         pose.camera(surface.middle, size_wh),
