@@ -4,7 +4,8 @@
 2. orthographic, a scale per view
 3. perspective, one distance for the sheet
 4. perspective, a distance per view
-and, only where the mannequin's outline is visibly not the drawings', its proportions.
+and, only where the mannequin's outline is visibly not the drawings', its proportions (which have
+priors of their own and therefore pay Akaike's 2 per number instead of BIC's log(samples)).
 
 All are one model in k = 1 / distance with more or fewer numbers free, so a richer model is judged
 by how far its extra numbers are from what the simpler one says, in their own covariance: BIC's gain
@@ -29,6 +30,8 @@ from toonset.calib.ties import Spreads
 BIC_MARGIN = 6.0  # "strong" evidence (Kass and Raftery 1995)
 # Where the mannequin is visibly another body, what its shape gets wrong looks like perspective.
 DOUBTFUL_MARGIN = 300.0
+# Proportions have priors, which BIC would count against them a second time: Akaike's 2 per unknown
+AKAIKE = 2.0
 FREE_SCALE = 0.2  # relative spread of scales that are not tied
 WIDTHS = np.geomspace(0.02, 0.01, 8)
 WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
@@ -55,11 +58,18 @@ class Rung:
         name: what it frees.
         bic_gain: over the model it extends; above the margin it is proven.
         unknowns: how many numbers it frees.
+        margin: what the gain must exceed.
     """
 
     name: str
     bic_gain: float
     unknowns: float
+    margin: float
+
+    @property
+    def is_proven(self) -> bool:
+        """Return whether the drawings refute the simpler model."""
+        return self.bic_gain > self.margin
 
 
 @dataclass(frozen=True)
@@ -71,14 +81,12 @@ class ModelChoice:
         distances: camera distance of every view in body heights; infinity for orthographic.
         rungs: what was tried.
         effective_samples: outline samples counted as independent.
-        margin: BIC gain that a richer model must show.
     """
 
     model: str
     distances: tuple[float, ...]
     rungs: tuple[Rung, ...]
     effective_samples: float
-    margin: float
 
     @property
     def is_perspective(self) -> bool:
@@ -88,7 +96,7 @@ class ModelChoice:
     @property
     def bends_mannequin(self) -> bool:
         """Return whether the mannequin's proportions were changed."""
-        return any(r.name == PROPORTIONS and r.bic_gain > BIC_MARGIN for r in self.rungs)
+        return any(rung.name == PROPORTIONS and rung.is_proven for rung in self.rungs)
 
 
 def climb(
@@ -111,24 +119,24 @@ def climb(
     views = len(poses)
     if keep_fov:
         fit = problem.fit(body, poses, WIDTHS, SheetModel("given"))
-        return fit, ModelChoice(GIVEN, _distances(fit), (), WHITE_POINTS * views, BIC_MARGIN)
+        return fit, ModelChoice(GIVEN, _distances(fit), (), WHITE_POINTS * views)
     margin = DOUBTFUL_MARGIN if doubtful else BIC_MARGIN
     samples = WHITE_POINTS * views
     fit = problem.fit(body, poses, WIDTHS, MODELS[SHARED])
     first_k = PARAMETERS * views
     gain = fit.poses[0].k ** 2 / fit.covariance[first_k, first_k] - np.log(samples)
-    rungs = [Rung(SHARED, float(gain), 1)]
-    model = SHARED if gain > margin else ORTHOGRAPHIC
+    rungs = [Rung(SHARED, float(gain), 1, margin)]
+    model = SHARED if rungs[0].is_proven else ORTHOGRAPHIC
     if model == ORTHOGRAPHIC:
         fit = problem.fit(body, poses, WIDTHS, MODELS[ORTHOGRAPHIC])
     if views > 1:
         richer = PER_VIEW if model == SHARED else SCALES
         rich = problem.fit(body, fit.poses, WARM_WIDTHS, MODELS[richer], offset=fit.offset)
         gain = _differences(rich, richer) - (views - 1) * np.log(samples)
-        rungs.append(Rung(richer, float(gain), views - 1))
-        if gain > margin:
+        rungs.append(Rung(richer, float(gain), views - 1, margin))
+        if rungs[1].is_proven:
             model, fit = richer, rich
-    return fit, ModelChoice(model, _distances(fit), tuple(rungs), samples, margin)
+    return fit, ModelChoice(model, _distances(fit), tuple(rungs), samples)
 
 
 def with_proportions(
@@ -140,9 +148,10 @@ def with_proportions(
     theta = bent.body.theta
     block = bent.covariance[-len(theta) :, -len(theta) :]
     unknowns = max(bent.freedom - fit.freedom, 1.0)
-    gain = theta @ np.linalg.solve(block, theta) - unknowns * np.log(choice.effective_samples)
-    choice = replace(choice, rungs=(*choice.rungs, Rung(PROPORTIONS, float(gain), unknowns)))
-    if gain <= BIC_MARGIN:
+    gain = theta @ np.linalg.solve(block, theta) - AKAIKE * unknowns
+    rung = Rung(PROPORTIONS, float(gain), unknowns, BIC_MARGIN)
+    choice = replace(choice, rungs=(*choice.rungs, rung))
+    if not rung.is_proven:
         return fit, choice
     return bent, replace(choice, distances=_distances(bent))
 

@@ -158,7 +158,6 @@ def _model(
     return ModelChoice(
         PER_VIEW if any(nearness) else ORTHOGRAPHIC,
         tuple(1 / near if near > 0 else float("inf") for near in nearness),
-        (Rung(TYPICAL, float(np.median([fit.bic_gain for fit in fits])), 1),),
+        (Rung(TYPICAL, float(np.median([fit.bic_gain for fit in fits])), 1, MARGIN),),
         float(2 * sum(len(own.names) for own in pairs)),
-        MARGIN,
     )

@@ -25,10 +25,14 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
             "chosen": model.model,
             "distance_heights": [d if math.isfinite(d) else None for d in model.distances],
             "tried": [
-                {"model": rung.name, "bic_gain": rung.bic_gain, "unknowns": rung.unknowns}
+                {
+                    "model": rung.name,
+                    "bic_gain": rung.bic_gain,
+                    "margin": rung.margin,
+                    "unknowns": rung.unknowns,
+                }
                 for rung in model.rungs
             ],
-            "bic_margin": model.margin,
             "effective_samples": model.effective_samples,
         },
         "outline_offset_of_height": calibration.outline_offset,
@@ -47,16 +51,14 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
 def model_line(calibration: Calibration) -> str:
     """Return what camera model was chosen and why, for people."""
     model = calibration.model
-    tried = ", ".join(f"{rung.name} {rung.bic_gain:+.0f}" for rung in model.rungs)
+    tried = ", ".join(f"{r.name} {r.bic_gain:+.0f} of {r.margin:.0f}" for r in model.rungs)
     text = f"camera model: {model.model}"
     near, far = min(model.distances), max(model.distances)
     if math.isfinite(near):
         text += f" from {near:.1f}" + (f" to {far:.1f}" if far > near * 1.01 else "")
         text += " body heights"
-    return (
-        f"{text} (BIC gain of {tried}; {model.margin:.0f} needed; "
-        f"{model.effective_samples:.0f} effective samples)"
-    )
+    evidence = f"BIC gain and what is needed: {tried}; " if tried else ""
+    return f"{text} ({evidence}{model.effective_samples:.0f} effective samples)"
 
 
 def view_line(view: ViewCalibration) -> str:
