@@ -71,6 +71,8 @@ def main() -> None:
     """Run the command line and leave with its exit code."""
     # Waiting threads that spin cost a loaded machine an order of magnitude; must precede torch.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    # NumPy's matrices are small here, and torch has threads of its own; must precede numpy.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app()
     except ToonsetError as error:
