@@ -31,8 +31,8 @@ MERGED = np.radians(3.0)  # starts this near to each other go to the same optimu
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
 EFFECTIVE_POINTS = 40.0  # weight of a view's outline against the priors, in points
-# Independent outline errors per view when it comes to how sure: fitted on 40 synthetic drawn sheets
-# so that probabilities of rival poses score best and yaw's z-scores have unit spread.
+# Independent outline errors per view when rival poses are compared: fitted on 40 synthetic drawn
+# sheets so that the rivals' probabilities score best.
 INDEPENDENT_POINTS = 10.0
 
 

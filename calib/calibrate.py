@@ -206,9 +206,8 @@ class _Problem:
         problem = JointProblem(self.fine, turn, self._kept())
         keep_fov = "fov" in self.known.locked
         differs = typical_coverage(self.fine, sketch) < ASKS_FOR_PROPORTIONS
-        joint, model = climb(
-            problem, sketch.body, sketch.poses, doubtful=differs, keep_fov=keep_fov
-        )
+        starts = self.known.at_locked_yaws(sketch.poses, self.surface.middle)
+        joint, model = climb(problem, sketch.body, starts, doubtful=differs, keep_fov=keep_fov)
         if differs:
             joint, model = with_proportions(self._level(problem, joint), joint, model)
         return joint, model, differs
@@ -240,7 +239,7 @@ class _Problem:
     def _kept(self) -> dict[str, Float[np.ndarray, " views"]]:
         poses = self.known.start_poses(self.surface.middle)
         values = {
-            "yaw": lambda: self.known.yaws(),
+            "yaw": lambda: self.known.yaws(self.surface.middle),
             "elevation": lambda: np.array([tilt(pose)[0][1] for pose in poses]),
             "scale": lambda: np.log([pose.scale for pose in poses]),
         }

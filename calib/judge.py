@@ -207,8 +207,8 @@ def _verdict(
         return "ambiguous", f"the mirror twin ({twin_is}) has p = {p_flip:.2f}"
     p_other = sum(p for p, _ in others)
     if p_other > 1 - SURE:
-        yaw = np.degrees(angles_from_rotation(others[0][1].rotation)[0]) % 360
-        return "ambiguous", f"yaw {yaw:.0f} fits as well, other directions have p = {p_other:.2f}"
+        rival = _direction(others[0][1])
+        return "ambiguous", f"{rival} fits as well, other directions have p = {p_other:.2f}"
     if index == sheet.odd_view:
         return "weak", "disagrees with the other drawings: wrong direction, mirrored or other scale"
     if coverage < WEAK_COVERAGE:
@@ -217,6 +217,11 @@ def _verdict(
         worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
         return "weak", f"the outline hardly changes with {worst}"
     return "ok", ""
+
+
+def _direction(pose: Pose) -> str:
+    yaw, elevation, _ = np.degrees(angles_from_rotation(pose.rotation))
+    return f"yaw {yaw % 360:.0f}, elevation {elevation:.0f}"
 
 
 def _in_view_pixels(

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from toonset.calib.hypotheses import Candidates
 from toonset.calib.labels import Label
 from toonset.calib.pose import Pose, project
-from toonset.camera import Camera
+from toonset.camera import Camera, angles_from_rotation, rotation_from_angles
 from toonset.dataset.landmark_file import Landmarks
 from toonset.errors import CameraError
 from toonset.view import View
@@ -64,11 +64,27 @@ class Known:
         """Return the cameras to start from relative to the mannequin's middle."""
         return tuple(_pose(camera, middle) for camera in self.cameras)
 
-    def yaws(self) -> Float[np.ndarray, " views"]:
-        """Return the yaws to keep."""
+    def yaws(self, middle: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " views"]:
+        """Return the yaws to keep, radians."""
         if self.cameras:
-            return np.array([camera.angles[0] for camera in self.cameras])
+            poses = self.start_poses(middle)
+            return np.array([angles_from_rotation(pose.rotation)[0] for pose in poses])
         return np.array([label[0] for label in self.labels])
+
+    def at_locked_yaws(
+        self, poses: Sequence[Pose], middle: Float[np.ndarray, " 3"]
+    ) -> tuple[Pose, ...]:
+        """Return the poses turned about +Y to the yaws to keep, if yaw is locked.
+
+        Steps are limited: a lock keeps a yaw, but does not bring a far one there.
+        """
+        if "yaw" not in self.locked:
+            return tuple(poses)
+        kept = []
+        for pose, yaw in zip(poses, self.yaws(middle), strict=True):
+            _, elevation, roll = angles_from_rotation(pose.rotation)
+            kept.append(replace(pose, rotation=rotation_from_angles(yaw, elevation, roll)))
+        return tuple(kept)
 
 
 def weighed_by_landmarks(

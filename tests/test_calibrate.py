@@ -199,3 +199,14 @@ def test_perspective_from_opencvs_pnp_on_the_same_outlines_agrees():
         assert solved_it
         assert (world @ rotation[2] + shift[2] > 0).all()
         assert math.degrees(rotation_distance(rotation, camera.rotation)) < 1.5
+
+
+def test_a_locked_yaw_stays_even_where_the_drawings_say_another():
+    turnaround = make_turnaround(random_body(13), dataclasses.replace(DRAWN, views=4), 13)
+    labels = parse_labels("front,right,back,left", 4)  # the sides are the other way round
+    known = Known(labels, locked=frozenset({"yaw"}))
+    found = calibrate(split_sheet(turnaround.sheet).views, turnaround.mesh, known=known)
+    for view, label in zip(found.views, labels, strict=True):
+        off = math.remainder(view.camera.angles[0] - label[0], 2 * math.pi)
+        assert abs(math.degrees(off)) < 0.1
+        assert view.verdict != "ok"
