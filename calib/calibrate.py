@@ -132,12 +132,11 @@ def calibrate(
         state = sheet_state(views, joint, surface, templates)
         final = problem.rivals(joint, model, candidates, differs=differs)
         sure = sheet.probabilities(final)
-        judged = with_sheet_in_mind(
-            [
-                judge_view(view, fine[i], joint.body.surface, joint, i, final[i], sure[i], state)
-                for i, view in enumerate(views)
-            ]
-        )
+        each = [
+            judge_view(view, fine[i], joint.body.surface, joint, i, final[i], sure[i], state)
+            for i, view in enumerate(views)
+        ]
+        judged = with_sheet_in_mind(each, sheet.faces_contradict(final))
     verdict, reason = judge_sheet(judged, state)
     return Calibration(
         judged,
@@ -238,7 +237,7 @@ class _Problem:
 
     def _kept(self) -> dict[str, Float[np.ndarray, " views"]]:
         poses = self.known.start_poses(self.surface.middle)
-        values = {
+        values: dict[str, Callable[[], Float[np.ndarray, " views"]]] = {
             "yaw": lambda: self.known.yaws(self.surface.middle),
             "elevation": lambda: np.array([tilt(pose)[0][1] for pose in poses]),
             "scale": lambda: np.log([pose.scale for pose in poses]),

@@ -27,6 +27,8 @@ WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
 FAILED_COVERAGE = 0.70
 # Sheets with cameras that are right contradict themselves by 0.4 to 0.9 %, wrong ones by 1.8 % on
 MOST_CONTRADICTION = 0.012
+# Of the probability that faces are none: at most 0.2 on sheets with right cameras
+MOST_FACES_CONTRADICT = 0.5
 TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly anything
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 OTHER = np.radians(15.0)  # an alternative this far away is another camera
@@ -129,10 +131,17 @@ def judge_view(
     )
 
 
-def with_sheet_in_mind(views: Sequence[ViewCalibration]) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where the typical view of the sheet is not.
+def with_sheet_in_mind(
+    views: Sequence[ViewCalibration], faces_contradict: float = 0.0
+) -> tuple[ViewCalibration, ...]:
+    """Return the views; none is ok where the sheet as a whole is not.
 
-    A wrong body can match a side view's outline well, at a wrong angle.
+    A wrong body can match a side view's outline well, at a wrong angle; a mirrored one matches all
+    views, front and back swapped.
+
+    Args:
+        views: judged one by one.
+        faces_contradict: probability that what looks like faces must be none.
     """
     typical = float(np.median([view.coverage for view in views]))
     doubtful = sum(view.verdict != "ok" for view in views)
@@ -143,6 +152,11 @@ def with_sheet_in_mind(views: Sequence[ViewCalibration]) -> tuple[ViewCalibratio
         )
     elif 2 * doubtful > len(views):
         reason = f"{doubtful} of the sheet's {len(views)} views are uncertain"
+    elif faces_contradict > MOST_FACES_CONTRADICT:
+        reason = (
+            f"what looks like faces is not where these cameras have the front (p = "
+            f"{faces_contradict:.2f}): is the sheet, the mannequin or a label the wrong way round?"
+        )
     else:
         return tuple(views)
     return tuple(

@@ -122,6 +122,22 @@ class Sheet:
 
     def probabilities(self, views: Sequence[Candidates]) -> list[Float[np.ndarray, " n"]]:
         """Return every candidate's probability: P(c) = sum_h P(h | sheet) P(c | h)."""
+        posterior, weights = self._posterior(views)
+        return [posterior @ (w / w.sum(axis=1, keepdims=True)) for w in weights]
+
+    def faces_contradict(self, views: Sequence[Candidates]) -> float:
+        """Return the probability that what looks like faces is none, since outlines deny it.
+
+        High where the outlines can only be explained with the faces at the back: a drawing or a
+        mannequin that is mirrored fits in its mirror twins' cameras, and all outlines agree.
+        """
+        posterior, _ = self._posterior(views)
+        return float(posterior[len(posterior) // 2 :].sum())
+
+    def _posterior(
+        self, views: Sequence[Candidates]
+    ) -> tuple[Float[np.ndarray, " h"], list[Float[np.ndarray, "h n"]]]:
+        """Return the probability of every hypothesis, and its candidates' unscaled ones."""
         energies = self._of_candidates(views)
         lowest = [e.min(axis=1, keepdims=True) for e in energies]
         weights = [np.exp(low - e) for low, e in zip(lowest, energies, strict=True)]
@@ -132,8 +148,7 @@ class Sheet:
         chosen = np.stack([e.argmin(axis=1) for e in energies], axis=1)
         log_evidence += self._paint(views, chosen, -log_evidence)
         posterior = np.exp(log_evidence - log_evidence.max())
-        posterior /= posterior.sum()
-        return [posterior @ (w / w.sum(axis=1, keepdims=True)) for w in weights]
+        return posterior / posterior.sum(), weights
 
     def _of_candidates(self, views: Sequence[Candidates]) -> list[Float[np.ndarray, "h n"]]:
         return [

@@ -10,6 +10,7 @@ import trimesh
 
 from toonset.calib.align import Drawing, ElevationPrior, Fit, align, tilt, upright_prior
 from toonset.calib.contour import drawn_contour
+from toonset.calib.face import FaceEvidence
 from toonset.calib.hypotheses import Candidates
 from toonset.calib.pose import Pose, project, project_with_jacobian
 from toonset.calib.rim import find_rim, prepare_surface, silhouette_mask
@@ -219,3 +220,14 @@ def test_a_drawing_too_faint_for_an_outline_is_refused_by_name():
     rgba[10:30, 20] = (0, 0, 0, 140)
     with pytest.raises(SheetError, match=r"000\.png: too thin or faint"):
         drawn_contour(View(rgba, (0, 0, 40, 40), 0.0, "000.png"))
+
+
+def test_outlines_that_put_the_faces_at_the_back_say_so():
+    yaws = np.radians(np.arange(0.0, 360.0, 45.0))
+    faces = FaceEvidence(4.0 * np.stack([np.cos(yaws), np.sin(yaws)], axis=1))
+    sheet_with_faces = Sheet(possible_turns(8), faces)
+    right = [candidates((pose_at(yaw, 0.1, 0.0), 0.0)) for yaw in yaws]
+    twins = [candidates((pose_at(math.pi - yaw, -0.1, 0.0), 0.0)) for yaw in yaws]
+    assert sheet_with_faces.faces_contradict(right) < 0.05
+    assert sheet_with_faces.faces_contradict(twins) > 0.9
+    assert sheet(8).faces_contradict(twins) < 0.05
