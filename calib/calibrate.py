@@ -33,10 +33,11 @@ from toonset.calib.judge import (
     judge_view,
     sheet_state,
     typical_coverage,
+    with_locks_in_mind,
     with_sheet_in_mind,
 )
 from toonset.calib.known import Known, weighed_by_landmarks
-from toonset.calib.ladder import ModelChoice, climb, with_proportions
+from toonset.calib.ladder import MODELS, ModelChoice, climb, with_proportions
 from toonset.calib.landmarks import landmark_starts
 from toonset.calib.match import Drawing
 from toonset.calib.paint import read_paint
@@ -83,6 +84,7 @@ NEAR_HEIGHTS = 3.0  # camera distance of the second first guess
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 SKETCHED = np.geomspace(0.04, 0.015, 6)  # a joint fit that only has to rank selections
 SKETCH_NOISE = Noise()  # one for all, so that energies compare
+FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held back may be far
 SAME_START = np.radians(25.0)  # a candidate this near to a start is what the start became
 ASKS_FOR_PROPORTIONS = 0.93  # share of the outlines that meet in the typical view
 
@@ -136,6 +138,7 @@ def calibrate(
             judge_view(view, fine[i], joint.body.surface, joint, i, final[i], sure[i], state)
             for i, view in enumerate(views)
         ]
+        each = with_locks_in_mind(each, problem.pulled(joint, model, turn))
         judged = with_sheet_in_mind(each, sheet.faces_contradict(final))
     verdict, reason = judge_sheet(judged, state)
     return Calibration(
@@ -234,6 +237,23 @@ class _Problem:
         height = self.coarse[index].height / self.coarse[index].factor
         landmarks = self.known.landmarks[index]
         return weighed_by_landmarks(view, landmarks, self.surface.middle, height)
+
+    def pulled(
+        self, joint: JointFit, model: ModelChoice, turn: Turn
+    ) -> Float[np.ndarray, " views"]:
+        """Return how far every view would turn without the locks, radians."""
+        if not self.known.locked - {"fov"}:
+            return np.zeros(len(joint.poses))
+        problem = JointProblem(self.fine, turn)
+        free = problem.fit(
+            joint.body, joint.poses, FREE_WIDTHS, MODELS[model.model], offset=joint.offset
+        )
+        return np.array(
+            [
+                rotation_distance(p.rotation, q.rotation)
+                for p, q in zip(joint.poses, free.poses, strict=True)
+            ]
+        )
 
     def _kept(self) -> dict[str, Float[np.ndarray, " views"]]:
         poses = self.known.start_poses(self.surface.middle)

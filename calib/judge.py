@@ -32,6 +32,8 @@ MOST_FACES_CONTRADICT = 0.5
 TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly anything
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 OTHER = np.radians(15.0)  # an alternative this far away is another camera
+# 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
+MOST_PULL = np.radians(5.0)
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
 
@@ -129,6 +131,32 @@ def judge_view(
         verdict,
         reason,
     )
+
+
+def with_locks_in_mind(
+    views: Sequence[ViewCalibration], pulled: Float[np.ndarray, " views"]
+) -> list[ViewCalibration]:
+    """Return the views; none is ok that its outline would turn far from what is locked.
+
+    A wrong lock can hide in another number (elevation in scale) and its sigma is none, so that the
+    outlines alone look well met. Where most views are pulled, all are.
+
+    Args:
+        views: judged one by one.
+        pulled: how far every view turns where nothing is locked, radians.
+    """
+    least = MOST_PULL if np.median(pulled) < MOST_PULL else 0.0
+    return [
+        replace(
+            view,
+            verdict="weak",
+            reason=f"without --lock the outlines turn this view by {np.degrees(turn):.0f} degrees: "
+            "is what is locked right?",
+        )
+        if view.verdict == "ok" and turn > least
+        else view
+        for view, turn in zip(views, pulled, strict=True)
+    ]
 
 
 def with_sheet_in_mind(

@@ -19,7 +19,7 @@ from toonset.calib.overlay import draw_overlay
 from toonset.calib.pose import Pose
 from toonset.calib.report import calibration_dict
 from toonset.calib.rim import prepare_surface
-from toonset.camera import rotation_distance
+from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.bodies import random_body
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
@@ -210,3 +210,21 @@ def test_a_locked_yaw_stays_even_where_the_drawings_say_another():
         off = math.remainder(view.camera.angles[0] - label[0], 2 * math.pi)
         assert abs(math.degrees(off)) < 0.1
         assert view.verdict != "ok"
+
+
+def test_a_wrong_lock_that_hides_in_another_number_is_not_ok():
+    options = SynthOptions(views=4, cell_px=260, elevation_deg=8, warp_percent=1, yaw_jitter_deg=3)
+    turnaround = make_turnaround(random_body(3204), options, 3204)
+    views = split_sheet(turnaround.sheet).views
+    free = [view.camera for view in calibrate(views, turnaround.mesh).views]
+    elevation = frozenset({"elevation"})
+    right = calibrate(views, turnaround.mesh, known=Known(cameras=tuple(free), locked=elevation))
+    tilted = tuple(
+        dataclasses.replace(camera, rotation=rotation_from_angles(yaw, up + 0.35, roll))
+        for camera in free
+        for yaw, up, roll in [camera.angles]
+    )
+    wrong = calibrate(views, turnaround.mesh, known=Known(cameras=tilted, locked=elevation))
+    assert not any("--lock" in view.reason for view in right.views)
+    assert all(view.verdict != "ok" for view in wrong.views)
+    assert any("--lock" in view.reason for view in wrong.views)
