@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import INDEPENDENT_POINTS, ElevationPrior, tilt
+from toonset.calib.align import ElevationPrior, tilt
 from toonset.calib.bank import load_bank
 from toonset.calib.common_elevation import common_elevation
 from toonset.calib.contour import drawn_contour
-from toonset.calib.drawing_error import Noise
+from toonset.calib.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.face import read_faces
-from toonset.calib.hypotheses import SAME_POSE, Candidates, level_twins, refine, with_twins
+from toonset.calib.hypotheses import Candidates, level_twins, refine, with_twins
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.judge import (
     TELLING_VIEWS,
@@ -33,6 +33,7 @@ from toonset.calib.judge import (
     judge_view,
     sheet_state,
     typical_coverage,
+    with_labels_in_mind,
     with_locks_in_mind,
     with_sheet_in_mind,
 )
@@ -42,12 +43,13 @@ from toonset.calib.landmarks import landmark_starts
 from toonset.calib.match import Drawing
 from toonset.calib.paint import read_paint
 from toonset.calib.pose import Pose
-from toonset.calib.proportions import Body, as_it_is
+from toonset.calib.proportions import as_it_is
 from toonset.calib.result import Calibration
 from toonset.calib.rim import Surface, prepare_surface
 from toonset.calib.shared import Sheet, possible_turns
 from toonset.calib.templates import Templates, find_hypotheses
 from toonset.calib.ties import Turn
+from toonset.calib.together import SKETCHED, TogetherSearch, with_k
 from toonset.calib.turns import TurnStart, likely_turns
 from toonset.camera import rotation_distance
 from toonset.mesh import Mesh
@@ -78,14 +80,10 @@ class CalibrationOptions:
 
 COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
 COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
-RECHECK_WIDTHS = np.geomspace(0.03, 0.015, 3)
-RECHECKED = 4  # best candidates of a view that are tried again at another camera distance
-NEAR_HEIGHTS = 3.0  # camera distance of the second first guess
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
-SKETCHED = np.geomspace(0.04, 0.015, 6)  # a joint fit that only has to rank selections
-SKETCH_NOISE = Noise()  # one for all, so that energies compare
 FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held back may be far
-SAME_START = np.radians(25.0)  # a candidate this near to a start is what the start became
+# Yaw's z-scores on 12 synthetic sheets each spread 0.9 and 1.4 without them
+SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.3
 ASKS_FOR_PROPORTIONS = 0.93  # share of the outlines that meet in the typical view
 
 
@@ -138,8 +136,9 @@ def calibrate(
             judge_view(view, fine[i], joint.body.surface, joint, i, final[i], sure[i], state)
             for i, view in enumerate(views)
         ]
+        each = with_labels_in_mind(each, known.labels)
         each = with_locks_in_mind(each, problem.pulled(joint, model, turn))
-        judged = with_sheet_in_mind(each, sheet.faces_contradict(final))
+        judged = with_sheet_in_mind(each, sheet.faces_contradict(final), bent=model.bends_mannequin)
     verdict, reason = judge_sheet(judged, state)
     return Calibration(
         judged,
@@ -185,7 +184,7 @@ class _Problem:
             starts = [h.pose for h in found]
             starts = [*starts, starts[0].twin(), *(turn.poses[i] for turn in together)]
             own = marked[i] if marked else None
-            starts += _with_k(own.poses, 0.0) if own else []
+            starts += with_k(own.poses, 0.0) if own else []
             reached = refine(self.coarse[i], self.surface, starts, COARSE_WIDTHS)
             candidates.append(self._informed(reached, i))
         return candidates, together
@@ -200,19 +199,21 @@ class _Problem:
             model = SheetModel("given")
             fit = JointProblem(self.coarse, turn).fit(body, starts[0].poses, SKETCHED[-1:], model)
             return replace(fit, poses=starts[0].poses), turn, candidates
-        search = _Together(self.coarse, body, self.sheet, self._informed)
+        search = TogetherSearch(self.coarse, body, self.sheet, self._informed)
         return search.run(candidates, starts, self.options.rounds)
 
     def joint(self, sketch: JointFit, turn: Turn) -> tuple[JointFit, ModelChoice, bool]:
         """Return the fit at full resolution, its model, and whether the mannequin differs."""
-        problem = JointProblem(self.fine, turn, self._kept())
-        keep_fov = "fov" in self.known.locked
         differs = typical_coverage(self.fine, sketch) < ASKS_FOR_PROPORTIONS
+        samples = ROUGH_POINTS if differs else WHITE_POINTS
+        problem = JointProblem(self.fine, turn, self._kept(), samples)
+        keep_fov = "fov" in self.known.locked
         starts = self.known.at_locked_yaws(sketch.poses, self.surface.middle)
         joint, model = climb(problem, sketch.body, starts, doubtful=differs, keep_fov=keep_fov)
         if differs:
             joint, model = with_proportions(self._level(problem, joint), joint, model)
-        return joint, model, differs
+        factor = SIGMA_OF_ANOTHER_BODY if differs else SIGMA_OF_SAME_BODY
+        return replace(joint, covariance=factor**2 * joint.covariance), model, differs
 
     def rivals(
         self,
@@ -279,105 +280,9 @@ class _Problem:
         return problem.with_elevation(ElevationPrior(mean + found.offset, found.sigma))
 
 
-@dataclass(frozen=True, eq=False)
-class _Together:
-    """The search for the selection of candidates that explains the sheet best."""
-
-    drawings: Sequence[Drawing]
-    body: Body
-    sheet: Sheet
-    informed: Callable[[Candidates, int], Candidates]
-
-    def run(
-        self, candidates: Sequence[Candidates], starts: Sequence[TurnStart], rounds: int
-    ) -> tuple[JointFit, Turn, list[Candidates]]:
-        """Return the best joint fit over selections, its turn, and the candidates at its k.
-
-        The first selections: the candidates' own, as if orthographic and as if seen from near by
-        (perspective of two to three body heights moves outlines so much that the wrong candidate
-        can win without it), and the turns that explain all silhouettes.
-        """
-        nearby = self._at_camera(candidates, 1 / (NEAR_HEIGHTS * self.body.rest.height))
-        selections = [self._selected(candidates), self._selected(nearby)]
-        selections += [_nearest(candidates, start.poses) for start in starts]
-        best, turn, found = None, Turn(np.full(len(candidates), np.nan)), list(candidates)
-        for _ in range(rounds):
-            fits = [self._sketched(poses) for poses in _distinct(selections)]
-            leader = self._best(fits)[0]
-            fits.append(self._sketched([pose.twin() for pose in leader.poses]))
-            contender, its_turn = self._best(fits if best is None else [best, *fits])
-            if contender is best:
-                break
-            best, turn = contender, its_turn
-            again = [
-                replace(view, fits=(replace(view.fits[0], pose=pose), *view.fits[:RECHECKED]))
-                for pose, view in zip(best.poses, candidates, strict=True)
-            ]
-            found = self._at_camera(again, best.poses[0].k)
-            selections = [self._selected(found)]
-            if _same(selections[0], best.poses):
-                break
-        assert best is not None
-        return best, turn, found
-
-    def _best(self, fits: Sequence[JointFit]) -> tuple[JointFit, Turn]:
-        """Return the most probable of some joint fits, and the turn that it is."""
-        prior, turns = self.sheet.weigh([fit.poses for fit in fits])
-        views = len(self.drawings)
-        likelihood = [np.log(fit.energy / views) for fit in fits]
-        least = int(np.argmin(0.5 * INDEPENDENT_POINTS * views * np.array(likelihood) + prior))
-        return fits[least], turns[least]
-
-    def _sketched(self, poses: Sequence[Pose]) -> JointFit:
-        """Return a joint fit that only has to rank a selection."""
-        _, turns = self.sheet.weigh([poses])
-        problem = JointProblem(self.drawings, turns[0])
-        return problem.fit(self.body, poses, SKETCHED, SheetModel("shared"), SKETCH_NOISE)
-
-    def _selected(self, candidates: Sequence[Candidates]) -> list[Pose]:
-        chosen, _ = self.sheet.choose(candidates)
-        return [view.fits[c].pose for view, c in zip(candidates, chosen, strict=True)]
-
-    def _at_camera(self, candidates: Sequence[Candidates], k: float) -> list[Candidates]:
-        """Refine the best candidates and their twins again at a given k."""
-        surface = self.body.surface
-        again = []
-        for i, (drawing, found) in enumerate(zip(self.drawings, candidates, strict=True)):
-            starts = _with_k(with_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
-            again.append(self.informed(refine(drawing, surface, starts, RECHECK_WIDTHS), i))
-        return again
-
-
-def _nearest(candidates: Sequence[Candidates], starts: Sequence[Pose]) -> list[Pose]:
-    """Return what each view's start became, or the start where its view ran away from it."""
-    poses = []
-    for view, start in zip(candidates, starts, strict=True):
-        turns = [rotation_distance(fit.pose.rotation, start.rotation) for fit in view.fits]
-        near = int(np.argmin(turns))
-        poses.append(view.fits[near].pose if turns[near] < SAME_START else start)
-    return poses
-
-
-def _distinct(selections: Sequence[list[Pose]]) -> list[list[Pose]]:
-    kept: list[list[Pose]] = []
-    for poses in selections:
-        if not any(_same(poses, other) for other in kept):
-            kept.append(poses)
-    return kept
-
-
-def _same(poses: Sequence[Pose], others: Sequence[Pose]) -> bool:
-    turns = [rotation_distance(p.rotation, q.rotation) for p, q in zip(poses, others, strict=True)]
-    return max(turns) < SAME_POSE
-
-
 def _rivals(pose: Pose, candidates: Candidates) -> list[Pose]:
     """Return the chosen pose, its twin and the best candidates, all with the chosen k."""
-    return _with_k(with_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)
-
-
-def _with_k(poses: Sequence[Pose], k: float) -> list[Pose]:
-    return [replace(pose, k=k) for pose in poses]
+    return with_k(with_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)
 
 
 @contextmanager

@@ -29,7 +29,8 @@ from scipy.linalg import cho_factor, cho_solve
 from toonset.calib.match import Drawing
 
 LENGTH_OF_HEIGHT = 0.13  # a bump's width and the grid's spacing; chosen on synthetic sheets
-WHITE_POINTS = 80.0  # independent samples of what is not smooth: one per 1 to 2 % of the outline
+WHITE_POINTS = 200.0  # independent samples of what is not smooth: the points of a drawn outline
+ROUGH_POINTS = 80.0  # the same where the mannequin is, or may be, another body: it errs along arcs
 PRIOR_MODES = 20.0  # how many of a sheet's determined modes the expected smooth error is worth
 LEAST_WHITE_PX = 0.2  # of the drawing as it is: what a pixel hides
 LEAST_SMOOTH, MOST_SMOOTH = 0.0007, 0.05  # of the height
@@ -87,6 +88,7 @@ def marginalise(
     shares: Float[np.ndarray, " n"],
     robust: Float[np.ndarray, " n"],
     width: float,
+    samples: float,
 ) -> Marginal:
     """Return the normal equations of rows x = -residuals under the drawing's error.
 
@@ -100,8 +102,9 @@ def marginalise(
         shares: each row's share of the outline; sums to one.
         robust: weight of each row in [0, 1].
         width: robust width over the height, for the energy.
+        samples: how many independent samples the outline is worth.
     """
-    weights = shares * robust * WHITE_POINTS / (noise.white * height_px) ** 2
+    weights = shares * robust * samples / (noise.white * height_px) ** 2
     per_point = np.bincount(target_index, weights, len(modes))
     inner = (modes * per_point[:, None]).T @ modes
     inner[np.diag_indices_from(inner)] += 1 / noise.smooth**2
@@ -120,7 +123,7 @@ def marginalise(
     return Marginal(
         system[:-1, :-1],
         system[:-1, -1],
-        float(bent @ bent / noise.smooth**2 + WHITE_POINTS * shares @ capped / noise.white**2),
+        float(bent @ bent / noise.smooth**2 + samples * shares @ capped / noise.white**2),
         float(bent @ bent),
         max(len(bent) - unsure, 1e-3),
         float((shares * robust) @ rest**2 / (shares @ robust)),

@@ -20,6 +20,7 @@ from jaxtyping import Float
 
 from toonset.calib.align import MAX_TURN, ElevationPrior
 from toonset.calib.drawing_error import (
+    ROUGH_POINTS,
     Marginal,
     Noise,
     error_modes,
@@ -112,18 +113,21 @@ class JointProblem:
         drawings: Sequence[Drawing],
         turn: Turn | None = None,
         kept: Mapping[str, Float[np.ndarray, " views"]] = MappingProxyType({}),
+        samples: float = ROUGH_POINTS,
     ) -> None:
         """Prepare the drawings' error modes.
 
         Args:
             drawings: outlines at the working scale, one per view.
             turn: where the views are meant to be seen from.
+            samples: how many independent samples an outline is worth.
             kept: yaw, elevation (radians) or scale (log, px of the views) that stay as given.
         """
         self.drawings = tuple(drawings)
         self.modes = [error_modes(drawing) for drawing in drawings]
         self.turn = turn
         self.elevation = ElevationPrior()
+        self.samples = samples
         self.kept = {
             name: values + np.log([d.factor for d in drawings]) if name == "scale" else values
             for name, values in kept.items()
@@ -219,6 +223,7 @@ class JointProblem:
             1 / (2 * counts),
             (width**2 / (width**2 + relative**2)) ** 2,
             width,
+            self.samples,
         )
 
     def _system(self, state: _State, model: SheetModel, width: float, *, settled: bool) -> _System:

@@ -12,6 +12,7 @@ from toonset.calib.align import measure
 from toonset.calib.coherence import coherence
 from toonset.calib.hypotheses import Candidates, is_twin
 from toonset.calib.joint import JointFit
+from toonset.calib.labels import Label
 from toonset.calib.match import Drawing
 from toonset.calib.pose import PARAMETERS, Pose
 from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
@@ -20,8 +21,6 @@ from toonset.calib.templates import Templates, turns_visibly
 from toonset.camera import angles_from_rotation, rotation_distance
 from toonset.view import View
 
-# Matching and linearisation leave a little out: z-scores of 18 synthetic sheets spread 1.3 without
-SIGMA_FACTOR = 1.2
 SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
 WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
 FAILED_COVERAGE = 0.70
@@ -34,6 +33,7 @@ SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 OTHER = np.radians(15.0)  # an alternative this far away is another camera
 # 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
 MOST_PULL = np.radians(5.0)
+FAR_FROM_LABEL = np.radians(60.0)  # three quarters is neither front nor side
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
 
@@ -101,7 +101,7 @@ def judge_view(
     size_wh = (view.rgba.shape[1], view.rgba.shape[0])
     fit = measure(drawing, surface, drawing.pose_in(pose))
     own = slice(PARAMETERS * index, PARAMETERS * (index + 1))
-    covariance = _in_view_pixels(SIGMA_FACTOR**2 * joint.covariance[own, own], drawing.factor)
+    covariance = _in_view_pixels(joint.covariance[own, own], drawing.factor)
     far = [
         (float(p), f.pose)
         for p, f in zip(probability, candidates.fits, strict=True)
@@ -159,8 +159,21 @@ def with_locks_in_mind(
     ]
 
 
+def with_labels_in_mind(
+    views: Sequence[ViewCalibration], labels: Sequence[Label]
+) -> list[ViewCalibration]:
+    """Return the views; none is ok that ended far from what its label says."""
+    judged = list(views)
+    for i, (view, label) in enumerate(zip(views, labels, strict=False)):
+        off = [abs((view.camera.angles[0] - yaw + np.pi) % (2 * np.pi) - np.pi) for yaw in label]
+        if view.verdict == "ok" and off and min(off) > FAR_FROM_LABEL:
+            reason = f"{np.degrees(min(off)):.0f} degrees from its label: which of them is right?"
+            judged[i] = replace(view, verdict="weak", reason=reason)
+    return judged
+
+
 def with_sheet_in_mind(
-    views: Sequence[ViewCalibration], faces_contradict: float = 0.0
+    views: Sequence[ViewCalibration], faces_contradict: float = 0.0, *, bent: bool = False
 ) -> tuple[ViewCalibration, ...]:
     """Return the views; none is ok where the sheet as a whole is not.
 
@@ -170,6 +183,7 @@ def with_sheet_in_mind(
     Args:
         views: judged one by one.
         faces_contradict: probability that what looks like faces must be none.
+        bent: the mannequin was another body, its proportions were fitted.
     """
     typical = float(np.median([view.coverage for view in views]))
     doubtful = sum(view.verdict != "ok" for view in views)
@@ -178,6 +192,8 @@ def with_sheet_in_mind(
             f"in the sheet's typical view {100 * (1 - typical):.0f} % of the outlines are more "
             "than 5 % of the height apart: the mannequin's shape differs from the drawings'"
         )
+    elif bent:
+        reason = "the mannequin is another body: its proportions were fitted to the drawings"
     elif 2 * doubtful > len(views):
         reason = f"{doubtful} of the sheet's {len(views)} views are uncertain"
     elif faces_contradict > MOST_FACES_CONTRADICT:

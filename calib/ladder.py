@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toonset.calib.drawing_error import WHITE_POINTS
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.pose import PARAMETERS, Pose
 from toonset.calib.proportions import Body
@@ -119,9 +118,9 @@ def climb(
     views = len(poses)
     if keep_fov:
         fit = problem.fit(body, poses, WIDTHS, SheetModel("given"))
-        return fit, ModelChoice(GIVEN, _distances(fit), (), WHITE_POINTS * views)
+        return fit, ModelChoice(GIVEN, _distances(fit), (), problem.samples * views)
     margin = DOUBTFUL_MARGIN if doubtful else BIC_MARGIN
-    samples = WHITE_POINTS * views
+    samples = problem.samples * views
     fit = problem.fit(body, poses, WIDTHS, MODELS[SHARED])
     first_k = PARAMETERS * views
     gain = fit.poses[0].k ** 2 / fit.covariance[first_k, first_k] - np.log(samples)

@@ -17,6 +17,7 @@ from toonset.calib.pose import Pose, project
 from toonset.calib.rim import Rim, Surface, rim_at
 
 FAR = 10.0  # heights
+SUBPIXEL_HEIGHT = 90.0  # px of a figure's height per subpixel of the visibility test
 DIRECTION_OF_HEIGHT = 0.06  # a contour turned by 60 degrees counts as this far away
 BLOCK = 64  # rows of a distance table at once
 
@@ -71,6 +72,7 @@ class Drawing:
         self.free = scaled.free[::every]
         self.height = height
         self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
+        self.subpixels = max(1, round(height_px / SUBPIXEL_HEIGHT))
         self.direction_px = DIRECTION_OF_HEIGHT * height
         self.features = np.hstack([self.points, self.direction_px * self.normals])
         self.table = Table(self.features)
@@ -88,7 +90,7 @@ class Drawing:
 def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
     """Return two-sided nearest neighbours of rim and drawn outline at a working pose."""
     spacing = max(1.0, drawing.height / 128)
-    rim = rim_at(surface, pose, drawing.size_wh, spacing)
+    rim = rim_at(surface, pose, drawing.size_wh, spacing, drawing.subpixels)
     if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
         far = np.full(len(drawing.points), drawing.height)
         zeros = np.zeros((len(far), 3))

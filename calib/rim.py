@@ -22,6 +22,7 @@ from toonset.calib.pose import Pose, project
 from toonset.calib.surface import Surface as Surface
 from toonset.calib.surface import prepare_surface as prepare_surface
 
+OUTSIDE_PX = 0.75  # beside a straight outline the pixel there is background, however it lies
 FAR = 9.0  # depth that means "nothing here" in the rasteriser
 
 
@@ -55,7 +56,13 @@ def silhouette_mask(
     return depth < FAR - 0.1
 
 
-def rim_at(surface: Surface, pose: Pose, size_wh: tuple[int, int], spacing_px: float) -> Rim:
+def rim_at(
+    surface: Surface,
+    pose: Pose,
+    size_wh: tuple[int, int],
+    spacing_px: float,
+    subpixels: int = 1,
+) -> Rim:
     """Return the points of the surface on its outer silhouette, seen from `pose`.
 
     Args:
@@ -63,9 +70,11 @@ def rim_at(surface: Surface, pose: Pose, size_wh: tuple[int, int], spacing_px: f
         pose: of the camera; its pixels also set the resolution of the visibility test.
         size_wh: image size that holds the figure.
         spacing_px: distance of neighbouring rim points along an edge.
+        subpixels: the visibility test's pixels per pixel, along an axis: the rim of a leg that is
+            hidden by less than such a pixel counts as seen.
     """
     ends, pixels, layers = _seen_folds(surface, pose)
-    return _rim(ends, pixels, layers, size_wh, spacing_px)
+    return _rim(ends, pixels, layers, size_wh, spacing_px, subpixels)
 
 
 def mask_at(
@@ -87,7 +96,7 @@ def find_rim(
     ab, ac = b - a, c - a
     folds, layers = _folds(surface, ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0)
     edges = surface.edges[folds]
-    return _rim(surface.vertices[edges], pixels[edges], layers, size_wh, spacing_px)
+    return _rim(surface.vertices[edges], pixels[edges], layers, size_wh, spacing_px, 1)
 
 
 def _seen_folds(
@@ -121,6 +130,7 @@ def _rim(
     layers: Int[np.ndarray, " folds"],
     size_wh: tuple[int, int],
     spacing_px: float,
+    subpixels: int,
 ) -> Rim:
     (u, v), (du, dv) = pixels[:, 0].T, (pixels[:, 1] - pixels[:, 0]).T
     length = np.hypot(du, dv)
@@ -128,40 +138,37 @@ def _rim(
     which = np.repeat(np.arange(len(count)), count)
     step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
     fraction = (step + 0.5) / count[which]
-    at_u, at_v = u[which] + fraction * du[which], v[which] + fraction * dv[which]
-    keep = np.flatnonzero(_is_outer(at_u, at_v, pixels, layers, size_wh))
-    which, fraction = which[keep], fraction[keep, None]
     outward = np.sign(layers[which]) / length[which]
     normals = np.stack([outward * dv[which], -outward * du[which]], axis=1)
+    at = np.stack([u[which] + fraction * du[which], v[which] + fraction * dv[which]], axis=1)
+    beside = at * subpixels + OUTSIDE_PX * normals
+    size = (size_wh[0] * subpixels, size_wh[1] * subpixels)
+    keep = np.flatnonzero(_is_background(beside, pixels * subpixels, layers, size))
+    which, fraction = which[keep], fraction[keep, None]
     points = ends[which, 0] * (1 - fraction) + ends[which, 1] * fraction
-    return Rim(points, normals)
+    return Rim(points, normals[keep])
 
 
-def _is_outer(
-    u: Float[np.ndarray, " n"],
-    v: Float[np.ndarray, " n"],
+def _is_background(
+    points: Float[np.ndarray, "n 2"],
     folds: Float[np.ndarray, "folds 2 2"],
     layers: Int[np.ndarray, " folds"],
     size_wh: tuple[int, int],
 ) -> Bool[np.ndarray, " n"]:
-    """Return which points lie in the picture, in or next to a pixel of the background."""
-    if len(u) == 0:
+    """Return which points lie in the picture, in a pixel of the background."""
+    if len(points) == 0:
         return np.zeros(0, dtype=bool)
     left, right = _span(folds[..., 0], size_wh[0])
     top, bottom = _span(folds[..., 1], size_wh[1])
     width, height = right - left, bottom - top
     if width == 0 or height == 0:
-        return np.zeros(len(u), dtype=bool)
+        return np.zeros(len(points), dtype=bool)
     near = folds - np.array([left, top])
-    mask = covered(near[:, 0], near[:, 1], layers, (width, height))
-    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-    inner = cv2.erode(
-        mask.view(np.uint8), cross, borderType=cv2.BORDER_CONSTANT, borderValue=0
-    ).ravel()
-    column, row = np.floor(u - left).astype(np.intp), np.floor(v - top).astype(np.intp)
+    mask = covered(near[:, 0], near[:, 1], layers, (width, height)).ravel()
+    column, row = np.floor(points - (left, top)).astype(np.intp).T
     seen = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     place = np.where(seen, row * width + column, 0)
-    return seen & (inner[place] == 0)
+    return seen & ~mask[place]
 
 
 def _span(values: Float[np.ndarray, "folds 2"], size: int) -> tuple[int, int]:

@@ -135,7 +135,9 @@ def test_a_vase_has_no_yaw_and_is_not_called_ok():
 
 
 def test_another_body_is_not_called_ok():
-    _, found, errors = solved(DRAWN, 51, mannequin=random_body(58))
+    other = random_body(58)
+    stout = dataclasses.replace(other, vertices=other.vertices * [1.5, 1.0, 1.5])
+    _, found, errors = solved(DRAWN, 51, mannequin=stout)
     assert found.verdict != "ok"
     assert not [e for e in errors if e.verdict == "ok" and math.degrees(e.raw) > 15]
 
@@ -228,3 +230,14 @@ def test_a_wrong_lock_that_hides_in_another_number_is_not_ok():
     assert not any("--lock" in view.reason for view in right.views)
     assert all(view.verdict != "ok" for view in wrong.views)
     assert any("--lock" in view.reason for view in wrong.views)
+
+
+def test_a_label_that_the_drawing_contradicts_is_said():
+    turnaround = make_turnaround(random_body(11), dataclasses.replace(CLEAN, views=4), 11)
+    views = split_sheet(turnaround.sheet).views
+    found = calibrate(
+        views, turnaround.mesh, known=Known(parse_labels("front,left,front,right", 4))
+    )
+    far = view_error(found.views[2].camera, turnaround.cameras[2].rotation, "ok")
+    assert found.views[2].verdict != "ok"
+    assert math.degrees(far.raw) < 5 or found.views[2].p_flip > 0.05

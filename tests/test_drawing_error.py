@@ -30,7 +30,16 @@ def test_integrating_out_equals_generalised_least_squares(seed):
     index, rows, residuals, shares, robust = problem(np.random.default_rng(seed), drawing)
     modes = error_modes(drawing)
     found = marginalise(
-        modes, noise, drawing.height, index, rows, residuals, shares, robust, width=0.02
+        modes,
+        noise,
+        drawing.height,
+        index,
+        rows,
+        residuals,
+        shares,
+        robust,
+        width=0.02,
+        samples=80.0,
     )
     white = (noise.white * drawing.height) ** 2 / (shares * robust * 80.0)
     covariance = noise.smooth**2 * modes[index] @ modes[index].T + np.diag(white)
@@ -55,7 +64,16 @@ def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
             residuals += rng.normal(0, white * drawing.height, count)
             rows = np.zeros((count, 0))
             marginal = marginalise(
-                modes, estimate, drawing.height, index, rows, residuals, shares, np.ones(count), 1.0
+                modes,
+                estimate,
+                drawing.height,
+                index,
+                rows,
+                residuals,
+                shares,
+                np.ones(count),
+                1.0,
+                80.0,
             )
             views.append(marginal)
         estimate = next_noise(views, 0.0, 1.0)
@@ -69,7 +87,16 @@ def test_a_bent_drawing_costs_information():
     modes = error_modes(drawing)
     rigid, bent = (
         marginalise(
-            modes, Noise(s, 0.004), drawing.height, index, rows, residuals, shares, robust, 0.02
+            modes,
+            Noise(s, 0.004),
+            drawing.height,
+            index,
+            rows,
+            residuals,
+            shares,
+            robust,
+            0.02,
+            80.0,
         ).normal
         for s in (1e-5, 0.02)
     )
