@@ -33,6 +33,7 @@ from toonset.calib.judge import (
     judge_view,
     sheet_state,
     typical_coverage,
+    with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
     with_sheet_in_mind,
@@ -136,7 +137,7 @@ def calibrate(
             judge_view(view, fine[i], joint.body.surface, joint, i, final[i], sure[i], state)
             for i, view in enumerate(views)
         ]
-        each = with_labels_in_mind(each, known.labels)
+        each = with_labels_in_mind(with_elevations_in_mind(each), known.labels)
         each = with_locks_in_mind(each, problem.pulled(joint, model, turn))
         judged = with_sheet_in_mind(each, sheet.faces_contradict(final), bent=model.bends_mannequin)
     verdict, reason = judge_sheet(judged, state)

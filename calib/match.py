@@ -121,9 +121,10 @@ def nearest(asking: Table, asked: Table) -> Int[np.ndarray, " n"]:
     hundred points faster than building and asking a search tree.
     """
     blocks = range(0, len(asking.rows), BLOCK)
-    return np.concatenate(
-        [(asking.rows[i : i + BLOCK] @ asked.columns).argmin(axis=1) for i in blocks]
-    )
+    with np.errstate(invalid="ignore"):  # some BLAS raise the flag beside the result
+        return np.concatenate(
+            [(asking.rows[i : i + BLOCK] @ asked.columns).argmin(axis=1) for i in blocks]
+        )
 
 
 def _thinned(rim: Rim, wanted: int) -> Rim:

@@ -51,13 +51,13 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
 def model_line(calibration: Calibration) -> str:
     """Return what camera model was chosen and why, for people."""
     model = calibration.model
-    tried = ", ".join(f"{r.name} {r.bic_gain:+.0f} of {r.margin:.0f}" for r in model.rungs)
+    tried = "; ".join(f"{r.name} {r.bic_gain:+.0f} of {r.margin:.0f}" for r in model.rungs)
     text = f"camera model: {model.model}"
     near, far = min(model.distances), max(model.distances)
     if math.isfinite(near):
         text += f" from {near:.1f}" + (f" to {far:.1f}" if far > near * 1.01 else "")
         text += " body heights"
-    evidence = f"BIC gain and what is needed: {tried}; " if tried else ""
+    evidence = f"BIC gain and what is needed: {tried}. " if tried else ""
     return f"{text} ({evidence}{model.effective_samples:.0f} effective samples)"
 
 
