@@ -90,9 +90,12 @@ def test_a_mirrored_drawing_is_the_mirrored_body(sheet: DrawnSheet):
 
 def test_cropping_takes_the_lowest_rows_and_nothing_else(sheet):
     view, camera = sheet.drawings[1]
-    cut, same = without_feet(view, camera, 0.25)
+    cut, cropped = without_feet(view, camera, 0.25)
     rows, left = (np.flatnonzero(v.mask.any(axis=1)) for v in (view, cut))
-    assert same is camera
+    assert cropped.size_wh == cut.rgba.shape[1::-1]
+    points = np.random.default_rng(0).normal(size=(5, 3))
+    np.testing.assert_array_equal(cropped.project(points)[0], camera.project(points)[0])
+    assert left[-1] == len(cut.rgba) - 1  # the picture's edge cuts the figure
     assert len(left) == pytest.approx(0.75 * len(rows), abs=1)
     np.testing.assert_array_equal(cut.rgba[: left[-1] + 1], view.rgba[: left[-1] + 1])
     assert without_feet(view, camera, 0)[0] is view
