@@ -83,8 +83,8 @@ COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
 COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held back may be far
-# Yaw's z-scores on 12 synthetic sheets each spread 0.9 and 1.4 without them
-SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.3
+# Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them
+SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
 ASKS_FOR_PROPORTIONS = 0.93  # share of the outlines that meet in the typical view
 
 
