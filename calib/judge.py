@@ -119,6 +119,8 @@ def judge_view(
     sideways = abs(np.cos(angles_from_rotation(pose.rotation)[0])) < SIDEWAYS
     twin_is = "seen from below for above" if sideways else "front and back swapped"
     verdict, reason = _verdict(fit.coverage, sigmas, p_flip, others, sheet, index, twin_is)
+    if verdict == "ok" and not drawing.free.all():
+        verdict, reason = "weak", "the picture's edge cuts the figure: scale and shift are guesses"
     return ViewCalibration(
         view.name,
         pose.camera(surface.middle, size_wh),
