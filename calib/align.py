@@ -19,9 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.match import Drawing as Drawing
-from toonset.calib.match import Matches as Matches
-from toonset.calib.match import match as match
+from toonset.calib.match import Drawing, Matches, match
 from toonset.calib.pose import PARAMETERS, Pose, project, project_with_jacobian
 from toonset.calib.surface import Surface
 from toonset.camera import rotation_distance

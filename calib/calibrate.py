@@ -29,6 +29,7 @@ from toonset.calib.hypotheses import Candidates, level_twins, refine, with_twins
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.judge import (
     TELLING_VIEWS,
+    WEAK_COVERAGE,
     judge_sheet,
     judge_view,
     sheet_state,
@@ -85,7 +86,6 @@ FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held back may be far
 # Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them
 SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
-ASKS_FOR_PROPORTIONS = 0.93  # share of the outlines that meet in the typical view
 
 
 def calibrate(
@@ -205,7 +205,7 @@ class _Problem:
 
     def joint(self, sketch: JointFit, turn: Turn) -> tuple[JointFit, ModelChoice, bool]:
         """Return the fit at full resolution, its model, and whether the mannequin differs."""
-        differs = typical_coverage(self.fine, sketch) < ASKS_FOR_PROPORTIONS
+        differs = typical_coverage(self.fine, sketch) < WEAK_COVERAGE
         samples = ROUGH_POINTS if differs else WHITE_POINTS
         problem = JointProblem(self.fine, turn, self._kept(), samples)
         keep_fov = "fov" in self.known.locked

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import INDEPENDENT_POINTS, Drawing, Fit, align_all
+from toonset.calib.align import INDEPENDENT_POINTS, Fit, align_all
+from toonset.calib.match import Drawing
 from toonset.calib.pose import Pose, project
 from toonset.calib.rim import Surface, silhouette_mask
 from toonset.camera import rotation_distance

@@ -120,8 +120,8 @@ class JointProblem:
         Args:
             drawings: outlines at the working scale, one per view.
             turn: where the views are meant to be seen from.
-            samples: how many independent samples an outline is worth.
             kept: yaw, elevation (radians) or scale (log, px of the views) that stay as given.
+            samples: how many independent samples an outline is worth.
         """
         self.drawings = tuple(drawings)
         self.modes = [error_modes(drawing) for drawing in drawings]

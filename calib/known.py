@@ -17,7 +17,7 @@ from toonset.errors import CameraError
 from toonset.view import View
 
 LOCKS = ("yaw", "elevation", "scale", "fov")
-CLICK_OF_HEIGHT = 0.015  # error of a landmark under a candidate's camera, proportions included
+PAIR_OF_HEIGHT = 0.015  # error of a landmark under a candidate's camera, proportions included
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def weighed_by_landmarks(
     """
     if landmarks is None:
         return view
-    sigma = CLICK_OF_HEIGHT * height_px
+    sigma = PAIR_OF_HEIGHT * height_px
     costs = []
     for fit in view.fits:
         off = project(fit.pose, landmarks.world - middle) - landmarks.pixels

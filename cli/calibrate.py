@@ -139,6 +139,8 @@ def calibrate(
 
 def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
     """Return what the landmarks say of the views that have any."""
+    if not known.landmarks:
+        return []
     from toonset.calib.landmarks import landmark_starts
     from toonset.calib.rim import prepare_surface
 

@@ -8,10 +8,11 @@ import pytest
 import torch
 import trimesh
 
-from toonset.calib.align import Drawing, ElevationPrior, Fit, align, tilt, upright_prior
+from toonset.calib.align import ElevationPrior, Fit, align, tilt, upright_prior
 from toonset.calib.contour import drawn_contour
 from toonset.calib.face import FaceEvidence
 from toonset.calib.hypotheses import Candidates
+from toonset.calib.match import Drawing
 from toonset.calib.pose import Pose, project, project_with_jacobian
 from toonset.calib.rim import find_rim, prepare_surface, silhouette_mask
 from toonset.calib.shared import Sheet, possible_turns

@@ -1,0 +1,62 @@
+"""What is known of a sheet weakens its views: elevation, labels, locks, other views."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from toonset.calib.judge import (
+    with_elevations_in_mind,
+    with_labels_in_mind,
+    with_locks_in_mind,
+    with_sheet_in_mind,
+)
+from toonset.calib.result import Sigmas, ViewCalibration
+from toonset.camera import Camera
+
+
+def seen_from(yaw_deg: float = 0.0, elevation_deg: float = 10.0) -> ViewCalibration:
+    camera = Camera.looking_at(
+        np.zeros(3), math.radians(yaw_deg), math.radians(elevation_deg), 90.0, (100, 100)
+    )
+    sigmas = Sigmas(0.01, 0.01, 0.01, 0.01, 0.5)
+    return ViewCalibration(
+        "000.png", camera, sigmas, np.eye(6), 0.0, camera.twin(), (), 0.01, 0.99, "ok", ""
+    )
+
+
+def verdicts(views) -> list[str]:
+    return [view.verdict for view in views]
+
+
+def test_a_view_that_looks_up_where_the_sheet_looks_down_is_not_ok():
+    views = [seen_from(elevation_deg=e) for e in (10, 8, 12, -10)]
+    judged = with_elevations_in_mind(views)
+    assert verdicts(judged) == ["ok", "ok", "ok", "weak"]
+    assert "mirrored" in judged[3].reason
+
+
+def test_a_view_far_from_its_label_is_not_ok_and_no_label_says_nothing():
+    views = [seen_from(yaw_deg=y) for y in (20, 170, 170)]
+    labels = [(0.0,), (0.0,), ()]
+    assert verdicts(with_labels_in_mind(views, labels)) == ["ok", "weak", "ok"]
+
+
+def test_views_that_turn_without_their_lock_are_not_ok():
+    views = [seen_from() for _ in range(3)]
+    assert verdicts(with_locks_in_mind(views, np.radians([1, 2, 9]))) == ["ok", "ok", "weak"]
+    assert verdicts(with_locks_in_mind(views, np.radians([9, 2, 9]))) == ["weak"] * 3
+
+
+@pytest.mark.parametrize("how", ["bent", "faces", "uncertain", "shape"])
+def test_no_view_is_ok_where_the_sheet_is_not(how):
+    views = [seen_from() for _ in range(3)]
+    if how == "uncertain":
+        views[:2] = [replace(view, verdict="ambiguous") for view in views[:2]]
+    if how == "shape":
+        views[:2] = [replace(view, coverage=0.9) for view in views[:2]]
+    judged = with_sheet_in_mind(views, 0.9 if how == "faces" else 0.0, bent=how == "bent")
+    assert judged[2].verdict == "weak"
+    assert judged[2].reason
+    assert verdicts(with_sheet_in_mind([seen_from()] * 3)) == ["ok"] * 3
