@@ -22,6 +22,8 @@ LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
 SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
 WIDE = 1.8  # times the median width: two figures that touch
 
+Box = tuple[int, int, int, int]
+
 
 @dataclass(frozen=True)
 class SheetOptions:
@@ -34,12 +36,33 @@ class SheetOptions:
         least_hole: share of the figure's area from which an enclosed patch in the background's
             colour is a hole.
         most_figures: more are refused; a sheet of letters or a pattern is no character sheet.
+        background_rgb: the background's colour, where a person knows it.
+        boxes: (x, y, width, height) of the figures where a person gives them; one view each, in
+            this order.
+        grid: columns and rows of equal cells, one view per cell that is not empty.
     """
 
     margin_px: int = 4
     least_figure: float = 0.2
     least_hole: float = 0.001
     most_figures: int = 64
+    background_rgb: tuple[int, int, int] | None = None
+    boxes: tuple[Box, ...] = ()
+    grid: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something on the sheet that is no view.
+
+    Attributes:
+        box: (x, y, width, height) in the sheet.
+        kind: "text", "frame", "swatch", "study" (a head, a prop, a small extra drawing), "mark"
+            (an arrow, a rule) or "speck".
+    """
+
+    box: Box
+    kind: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +74,14 @@ class Sheet:
         background: the sheet's colour; None where it is transparent.
         sure: share of the sheet's border that is background, 0 to 1.
         warnings: what was dropped or doubtful, for people.
+        left_out: what was seen but is no view.
     """
 
     views: tuple[View, ...]
     background: tuple[int, int, int] | None
     sure: float
     warnings: tuple[str, ...]
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def split_sheet(
@@ -89,7 +114,6 @@ def split_sheet(
     return Sheet(tuple(views), ground.rgb, ground.sure, warnings)
 
 
-Box = tuple[int, int, int, int]
 Crop = tuple[Box, Bool[np.ndarray, "_ _"]]
 
 
