@@ -54,7 +54,7 @@ def palette(
     """
     from toonset.dataset.palette_files import write_palette
     from toonset.files import new_folder
-    from toonset.palette.extract import label_image
+    from toonset.palette.labels import label_image
 
     printer = Printer(as_json, quiet)
     places = inputs or [BUNDLE]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from toonset.dataset.scene import Scene
-from toonset.palette.extract import extract_palette, label_image
+from toonset.palette.extract import extract_palette
+from toonset.palette.labels import label_image
 from toonset.palette.palette import Palette
 
 

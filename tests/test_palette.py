@@ -11,10 +11,9 @@ from toonset.errors import PaletteError
 from toonset.palette.extract import (
     PaletteOptions,
     extract_palette,
-    label_image,
-    nearest_colors,
     pick_palette,
 )
+from toonset.palette.labels import label_image, nearest_colors
 from toonset.palette.mixed import mixed_pixels
 from toonset.palette.names import NAMED, name_of
 from toonset.palette.oklab import oklab_from_rgb
