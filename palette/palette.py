@@ -18,7 +18,7 @@ class PaletteColor:
 
     Attributes:
         rgb: 8-bit sRGB.
-        share: of the character's flat pixels over all pictures, 0 to 1.
+        share: of the character's pixels over all pictures, 0 to 1.
         name: a plain name for people.
     """
 
@@ -28,20 +28,69 @@ class PaletteColor:
 
 
 @dataclass(frozen=True)
+class Place:
+    """Where most of a colour is.
+
+    Attributes:
+        view: number of the picture, from 0.
+        box: (x, y, width, height) in its pixels.
+    """
+
+    view: int
+    box: tuple[int, int, int, int]
+
+
+@dataclass(frozen=True)
 class DroppedColor:
     """A colour that fell under the rule.
 
     Attributes:
         rgb: 8-bit sRGB.
-        share: of the character's flat pixels, 0 to 1.
+        share: of the character's pixels, 0 to 1.
         name: a plain name for people.
         cost: distance in OKLab from its pixels to the palette colour that they now get, the mean.
+        place: its largest patch; None if unknown.
     """
 
     rgb: tuple[int, int, int]
     share: float
     name: str
     cost: float
+    place: Place | None = None
+
+
+@dataclass(frozen=True)
+class ContourColor:
+    """The colour of the drawn lines.
+
+    Attributes:
+        rgb: 8-bit sRGB.
+        share: of the character's pixels that are lines, 0 to 1.
+        cloth: share of the character's pixels that have this colour without being lines.
+        name: a plain name for people.
+    """
+
+    rgb: tuple[int, int, int]
+    share: float
+    cloth: float
+    name: str
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Why so many colours were told apart: their description is the shortest.
+
+    Bits to describe 1,024 independent pixels of the character, with the colours themselves.
+
+    Attributes:
+        colors: told apart, those under the rule included.
+        one_less: bits more with one colour less.
+        one_more: bits more with one colour more.
+    """
+
+    colors: int
+    one_less: float
+    one_more: float
 
 
 @dataclass(frozen=True)
@@ -53,12 +102,16 @@ class Palette:
         rule: how they were chosen, in words.
         dropped: what was seen but left out.
         warnings: what a person should know.
+        contour: the drawn lines' colour; None without lines, or where nobody looked for them.
+        evidence: of the number of colours; None where it was not chosen by us.
     """
 
     colors: tuple[PaletteColor, ...]
     rule: str
     dropped: tuple[DroppedColor, ...] = ()
     warnings: tuple[str, ...] = ()
+    contour: ContourColor | None = None
+    evidence: Evidence | None = None
 
     def __post_init__(self) -> None:
         """Refuse palettes that cannot label anything.
