@@ -1,0 +1,106 @@
+"""JSON files of a bundle: read strictly, named by a schema, checked against it.
+
+A file says what it is in `schema`: "NAME/MAJOR", or "NAME/MAJOR.MINOR". Within a major version keys
+may be added, never changed or taken away, so readers ignore keys that they do not know. A camera
+is the exception: a number more could change where it looks, so its keys must all be known.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from toonset.errors import BundleError
+from toonset.reading import read_whole
+from toonset.strict_json import parse_json
+
+MAX_JSON_BYTES = 32 * 2**20
+MOST_PROBLEMS = 20  # of one file; the rest is counted
+
+Record = TypeVar("Record", bound=BaseModel)
+
+
+class SchemaProblems(BundleError):
+    """A file that does not fit its schema.
+
+    Attributes:
+        problems: where in the file and what, one line each, the first 20 in words.
+    """
+
+    def __init__(self, file: Path, error: ValidationError) -> None:
+        """Say the first problem and how many there are; keep all."""
+        problems = _problems(error, MOST_PROBLEMS)
+        more = error.error_count() - len(problems)
+        self.problems = [*problems, f"and {more} more problems like these"] if more else problems
+        super().__init__(f"{file}: {validation_reason(error)}")
+
+
+def read_json(file: Path) -> Any:
+    """Return the content of a JSON file of bounded size.
+
+    Raises:
+        BundleError: the file cannot be read, is too large, or is no JSON (see
+            `toonset.strict_json`).
+    """
+    data = read_whole(file, "JSON", BundleError, MAX_JSON_BYTES)
+    return parse_json(data, str(file), BundleError)
+
+
+def schema_version(content: Any, name: str, newest: int, where: str) -> int | None:
+    """Return the major version that a file's `schema` states, None where it states none.
+
+    Args:
+        content: of the file.
+        name: of the schema that is meant, e.g. "toonset-calibration".
+        newest: the highest major version that is understood.
+        where: the file, for messages.
+
+    Raises:
+        BundleError: another schema, or one of a newer toonset.
+    """
+    stated = content.get("schema") if isinstance(content, dict) else None
+    if stated is None:
+        return None
+    match = re.fullmatch(rf"{name}/([1-9]\d{{0,3}})(\.\d{{1,4}})?", str(stated), re.ASCII)
+    if match is None:
+        raise BundleError(
+            f"{where}: schema {str(stated)[:60]!r}, '{name}/{newest}' is needed; write it again"
+        )
+    major = int(match[1])
+    if major > newest:
+        raise BundleError(
+            f"{where}: schema '{name}/{major}' is newer than this toonset, which reads up to "
+            f"'{name}/{newest}'; update toonset"
+        )
+    return major
+
+
+def validated(schema: type[Record], content: Any, file: Path) -> Record:
+    """Return the content of a file as its schema has it.
+
+    Raises:
+        SchemaProblems: it does not fit.
+    """
+    try:
+        return schema.model_validate(content)
+    except ValidationError as error:
+        raise SchemaProblems(file, error) from error
+
+
+def validation_reason(error: ValidationError) -> str:
+    """Return where and what the first problem of a schema check is."""
+    return f"{_problems(error, 1)[0]} ({error.error_count()} problem(s)); correct the file"
+
+
+def _problems(error: ValidationError, most: int) -> list[str]:
+    found = error.errors(include_url=False, include_context=False, include_input=False)
+    return [_problem(tuple(one["loc"]), one["msg"]) for one in found[:most]]
+
+
+def _problem(path: tuple[object, ...], message: str) -> str:
+    place = ".".join(str(part)[:60] for part in path)
+    text = f"field {place}: {message}" if place else f"the whole: {message}"
+    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
