@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from toonset.cli.export_formats import TARGETS, Format, Job
 from toonset.cli.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -19,24 +21,18 @@ from toonset.cli.output import (
 )
 
 if TYPE_CHECKING:
-    import numpy as np
-    from jaxtyping import Float
-
-    from toonset.camera import Camera
-    from toonset.dataset.colmap import FarPinhole
     from toonset.dataset.colmap_points import TrackedPoints
-    from toonset.dataset.scene import Frame
+    from toonset.dataset.export_views import ExportView
     from toonset.mesh import Mesh
 
-WRITTEN = ("images", "masks", "sparse", "toonset.json")
-RIM_SPACING_PX = 2.0
-SURFACE_POINTS = 10_000  # about what a splatting trainer starts a single object from
+COLMAP_PANEL = "COLMAP"
 
 
-class Format(StrEnum):
-    """What is written."""
+class Layout(StrEnum):
+    """Which COLMAP reads it."""
 
-    colmap = "colmap"
+    new = "new"
+    old = "old"
 
 
 def export(
@@ -47,89 +43,109 @@ def export(
     to: Annotated[Format, typer.Option("--to", help="Format.")] = Format.colmap,
     mesh: Annotated[
         Path | None,
-        typer.Option("--mesh", help="Mannequin for points3D (default: the bundle's own)."),
+        typer.Option("--mesh", help="The mannequin (default: the bundle's own)."),
     ] = None,
-    text: Annotated[bool, typer.Option("--text", help="Write .txt files, not .bin.")] = False,
+    text: Annotated[
+        bool,
+        typer.Option("--text", help="Write .txt files, not .bin.", rich_help_panel=COLMAP_PANEL),
+    ] = False,
+    layout: Annotated[
+        Layout,
+        typer.Option(
+            "--layout",
+            help="old: without rigs and frames, as COLMAP before 3.12.",
+            rich_help_panel=COLMAP_PANEL,
+        ),
+    ] = Layout.new,
+    centre: Annotated[
+        bool,
+        typer.Option(
+            "--centre",
+            help="Pad pictures until the principal point is in the middle: Gaussian splatting's "
+            "own reader takes it to be there.",
+            rich_help_panel=COLMAP_PANEL,
+        ),
+    ] = False,
     force: ForceFlag = False,
     seed: SeedOption = 0,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Write a bundle as a COLMAP dataset: images over white, masks, sparse/0 and exact cameras.
+    """Write a bundle for another program: pictures, cameras, mannequin, and toonset.json.
 
-    COLMAP has no orthographic camera; such views become pinholes 100 body heights away, and how
-    far these may be off is printed. points3D are points of the mannequin.
+    Where a format has no orthographic camera, such views become pinholes 100 body heights away, and
+    how far these may be off is printed. The exact cameras are in toonset.json.
     """
-    from toonset.dataset.bundle import MANNEQUIN
-    from toonset.dataset.colmap import read_far_pinholes, write_colmap
-    from toonset.dataset.mesh_file import load_mesh
-    from toonset.dataset.transforms import read_scene, transforms_file
-    from toonset.errors import MeshError
+    if to != Format.colmap and (text or centre or layout != Layout.new):
+        raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
+    from toonset.dataset.export_lens import centred
+    from toonset.dataset.export_views import read_views
 
-    printer = Printer(as_json, quiet)
-    check_output(out, [bundle, mesh], WRITTEN, force=force)
-    frames = read_scene(bundle).frames
-    pinholes = read_far_pinholes(bundle)
+    printer, target = Printer(as_json, quiet), TARGETS[to]
+    check_output(out, [bundle, mesh], target.written, force=force)
+    views = read_views(bundle)
+    if centre:
+        views = tuple(centred(view) for view in views)
+    body = _mannequin(bundle, mesh)
+    points = None
+    if body is not None and target.wants_points:
+        printer.progress("colouring points")
+        points = _points(body, views, seed, is_given=mesh is not None)
+    job = Job(out, views, points, body, text, layout == Layout.old, force)
+    _report(printer, to, job, target.write(job))
+
+
+def _mannequin(bundle: Path, mesh: Path | None) -> Mesh | None:
+    """Return the mesh that was named, else the bundle's own, else None."""
+    from toonset.dataset.bundle import MANNEQUIN
+    from toonset.dataset.mesh_file import load_mesh
+    from toonset.dataset.transforms import transforms_file
+
     own = transforms_file(bundle).parent / MANNEQUIN
     body = mesh or (own if own.is_file() else None)
-    points = None
-    if body is not None:
-        printer.progress("colouring points")
-        cameras = [pinhole.camera for pinhole in pinholes]
-        points = _points(load_mesh(body), frames, cameras, seed)
-    if mesh is not None and points is None:
-        raise MeshError(
-            f"{mesh}: no point of it lies on the figure in every drawing; give the mannequin of "
-            "the calibration, or none"
-        )
-    write_colmap(out, frames, pinholes, points, text=text, force=force)
-    error_px = max(pinhole.error_px for pinhole in pinholes)
-    printer.say(_summary(frames, pinholes, points))
-    count = 0 if points is None else len(points.xyz)
-    values = {"out": out, "format": to.value, "views": len(frames), "points": count}
-    printer.result({**values, "pinhole_error_px": error_px}, str(out))
+    return None if body is None else load_mesh(body)
 
 
 def _points(
-    mesh: Mesh, frames: tuple[Frame, ...], cameras: list[Camera], seed: int
+    body: Mesh, views: Sequence[ExportView], seed: int, *, is_given: bool
 ) -> TrackedPoints | None:
-    """Return coloured points of the mannequin; None where none lies on the figure in all views."""
-    import numpy as np
+    from toonset.cli.export_points import mannequin_points
+    from toonset.errors import MeshError
 
-    from toonset.dataset.colmap_points import sample_surface, track_points
-
-    candidates = [*_rims(mesh, cameras), sample_surface(mesh, SURFACE_POINTS, seed)]
-    points = track_points(np.concatenate(candidates), mesh, frames, cameras)
-    return points if len(points.xyz) else None
-
-
-def _rims(mesh: Mesh, cameras: list[Camera]) -> list[Float[np.ndarray, "n 3"]]:
-    """Return the points of the mannequin that are its outline in a view, per view."""
-    from toonset.calib.rim import find_rim, prepare_surface
-
-    surface = prepare_surface(mesh)
-    rims = []
-    for camera in cameras:
-        pixels, _, in_front = camera.project(mesh.vertices)
-        if in_front.all():
-            rim = find_rim(surface, pixels, camera.size_wh, RIM_SPACING_PX)
-            rims.append(rim.points + surface.middle)
-    return rims
+    points = mannequin_points(body, views, seed)
+    if points is None and is_given:
+        raise MeshError(
+            f"{body.name}: no point of it lies on the figure in every drawing; give the mannequin "
+            "of the calibration, or none"
+        )
+    return points
 
 
-def _summary(
-    frames: tuple[Frame, ...],
-    pinholes: tuple[FarPinhole, ...],
-    points: TrackedPoints | None,
-) -> str:
-    far = sum(frame.camera.is_orthographic for frame in frames)
-    lines = [f"{len(frames)} {'view' if len(frames) == 1 else 'views'}"]
-    if far:
-        error_px = max(pinhole.error_px for pinhole in pinholes)
+def _report(printer: Printer, to: Format, job: Job, views: Sequence[ExportView]) -> None:
+    from toonset.dataset.export_views import largest_error_px
+
+    error_px = 0.0 if TARGETS[to].is_exact else largest_error_px(views)
+    printer.say("\n".join(_summary(to, job, views, error_px)))
+    count = 0 if job.points is None else len(job.points.xyz)
+    values = {"out": job.out, "format": to.value, "views": len(views), "points": count}
+    printer.result({**values, "pinhole_error_px": error_px}, str(job.out))
+
+
+def _summary(to: Format, job: Job, views: Sequence[ExportView], error_px: float) -> list[str]:
+    """Return what a person should know, line by line."""
+    target = TARGETS[to]
+    far = sum(view.camera.is_orthographic for view in views)
+    lines = [f"{len(views)} {'view' if len(views) == 1 else 'views'}"]
+    if far and not target.is_exact:
         lines.append(f"{far} orthographic, written as far pinholes: at most {error_px:.2f} px off")
-    if points is None:
-        lines.append("points3D is empty; give a mannequin that the drawings show as --mesh")
-    else:
-        several = int((points.seen.sum(axis=0) > 1).sum())
-        lines.append(f"{len(points.xyz)} points, {several} of them seen by several views")
-    return "\n".join(lines)
+    pairs = list(zip(job.views, views, strict=True))
+    grown = max(new.camera.scale / old.camera.scale for old, new in pairs)
+    if any(old.rgba.shape != new.rgba.shape for old, new in pairs):
+        width, height = views[0].camera.size_wh
+        lines.append(f"pictures padded to {width} x {height} px, enlarged by {grown:.3f} at most")
+    if target.wants_points and job.points is None:
+        lines.append("no points; give a mannequin that the drawings show as --mesh")
+    elif job.points is not None:
+        several = int((job.points.seen.sum(axis=0) > 1).sum())
+        lines.append(f"{len(job.points.xyz)} points, {several} of them seen by several views")
+    return [*lines, target.hint] if target.hint else lines

@@ -14,9 +14,10 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.bodies import random_body
-from toonset.dataset.colmap import FarPinhole, read_far_pinholes, write_colmap
+from toonset.dataset.colmap import write_colmap
 from toonset.dataset.colmap_points import depth_map, sample_surface, track_points
 from toonset.dataset.colmap_read import read_colmap
+from toonset.dataset.export_views import ExportView, read_views
 from toonset.dataset.mesh_file import load_mesh, save_obj
 from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.scene import Frame
@@ -77,32 +78,37 @@ def around(target: np.ndarray, seed: int = 5) -> np.ndarray:
 
 @pytest.mark.parametrize("text", [False, True], ids=["bin", "txt"])
 @pytest.mark.parametrize("k", [0.0, 0.2], ids=["orthographic", "pinhole"])
-def test_cameras_return_with_the_same_pixels(tmp_path: Path, text: bool, k: float) -> None:
+@pytest.mark.parametrize("old", [False, True], ids=["new", "old"])
+def test_cameras_return_with_the_same_pixels(
+    tmp_path: Path, text: bool, k: float, old: bool
+) -> None:
     frames = posed(5, k=k)
-    pinholes = read_far_pinholes(bundle_of(frames, tmp_path / "bundle"))
-    write_colmap(tmp_path / "out", frames, pinholes, text=text)
+    views = read_views(bundle_of(frames, tmp_path / "bundle"))
+    write_colmap(tmp_path / "out", views, text=text, old_layout=old)
     found = read_colmap(tmp_path / "out")
     assert [name for name, _ in found] == [frame.name for frame in frames]
-    for (_, camera), pinhole, frame in zip(found, pinholes, frames, strict=True):
+    for (_, camera), view, frame in zip(found, views, frames, strict=True):
         points = around(frame.camera.target)
         pixels = camera.project(points)[0]
-        assert np.abs(pixels - pinhole.camera.project(points)[0]).max() < 0.01
+        assert np.abs(pixels - view.pinhole.project(points)[0]).max() < 0.01
         off = np.linalg.norm(pixels - frame.camera.project(points)[0], axis=1).max()
-        assert off <= pinhole.error_px + 0.01
-        assert (pinhole.error_px > 0) == frame.camera.is_orthographic
+        assert off <= view.error_px + 0.01
+        assert (view.error_px > 0) == frame.camera.is_orthographic
         assert camera.size_wh == frame.camera.size_wh
+    rigs = list((tmp_path / "out" / "sparse" / "0").glob("rigs.*"))
+    assert len(rigs) == (not old)
 
 
 def test_exact_cameras_stand_beside_the_model(tmp_path: Path) -> None:
     frames = posed(3)
-    pinholes = read_far_pinholes(bundle_of(frames, tmp_path / "bundle"))
-    write_colmap(tmp_path / "out", frames, pinholes)
+    views = read_views(bundle_of(frames, tmp_path / "bundle"))
+    write_colmap(tmp_path / "out", views)
     beside = json.loads((tmp_path / "out" / "toonset.json").read_text())
-    assert beside["pinhole_error_px"] == max(p.error_px for p in pinholes) > 0
-    for view, frame in zip(beside["views"], frames, strict=True):
-        assert view["name"] == frame.name
-        assert view["camera"]["model"] == "orthographic"
-        np.testing.assert_array_equal(view["camera"]["rotation"], frame.camera.rotation)
+    assert beside["pinhole_error_px"] == max(view.error_px for view in views) > 0
+    for record, frame in zip(beside["views"], frames, strict=True):
+        assert record["name"] == frame.name
+        assert record["camera"]["model"] == "orthographic"
+        np.testing.assert_array_equal(record["camera"]["rotation"], frame.camera.rotation)
 
 
 @pytest.mark.parametrize("text", [False, True], ids=["bin", "txt"])
@@ -111,10 +117,10 @@ def test_pycolmap_projects_points_to_their_keypoints(tmp_path: Path, text: bool)
     frames = [
         replace(f, rgba=np.full_like(f.rgba, 255)) for f in posed(4)
     ]  # all figure: no point is dropped
-    pinholes = [FarPinhole(f.camera.as_pinhole(180.0), 0.1) for f in frames]
-    cameras = [p.camera for p in pinholes]
+    views = [ExportView(f.name, f.rgba, f.camera, 180.0, RADIUS) for f in frames]
+    cameras = [view.pinhole for view in views]
     points = track_points(sample_surface(mesh, 300, 0), mesh, frames, cameras)
-    write_colmap(tmp_path / "out", frames, pinholes, points, text=text)
+    write_colmap(tmp_path / "out", views, points, text=text)
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
     assert (model.num_reg_images(), model.num_points3D()) == (4, len(points.xyz))
     for i, (_, point) in enumerate(sorted(model.points3D.items())):
@@ -133,8 +139,8 @@ def test_pycolmap_projects_points_to_their_keypoints(tmp_path: Path, text: bool)
 
 def test_pictures_are_over_white_and_masks_tell_the_figure(tmp_path: Path) -> None:
     frames = posed(2)
-    pinholes = read_far_pinholes(bundle_of(frames, tmp_path / "bundle"))
-    write_colmap(tmp_path / "out", frames, pinholes)
+    views = read_views(bundle_of(frames, tmp_path / "bundle"))
+    write_colmap(tmp_path / "out", views)
     for frame in frames:
         figure = frame.rgba[..., 3] == 255
         picture = load_rgba(tmp_path / "out" / "images" / frame.name)
@@ -210,8 +216,8 @@ def test_surface_samples_lie_on_the_surface_and_follow_the_seed() -> None:
 @pytest.fixture
 def dataset(tmp_path: Path) -> Path:
     frames = posed(2)
-    pinholes = read_far_pinholes(bundle_of(frames, tmp_path / "bundle"))
-    write_colmap(tmp_path / "out", frames, pinholes)
+    views = read_views(bundle_of(frames, tmp_path / "bundle"))
+    write_colmap(tmp_path / "out", views)
     return tmp_path / "out"
 
 
@@ -251,10 +257,9 @@ def test_lens_distortion_is_refused_by_name(dataset: Path) -> None:
 def test_two_pictures_of_one_name_are_refused(tmp_path: Path) -> None:
     frames = posed(2)
     frames[1] = replace(frames[1], name="000.jpg")
-    pinholes = [FarPinhole(frame.camera.as_pinhole(180.0), 0.1) for frame in frames]
+    bundle = bundle_of(frames, tmp_path / "bundle")
     with pytest.raises(BundleError, match=r"two pictures would be written as 000\.png"):
-        write_colmap(tmp_path / "out", frames, pinholes)
-    assert not (tmp_path / "out").exists()
+        read_views(bundle)
 
 
 # ---- the verb
@@ -269,7 +274,7 @@ def test_export_writes_what_pycolmap_reads(toonset, tmp_path: Path) -> None:
     bare = toonset("export", bundle, "-o", out, "--json")
     assert bare.code == 0, bare
     assert bare.json["points"] == 0
-    assert "points3D is empty" in bare.err
+    assert "no points; give a mannequin" in bare.err
     assert f"at most {bare.json['pinhole_error_px']:.2f} px off" in bare.err
     again = toonset("export", bundle, "-o", out, "--mesh", tmp_path / "m.obj", "--text")
     assert "exists already" in again.reason

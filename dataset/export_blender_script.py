@@ -1,0 +1,81 @@
+"""Writing a Python script that rebuilds cameras, mannequin and drawings inside Blender.
+
+    import_cameras.py    run it in Blender: blender --python import_cameras.py, or Scripting > Open
+    images/000.png       the drawings, RGBA
+    mannequin.obj        the mannequin
+    toonset.json         the exact cameras
+
+Blender has orthographic cameras and lens shift: every view is exact. A scene has one render size:
+all cameras get the same window (in their own pixels) with the drawing in its middle. Every view is
+bound to its own frame of the timeline. Blender's world has +Z up: the script turns ours.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from toonset import __version__
+from toonset import frames as conventions
+from toonset.dataset.blender_script import SCRIPT
+from toonset.dataset.export_planes import clip_range, plane_corners, scene_views, stand, window_wh
+from toonset.dataset.export_views import ExportView, write_beside
+from toonset.dataset.picture import encode_png
+from toonset.files import new_folder, write_bytes
+from toonset.mesh import Mesh
+
+SCRIPT_NAME = "import_cameras.py"
+
+
+def write_blender_script(
+    folder: Path,
+    views: Sequence[ExportView],
+    mesh: Mesh | None = None,
+    *,
+    force: bool = False,
+) -> tuple[ExportView, ...]:
+    """Write import_cameras.py and what it reads; the folder appears whole or not at all.
+
+    Returns:
+        The views as they were written: with square pixels.
+
+    Raises:
+        OutputError: the folder exists, or cannot be written.
+    """
+    written = scene_views(views)
+    pictures = [f"images/{view.name}" for view in written]
+    window = window_wh(written)
+    records = [_record(v, p, mesh, window) for v, p in zip(written, pictures, strict=True)]
+    text = SCRIPT.replace("@VERSION@", __version__)
+    text = text.replace("@WINDOW@", repr(window))
+    text = text.replace("@VIEWS@", json.dumps(records, indent=1, allow_nan=False))
+    with new_folder(folder, force=force) as temporary:
+        for view, picture in zip(written, pictures, strict=True):
+            write_bytes(temporary / picture, encode_png(view.rgba))
+        write_bytes(temporary / SCRIPT_NAME, text.encode())
+        write_beside(temporary, "blender", written, pictures, mesh)
+    return written
+
+
+def _record(
+    view: ExportView, picture: str, mesh: Mesh | None, window: tuple[int, int]
+) -> dict[str, Any]:
+    camera = view.camera
+    width, height = camera.size_wh
+    near, far = clip_range(view, mesh)
+    # Blender measures lens shift in widths of the window, to the right and up
+    right = (width / 2 - float(camera.center[0])) / window[0]
+    up = (float(camera.center[1]) - height / 2) / window[0]
+    return {
+        "name": view.name,
+        "picture": picture,
+        "orthographic": camera.is_orthographic,
+        "world_from_camera": conventions.opengl_pose_from_opencv(stand(view, mesh)).tolist(),
+        "width_world": window[0] / camera.scale,
+        "focal_widths": 0.0 if camera.is_orthographic else float(camera.K[0, 0]) / window[0],
+        "shift": [right, up],
+        "clip": [near, far],
+        "plane": plane_corners(view, mesh).tolist(),
+    }

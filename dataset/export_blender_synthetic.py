@@ -1,0 +1,66 @@
+"""Writing datasets as NeRF's synthetic scenes: transforms_train, _val and _test.json.
+
+    transforms_train.json    camera_angle_x for all, and a pose per picture
+    train/000.png            RGBA, straight alpha
+    points3d.ply             coloured points of the mannequin: Gaussian splatting starts from them
+    toonset.json             the exact cameras of these pictures
+
+The format has one focal length, square pixels, one size and the principal point in the middle:
+`toonset.dataset.export_lens.common_lens` makes the views so. val and test name the pictures of
+train: their readers need at least one, and a turnaround has none to spare.
+Source: Mildenhall et al., NeRF (2020), load_blender.py.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from toonset.dataset.colmap_points import TrackedPoints
+from toonset.dataset.export_lens import common_lens
+from toonset.dataset.export_points import encode_ply
+from toonset.dataset.export_transforms import transform_matrix
+from toonset.dataset.export_views import ExportView, write_beside
+from toonset.dataset.picture import encode_png
+from toonset.files import new_folder, write_bytes, write_json
+from toonset.mesh import Mesh
+
+SPLITS = ("train", "val", "test")
+
+
+def write_blender_synthetic(
+    folder: Path,
+    views: Sequence[ExportView],
+    points: TrackedPoints | None = None,
+    mesh: Mesh | None = None,
+    *,
+    force: bool = False,
+) -> tuple[ExportView, ...]:
+    """Write a synthetic-scene dataset.
+
+    Returns:
+        The views as they were written: padded or enlarged to one lens and size.
+
+    Raises:
+        BundleError: the views cannot share a lens.
+        OutputError: the folder exists, or cannot be written.
+    """
+    written = common_lens(views)
+    pictures = [f"train/{view.name}" for view in written]
+    pinhole = written[0].pinhole
+    frames = [
+        {"file_path": f"./train/{Path(v.name).stem}", "transform_matrix": transform_matrix(v)}
+        for v in written
+    ]
+    angle = 2 * math.atan(pinhole.size_wh[0] / 2 / float(pinhole.K[0, 0]))
+    with new_folder(folder, force=force) as temporary:
+        for view, picture in zip(written, pictures, strict=True):
+            write_bytes(temporary / picture, encode_png(view.rgba))
+        for split in SPLITS:
+            content = {"camera_angle_x": angle, "frames": frames}
+            write_json(temporary / f"transforms_{split}.json", content)
+        if points is not None:
+            write_bytes(temporary / "points3d.ply", encode_ply(points))
+        write_beside(temporary, "blender-synthetic", written, pictures, mesh)
+    return written
