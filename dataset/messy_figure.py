@@ -1,0 +1,127 @@
+"""A drawn figure before it lies on a sheet, and what can be done to one: line art, gaps, shading.
+
+All pictures are straight RGBA, cut to what they show.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Shaped, UInt8
+
+Rgb = tuple[int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """One drawing.
+
+    Attributes:
+        rgba: (height, width, 4) straight alpha; alpha is the figure's coverage.
+        ink: (height, width) coverage of its lines, 0 to 255.
+        paper: (height, width) share of each pixel that shows the paper instead of a colour, 0 to 1:
+            the inside of line art.
+    """
+
+    rgba: UInt8[np.ndarray, "height width 4"]
+    ink: UInt8[np.ndarray, "height width"]
+    paper: Float[np.ndarray, "height width"]
+
+    @property
+    def height(self) -> int:
+        """Return its height in pixels."""
+        return self.rgba.shape[0]
+
+    @property
+    def width(self) -> int:
+        """Return its width in pixels."""
+        return self.rgba.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Cast:
+    """One character as drawn for a sheet.
+
+    Attributes:
+        figures: its views, the front one first, all at one scale.
+        heads: some of the same views, the head alone.
+        colors: sRGB, as a swatch strip would show them.
+        outline_px: width of the contour line; 0 = none.
+    """
+
+    figures: tuple[Figure, ...]
+    heads: tuple[Figure, ...]
+    colors: tuple[Rgb, ...]
+    outline_px: float
+
+
+def tight_window(covered: Shaped[np.ndarray, "h w"]) -> tuple[slice, slice]:
+    """Return rows and columns just around what is not zero; something must be."""
+    rows = np.flatnonzero(covered.any(axis=1))
+    columns = np.flatnonzero(covered.any(axis=0))
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def cut_figure(rgba: UInt8[np.ndarray, "h w 4"], ink: UInt8[np.ndarray, "h w"]) -> Figure:
+    """Return the figure of a larger picture that shows nothing else."""
+    window = tight_window(rgba[..., 3])
+    return Figure(rgba[window], ink[window], np.zeros(rgba[window].shape[:2], np.float32))
+
+
+def resized(figure: Figure, factor: float) -> Figure:
+    """Return the figure drawn smaller (lines become thinner with it); factors up to 1."""
+    size = max(round(figure.width * factor), 1), max(round(figure.height * factor), 1)
+    alpha = figure.rgba[..., 3:].astype(np.float32)
+    premultiplied = np.concatenate([figure.rgba[..., :3] * (alpha / 255), alpha], axis=-1)
+    small = cv2.resize(premultiplied, size, interpolation=cv2.INTER_AREA)
+    small[..., :3] *= 255 / np.maximum(small[..., 3:], 1e-3)
+    rgba = np.rint(np.clip(small, 0, 255)).astype(np.uint8)
+    ink, paper = (
+        cv2.resize(layer, size, interpolation=cv2.INTER_AREA)
+        for layer in (figure.ink, figure.paper)
+    )
+    return Figure(rgba, ink, paper)
+
+
+def as_line_art(figure: Figure, ink_rgb: Rgb) -> Figure:
+    """Return the figure's lines alone; what they enclose is paper, but still the figure."""
+    alpha = figure.rgba[..., 3]
+    covered = np.minimum(figure.ink / np.maximum(alpha, 1), 1.0)
+    rgba = np.dstack([np.full((*alpha.shape, 3), ink_rgb, np.uint8), alpha])
+    return replace(figure, rgba=rgba, paper=(1 - covered).astype(np.float32))
+
+
+def with_gaps(
+    figure: Figure, gaps: int, gap_px: float, outline_px: float, rng: np.random.Generator
+) -> Figure:
+    """Return line art whose contour is interrupted: the pen was lifted.
+
+    Args:
+        figure: from `as_line_art`.
+        gaps: how many.
+        gap_px: free width of each between the two ends of the line.
+        outline_px: width of the contour line.
+        rng: chooses the places.
+    """
+    inside = np.pad((figure.rgba[..., 3] >= 128).astype(np.uint8), 1)
+    depth = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    on_line = np.argwhere((np.abs(depth - outline_px / 2) < 0.75) & (figure.paper < 0.5))
+    if len(on_line) == 0:
+        return figure
+    radius = float(np.hypot(outline_px / 2, gap_px / 2)) + 0.5
+    y, x = np.mgrid[: figure.height, : figure.width].astype(np.float32)
+    paper = figure.paper
+    for row, column in on_line[rng.integers(len(on_line), size=gaps)]:
+        erased = np.clip(radius + 0.5 - np.hypot(y - row, x - column), 0, 1)
+        paper = np.maximum(paper, erased)
+    return replace(figure, paper=paper)
+
+
+def shaded(figure: Figure, strength: float) -> Figure:
+    """Return the figure lit softly from above left: its colours darken by up to `strength`."""
+    y, x = np.linspace(0, 1, figure.height), np.linspace(0, 1, figure.width)
+    light = 1 - strength * (0.7 * y[:, None] + 0.3 * x)
+    rgb = figure.rgba[..., :3] * light[..., None]
+    return replace(figure, rgba=np.dstack([np.rint(rgb).astype(np.uint8), figure.rgba[..., 3]]))
