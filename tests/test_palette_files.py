@@ -1,20 +1,27 @@
-"""Palette files: what people type and other programs write comes in, nonsense is refused."""
+"""Palettes that people type or name: read by content, ours come back, nonsense refused."""
 
 import json
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pytest
+from PIL.GimpPaletteFile import GimpPaletteFile
 
 from toonset.errors import PaletteError
-from toonset.palette.files import parse_colors, read_palette_json, to_gpl, to_json
-from toonset.palette.palette import DroppedColor, Palette, PaletteColor
+from toonset.palette.files import (
+    WRITTEN,
+    encode_palette,
+    parse_colors,
+    parse_named_colors,
+    to_gpl,
+    to_json,
+)
+from toonset.palette.named import NamedColor
+from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor
 
 PALETTE = Palette(
-    (PaletteColor((200, 30, 40), 0.75, "red"), PaletteColor((1, 2, 3), 0.2, "black")),
+    (PaletteColor((200, 30, 40), 0.75, "red"), PaletteColor((1, 2, 3), 0.2, "7 o'clock \u5c71 ü")),
     "at least 0.05",
-    (DroppedColor((0, 255, 0), 0.05, "green", 0.25),),
-    ("a warning",),
 )
 
 
@@ -38,27 +45,91 @@ FILES = {
     "b.gpl": "GIMP Palette\r\n170 187 204\r\n17 34 51 Untitled\r\n",
     "c.hex": "aabbcc\n112233\n",
     "d.txt": "#AABBCC\n\n#123\n",
-    "e.txt": ";paint.net Palette File\n; comment\nFFAABBCC\nFF112233\n",
+    "e.txt": ";paint.net Palette File\n; comment\nFFAABBCC\n00FFFFFF\nFF112233\n",
     "f.json": '["#aabbcc", "#123"]',
     "g.json": '{"name": "x", "colors": ["aabbcc", "112233"]}',
     "h.json": '{"colors": [{"hex": "#aabbcc", "share": 1}, {"hex": "#112233"}]}',
     "i.HEX": "\ufeffaabbcc\r\n112233",
+    "j.pal": "JASC-PAL\r\n0100\r\n2\r\n170 187 204\r\n17 34 51\r\n",
+    # by content, whatever the name says
+    "k.txt": "GIMP Palette\n170 187 204\n17 34 51\n",
+    "l.gpl": "JASC-PAL\n0100\n2\n170 187 204\n17 34 51\n",
+    "m.hex": ' \n["#aabbcc", "#123"]',
+    "n": "aabbcc\n112233\n",
+    "o.palette": "GIMP Palette\n170 187 204\n17 34 51\n",
 }
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 @pytest.mark.parametrize("name", FILES)
-def test_palette_files(name: str, tmp_path: Path) -> None:
+def test_palette_files(name: str, encoding: str, tmp_path: Path) -> None:
     file = tmp_path / name
-    file.write_text(FILES[name])
+    file.write_bytes(FILES[name].removeprefix("\ufeff").encode(encoding))
     assert parse_colors(str(file)).tolist() == [[0xAA, 0xBB, 0xCC], [0x11, 0x22, 0x33]]
 
 
-def test_our_own_files_come_back(tmp_path: Path) -> None:
-    (tmp_path / "a.gpl").write_text(to_gpl(PALETTE))
-    (tmp_path / "a.json").write_text(json.dumps(to_json(PALETTE)))
-    for name in ("a.gpl", "a.json"):
-        assert parse_colors(str(tmp_path / name)).tolist() == PALETTE.rgb.tolist()
-    assert read_palette_json(tmp_path / "a.json") == PALETTE
+def many(rng: np.random.Generator, count: int) -> Palette:
+    """Return a palette of different colours, each with a name of its own."""
+    codes = rng.choice(2**24, size=count, replace=False).tolist()
+    return Palette(
+        tuple(
+            PaletteColor((code >> 16, code >> 8 & 255, code & 255), 1 / count, f"colour {i}\u00e9")
+            for i, code in enumerate(codes)
+        ),
+        "random",
+    )
+
+
+@pytest.mark.parametrize("extension", WRITTEN)
+@pytest.mark.parametrize("count", [1, 2, 100, MAX_COLORS])
+def test_what_is_written_comes_back(extension: str, count: int, tmp_path: Path) -> None:
+    palette = many(np.random.default_rng(count), count)
+    file = tmp_path / f"p{extension}"
+    file.write_bytes(encode_palette(palette, extension))
+    named = extension != ".hex"
+    assert parse_named_colors(str(file)) == tuple(
+        NamedColor(color.rgb, color.name if named else "") for color in palette.colors
+    )
+    assert encode_palette(palette, extension) == file.read_bytes()
+
+
+def test_every_colour_survives_every_writer(tmp_path: Path) -> None:
+    levels = np.arange(255)
+    for extension in WRITTEN:  # floats of .ase included
+        colors = tuple(PaletteColor((i, 255 - i, i + 1), 0, "") for i in levels.tolist())
+        file = tmp_path / f"p{extension}"
+        file.write_bytes(encode_palette(Palette(colors, "all levels"), extension))
+        expected = np.stack([levels, 255 - levels, levels + 1], axis=1)
+        np.testing.assert_array_equal(parse_colors(str(file)), expected)
+
+
+def test_strange_names_stay_on_their_line(tmp_path: Path) -> None:
+    names = ("a\tb\nc", "", "x" * 500, "\ud800\x1b[31m", " 12 12 12 ", "Name: x", "# y")
+    colors = tuple(PaletteColor((i, 0, 0), 0, name) for i, name in enumerate(names))
+    for extension in WRITTEN:
+        file = tmp_path / f"p{extension}"
+        file.write_bytes(encode_palette(Palette(colors, "names"), extension))
+        found = parse_named_colors(str(file))
+        assert [color.rgb for color in found] == [color.rgb for color in colors]
+        if extension != ".hex":
+            assert [color.name for color in found] == [
+                "a b c", "", "x" * 64, "[31m", "12 12 12", "Name: x", "# y"
+            ]  # fmt: skip
+
+
+def test_pillow_reads_our_gpl(tmp_path: Path) -> None:
+    palette = many(np.random.default_rng(5), 200)
+    file = tmp_path / "p.gpl"
+    file.write_text(to_gpl(palette, "a title"), encoding="utf-8")
+    with file.open("rb") as opened:
+        found, mode = GimpPaletteFile(opened).getpalette()
+    assert mode == "RGB"
+    assert found[:600] == palette.rgb.tobytes()
+
+
+def test_an_unwritten_format_is_named() -> None:
+    with pytest.raises(PaletteError, match=r"\.aco: is not written; one of \.gpl, \.ase, \.json"):
+        encode_palette(PALETTE, ".aco")
 
 
 @pytest.mark.parametrize(
@@ -67,12 +138,15 @@ def test_our_own_files_come_back(tmp_path: Path) -> None:
         ("", "colours: none given"),
         (" , ", "colours: none given"),
         ("red", "red: neither colours such as '#aabbcc,#123' nor a palette file"),
+        ("red\0", r"'red\\x00': neither colours"),
+        ("r" * 5000, "^r{80}: neither colours"),
         ("#12", "colours: '#12' is no colour; write it as #rrggbb or #rgb"),
         ("#aabbcc,blue", "'blue' is no colour"),
         ("#aabbccdd", "'#aabbccdd' is no colour"),
         ("#gggggg", "'#gggggg' is no colour"),
         ("none.gpl", "none.gpl: no such file; check the name of the palette"),
-        ("none.aco", "neither colours"),
+        ("none.aco", "none.aco: no such file"),
+        ("none.png", "none.png: neither colours"),
         (",".join(f"#{i:06x}" for i in range(256)), "256 colours; 1 to 255 are needed"),
     ],
 )
@@ -82,7 +156,7 @@ def test_typed_nonsense(text: str, fragment: str) -> None:
 
 
 BAD_FILES = {
-    "a.gpl": ("JASC-PAL\n0100\n", "does not begin with 'GIMP Palette'"),
+    "a.gpl": ("hello", "does not begin with 'GIMP Palette'"),
     "b.gpl": ("GIMP Palette\n256 0 0\n", "line 2: '256 0 0' is no colour; three numbers"),
     "c.gpl": ("GIMP Palette\n1 2\n", "line 2: '1 2' is no colour"),
     "d.gpl": ("GIMP Palette\n-1 2 3\n", "line 2: '-1 2 3' is no colour"),
@@ -91,13 +165,17 @@ BAD_FILES = {
     "g.txt": ("FFAABBCC\n", "line 1: 'FFAABBCC' is no colour"),
     "h.json": ("{", "is no valid JSON"),
     "i.json": ('{"x": 1}', "has no list of colours"),
-    "j.json": ('[1, "#fff"]', "'1' is no colour"),
+    "j.json": ('[1, "#fff"]', "colour 1: '1' is no colour"),
     "k.json": ('{"colors": [{"rgb": 1}]}', "'None' is no colour"),
     "l.json": ("[]", "0 colours; 1 to 255 are needed"),
     "m.json": ("[" * 100_000, "is no valid JSON"),
     "n.hex": ("aa\0bb", "is no text"),
     "o.hex": ("", r"is empty \(0 bytes\)"),
-    "p.txt": ("aabbcc\n" * 200_000, "1 MB, at most 1 MB is read"),
+    "p.txt": ("aabbcc\n" * 1_300_000, "9 MB, at most 8 MB is read"),
+    "q.pal": ("GIF89", "begins with neither 'JASC-PAL' nor 'RIFF'"),
+    "r.bin": ("\x01\x02", r"is of an unknown kind; a palette file \(\.gpl, \.ase"),
+    "s.jpg": ("hello", "line 1: 'hello' is no colour"),
+    "t.gpl": ("GIMP Palette\nChannels: RGBA\n1 2 3 red\n", "four numbers from 0 to 255"),
 }
 
 
@@ -105,34 +183,21 @@ BAD_FILES = {
 def test_bad_files(name: str, tmp_path: Path) -> None:
     text, fragment = BAD_FILES[name]
     file = tmp_path / name
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     with pytest.raises(PaletteError, match=fragment) as caught:
         parse_colors(str(file))
     assert str(caught.value).startswith(str(file))
 
 
-GOOD: dict[str, Any] = to_json(PALETTE)
-COLOR: dict[str, Any] = GOOD["colors"][0]
+def test_a_folder_and_a_picture_are_no_palettes(tmp_path: Path) -> None:
+    (tmp_path / "p.png").write_bytes(b"\x89PNG\r\n\x1a\n\0\0")
+    for place, fragment in [
+        (tmp_path, "is a folder"),
+        (tmp_path / "p.png", "is a PNG picture; a palette file"),
+    ]:
+        with pytest.raises(PaletteError, match=fragment):
+            parse_colors(str(place))
 
 
-@pytest.mark.parametrize(
-    ("content", "fragment"),
-    [
-        ([], "schema 'list', 'toonset-palette/1' is needed"),
-        (GOOD | {"schema": "toonset-palette/9"}, "schema 'toonset-palette/9'"),
-        ({k: v for k, v in GOOD.items() if k != "colors"}, r"is damaged \(KeyError: 'colors'\)"),
-        (GOOD | {"colors": []}, "0 colours; 1 to 255 are needed"),
-        (GOOD | {"colors": [COLOR] * 256}, "256 colours"),
-        (GOOD | {"colors": 5}, "is damaged"),
-        (GOOD | {"colors": [COLOR | {"hex": "#12"}]}, "'#12' is no colour"),
-        (GOOD | {"colors": [COLOR | {"share": 7}]}, "share 7.0 is not within 0 to 1"),
-        (GOOD | {"colors": [COLOR | {"share": "x"}]}, "is damaged"),
-        (GOOD | {"dropped": [COLOR]}, "KeyError: 'oklab_cost'"),
-    ],
-)
-def test_bad_palette_json(content: object, fragment: str, tmp_path: Path) -> None:
-    file = tmp_path / "palette.json"
-    file.write_text(json.dumps(content))
-    with pytest.raises(PaletteError, match=fragment) as caught:
-        read_palette_json(file)
-    assert str(caught.value).startswith(str(file))
+def test_our_json_is_what_the_writer_says() -> None:
+    assert json.loads(encode_palette(PALETTE, ".json")) == to_json(PALETTE)

@@ -1,0 +1,72 @@
+"""GIMP's .gpl, which Krita, Inkscape and Aseprite read and write too.
+
+Lines of "red green blue name". Aseprite's variant says `Channels: RGBA` and has a fourth number.
+Sources: GIMP's app/core/gimppalette-load.c; Aseprite's docs/gpl-palette-extension.md.
+"""
+
+from __future__ import annotations
+
+import re
+
+from toonset.errors import PaletteError
+from toonset.palette.named import NamedColor, clean_name
+from toonset.palette.palette import Palette
+from toonset.palette.text import lines_of
+
+MAGIC = "GIMP Palette"
+HEADER = re.compile(r"\s*(#|Name:|Columns:|Channels:|$)", re.IGNORECASE)
+UNNAMED = "Untitled"  # what GIMP writes for a colour without a name
+COLUMNS = 16
+
+
+def read_gpl(data: bytes, where: str) -> list[NamedColor]:
+    """Return the colours of a .gpl, without Aseprite's fully transparent ones.
+
+    Raises:
+        PaletteError: not a .gpl, or a line that is no colour.
+    """
+    lines = lines_of(data, where)
+    if not lines[0].startswith(MAGIC):
+        raise PaletteError(
+            f"{where}: does not begin with {MAGIC!r}; export it again as GIMP palette"
+        )
+    count = 4 if any(_says_rgba(line) for line in lines) else 3
+    rows = [
+        _row(line, count, f"{where}: line {number}")
+        for number, line in enumerate(lines[1:], start=2)
+        if not HEADER.match(line)
+    ]
+    return [
+        NamedColor((red, green, blue), name)
+        for (red, green, blue, *alpha), name in rows
+        if alpha != [0]
+    ]
+
+
+def to_gpl(palette: Palette, title: str = "toonset") -> str:
+    """Return the palette as .gpl text; shares stand in palette.json, names stay as they are."""
+    rows = [
+        f"{red:3d} {green:3d} {blue:3d}\t{clean_name(color.name) or UNNAMED}"
+        for color in palette.colors
+        for red, green, blue in [color.rgb]
+    ]
+    columns = min(len(rows), COLUMNS)  # never 0: Krita divides by it
+    head = [MAGIC, f"Name: {clean_name(title)}", f"Columns: {columns}", "#"]
+    return "\n".join([*head, *rows, ""])
+
+
+def _says_rgba(line: str) -> bool:
+    key, _, value = line.partition(":")
+    return key.strip().lower() == "channels" and value.strip().upper() == "RGBA"
+
+
+def _row(line: str, count: int, where: str) -> tuple[list[int], str]:
+    words = line.split(maxsplit=count)
+    numbers = [int(word) for word in words[:count] if word.isascii() and word.isdigit()]
+    if len(numbers) != count or max(numbers) > 255:
+        amount = "four numbers" if count == 4 else "three numbers"
+        raise PaletteError(
+            f"{where}: {line.strip()[:40]!r} is no colour; {amount} from 0 to 255 are needed"
+        )
+    name = clean_name("".join(words[count:]))
+    return numbers, "" if name == UNNAMED else name

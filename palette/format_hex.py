@@ -1,0 +1,60 @@
+"""Hex lists: one colour per line, as Lospec writes .hex, and paint.net's .txt (AARRGGBB).
+
+Source: paint.net documentation, "Working with palettes": comments begin with ";", eight digits are
+alpha, red, green, blue.
+"""
+
+from __future__ import annotations
+
+import re
+
+from toonset.errors import PaletteError
+from toonset.palette.named import RGB, NamedColor
+from toonset.palette.palette import Palette
+from toonset.palette.text import lines_of
+
+HEX = re.compile(r"#?([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
+WITH_ALPHA = re.compile(r"#?([0-9a-fA-F]{2})([0-9a-fA-F]{6})")
+
+
+def rgb_of_hex(word: object, where: str) -> RGB:
+    """Return the colour of "#rrggbb" or "#rgb"; the # may be left out.
+
+    Raises:
+        PaletteError: anything else.
+    """
+    match = HEX.fullmatch(word) if isinstance(word, str) else None
+    if match is None:
+        raise PaletteError(f"{where}: {str(word)[:40]!r} is no colour; write it as #rrggbb or #rgb")
+    digits = match[1] if len(match[1]) == 6 else "".join(2 * digit for digit in match[1])
+    return int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:], 16)
+
+
+def read_hex(data: bytes, where: str) -> list[NamedColor]:
+    """Return the colours of a list with one colour per line.
+
+    Raises:
+        PaletteError: a line is neither a colour, empty, nor a comment.
+    """
+    lines = lines_of(data, where)
+    paint_net = "paint.net" in lines[0].lower()
+    words = [line.split(";")[0].strip() for line in lines]
+    found = [
+        _color(word, paint_net, f"{where}: line {number}")
+        for number, word in enumerate(words, start=1)
+        if word
+    ]
+    return [color for color in found if color is not None]
+
+
+def to_hex(palette: Palette) -> str:
+    """Return one colour per line as rrggbb, which Lospec, Aseprite and paint programs read."""
+    return "".join("{:02x}{:02x}{:02x}\n".format(*color.rgb) for color in palette.colors)
+
+
+def _color(word: str, paint_net: bool, where: str) -> NamedColor | None:
+    """Return the colour; None for paint.net's fully transparent one, which is none."""
+    match = WITH_ALPHA.fullmatch(word) if paint_net else None
+    if match is None:
+        return NamedColor(rgb_of_hex(word, where))
+    return NamedColor(rgb_of_hex(match[2], where)) if int(match[1], 16) else None

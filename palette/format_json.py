@@ -1,0 +1,87 @@
+"""JSON: toonset's own palette.json, and lists of hex colours such as Lospec gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from toonset.errors import PaletteError
+from toonset.palette.format_hex import rgb_of_hex
+from toonset.palette.named import NamedColor, clean_name
+from toonset.palette.names import hex_of
+from toonset.palette.palette import Palette
+from toonset.reading import read_whole
+from toonset.strict_json import parse_json
+
+SCHEMA = "toonset-palette/1"  # see toonset.palette.palette_schema for what may change within it
+MAX_BYTES = 8 * 2**20
+
+
+def read_json(data: bytes, where: str) -> list[NamedColor]:
+    """Return the colours of a list, or of an object's "colors".
+
+    An entry is "#rrggbb", or an object with "hex" and perhaps "name".
+
+    Raises:
+        PaletteError: no JSON, no such list, or an entry that is no colour.
+    """
+    content = parse_json(data, where, PaletteError)
+    entries = content.get("colors") if isinstance(content, dict) else content
+    if not isinstance(entries, list):
+        raise PaletteError(f'{where}: has no list of colours; ["#aabbcc", ...] is needed')
+    return [_entry(entry, f"{where}: colour {i}") for i, entry in enumerate(entries, start=1)]
+
+
+def to_json(palette: Palette) -> dict[str, Any]:
+    """Return the content of palette.json."""
+    contour, evidence = palette.contour, palette.evidence
+    return {
+        "schema": SCHEMA,
+        "colors": [_record(color.rgb, color.share, color.name) for color in palette.colors],
+        "rule": palette.rule,
+        "dropped": [
+            {
+                **_record(color.rgb, color.share, color.name),
+                "oklab_cost": round(color.cost, 6),
+                "place": color.place and {"view": color.place.view, "box": list(color.place.box)},
+            }
+            for color in palette.dropped
+        ],
+        "warnings": list(palette.warnings),
+        "contour": contour
+        and {
+            **_record(contour.rgb, contour.share, contour.name),
+            "cloth": round(contour.cloth, 6),
+        },
+        "evidence": evidence
+        and {
+            "colors": evidence.colors,
+            "one_less": round(evidence.one_less, 3),
+            "one_more": round(evidence.one_more, 3),
+        },
+    }
+
+
+def read_palette_json(path: Path) -> Palette:
+    """Return the palette of a palette.json.
+
+    Raises:
+        PaletteError: the file is missing, damaged, of another schema or of a newer toonset.
+    """
+    from toonset.palette.palette_schema import palette_of  # pydantic, only when it is needed
+
+    data = read_whole(path, "palette", PaletteError, MAX_BYTES)
+    return palette_of(parse_json(data, str(path), PaletteError), str(path))
+
+
+def _entry(entry: Any, where: str) -> NamedColor:
+    if not isinstance(entry, dict):
+        return NamedColor(rgb_of_hex(entry, where))
+    name = entry.get("name")
+    return NamedColor(
+        rgb_of_hex(entry.get("hex"), where), clean_name(name) if isinstance(name, str) else ""
+    )
+
+
+def _record(rgb: tuple[int, int, int], share: float, name: str) -> dict[str, Any]:
+    return {"hex": hex_of(rgb), "share": round(share, 6), "name": name}

@@ -1,0 +1,70 @@
+"""A colour with the name that a palette file gives it, and what its readers share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from toonset.errors import PaletteError
+
+MAX_NAME = 64  # characters; a palette row in GIMP or a swatch's label holds no more anyway
+ROUNDING = 1e-3  # of a range: how far a float may lie outside it before it is no slip of rounding
+
+RGB = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class NamedColor:
+    """One colour of a palette file.
+
+    Attributes:
+        rgb: 8-bit sRGB.
+        name: what the file calls it; "" where it does not.
+    """
+
+    rgb: RGB
+    name: str = ""
+
+
+def one_line(text: str) -> str:
+    """Return a foreign text as one printable line: no control characters, single spaces."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def clean_name(text: str) -> str:
+    """Return a foreign name as one printable line of at most 64 characters."""
+    return one_line(text)[:MAX_NAME].strip()
+
+
+def within(value: float, low: float, high: float, where: str) -> float:
+    """Return `value`, with slips of rounding clamped to [low, high].
+
+    Raises:
+        PaletteError: not a finite number, or clearly outside.
+    """
+    slip = ROUNDING * (high - low)
+    if not (math.isfinite(value) and low - slip <= value <= high + slip):
+        raise PaletteError(
+            f"{where}: has the value {value:g}, {low:g} to {high:g} is needed; export it again"
+        )
+    return min(max(value, low), high)
+
+
+def level(unit: float, where: str) -> int:
+    """Return the 8-bit level of a number from 0 to 1.
+
+    Raises:
+        PaletteError: not a finite number, or clearly outside.
+    """
+    return round(255 * within(unit, 0, 1, where))
+
+
+def no_cmyk(where: str) -> PaletteError:
+    """Return the refusal of inks: without the press's profile they have no sRGB colour.
+
+    A guessed conversion would be off by far more than the shades that a palette tells apart.
+    """
+    return PaletteError(
+        f"{where}: is CMYK, which has no screen colour without its print profile; convert the "
+        "swatches to RGB in the program that wrote them, then export again"
+    )

@@ -1,0 +1,154 @@
+"""The content of palette.json, as pydantic checks it.
+
+`schema` is "toonset-palette/MAJOR" or "toonset-palette/MAJOR.MINOR". Within a major version keys
+may be added, never changed or taken away: readers ignore keys that they do not know. To add one,
+give it a default here, write it in `format_json.to_json`, and leave SCHEMA as it is. Whatever would
+make an older reader draw a wrong conclusion needs the next major version.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from toonset.errors import PaletteError
+from toonset.palette.format_hex import rgb_of_hex
+from toonset.palette.named import RGB, clean_name, one_line
+from toonset.palette.palette import (
+    MAX_COLORS,
+    ContourColor,
+    DroppedColor,
+    Evidence,
+    Palette,
+    PaletteColor,
+    Place,
+)
+
+NAME, MAJOR = "toonset-palette", 1
+SCHEMA = f"{NAME}/{MAJOR}"
+VERSION = re.compile(rf"{NAME}/([1-9]\d{{0,3}})(\.\d{{1,4}})?", re.ASCII)
+
+Name = Annotated[str, AfterValidator(clean_name)]
+Line = Annotated[str, AfterValidator(one_line)]
+Hex = Annotated[str, Field(pattern=r"^#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})$")]
+Share = Annotated[float, Field(ge=0, le=1)]
+Cost = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class Record(BaseModel):
+    """An object of the file: no number for a text, no text for a number, nothing infinite."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
+
+
+class ColorRecord(Record):
+    """One colour."""
+
+    hex: Hex
+    share: Share
+    name: Name
+
+    @property
+    def rgb(self) -> RGB:
+        """Return the colour as 8-bit sRGB."""
+        return rgb_of_hex(self.hex, "hex")
+
+
+class PlaceRecord(Record):
+    """Where most of a colour is."""
+
+    view: Count
+    box: Annotated[list[Count], Field(min_length=4, max_length=4)]
+
+
+class DroppedRecord(ColorRecord):
+    """A colour under the rule."""
+
+    oklab_cost: Cost
+    place: PlaceRecord | None = None
+
+
+class ContourRecord(ColorRecord):
+    """The drawn lines' colour."""
+
+    cloth: Share
+
+
+class EvidenceRecord(Record):
+    """Why so many colours."""
+
+    colors: Count
+    one_less: float
+    one_more: float
+
+
+class PaletteRecord(Record):
+    """The whole file."""
+
+    colors: Annotated[list[ColorRecord], Field(min_length=1, max_length=MAX_COLORS)]
+    rule: Line
+    dropped: list[DroppedRecord] = []
+    warnings: list[Line] = []
+    contour: ContourRecord | None = None
+    evidence: EvidenceRecord | None = None
+
+
+def palette_of(content: Any, where: str) -> Palette:
+    """Return the palette that the content of a palette.json states.
+
+    Raises:
+        PaletteError: of another schema, of a newer toonset, or not fitting its schema.
+    """
+    _check_version(content, where)
+    try:
+        record = PaletteRecord.model_validate(content)
+    except ValidationError as error:
+        raise PaletteError(
+            f"{where}: {_first_problem(error)}; write it again with `toonset palette`"
+        ) from error
+    contour, evidence = record.contour, record.evidence
+    return Palette(
+        tuple(PaletteColor(color.rgb, color.share, color.name) for color in record.colors),
+        record.rule,
+        tuple(_dropped(color) for color in record.dropped),
+        tuple(record.warnings),
+        None
+        if contour is None
+        else ContourColor(contour.rgb, contour.share, contour.cloth, contour.name),
+        None
+        if evidence is None
+        else Evidence(evidence.colors, evidence.one_less, evidence.one_more),
+    )
+
+
+def _dropped(color: DroppedRecord) -> DroppedColor:
+    place = None
+    if color.place is not None:
+        x, y, width, height = color.place.box
+        place = Place(color.place.view, (x, y, width, height))
+    return DroppedColor(color.rgb, color.share, color.name, color.oklab_cost, place)
+
+
+def _check_version(content: Any, where: str) -> None:
+    stated = content.get("schema") if isinstance(content, dict) else type(content).__name__
+    match = VERSION.fullmatch(str(stated))
+    if match is None:
+        raise PaletteError(
+            f"{where}: schema {str(stated)[:60]!r}, {SCHEMA!r} is needed; write it again with "
+            "`toonset palette`"
+        )
+    if int(match[1]) > MAJOR:
+        raise PaletteError(
+            f"{where}: schema {match[0]!r} is newer than this toonset, which reads {SCHEMA!r}; "
+            "update toonset"
+        )
+
+
+def _first_problem(error: ValidationError) -> str:
+    problem = error.errors(include_url=False, include_input=True)[0]
+    place = ".".join(str(part) for part in problem["loc"])
+    found = "" if problem["type"] == "missing" else f" (found {problem['input']!r:.40})"
+    return one_line(f"{place}: {problem['msg']}{found}")
