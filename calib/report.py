@@ -7,18 +7,19 @@ from typing import Any
 
 from toonset.calib.result import Calibration, ViewCalibration
 from toonset.camera import Camera
-
-SCHEMA = "toonset-calibration/1"
+from toonset.dataset.calibration_schema import SCHEMA, VERSION
 
 
 def calibration_dict(calibration: Calibration) -> dict[str, Any]:
     """Return the JSON form; angles in degrees, lengths in world units or pixels of the view.
 
-    Callers add what only they know: options, seed, versions, input hashes.
+    Callers add what only they know: options, seed, versions, input hashes. `seconds` is for the
+    screen: `toonset.dataset.calibration_file` writes the rest, so that a bundle's bytes depend on
+    its input alone.
     """
     model = calibration.model
     return {
-        "schema": SCHEMA,
+        "schema": f"{SCHEMA}/{VERSION}",
         "verdict": calibration.verdict,
         "reason": calibration.reason,
         "camera_model": {

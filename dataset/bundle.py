@@ -2,11 +2,16 @@
 
     transforms.json    cameras (see `toonset.dataset.transforms`)
     images/000.png     RGBA crops, straight alpha
-    calibration.json   native cameras, uncertainty, verdicts
+    calibration.json   native cameras, uncertainty, verdicts (`toonset.dataset.calibration_schema`)
     overlay.png        every drawing with the mannequin's outline over it
     mannequin.obj      the mannequin as it was fitted, in the cameras' world
+    palette.json .gpl  the colours, once `toonset palette` has found them
+    labels/000.png     indexed PNG per picture: which colour a pixel is, 255 = none
+    contours/000.png   8-bit grey per picture: how much of a pixel is drawn line
+    run/               a trained field
 
-The folder appears whole or not at all.
+The folder appears whole or not at all. It holds no time, no path and no name of a machine: the same
+input, options, seed and versions give the same bytes, wherever it is made or moved to.
 """
 
 from __future__ import annotations
@@ -19,6 +24,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
+from toonset.dataset.calibration_file import calibration_content
 from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.picture import encode_png
 from toonset.dataset.transforms import transforms_dict
@@ -27,7 +33,8 @@ from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
 from toonset.view import View
 
-MANNEQUIN = "mannequin.obj"
+MANNEQUIN, OVERLAY, CALIBRATION = "mannequin.obj", "overlay.png", "calibration.json"
+LABELS, CONTOURS, IMAGES = "labels", "contours", "images"
 
 
 def write_bundle(
@@ -48,7 +55,7 @@ def write_bundle(
         cameras: one per view, in pixels of its crop.
         mesh: the mannequin as it was fitted; its height and radius set the far pinholes and their
             error bound.
-        calibration: content of calibration.json.
+        calibration: the report of `toonset.calib.report`, with what the caller adds.
         overlay: the picture for people.
         force: replace an existing bundle.
 
@@ -57,11 +64,12 @@ def write_bundle(
     """
     if len(views) != len(cameras):
         raise BundleError(f"{len(views)} views but {len(cameras)} cameras; one each is needed")
-    named = [(f"images/{v.name}", camera) for v, camera in zip(views, cameras, strict=True)]
+    content = calibration_content(calibration, views)
+    named = [(f"{IMAGES}/{v.name}", camera) for v, camera in zip(views, cameras, strict=True)]
     with new_folder(folder, force=force) as temporary:
         for view in views:
-            write_bytes(temporary / "images" / view.name, encode_png(view.rgba))
+            write_bytes(temporary / IMAGES / view.name, encode_png(view.rgba))
         write_json(temporary / "transforms.json", transforms_dict(named, mesh.height, mesh.radius))
-        write_json(temporary / "calibration.json", calibration)
-        write_bytes(temporary / "overlay.png", encode_png(overlay))
+        write_json(temporary / CALIBRATION, content)
+        write_bytes(temporary / OVERLAY, encode_png(overlay))
         write_bytes(temporary / MANNEQUIN, save_obj(mesh))

@@ -1,0 +1,56 @@
+"""calibration.json, both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from toonset.dataset.calibration_schema import SCHEMA, VERSION, CalibrationFile
+from toonset.dataset.calibration_upgrade import upgraded
+from toonset.dataset.json_file import read_json, schema_version, validated
+from toonset.errors import BundleError, CameraError
+from toonset.view import View
+
+RUN_ONLY = ("seconds",)  # of this run, not of the result: the same input gives the same bytes
+
+
+def calibration_content(report: dict[str, Any], views: Sequence[View]) -> dict[str, Any]:
+    """Return the content of calibration.json: the report, and what its views look like.
+
+    Args:
+        report: of `toonset.calib.report`, with what the caller adds (options, versions, inputs).
+        views: the drawings, in the report's order.
+    """
+    content = {key: value for key, value in report.items() if key not in RUN_ONLY}
+    content["views"] = [
+        {**found, "line_width_px": round(view.line_width_px, 3)}
+        for found, view in zip(report["views"], views, strict=True)
+    ]
+    CalibrationFile.model_validate(content)  # what is written can be read
+    return content
+
+
+def read_calibration(file: Path) -> CalibrationFile:
+    """Return the content of a calibration.json of this or an earlier version.
+
+    Raises:
+        BundleError: the file cannot be read, is of a newer toonset, does not fit its schema, or
+            holds a camera that cannot exist.
+    """
+    content = read_json(file)
+    version = schema_version(content, SCHEMA, VERSION, str(file))
+    if version is None:
+        raise BundleError(
+            f"{file}: states no schema, '{SCHEMA}/{VERSION}' is needed; calibrate again"
+        )
+    found = validated(CalibrationFile, upgraded(content) if version == 1 else content, file)
+    for number, view in enumerate(found.views):
+        others = [other.camera for other in view.alternatives]
+        for camera in (view.camera, view.twin, *others):
+            try:
+                camera.camera()
+            except (CameraError, BundleError) as error:
+                where = f"{file}: view {number} ({view.name[:80]!r})"
+                raise BundleError(f"{where}: {error}; calibrate again") from error
+    return found
