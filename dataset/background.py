@@ -1,4 +1,8 @@
-"""What of a sheet is background: its colour, its noise, and which pixels belong to it."""
+"""What of a sheet is background: its colour or its gradient, its noise, and how far pixels are off.
+
+No more is modelled than the border asks for: one colour; else a quadratic gradient; else a smooth
+field (`toonset.dataset.background_field`).
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,11 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.dataset.background_field import Box, Field, fit_gradient, fit_smooth, sampled
 from toonset.errors import SheetError
 
 BINS = 16  # levels per bin of the coarse histogram that finds the dominant colour
-CLUSTER_RADIUS = 32  # levels: border pixels this near to the dominant colour are background + noise
+CLUSTER_RADIUS = 32  # levels: border pixels this near to the background are background + noise
 LEAST_TOLERANCE = 2  # levels: a picture without noise still holds rounding
 MOST_TOLERANCE = 48  # levels: beyond it figures would be eaten, whatever the noise
 TRANSPARENT = 0.01  # of the sheet: less see-through area is an accident, not a background
@@ -19,7 +24,11 @@ HALO_WIDTH = 8  # levels: noise of the file falls off within about so many
 CLEAR_HALO = 4.0  # times as many pixels as a little farther from the background: noise at all
 HALO = 2.0  # times as many pixels as a little farther: still noise
 LEAST_SURE = 0.3  # of the border: less in one colour is no background
-LINE_SHARE = 0.8  # of a row or column in one colour: a ruled line or frame, not a figure
+WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
+WORTH_LEVELS = 2.0  # and less by so many levels
+WORTH_SHARE = 0.05  # of the border: or explain so much more of it
+CLEARLY = 0.98  # of the border in one colour with less noise than that: nothing to gain
+MOST_SAMPLES = 200_000  # border pixels that are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,51 +36,70 @@ class Background:
     """The background of a sheet.
 
     Attributes:
-        rgb: its colour; None where the sheet has an alpha channel of its own.
-        sure: share of the border that has this colour (or is transparent), 0 to 1.
+        rgb: its typical colour; None where the sheet has an alpha channel of its own.
+        field: how the colour changes over the sheet; None where it does not.
+        kind: "transparent", "plain", "gradient" or "uneven".
+        sure: share of the border that is background, 0 to 1.
         tolerance: largest difference of a channel, in levels, that is still background.
-        outside: (height, width) pixels reached from the border through background.
-        enclosed: (height, width) background-coloured pixels that the border does not reach.
+        evidence: why this kind and not a simpler one, for people; "" for the simplest.
     """
 
     rgb: tuple[int, int, int] | None
+    field: Field | None
+    kind: str
     sure: float
     tolerance: int
-    outside: Bool[np.ndarray, "height width"]
-    enclosed: Bool[np.ndarray, "height width"]
+    evidence: str = ""
+
+    def colors(self, box: Box) -> UInt8[np.ndarray, "height width 3"]:
+        """Return the background's colour in a window (x, y, width, height) of the sheet."""
+        if self.field is not None:
+            return self.field.colors(box)
+        return np.broadcast_to(np.array(self.rgb, dtype=np.uint8), (box[3], box[2], 3))
+
+    def __str__(self) -> str:
+        """Return what it is, for people."""
+        if self.rgb is None:
+            return "transparent background"
+        color = "#{:02x}{:02x}{:02x}".format(*self.rgb)
+        return f"{self.kind} background {color}" + (f" ({self.evidence})" if self.evidence else "")
 
 
-def find_background(rgba: UInt8[np.ndarray, "height width 4"]) -> Background:
-    """Return the background of a sheet: its transparency, else the border's dominant colour.
+def find_background(
+    rgba: UInt8[np.ndarray, "height width 4"], known_rgb: tuple[int, int, int] | None = None
+) -> Background:
+    """Return the background of a sheet: its transparency, else what its border shows.
 
-    The tolerance comes from the border's own noise, so that JPEG sheets work and white shirts on
-    an almost white ground survive. Ruled lines and frames across the whole sheet count as
-    background where no figure stands on both sides of them.
+    The tolerance comes from the border's own noise, so that JPEG sheets and textured paper work
+    and white shirts on an almost white ground survive.
+
+    Args:
+        rgba: the sheet.
+        known_rgb: the colour, where a person gives it.
 
     Raises:
         SheetError: the border has no dominant colour.
     """
-    ring = _ring(rgba.shape[0], rgba.shape[1])
-    if is_transparent(rgba):
-        nothing = np.zeros(rgba.shape[:2], dtype=bool)
-        sure = float((rgba[ring][:, 3] < 128).mean())
-        return Background(None, sure, 0, rgba[..., 3] == 0, nothing)
-    rgb, sure, tolerance = _dominant(rgba[ring][:, :3])
-    if sure < LEAST_SURE:
+    ring = ring_of(rgba.shape[0], rgba.shape[1])
+    if is_transparent(rgba) and known_rgb is None:
+        return Background(None, None, "transparent", _sure_of_alpha(rgba, ring), 0)
+    places = _samples(ring)
+    colors = rgba[places][:, :3]
+    if known_rgb is not None:
+        return _judged("plain", None, known_rgb, colors, np.array(known_rgb))
+    found = _richest_worth_it(rgba, places, colors)
+    if found.sure < LEAST_SURE:
         raise SheetError(
-            f"the background is not one colour (the commonest takes {sure:.0%} of the border); put "
-            "the figures on a plain or a transparent background"
+            f"the background is not one colour (the commonest takes {found.sure:.0%} of the "
+            "border); put the figures on a plain or a transparent background, or name its colour "
+            "with --background '#rrggbb'"
         )
-    away = difference(rgba[..., :3], rgb)
-    tolerance = max(tolerance, _halo(away))
-    like = away <= tolerance
-    like |= _ruled_lines(rgba[..., :3], like)
-    return _flood(like, ring, rgb, sure, tolerance)
+    return found
 
 
 def is_transparent(rgba: UInt8[np.ndarray, "height width 4"]) -> bool:
     """Return whether the sheet's own alpha tells the figures from the background."""
-    return bool((rgba[..., 3] < 128).mean() > TRANSPARENT)
+    return float(np.count_nonzero(rgba[..., 3] < 128)) / rgba[..., 3].size > TRANSPARENT
 
 
 def flattened(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
@@ -84,53 +112,23 @@ def flattened(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "h
 
 
 def difference(
-    rgb: UInt8[np.ndarray, "*n 3"], background: tuple[int, int, int]
-) -> UInt8[np.ndarray, " *n"]:
+    rgb: UInt8[np.ndarray, "height width 3"], ground: UInt8[np.ndarray, "height width 3"]
+) -> UInt8[np.ndarray, "height width"]:
     """Return the largest difference of any channel from the background, in levels."""
-    apart = [
-        np.maximum(rgb[..., i], level) - np.minimum(rgb[..., i], level)
-        for i, level in enumerate(np.array(background, dtype=np.uint8))
-    ]
-    return np.maximum(np.maximum(apart[0], apart[1]), apart[2])
+    result = cv2.absdiff(rgb[..., 0], np.ascontiguousarray(ground[..., 0]))
+    for channel in (1, 2):
+        apart = cv2.absdiff(rgb[..., channel], np.ascontiguousarray(ground[..., channel]))
+        cv2.max(result, apart, dst=result)
+    return np.asarray(result, dtype=np.uint8)
 
 
-def _ring(height: int, width: int) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels near the border: 2 % of the shorter side, so a thin frame is outvoted."""
-    thick = max(3, round(0.02 * min(height, width)))
-    ring = np.ones((height, width), dtype=bool)
-    ring[thick : height - thick, thick : width - thick] = False
-    return ring
-
-
-def _dominant(colors: UInt8[np.ndarray, "n 3"]) -> tuple[tuple[int, int, int], float, int]:
-    """Return the dominant colour, its share, and the tolerance that its noise asks for."""
-    best = np.median(colors, axis=0)
-    share = -1.0
-    for shift in (0, BINS // 2):  # two grids: a colour on the edge of a bin is whole in the other
-        bins = (colors.astype(np.int64) + shift) // BINS
-        codes = bins @ np.array([289, 17, 1])
-        code, count = np.unique(codes, return_counts=True)
-        if count.max() / len(colors) > share:
-            share = float(count.max() / len(colors))
-            best = np.median(colors[codes == code[count.argmax()]], axis=0)
-    red, green, blue = (round(float(x)) for x in best)
-    away = difference(colors, (red, green, blue))
-    near = away <= CLUSTER_RADIUS
-    center = np.median(colors[near], axis=0)
-    # 99 % of the border's noise, doubled: noise near figures (JPEG) is stronger than far away
-    noise = float(np.percentile(away[near], 99))
-    tolerance = int(np.clip(np.ceil(2 * noise), LEAST_TOLERANCE, MOST_TOLERANCE))
-    red, green, blue = (round(float(x)) for x in center)
-    return (red, green, blue), float(near.mean()), tolerance
-
-
-def _halo(away: UInt8[np.ndarray, "height width"]) -> int:
+def halo_tolerance(away: UInt8[np.ndarray, "height width"]) -> int:
     """Return how far, in levels, compression has spread the background's colour near figures.
 
     A soft edge passes all differences from the background equally often; ringing around edges
     (JPEG) adds small ones, the smaller the more. The level is where that decay ends.
     """
-    often = np.bincount(away.ravel(), minlength=256).astype(np.float64)
+    often = cv2.calcHist([away], [0], None, [256], [0, 256]).ravel().astype(np.float64)
     for level in range(1, MOST_TOLERANCE):
         here = often[level : level + 3].mean()
         beyond = np.median(often[level + HALO_WIDTH : level + 3 * HALO_WIDTH])
@@ -140,54 +138,82 @@ def _halo(away: UInt8[np.ndarray, "height width"]) -> int:
     return MOST_TOLERANCE
 
 
-def _flood(
-    like: Bool[np.ndarray, "height width"],
-    ring: Bool[np.ndarray, "height width"],
-    rgb: tuple[int, int, int],
-    sure: float,
-    tolerance: int,
+def ring_of(height: int, width: int) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels near the border: 2 % of the shorter side, so a thin frame is outvoted."""
+    thick = max(3, round(0.02 * min(height, width)))
+    ring = np.ones((height, width), dtype=bool)
+    ring[thick : height - thick, thick : width - thick] = False
+    return ring
+
+
+def _sure_of_alpha(rgba: np.ndarray, ring: np.ndarray) -> float:
+    return float((rgba[..., 3][ring] < 128).mean())
+
+
+def _samples(ring: Bool[np.ndarray, "height width"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows and columns of evenly picked border pixels."""
+    rows, columns = np.nonzero(ring)
+    step = max(1, len(rows) // MOST_SAMPLES)
+    return rows[::step], columns[::step]
+
+
+def _richest_worth_it(
+    rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray
 ) -> Background:
-    """Divide background-coloured pixels into those that the border reaches and the others."""
-    _, found = cv2.connectedComponents(like.astype(np.uint8), connectivity=4)
-    labels = np.asarray(found, dtype=np.int32)
-    reached = np.zeros(int(labels.max()) + 1, dtype=bool)
-    reached[np.unique(labels[ring & like])] = True
-    reached[0] = False
-    outside = reached[labels]
-    return Background(rgb, sure, tolerance, outside, like & ~outside)
+    """Return the plain background, or a gradient or smooth field where the border asks for it."""
+    dominant = _dominant(colors)
+    best = _judged("plain", None, dominant, colors, np.array(dominant))
+    if best.sure >= CLEARLY and best.tolerance <= 2 * WORTH_LEVELS:
+        return best
+    gradient = fit_gradient(rgba)
+    for kind, field in (("gradient", gradient), ("uneven", fit_smooth(rgba, gradient))):
+        expected = sampled(field, places)
+        richer = _judged(kind, field, field.typical, colors, expected)
+        if not _is_worth_it(richer, best):
+            continue
+        evidence = (
+            f"noise {richer.tolerance / 2:g} levels, {best.tolerance / 2:g} if it were "
+            f"{best.kind}; {richer.sure:.0%} of the border, {best.sure:.0%} if it were"
+        )
+        best = Background(field.typical, field, kind, richer.sure, richer.tolerance, evidence)
+    return best
 
 
-def _ruled_lines(
-    rgb: UInt8[np.ndarray, "height width 3"], like: Bool[np.ndarray, "height width"]
-) -> Bool[np.ndarray, "height width"]:
-    """Return pixels of lines in one colour that cross the sheet, except within figures."""
-    found = np.zeros(like.shape, dtype=bool)
-    for turned in (False, True):
-        picture = rgb.swapaxes(0, 1) if turned else rgb
-        ground = like.T if turned else like
-        target = found.T if turned else found
-        rows = np.flatnonzero((~ground).mean(axis=1) >= LINE_SHARE)
-        rows = np.array([row for row in rows if _is_one_colour(picture[row])], dtype=int)
-        for first, last in _runs(rows):
-            above = ground[first - 1] if first > 0 else np.ones(ground.shape[1], dtype=bool)
-            below = (
-                ground[last + 1] if last + 1 < len(ground) else np.ones(ground.shape[1], dtype=bool)
-            )
-            if last - first < 0.02 * len(ground):  # thicker is a block, not a line
-                target[first : last + 1] = above | below
-    return found
+def _is_worth_it(richer: Background, simpler: Background) -> bool:
+    quieter = richer.tolerance <= WORTH * simpler.tolerance
+    quieter &= richer.tolerance / 2 <= simpler.tolerance / 2 - WORTH_LEVELS
+    return richer.sure >= simpler.sure + WORTH_SHARE or (
+        quieter and richer.sure >= simpler.sure - WORTH_SHARE
+    )
 
 
-def _is_one_colour(row: UInt8[np.ndarray, "width 3"]) -> bool:
-    middle: Float[np.ndarray, " 3"] = np.median(row, axis=0)
-    return bool((np.abs(row - middle).max(axis=1) < CLUSTER_RADIUS).mean() >= LINE_SHARE)
+def _judged(
+    kind: str,
+    field: Field | None,
+    rgb: tuple[int, int, int],
+    colors: UInt8[np.ndarray, "n 3"],
+    expected: Float[np.ndarray, "*n 3"],
+) -> Background:
+    """Return a background with its share of the border and the tolerance that its noise asks."""
+    away = np.abs(colors - expected.astype(np.float32)).max(axis=1)
+    near = away <= CLUSTER_RADIUS
+    # 99 % of the border's noise, doubled: noise near figures (JPEG) is stronger than far away
+    noise = float(np.percentile(away[near], 99)) if near.any() else 0.0
+    tolerance = int(np.clip(np.ceil(2 * noise), LEAST_TOLERANCE, MOST_TOLERANCE))
+    return Background(rgb, field, kind, float(near.mean()), tolerance)
 
 
-def _runs(rows: np.ndarray) -> list[tuple[int, int]]:
-    """Return first and last of every run of neighbouring rows."""
-    if not len(rows):
-        return []
-    breaks = np.flatnonzero(np.diff(rows) > 1)
-    firsts = np.concatenate([[rows[0]], rows[breaks + 1]])
-    lasts = np.concatenate([rows[breaks], [rows[-1]]])
-    return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
+def _dominant(colors: UInt8[np.ndarray, "n 3"]) -> tuple[int, int, int]:
+    """Return the dominant colour of the border."""
+    best = np.median(colors, axis=0)
+    share = -1.0
+    for shift in (0, BINS // 2):  # two grids: a colour on the edge of a bin is whole in the other
+        bins = (colors.astype(np.int64) + shift) // BINS
+        codes = bins @ np.array([289, 17, 1])
+        code, count = np.unique(codes, return_counts=True)
+        if count.max() / len(colors) > share:
+            share = float(count.max() / len(colors))
+            best = np.median(colors[codes == code[count.argmax()]], axis=0)
+    near = np.abs(colors - best).max(axis=1) <= CLUSTER_RADIUS
+    red, green, blue = (round(float(x)) for x in np.median(colors[near], axis=0))
+    return red, green, blue

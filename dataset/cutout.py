@@ -27,7 +27,7 @@ Pixels = tuple[np.ndarray, np.ndarray]
 def edge_softness_px(
     rgb: UInt8[np.ndarray, "height width 3"],
     mask: Bool[np.ndarray, "height width"],
-    background: tuple[int, int, int],
+    background: UInt8[np.ndarray, "height width 3"],
     tolerance: int,
 ) -> int:
     """Return how many pixels deep the figure's edge is mixed with the background; 0 = hard.
@@ -36,9 +36,9 @@ def edge_softness_px(
     of the colours farther inside. Pixel art is hard, anti-aliased drawings have 1, scans 2 or 3.
     """
     depth = _depth(mask)
-    ground = np.array(background, dtype=np.float64)
     for softness in range(SOFTEST_EDGE_PX):
         layer = _pixels((depth > softness) & (depth <= softness + 1))
+        ground = background[layer].astype(np.float64)
         pure = rgb[_pure_pixels(layer, depth, rgb, ground, tolerance)] - ground
         contrast = np.linalg.norm(pure, axis=1)
         usable = contrast > HARD_CONTRAST
@@ -53,7 +53,7 @@ def edge_softness_px(
 def cut_out(
     rgb: UInt8[np.ndarray, "height width 3"],
     mask: Bool[np.ndarray, "height width"],
-    background: tuple[int, int, int],
+    background: UInt8[np.ndarray, "height width 3"],
     tolerance: int,
     softness_px: int,
 ) -> UInt8[np.ndarray, "height width 4"]:
@@ -62,7 +62,7 @@ def cut_out(
     Args:
         rgb: the crop of the sheet.
         mask: the figure's pixels, mixed ones included.
-        background: the sheet's colour.
+        background: the sheet's colour behind the crop.
         tolerance: noise of the sheet in levels.
         softness_px: depth of the mixed edge, see `edge_softness_px`.
 
@@ -76,8 +76,8 @@ def cut_out(
     if softness_px == 0:
         return rgba
     depth = _depth(mask)
-    ground = np.array(background, dtype=np.float64)
     band = _pixels(mask & (depth <= softness_px + 1))
+    ground = background[band].astype(np.float64)
     mixed = rgb[band] - ground
     pure = rgb[_pure_pixels(band, depth, rgb, ground, tolerance)] - ground
     alpha = _coverage(mixed, pure, ground, tolerance)

@@ -1,4 +1,9 @@
-"""Which pixels of a sheet form which figure, and in which order one reads the figures."""
+"""Which patches of a sheet are the drawn views, which are parts of one, and what the others are.
+
+The views of a turnaround show one character, so they are about equally high: of all heights the one
+counts that explains most of what is drawn, tall things first. Everything else is a part of a view
+(a floating hat, a hand apart) if it lies within or close to one, or it is left out under a name.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +11,26 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 
-NEAR = 0.02  # of the figure's height: a part this near to the figure's box is the figure's
-FAR = 0.15  # of the figure's height: a part farther away belongs to nobody
-LEAST_PART = 0.01  # of the figure's area: smaller things beside a figure are specks or letters
-LEAST_SPECK_PX = 4  # pixels: smaller things within a figure's box are noise
-LETTERS = 3  # small things in a row beside the figures: a caption
+from toonset.dataset.letters import find_letters
+
+LOWEST = 0.7  # of the views' median height: lower drawings are studies or props
+HIGHEST = 1.45  # of the same: higher ones, too
+LEAST_AREA = 0.25  # of the views' median area: a side view is rarely below a third of a front view
+RECTANGLE = 0.96  # of its box that a patch fills: a block of colour, no character
+WITHIN = 0.5  # of a patch that lies in a figure's box: its part
+NEAR = 0.02  # of the figure's height: a part this near to the figure is the figure's
+ABOVE = 0.08  # of the figure's height: so near something above or below it may be its part
+BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
+PART_AREA = 0.35  # of the figure's area: a larger thing apart is a drawing of its own
+LEAST_PART = 0.004  # of the figure's area: smaller things beside a figure are marks
+LEAST_SPECK = 4  # cells: smaller things are noise
+LISTED_SPECK = 0.0005  # of the figure's area: smaller ones are counted, not listed
+FAMILIAR = 0.8  # of a part's pixels in colours that its figure has
+STROKE = 0.12  # of its box's diagonal: a thing no thicker is a stroke
+SWATCH = 0.9  # of its box that a swatch fills
+DISC = (0.74, 0.83)  # of its box that a disc fills
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +49,15 @@ class Blobs:
     areas: Int[np.ndarray, " blobs"]
     centers: Float[np.ndarray, "blobs 2"]
 
+    def window(self, number: int) -> tuple[slice, slice]:
+        """Return rows and columns of a patch's box."""
+        x, y, width, height = self.boxes[number]
+        return slice(y, y + height), slice(x, x + width)
+
+    def mask(self, number: int) -> Bool[np.ndarray, "height width"]:
+        """Return the pixels of a patch within its box."""
+        return self.labels[self.window(number)] == number + 1
+
 
 @dataclass(frozen=True, eq=False)
 class Grouping:
@@ -39,52 +66,65 @@ class Grouping:
     Attributes:
         figure_of_blob: (blobs,) number of the figure in reading order; -1 = none.
         count: number of figures.
-        captions: patches dropped as text.
-        strays: patches dropped because they belong to no figure (noise not counted).
+        kinds: per patch what it is if it is no figure's: see `toonset.dataset.sheet.LeftOut`;
+            "" for noise that is too small to name.
     """
 
     figure_of_blob: Int[np.ndarray, " blobs"]
     count: int
-    captions: int
-    strays: int
+    kinds: tuple[str, ...]
 
 
 def find_blobs(foreground: Bool[np.ndarray, "height width"]) -> Blobs:
     """Return the connected patches (diagonal neighbours touch)."""
     _, labels, stats, centers = cv2.connectedComponentsWithStats(
-        foreground.astype(np.uint8), connectivity=8
+        foreground.view(np.uint8), connectivity=8
     )
     return Blobs(labels, stats[1:, :4], stats[1:, 4], centers[1:])
 
 
-def group_blobs(blobs: Blobs, least_share: float) -> Grouping:
-    """Return which figure every patch belongs to.
+def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
+    """Return the numbers of the patches that are the bodies of the views, in no order."""
+    large = np.flatnonzero(blobs.areas >= LEAST_SPECK)
+    letters = np.zeros(len(blobs.areas), dtype=bool)
+    letters[large] = find_letters(blobs.boxes[large], int(blobs.boxes[:, 3].max(initial=0)))
+    fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
+    drawn = large[~letters[large]]
+    figurative = drawn[fill[drawn] < RECTANGLE]
+    for candidates in (figurative, drawn, large):  # a sheet of boxes still has views
+        if len(candidates):
+            return candidates[_of_one_height(blobs.boxes[candidates, 3], blobs.areas[candidates])]
+    return large
 
-    A patch of at least `least_share` of the largest one's area is a figure. A smaller one joins
-    the nearest figure if it lies within that figure's box or touches it nearly, or close above,
-    below or beside it (a floating hat, a sword tip, a hand apart) unless it is a speck or part of
-    a caption.
+
+def group_blobs(
+    blobs: Blobs, mains: Int[np.ndarray, " mains"], rgb: UInt8[np.ndarray, "height width 3"]
+) -> Grouping:
+    """Return which figure every patch belongs to, and what the others are.
+
+    Args:
+        blobs: the patches.
+        mains: those that are the bodies of the views.
+        rgb: the sheet.
     """
-    mains = np.flatnonzero(blobs.areas >= least_share * blobs.areas.max())
     mains = mains[reading_order(blobs.boxes[mains], blobs.centers[mains])]
     figure = np.full(len(blobs.areas), -1)
     figure[mains] = np.arange(len(mains))
-    small = np.flatnonzero((figure < 0) & (blobs.areas >= LEAST_SPECK_PX))
-    if not len(small):
-        return Grouping(figure, len(mains), 0, 0)
-    nearest = _nearest_main(blobs, mains, small)
-    gaps = _gaps(blobs.boxes[small], blobs.boxes[mains[nearest]])
-    heights = blobs.boxes[mains[nearest], 3]
-    inside = gaps.max(axis=1) <= 0
-    texts = np.zeros(len(small), dtype=bool)
-    texts[~inside] = _in_captions(blobs.boxes[small[~inside]])
-    near = gaps.max(axis=1) <= NEAR * heights
-    close = (gaps.max(axis=1) <= FAR * heights) & (gaps.min(axis=1) <= 0)
-    large = blobs.areas[small] >= LEAST_PART * blobs.areas[mains[nearest]]
-    joins = inside | (~texts & (near | (close & large)))
-    figure[small[joins]] = nearest[joins]
-    captions = int((texts & ~joins).sum())
-    return Grouping(figure, len(mains), captions, int((~joins).sum()) - captions)
+    kinds = np.full(len(blobs.areas), "", dtype=object)
+    small = np.flatnonzero((figure < 0) & (blobs.areas >= LEAST_SPECK))
+    if len(small):
+        nearest, gap = _nearest_main(blobs, mains, small)
+        letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[mains, 3])))
+        typical = float(np.median(blobs.areas[mains]))
+        for i, number in enumerate(small):
+            body = int(mains[nearest[i]])
+            if _is_part(blobs, int(number), body, float(gap[i]), bool(letters[i]), rgb):
+                figure[number] = nearest[i]
+            elif letters[i]:
+                kinds[number] = "text"
+            elif blobs.areas[number] >= LISTED_SPECK * typical:
+                kinds[number] = _kind(blobs, int(number), typical)
+    return Grouping(figure, len(mains), tuple(kinds))
 
 
 def reading_order(
@@ -110,64 +150,95 @@ def reading_order(
     )
 
 
-def _nearest_main(blobs: Blobs, mains: np.ndarray, small: np.ndarray) -> np.ndarray:
-    """Return for every small patch the position in `mains` of the figure nearest to its pixels."""
+def _of_one_height(
+    heights: Int[np.ndarray, " n"], areas: Int[np.ndarray, " n"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which patches are of the height that explains most: area, number, and tallness."""
+    best, merit = np.zeros(len(heights), dtype=bool), -1.0
+    for height in np.unique(heights[areas >= 0.02 * areas.max()]):
+        alike = (heights >= LOWEST * height) & (heights <= height / LOWEST)
+        alike &= areas >= LEAST_AREA * np.median(areas[alike])
+        middle = float(np.median(heights[alike]))
+        alike &= (heights >= LOWEST * middle) & (heights <= HIGHEST * middle)
+        score = float(areas[alike].sum()) * int(alike.sum()) * middle**2
+        if score > merit:
+            best, merit = alike, score
+    return best
+
+
+def _nearest_main(
+    blobs: Blobs, mains: np.ndarray, small: np.ndarray
+) -> tuple[Int[np.ndarray, " small"], Float[np.ndarray, " small"]]:
+    """Return for every small patch the position in `mains` of the nearest figure, and the gap."""
     is_main = np.zeros(len(blobs.areas) + 1, dtype=bool)
     is_main[mains + 1] = True
-    zero_at_main = (~is_main[blobs.labels]).astype(np.uint8)
-    away, found = cv2.distanceTransformWithLabels(
-        zero_at_main, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_CCOMP
+    position = np.zeros(len(blobs.areas) + 1, dtype=np.int64)
+    position[mains + 1] = np.arange(len(mains))
+    zero_at_main = (~is_main[blobs.labels]).view(np.uint8)
+    away, zones = cv2.distanceTransformWithLabels(
+        zero_at_main, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    zones = np.asarray(found, dtype=np.int32)
-    zone_of_main = zones[_a_pixel_of_each(blobs, mains)]
-    main_of_zone = np.full(int(zones.max()) + 1, 0)
-    main_of_zone[zone_of_main] = np.arange(len(mains))
-    result = []
+    main_of_zone = np.zeros(int(zones.max()) + 1, dtype=np.int64)
+    at_main = zero_at_main == 0
+    main_of_zone[zones[at_main]] = position[blobs.labels[at_main]]
+    nearest, gaps = [], []
     for number in small:
-        x, y, width, height = blobs.boxes[number]
-        window = (slice(y, y + height), slice(x, x + width))
-        inside = blobs.labels[window] == number + 1
-        nearest = np.where(inside, away[window], np.inf).argmin()
-        result.append(main_of_zone[zones[window].flat[nearest]])
-    return np.array(result)
+        window = blobs.window(number)
+        gap = np.where(blobs.mask(number), away[window], np.inf)
+        place = gap.argmin()
+        nearest.append(main_of_zone[zones[window].flat[place]])
+        gaps.append(gap.flat[place])
+    return np.array(nearest), np.array(gaps)
 
 
-def _a_pixel_of_each(blobs: Blobs, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    rows, columns = [], []
-    for number in numbers:
-        x, y, width, height = blobs.boxes[number]
-        inside = blobs.labels[y : y + height, x : x + width] == number + 1
-        row, column = np.unravel_index(int(inside.argmax()), inside.shape)
-        rows.append(y + row)
-        columns.append(x + column)
-    return np.array(rows), np.array(columns)
+def _is_part(
+    blobs: Blobs, number: int, body: int, gap: float, is_letter: bool, rgb: np.ndarray
+) -> bool:
+    """Return whether a patch is a part of the figure whose body is nearest to it."""
+    own, main = blobs.boxes[number], blobs.boxes[body]
+    area = blobs.areas[number] / blobs.areas[body]
+    if area > PART_AREA:
+        return False
+    if _share_within(own, main) >= WITHIN:
+        return True
+    if is_letter:
+        return False
+    if gap <= NEAR * main[3]:
+        return True
+    if area < LEAST_PART or _is_stroke(blobs.mask(number)):
+        return False
+    middle = own[0] + own[2] / 2
+    if main[0] <= middle <= main[0] + main[2]:
+        return gap <= ABOVE * main[3]
+    return gap <= BESIDE * main[3] and _in_its_colors(blobs, number, body, rgb)
 
 
-def _gaps(a: Int[np.ndarray, "n 4"], b: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, "n 2"]:
-    """Return the gaps in x and y between boxes; <= 0 where they overlap."""
-    start = np.maximum(a[:, :2], b[:, :2])
-    end = np.minimum(a[:, :2] + a[:, 2:], b[:, :2] + b[:, 2:])
-    return start - end
+def _share_within(own: np.ndarray, main: np.ndarray) -> float:
+    start = np.maximum(own[:2], main[:2])
+    stop = np.minimum(own[:2] + own[2:], main[:2] + main[2:])
+    width, height = np.maximum(stop - start, 0)
+    return float(width * height / (own[2] * own[3]))
 
 
-def _in_captions(boxes: Int[np.ndarray, "n 4"]) -> Bool[np.ndarray, " n"]:
-    """Return which boxes are letters: three or more of like height, side by side on a line."""
-    count = len(boxes)
-    if count < LETTERS or count > 5000:  # more is noise, and the table below would be large
-        return np.zeros(count, dtype=bool)
-    x, y, width, height = (boxes[:, i, None].astype(float) for i in range(4))
-    taller = np.maximum(height, height.T)
-    gap = np.maximum(x, x.T) - np.minimum(x + width, (x + width).T)
-    level = np.abs((y + height / 2) - (y + height / 2).T) <= 0.6 * taller
-    alike = taller <= 2.5 * np.minimum(height, height.T)
-    near = level & alike & (gap <= 1.5 * taller)
-    links, groups = _connected(near)
-    return np.bincount(groups, minlength=links)[groups] >= LETTERS
+def _is_stroke(mask: Bool[np.ndarray, "height width"]) -> bool:
+    """Return whether a patch is thin everywhere: an arrow's shaft, a flourish."""
+    depth = cv2.distanceTransform(np.pad(mask, 1).view(np.uint8), cv2.DIST_L2, 3).max()
+    return bool(2 * depth <= STROKE * np.hypot(*mask.shape))
 
 
-def _connected(near: Bool[np.ndarray, "n n"]) -> tuple[int, Int[np.ndarray, " n"]]:
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
+def _in_its_colors(blobs: Blobs, number: int, body: int, rgb: np.ndarray) -> bool:
+    """Return whether a patch has hardly a colour that the figure does not have."""
+    known = np.zeros((8, 8, 8), dtype=np.uint8)
+    known[tuple((rgb[blobs.window(body)][blobs.mask(body)] // 32).T)] = 1
+    own = tuple((rgb[blobs.window(number)][blobs.mask(number)] // 32).T)
+    return float(known[own].mean()) >= FAMILIAR
 
-    count, groups = connected_components(csr_matrix(near), directed=False)
-    return int(count), groups
+
+def _kind(blobs: Blobs, number: int, typical: float) -> str:
+    mask, (_, _, width, height) = blobs.mask(number), blobs.boxes[number]
+    fill = blobs.areas[number] / (width * height)
+    if fill >= SWATCH or (DISC[0] <= fill <= DISC[1] and 0.8 <= width / height <= 1.25):
+        return "swatch"
+    if _is_stroke(mask):
+        return "mark"
+    return "study" if blobs.areas[number] >= LEAST_PART * typical else "speck"

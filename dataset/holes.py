@@ -66,7 +66,7 @@ def outline_look(
     rgb: UInt8[np.ndarray, "height width 3"],
     mask: Bool[np.ndarray, "height width"],
     enclosed: Bool[np.ndarray, "height width"],
-    background: tuple[int, int, int],
+    background: UInt8[np.ndarray, "height width 3"],
 ) -> BorderLook:
     """Return what a figure's outline looks like; see `open_holes` for the arguments."""
     return _look(
@@ -81,7 +81,7 @@ def open_holes(
     rgb: UInt8[np.ndarray, "height width 3"],
     mask: Bool[np.ndarray, "height width"],
     enclosed: Bool[np.ndarray, "height width"],
-    background: tuple[int, int, int],
+    background: UInt8[np.ndarray, "height width 3"],
     outline: BorderLook,
     least_share: float,
 ) -> tuple[Bool[np.ndarray, "height width"], int]:
@@ -91,7 +91,7 @@ def open_holes(
         rgb: the crop of the sheet.
         mask: the figure with everything that it encloses.
         enclosed: its patches in the background's colour.
-        background: that colour.
+        background: that colour behind the crop.
         outline: what the outlines of all figures of the sheet look like.
         least_share: of the figure's area; a smaller patch is no hole.
     """

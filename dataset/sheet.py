@@ -7,20 +7,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.background import Background, find_background, flattened, is_transparent
 from toonset.dataset.cutout import cut_out, edge_softness_px
-from toonset.dataset.figures import Blobs, Grouping, find_blobs, group_blobs
 from toonset.dataset.holes import BorderLook, open_holes, outline_look
+from toonset.dataset.letters import words
 from toonset.dataset.line_width import contour_width_px
+from toonset.dataset.survey import Survey, figure_cells, find_paint, in_pixels, joined, survey
 from toonset.errors import SheetError
 from toonset.view import View
 
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
 SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
 WIDE = 1.8  # times the median width: two figures that touch
+
+NAMES = {
+    "text": "text beside the figures was",
+    "swatch": "patches of plain colour were",
+    "mark": "strokes beside the figures were",
+    "study": "smaller drawings were",
+    "speck": "small patches that belong to no figure were",
+}
 
 Box = tuple[int, int, int, int]
 
@@ -97,65 +107,100 @@ def split_sheet(
         SheetError: blank, no plain background, nothing on it large enough, far too many figures.
     """
     options = options or SheetOptions()
-    if not is_transparent(rgba):
+    if options.background_rgb is not None or not is_transparent(rgba):
         rgba = flattened(rgba)
-    ground = find_background(rgba)
-    blobs = find_blobs(~ground.outside)
-    _check_blobs(blobs, ground)
-    grouping = group_blobs(blobs, options.least_figure)
-    if grouping.count > options.most_figures:
-        raise SheetError(
-            f"found {grouping.count} figures, at most {options.most_figures} are read; crop the "
-            "sheet to one character"
-        )
-    crops = [_crop(blobs, grouping, number, options.margin_px) for number in range(grouping.count)]
+    ground = find_background(rgba, options.background_rgb)
+    paint, ground = find_paint(rgba, ground)
+    found = survey(rgba, paint, ground)
+    _check(found, ground, options)
+    crops = _crops(found, paint, options.margin_px)
     views, holes = _views(rgba, ground, crops, options)
-    warnings = _warnings(ground, grouping, views, holes)
-    return Sheet(tuple(views), ground.rgb, ground.sure, warnings)
+    return Sheet(
+        tuple(views),
+        ground.rgb,
+        ground.sure,
+        _warnings(ground, found, views, holes),
+        _left_out(found),
+    )
 
 
-Crop = tuple[Box, Bool[np.ndarray, "_ _"]]
+@dataclass(frozen=True, eq=False)
+class Crop:
+    """Where a figure stands, and its pixels there.
+
+    Attributes:
+        box: (x, y, width, height) in the sheet.
+        solid: what the figure covers with all that it encloses.
+        enclosed: background-coloured pixels within.
+    """
+
+    box: Box
+    solid: Bool[np.ndarray, "height width"]
+    enclosed: Bool[np.ndarray, "height width"]
 
 
-def _check_blobs(blobs: Blobs, ground: Background) -> None:
+def _check(found: Survey, ground: Background, options: SheetOptions) -> None:
     color = "transparent" if ground.rgb is None else "#{:02x}{:02x}{:02x}".format(*ground.rgb)
+    blobs = found.blobs
     if not len(blobs.areas):
         raise SheetError(f"the sheet is blank (all {color}); a drawn figure is needed")
-    width, height = blobs.boxes[blobs.areas.argmax(), 2:]
+    width, height = (int(v) * found.cell_px for v in blobs.boxes[blobs.areas.argmax(), 2:])
     if min(width, height) < LEAST_FIGURE_PX:
         raise SheetError(
             f"no figure on the {color} background: the largest patch is {width} x {height} px, "
             f"{LEAST_FIGURE_PX} x {LEAST_FIGURE_PX} is needed; use a larger picture"
         )
+    if found.grouping.count > options.most_figures:
+        raise SheetError(
+            f"found {found.grouping.count} figures, at most {options.most_figures} are read; crop "
+            "the sheet to one character"
+        )
 
 
-def _crop(blobs: Blobs, grouping: Grouping, number: int, margin: int) -> Crop:
-    """Return the box of a figure with its margin, and its pixels within."""
-    members = np.flatnonzero(grouping.figure_of_blob == number)
-    boxes = blobs.boxes[members]
-    height, width = blobs.labels.shape
+def _crops(found: Survey, paint: Bool[np.ndarray, "height width"], margin_px: int) -> list[Crop]:
+    cells = figure_cells(found)
+    bare = found.ruled | found.shadow
+    crops = []
+    for number in range(found.grouping.count):
+        box = _box(found, number, paint.shape, margin_px)
+        drawn = _window(paint, box) & ~in_pixels(bare, found.cell_px, box)
+        if found.cell_px == 1:
+            solid = _window(cells, box) == number + 1
+        else:
+            own = _own_pixels(cells, number, found.cell_px, box)
+            paper = in_pixels(found.paper, found.cell_px, box)
+            solid = own & ~joined(~drawn, paper & ~drawn)
+        solid &= ~in_pixels(found.shadow, found.cell_px, box)
+        crops.append(Crop(box, solid, solid & ~drawn))
+    return crops
+
+
+def _own_pixels(
+    cells: Int[np.ndarray, "rows columns"], number: int, cell_px: int, box: Box
+) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels of a figure's cells and of those beside them that are nobody's."""
+    x, y, width, height = box
+    rows = slice(max(y // cell_px - 1, 0), (y + height) // cell_px + 2)
+    columns = slice(max(x // cell_px - 1, 0), (x + width) // cell_px + 2)
+    near = cells[rows, columns]
+    grown = cv2.dilate((near == number + 1).view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    own = grown & ((near == 0) | (near == number + 1))
+    local = (x - columns.start * cell_px, y - rows.start * cell_px, width, height)
+    return np.asarray(in_pixels(own, cell_px, local), dtype=bool)
+
+
+def _box(found: Survey, number: int, shape: tuple[int, ...], margin: int) -> Box:
+    """Return the box of a figure with its margin, in pixels of the sheet."""
+    boxes = found.blobs.boxes[found.grouping.figure_of_blob == number] * found.cell_px
     left, top = np.maximum(boxes[:, :2].min(axis=0) - margin, 0)
     right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0) + margin
-    right, bottom = min(right, width), min(bottom, height)
-    is_member = np.zeros(len(blobs.areas) + 1, dtype=bool)
-    is_member[members + 1] = True
-    mask: Int[np.ndarray, "h w"] = is_member[blobs.labels[top:bottom, left:right]]
-    return (int(left), int(top), int(right - left), int(bottom - top)), mask
+    right, bottom = min(right, shape[1]), min(bottom, shape[0])
+    return int(left), int(top), int(right - left), int(bottom - top)
 
 
 def _window(picture: np.ndarray, box: Box) -> np.ndarray:
     x, y, width, height = box
     return picture[y : y + height, x : x + width]
-
-
-def _softness(rgba: np.ndarray, ground: Background, crops: list[Crop]) -> int:
-    """Return the edge softness of the sheet: the median of its figures'."""
-    assert ground.rgb is not None  # a transparent sheet has its own alpha
-    each = [
-        edge_softness_px(_window(rgba, box)[..., :3], mask, ground.rgb, ground.tolerance)
-        for box, mask in crops
-    ]
-    return int(np.median(each))
 
 
 def _views(
@@ -164,24 +209,37 @@ def _views(
     """Return the views and the number of opened holes."""
     holes = 0
     if ground.rgb is None:
-        cuts = [np.where(mask[..., None], _window(rgba, box), np.uint8(0)) for box, mask in crops]
+        cuts = [np.where(c.solid[..., None], _window(rgba, c.box), np.uint8(0)) for c in crops]
     else:
+        papers = [ground.colors(crop.box) for crop in crops]
         softness = _softness(rgba, ground, crops)
         look = BorderLook(0, 0, 0, 0)
-        for box, mask in crops:
-            enclosed = _window(ground.enclosed, box) & mask
-            look += outline_look(_window(rgba, box)[..., :3], mask, enclosed, ground.rgb)
+        for crop, paper in zip(crops, papers, strict=True):
+            rgb = _window(rgba, crop.box)[..., :3]
+            look += outline_look(rgb, crop.solid, crop.enclosed, paper)
         cuts = []
-        for box, mask in crops:
-            rgb, enclosed = _window(rgba, box)[..., :3], _window(ground.enclosed, box) & mask
-            solid, opened = open_holes(rgb, mask, enclosed, ground.rgb, look, options.least_hole)
-            cuts.append(cut_out(rgb, solid, ground.rgb, ground.tolerance, softness))
+        for crop, paper in zip(crops, papers, strict=True):
+            rgb = _window(rgba, crop.box)[..., :3]
+            solid, opened = open_holes(
+                rgb, crop.solid, crop.enclosed, paper, look, options.least_hole
+            )
+            cuts.append(cut_out(rgb, solid, paper, ground.tolerance, softness))
             holes += opened
-    boxes = [box for box, _ in crops]
     return [
-        _view(cut, box, f"{i:03d}.png")
-        for i, (cut, box) in enumerate(zip(cuts, boxes, strict=True))
+        _view(cut, crop.box, f"{i:03d}.png")
+        for i, (cut, crop) in enumerate(zip(cuts, crops, strict=True))
     ], holes
+
+
+def _softness(rgba: np.ndarray, ground: Background, crops: list[Crop]) -> int:
+    """Return the edge softness of the sheet: the median of its figures'."""
+    each = [
+        edge_softness_px(
+            _window(rgba, crop.box)[..., :3], crop.solid, ground.colors(crop.box), ground.tolerance
+        )
+        for crop in crops
+    ]
+    return int(np.median(each))
 
 
 def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View:
@@ -190,20 +248,43 @@ def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View
     return View(cut, box, contour_width_px(cut), name)
 
 
-def _warnings(
-    ground: Background, grouping: Grouping, views: list[View], holes: int
-) -> tuple[str, ...]:
-    found = []
+def _left_out(found: Survey) -> tuple[LeftOut, ...]:
+    """Return what was seen but is no view, words as one each."""
+    boxes = [(line.box, "frame") for line in found.lines]
+    kinds = np.array(found.grouping.kinds, dtype=object)
+    for kind in NAMES:
+        own = found.blobs.boxes[kinds == kind]
+        boxes += [(_as_box(box), kind) for box in (words(own) if kind == "text" else own)]
+    cell = found.cell_px
+    return tuple(
+        LeftOut((x * cell, y * cell, width * cell, height * cell), kind)
+        for (x, y, width, height), kind in boxes
+    )
+
+
+def _as_box(box: Int[np.ndarray, " 4"]) -> Box:
+    x, y, width, height = (int(value) for value in box)
+    return x, y, width, height
+
+
+def _warnings(ground: Background, found: Survey, views: list[View], holes: int) -> tuple[str, ...]:
+    said = []
     if ground.rgb is not None and ground.sure < SURE_ENOUGH:
-        found.append(f"only {ground.sure:.0%} of the sheet's border is background")
-    if grouping.captions:
-        found.append(f"text beside the figures was left out ({grouping.captions} patches)")
-    if grouping.strays:
-        found.append(f"{grouping.strays} small patches that belong to no figure were left out")
+        said.append(f"only {ground.sure:.0%} of the sheet's border is background")
+    kinds = found.grouping.kinds
+    for kind, what in NAMES.items():
+        if kind in kinds:
+            said.append(f"{what} left out ({kinds.count(kind)} patches)")
     if holes:
-        found.append(f"{holes} enclosed patches in the background's colour became holes")
+        said.append(f"{holes} enclosed patches in the background's colour became holes")
+    for cut in found.cuts:
+        x, y, width, height = (value * found.cell_px for value in cut.box)
+        said.append(
+            f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "
+            f"through {cut.crossed:.1%} of their height: look whether the cut is right"
+        )
     median = float(np.median([view.box[2] for view in views]))
     for view in views:
         if len(views) >= 3 and view.box[2] > WIDE * median:
-            found.append(f"view {view.name} is unusually wide: do two figures touch?")
-    return tuple(found)
+            said.append(f"view {view.name} is unusually wide: do two figures touch?")
+    return tuple(said)

@@ -1,0 +1,52 @@
+"""Text on a sheet: small things of like height, side by side on a line."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+LETTERS = 3  # small things in a row: a word
+HIGHEST = 0.3  # of a figure's height, of letters; and their width
+TOO_MANY = 4000  # more is noise, and the table below would be large
+
+
+def find_letters(boxes: Int[np.ndarray, "n 4"], figure_height: int) -> Bool[np.ndarray, " n"]:
+    """Return which boxes (x, y, width, height) are letters of a word.
+
+    Three or more of like height, on one level, nearer to each other than one and a half of their
+    height, and well below a figure's height.
+    """
+    result = np.zeros(len(boxes), dtype=bool)
+    able = np.flatnonzero(boxes[:, 2:].max(axis=1, initial=0) <= HIGHEST * figure_height)
+    if len(able) < LETTERS or len(able) > TOO_MANY:
+        return result
+    groups = _groups(boxes[able])
+    result[able] = np.bincount(groups)[groups] >= LETTERS
+    return result
+
+
+def words(letters: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, "words 4"]:
+    """Return the boxes round the words that letters form."""
+    if not len(letters) or len(letters) > TOO_MANY:
+        return letters
+    groups = _groups(letters)
+    boxes = []
+    for group in range(int(groups.max()) + 1):
+        own = letters[groups == group]
+        low, high = own[:, :2].min(axis=0), (own[:, :2] + own[:, 2:]).max(axis=0)
+        boxes.append([*low, *(high - low)])
+    return np.array(boxes)
+
+
+def _groups(boxes: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, " n"]:
+    """Return for every box the number of its group: boxes of like height on one level."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    x, y, width, height = (boxes[:, i, None].astype(float) for i in range(4))
+    taller = np.maximum(height, height.T)
+    gap = np.maximum(x, x.T) - np.minimum(x + width, (x + width).T)
+    level = np.abs((y + height / 2) - (y + height / 2).T) <= 0.6 * taller
+    alike = taller <= 2.5 * np.minimum(height, height.T)
+    near = level & alike & (gap <= 1.5 * taller)
+    return np.asarray(connected_components(csr_matrix(near), directed=False)[1], dtype=np.int64)

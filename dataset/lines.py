@@ -1,0 +1,156 @@
+"""Ruled lines of a sheet: frames round it or round each figure, tables, ground and height lines.
+
+A line is a thin straight run with paper along most of it. It counts if it crosses most of the
+sheet, or if it closes a rectangle with other lines; so a spear, a belt or a letter is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool
+
+LEAST_RUN = 0.04  # of the sheet's side along the line
+LEAST_RUN_PX = 24
+THICKEST = 0.008  # of the sheet's shorter side
+THICKEST_PX = 4  # whatever the sheet's size
+CROSSING = 0.6  # of the sheet: a line this long needs no others
+LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
+ALIKE = 0.8  # overlap of the runs of neighbouring rows
+OPEN = 0.5  # of the line's length with paper beside it, on the better side
+JOINT = 0.02  # of the shorter side: corners may miss each other by so much
+BROKEN_PX = 5  # gaps in a run that noise may leave
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line of the sheet; rows and columns change roles for vertical ones.
+
+    Attributes:
+        first: its first row.
+        last: its last row.
+        start: its first column.
+        stop: the column after its last.
+        vertical: rows are columns.
+    """
+
+    first: int
+    last: int
+    start: int
+    stop: int
+    vertical: bool
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """Return x, y, width, height."""
+        if self.vertical:
+            return self.first, self.start, self.last - self.first + 1, self.stop - self.start
+        return self.start, self.first, self.stop - self.start, self.last - self.first + 1
+
+
+def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
+    """Return the ruled lines of a sheet.
+
+    Args:
+        paint: pixels that are not background-coloured.
+    """
+    height, width = paint.shape
+    thickest = max(THICKEST_PX, round(THICKEST * min(height, width)))
+    lines = _straight(paint, thickest, vertical=False)
+    lines += _straight(np.ascontiguousarray(paint.T), thickest, vertical=True)
+    free = [line for line in lines if _crosses(line, paint.shape)]
+    closed = _closed(lines, free, JOINT * min(height, width) + thickest)
+    shortest = LEAST_SIDE * min(height, width)
+    return free + [
+        line for line in closed if line not in free and line.stop - line.start >= shortest
+    ]
+
+
+def line_pixels(
+    paint: Bool[np.ndarray, "height width"], lines: list[Line]
+) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels of the lines, except where a figure stands on both of their sides."""
+    found = np.zeros(paint.shape, dtype=bool)
+    for line in lines:
+        source, target = (paint.T, found.T) if line.vertical else (paint, found)
+        columns = slice(line.start, line.stop)
+        above, below = _beside(source, line)
+        target[line.first : line.last + 1, columns] |= ~(above & below)
+    return found & paint
+
+
+def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
+    """Return thin horizontal lines with paper beside them."""
+    least = max(LEAST_RUN_PX, round(LEAST_RUN * paint.shape[1]))
+    whole = cv2.morphologyEx(
+        paint.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((1, BROKEN_PX), np.uint8)
+    )
+    edges = np.diff(np.pad(whole, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    rows, starts = np.nonzero(edges == 1)
+    stops = np.nonzero(edges == -1)[1]
+    long = stops - starts >= least
+    runs = zip(rows[long].tolist(), starts[long].tolist(), stops[long].tolist(), strict=True)
+    bands = _stacked(list(runs))
+    lines = [Line(*band, vertical) for band in bands if band[1] - band[0] < thickest]
+    return [line for line in lines if _is_open(paint, line)]
+
+
+def _stacked(runs: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]]:
+    """Return (first row, last row, start, stop) of runs that lie below each other."""
+    done: list[tuple[int, int, int, int]] = []
+    growing: list[tuple[int, int, int, int]] = []
+    for row, start, stop in runs:
+        for i, (first, last, left, right) in enumerate(growing):
+            shared = min(stop, right) - max(start, left)
+            if last == row - 1 and shared >= ALIKE * max(stop - start, right - left):
+                growing[i] = (first, row, min(start, left), max(stop, right))
+                break
+        else:
+            growing.append((row, row, start, stop))
+        if len(growing) > 256:
+            done += [band for band in growing if band[1] < row - 1]
+            growing = [band for band in growing if band[1] >= row - 1]
+    return done + growing
+
+
+def _is_open(paint: np.ndarray, line: Line) -> bool:
+    above, below = _beside(paint, line)
+    return bool(np.mean(~above & ~below) >= OPEN)
+
+
+def _beside(paint: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
+    """Return whether something is painted just above and just below each column of a line."""
+    columns = slice(line.start, line.stop)
+    nothing = np.zeros(line.stop - line.start, dtype=bool)
+    above = paint[line.first - 2, columns] if line.first >= 2 else nothing
+    below = paint[line.last + 2, columns] if line.last + 2 < len(paint) else nothing
+    return above, below
+
+
+def _crosses(line: Line, shape: tuple[int, ...]) -> bool:
+    return line.stop - line.start >= CROSSING * shape[0 if line.vertical else 1]
+
+
+def _closed(lines: list[Line], free: list[Line], slack: float) -> list[Line]:
+    """Return the lines both of whose ends meet lines across, until all do: rectangles, tables."""
+    kept = list(lines)
+    while True:
+        left = [line for line in kept if line in free or _is_joined(line, kept, slack)]
+        if len(left) == len(kept):
+            return left
+        kept = left
+
+
+def _is_joined(line: Line, others: list[Line], slack: float) -> bool:
+    across = [other for other in others if other.vertical != line.vertical]
+    middle = (line.first + line.last) / 2
+    return all(
+        any(
+            abs((other.first + other.last) / 2 - end) <= slack
+            and other.start - slack <= middle <= other.stop + slack
+            for other in across
+        )
+        for end in (line.start, line.stop)
+    )
