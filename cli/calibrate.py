@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.calibrate_inputs import Body, Hints, load_body, load_known, load_views
+from toonset.cli.calibrate_inputs import Body, Hints, load_body, load_known, load_sheets
 from toonset.cli.calibrate_provenance import provenance
 from toonset.cli.output import (
     OUTPUT_PANEL,
@@ -19,6 +20,14 @@ from toonset.cli.output import (
     QuietFlag,
     SeedOption,
     check_output,
+)
+from toonset.cli.sheet_options import (
+    LABELS_HELP,
+    BackgroundOption,
+    BoxesOption,
+    Cutting,
+    DropOption,
+    GridOption,
 )
 
 if TYPE_CHECKING:
@@ -48,7 +57,11 @@ class Lock(StrEnum):
 def calibrate(
     sheets: Annotated[
         list[Path],
-        typer.Argument(metavar="SHEET", help="A character sheet, or one file per view."),
+        typer.Argument(
+            metavar="SHEET",
+            help="A character sheet, one file per view, a folder of them, or what `toonset split` "
+            "wrote.",
+        ),
     ],
     mesh: Annotated[
         Path | None,
@@ -64,8 +77,7 @@ def calibrate(
         typer.Option(
             "--views",
             metavar="LABELS",
-            help="What each view shows, in sheet order: front,3q,side,back ..., yaws in degrees, "
-            "? where unknown.",
+            help=LABELS_HELP,
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = "",
@@ -105,6 +117,10 @@ def calibrate(
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = None,
+    boxes: BoxesOption = None,
+    grid: GridOption = "",
+    background: BackgroundOption = "",
+    drop: DropOption = "",
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Bundle folder.", rich_help_panel=OUTPUT_PANEL)
     ] = Path("bundle"),
@@ -119,17 +135,19 @@ def calibrate(
     code 3 when a view is weak, ambiguous or failed; the files are written then too.
     """
     kept = tuple(lock.value for lock in locked or ())
-    hints = Hints(labels, landmarks, landmarks_only, init, kept)
+    cutting = Cutting(boxes, drop, background, grid)
+    hints = Hints(labels, landmarks, landmarks_only, init, kept, cutting)
     hints.check_usage()
     printer = Printer(as_json, quiet)
-    check_output(out, [*sheets, mesh, landmarks, init], WRITTEN, force=force)
+    check_output(out, [*sheets, mesh, landmarks, init, boxes], WRITTEN, force=force)
     body = load_body(mesh)
-    views = load_views(sheets, printer)
+    given = load_sheets(sheets, hints, printer)
+    views, hints = given.views, replace(hints, labels=given.labels)
     known = load_known(hints, views, body)
     marks = _landmark_fits(known, body.mesh)
     _say_inputs(views, body, marks, printer)
     found = _fit(views, body.mesh, known, printer, landmarks_only=landmarks_only)
-    report = _report(found, marks) | provenance(sheets, body, hints, seed)
+    report = _report(found, marks) | provenance(given.files, body, hints, seed)
     _write(out, views, body.mesh, found, report, force=force)
     _say_result(found, out, printer)
     printer.result({"bundle": out, **report}, str(out))
@@ -200,8 +218,6 @@ def _write(
     *,
     force: bool,
 ) -> None:
-    from dataclasses import replace
-
     from toonset.calib.overlay import draw_overlay
     from toonset.dataset.bundle import write_bundle
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from toonset.cli.output import Printer
+from toonset.cli.sheet_inputs import check_label_count, load_drawings
+from toonset.cli.sheet_options import Cutting
 
 if TYPE_CHECKING:
     from toonset.calib.known import Known
@@ -33,6 +35,7 @@ class Hints:
         landmarks_only: no outline is fitted.
         init: bundle or transforms.json with cameras to start from.
         locked: what stays as given.
+        cutting: how the sheets are cut.
     """
 
     labels: str = ""
@@ -40,13 +43,16 @@ class Hints:
     landmarks_only: bool = False
     init: Path | None = None
     locked: tuple[str, ...] = ()
+    cutting: Cutting = field(default_factory=Cutting)
 
     def check_usage(self) -> None:
         """Refuse what contradicts itself.
 
         Raises:
             BadParameter: --landmarks-only without --landmarks, or beside what it does not use.
+            SheetError: an option that says how sheets are cut cannot be understood.
         """
+        self.cutting.check_usage()
         if not self.landmarks_only:
             return
         if self.landmarks is None:
@@ -62,6 +68,7 @@ class Hints:
             "views": self.labels or None,
             "landmarks_only": self.landmarks_only,
             "locked": list(self.locked),
+            **self.cutting.as_options(),
         }
 
 
@@ -110,27 +117,36 @@ def load_body(path: Path | None) -> Body:
     return Body(mesh, path)
 
 
-def load_views(paths: Sequence[Path], printer: Printer) -> list[View]:
-    """Return the drawings of all sheets, named in order.
+@dataclass(frozen=True, eq=False)
+class Sheets:
+    """The drawings to fit.
+
+    Attributes:
+        views: named in order.
+        labels: what each shows, as --views or a split folder says; empty for nothing.
+        files: role and path of every file that the views depend on.
+    """
+
+    views: tuple[View, ...]
+    labels: str
+    files: tuple[tuple[str, Path], ...]
+
+
+def load_sheets(paths: Sequence[Path], hints: Hints, printer: Printer) -> Sheets:
+    """Return the drawings of all sheets.
 
     Raises:
-        PictureError, SheetError: a file is no picture, or shows no figures.
+        PictureError, SheetError: see `load_drawings`; or --views has not one label per view.
     """
-    from toonset.dataset.picture import load_rgba
-    from toonset.dataset.sheet import split_sheet
-    from toonset.errors import SheetError
-
-    views: list[View] = []
-    for path in paths:
-        picture = load_rgba(path)
-        try:
-            sheet = split_sheet(picture)
-        except SheetError as error:
-            raise SheetError(f"{path}: {error}") from error
-        for warning in sheet.warnings:
-            printer.say(f"{path.name}: {warning}")
-        views.extend(sheet.views)
-    return [replace(view, name=f"{i:03d}.png") for i, view in enumerate(views)]
+    drawings = load_drawings(paths, hints.cutting, printer)
+    for source in drawings.split.sources:
+        for warning in source.warnings:
+            printer.say(f"{source.name}: {warning}")
+    for note in drawings.notes:
+        printer.say(note)
+    check_label_count(hints.labels, drawings)
+    labels = hints.labels or drawings.split.label_text
+    return Sheets(drawings.split.views, labels, drawings.files)
 
 
 def load_known(hints: Hints, views: Sequence[View], body: Body) -> Known:

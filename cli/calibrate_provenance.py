@@ -10,8 +10,17 @@ from typing import Any
 from toonset.cli.calibrate_inputs import Body, Hints
 
 
-def provenance(sheets: Sequence[Path], body: Body, hints: Hints, seed: int) -> dict[str, Any]:
-    """Return what calibration.json says of where its cameras come from."""
+def provenance(
+    drawings: Sequence[tuple[str, Path]], body: Body, hints: Hints, seed: int
+) -> dict[str, Any]:
+    """Return what calibration.json says of where its cameras come from.
+
+    Args:
+        drawings: role and path of every file that the views depend on.
+        body: the mannequin.
+        hints: what the command line says of the views.
+        seed: of everything random.
+    """
     from hashlib import sha256
     from importlib.metadata import version
 
@@ -24,17 +33,19 @@ def provenance(sheets: Sequence[Path], body: Body, hints: Hints, seed: int) -> d
         "versions": {name: version(name) for name in packages},
         "inputs": [  # views may come from files of the same name in several folders
             {"name": path.name, "sha256": sha256(path.read_bytes()).hexdigest(), "role": role}
-            for role, path in _files(sheets, body, hints)
+            for role, path in _files(drawings, body, hints)
         ],
     }
 
 
-def _files(sheets: Sequence[Path], body: Body, hints: Hints) -> list[tuple[str, Path]]:
+def _files(
+    drawings: Sequence[tuple[str, Path]], body: Body, hints: Hints
+) -> list[tuple[str, Path]]:
     """Return (role, path) of every file that the cameras depend on."""
     from toonset.dataset.mannequin_files import landmarks_path
     from toonset.dataset.transforms import transforms_file
 
-    files = [("sheet", path) for path in sheets]
+    files = list(drawings)
     if body.path is not None:
         files.append(("mesh", body.path))
     if hints.landmarks is not None:

@@ -59,7 +59,7 @@ BAD_PICTURES: dict[str, tuple[Callable[[Path, Image.Image], Any], str]] = {
     "missing.png": (lambda path, _: None, "no such file; check the name"),
     "dangling.png": (lambda path, _: path.symlink_to("gone.png"), "no such file; check the name"),
     "loop.png": (lambda path, _: path.symlink_to(path.name), "cannot be read"),
-    "folder.png": (lambda path, _: path.mkdir(), "is a folder, a picture file is needed; name"),
+    "folder.png": (lambda path, _: path.mkdir(), "is a folder without pictures; name a sheet"),
     "pipe.png": (lambda path, _: os.mkfifo(path), "no regular file; a picture file is needed"),
     "empty.png": (text(""), "is empty (0 bytes); export the picture again"),
     "cut.png": (cut("PNG"), "PNG file is damaged or cut off"),

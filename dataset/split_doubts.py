@@ -1,0 +1,55 @@
+"""What is odd about files that are read together: copies, a sheet among views, another scale."""
+
+from __future__ import annotations
+
+from statistics import median
+
+from toonset.dataset.split import Split
+
+OTHER_SCALE = 1.5  # times the usual height of a figure, or less than its inverse
+
+
+def odd_files(split: Split) -> tuple[str, ...]:
+    """Return a line, for people, about every file that is unlike the others or a copy of one."""
+    return (*_copies(split), *_sheets_among_views(split), *_other_scales(split))
+
+
+def _copies(split: Split) -> tuple[str, ...]:
+    """Return a line for every file that is a copy of an earlier one; its views count twice."""
+    first: dict[str, int] = {}
+    notes = []
+    for index, source in enumerate(split.sources):
+        earlier = first.setdefault(source.sha256, index)
+        if earlier != index:
+            name = split.sources[earlier].name
+            notes.append(f"{source.name} is a copy of {name}: is one of them another view?")
+    return tuple(notes)
+
+
+def _sheets_among_views(split: Split) -> tuple[str, ...]:
+    counts = [split.source_of.count(index) for index in range(len(split.sources))]
+    if len(counts) < 3 or median(counts) != 1:
+        return ()
+    return tuple(
+        f"{source.name} shows {count} figures, the others one: is it a sheet of the same views?"
+        for source, count in zip(split.sources, counts, strict=True)
+        if count > 1
+    )
+
+
+def _other_scales(split: Split) -> tuple[str, ...]:
+    """Return a line for every file whose figures are much higher or lower than most."""
+    if len(split.sources) < 2:
+        return ()
+    heights = [view.box[3] for view in split.views]
+    usual = median(heights)
+    lines = []
+    for index, source in enumerate(split.sources):
+        mine = [h for h, of in zip(heights, split.source_of, strict=True) if of == index]
+        height = median(mine) if mine else usual
+        if not usual / OTHER_SCALE <= height <= usual * OTHER_SCALE:
+            lines.append(
+                f"{source.name}: {height:g} px high, most views are {usual:g}: is it drawn at "
+                "another scale?"
+            )
+    return tuple(lines)
