@@ -12,6 +12,7 @@ from toonset.dataset.messy_cast import Brief
 from toonset.dataset.messy_figure import Cast, Rgb
 from toonset.dataset.messy_layout import Layout, Placed, Spacing
 from toonset.dataset.messy_props import Stamp, arrow, swatches
+from toonset.dataset.messy_rules import frame_px
 from toonset.dataset.messy_text import faded, signature, title_block
 
 LEAST_ARROW_PX = 16
@@ -49,7 +50,7 @@ def plan_margins(
     widths = [s.shape[1] for s in (title, None if upright else strip, name) if s is not None]
     return Margins(
         Spacing(
-            margin=round(unit * float(rng.uniform(0.06, 0.25))),
+            margin=round(unit * float(rng.uniform(0.06, 0.25))) + frame_px("frame" in chosen),
             gap=max(round(unit * _gap(chosen, rng)), 4),
             leading=max(round(unit * float(rng.uniform(0.08, 0.3))), 8),
             text_gap=max(round(unit * float(rng.uniform(0.025, 0.08))), 4),
@@ -98,7 +99,8 @@ def furnish(
 
 def _gap(chosen: frozenset[str], rng: np.random.Generator) -> float:
     """Return the distance between figures as a share of their height."""
-    return float(rng.uniform(0.3, 0.5) if "arrows" in chosen else rng.uniform(0.08, 0.4))
+    least, most = (0.3, 0.5) if "arrows" in chosen else (0.08, 0.4)
+    return float(rng.uniform(max(least, 0.15) if "cells" in chosen else least, most))
 
 
 def _arrows(canvas: Canvas, layout: Layout, rgb: Rgb, rng: np.random.Generator) -> None:

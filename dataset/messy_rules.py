@@ -8,6 +8,8 @@ from toonset.dataset.messy_canvas import Canvas
 from toonset.dataset.messy_figure import Rgb
 from toonset.dataset.messy_layout import Layout, Rectangle
 
+INSETS = (0, 3, 8)  # px from the sheet's edge to its frame
+WIDEST_PEN, BETWEEN = 5, 3  # px; of a frame's lines
 GUIDES: tuple[Rgb, ...] = ((150, 190, 230), (190, 190, 190), (230, 140, 140))
 
 
@@ -47,13 +49,18 @@ def rectangle(canvas: Canvas, box: Rectangle, pen: int, rgb: Rgb) -> None:
     canvas.rule(x + width - pen, y, pen, height, rgb, 1.0)
 
 
+def frame_px(framed: bool) -> int:
+    """Return how far a frame can reach into the sheet."""
+    return max(INSETS) + 2 * (WIDEST_PEN + BETWEEN) if framed else 0
+
+
 def _frame(canvas: Canvas, size_wh: tuple[int, int], rgb: Rgb, rng: np.random.Generator) -> None:
     """Draw one line or two round the sheet, at its very edge or a little inside."""
-    inset, pen = int(rng.choice([0, 3, 8])), int(rng.integers(1, 6))
+    inset, pen = int(rng.choice(INSETS)), int(rng.integers(1, WIDEST_PEN + 1))
     for _ in range(int(rng.integers(1, 3))):
         inner = size_wh[0] - 2 * inset, size_wh[1] - 2 * inset
         rectangle(canvas, (inset, inset, *inner), pen, rgb)
-        inset += pen + 3
+        inset += pen + BETWEEN
 
 
 def _dashed(canvas: Canvas, y: int, width: int, pen: int, dash: int, rgb: Rgb) -> None:

@@ -1,0 +1,59 @@
+"""What the command line of `toonset bench` asks for, and which options go together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+import typer
+
+DEFAULT_COUNT = 4
+
+
+class Subject(StrEnum):
+    """What is measured."""
+
+    calib = "calib"
+    train = "train"
+    stability = "stability"
+    splitting = "split"  # a string has a method `split`
+
+
+class Baseline(StrEnum):
+    """What calibration is compared with, besides the nominal angles."""
+
+    colmap = "colmap"
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What the command line asks for."""
+
+    subject: Subject
+    cases: Path | None
+    sprites: Path | None
+    only: str
+    count: int | None
+    half: bool
+    baseline: Baseline | None
+    quick: bool
+    seed: int
+
+    def check(self) -> None:
+        """Refuse options of another subject.
+
+        Raises:
+            BadParameter: one of them is given.
+        """
+        if self.half and (self.subject is not Subject.train or self.cases is None):
+            raise typer.BadParameter("--half belongs to `train --cases`")
+        if self.baseline is not None and self.subject is not Subject.calib:
+            raise typer.BadParameter("--baseline belongs to `calib`")
+        if self.sprites is not None and self.subject not in (Subject.calib, Subject.splitting):
+            raise typer.BadParameter("--sprites belongs to `calib` and `split`")
+        alone = self.subject is Subject.calib and self.sprites is not None
+        if alone and (self.cases is not None or self.baseline is not None):
+            raise typer.BadParameter("--sprites goes without --cases and --baseline")
+        if self.cases is not None and self.subject is Subject.stability:
+            raise typer.BadParameter("--cases does not belong to `stability`")

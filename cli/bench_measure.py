@@ -1,0 +1,135 @@
+"""What `toonset bench` measures for each subject: records, their table, pictures to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from toonset.cli.bench_chosen import DEFAULT_COUNT, Baseline, Chosen, Subject
+from toonset.cli.output import Printer
+from toonset.errors import BundleError
+
+if TYPE_CHECKING:
+    from toonset.bench.record import Record
+    from toonset.bench.split_cases import SplitCase
+
+CHARTED = ("rotation error modulo twin", "yaw error", "held-out PSNR")
+WRONG_SPLITS = "wrong.png"
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Records, their table, and PNG pictures by file name."""
+
+    records: list[Record]
+    text: str
+    pictures: dict[str, bytes] = field(default_factory=dict)
+
+
+def measure(chosen: Chosen, printer: Printer) -> Measured:
+    """Return what one run measures; `stability` has a module of its own.
+
+    Raises:
+        ToonsetError: no case of that name, or a folder without cases.
+    """
+    if chosen.subject is Subject.splitting:
+        return _splitting(chosen, printer)
+    records, text = _stage(chosen, printer)
+    return Measured(records, text, _charts(chosen, records))
+
+
+def _stage(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
+    if chosen.subject is Subject.train:
+        return _training(chosen, printer)
+    if chosen.sprites is not None:
+        from toonset.bench.calib_table import sprites_table
+        from toonset.bench.sprites import bench_sprites, sprite_cases
+
+        characters = sprite_cases(chosen.sprites, chosen.only)
+        records = bench_sprites(characters, chosen.seed, printer.progress)
+        return records, sprites_table(records)
+    return _calibration(chosen, printer)
+
+
+def _calibration(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
+    from toonset.bench.calib import bench_calibration, bench_colmap
+    from toonset.bench.calib_table import sheets_table
+    from toonset.bench.cases import calib_cases
+
+    count = chosen.count or DEFAULT_COUNT
+    sheets = list(calib_cases(chosen.cases, chosen.seed, count, chosen.only))
+    if not sheets:
+        raise _none_of(chosen)
+    quick, progress = chosen.quick, printer.progress
+    records = bench_calibration(sheets, chosen.seed, quick=quick, progress=progress)
+    if chosen.baseline is Baseline.colmap:
+        records += bench_colmap(sheets, chosen.seed, quick=quick, progress=progress)
+    return records, sheets_table(records)
+
+
+def _training(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
+    from toonset.bench.cases import train_cases
+    from toonset.bench.record import table
+    from toonset.bench.train import bench_training
+
+    count = chosen.count or DEFAULT_COUNT
+    found = train_cases(chosen.cases, chosen.seed, count, half=chosen.half)
+    scenes = [case for case in found if chosen.only in case.name]
+    if not scenes:
+        raise _none_of(chosen)
+    records = bench_training(scenes, chosen.seed, quick=chosen.quick, progress=printer.progress)
+    return records, table(records)
+
+
+def _splitting(chosen: Chosen, printer: Printer) -> Measured:
+    from toonset.bench.split import bench_split
+    from toonset.bench.split_picture import contact_sheet
+    from toonset.dataset.picture import encode_png
+
+    found = bench_split(_split_cases(chosen), chosen.seed, printer.progress)
+    if not found.records:
+        raise _none_of(chosen)
+    pictures = {WRONG_SPLITS: encode_png(contact_sheet(found.wrong))} if found.wrong else {}
+    return Measured(found.records, found.text, pictures)
+
+
+def _split_cases(chosen: Chosen) -> Iterator[SplitCase]:
+    """Yield the folders' sheets; synthetic ones where no folder is given."""
+    from toonset.bench.split_cases import messy_cases, sheet_cases, sprite_sheet_cases
+
+    if chosen.cases is not None:
+        yield from sheet_cases(chosen.cases, chosen.only)
+    if chosen.sprites is not None:
+        yield from sprite_sheet_cases(chosen.sprites, chosen.only)
+    if chosen.cases is None and chosen.sprites is None:
+        count = chosen.count or (1 if chosen.quick else DEFAULT_COUNT)
+        yield from messy_cases(chosen.seed, count, chosen.only)
+
+
+def _none_of(chosen: Chosen) -> BundleError:
+    return BundleError(f"no case's name contains {chosen.only!r}; correct --only")
+
+
+def _charts(chosen: Chosen, records: list[Record]) -> dict[str, bytes]:
+    from toonset.bench.chart import Point, draw_chart
+    from toonset.bench.record import machine
+
+    charts = {}
+    for group in dict.fromkeys(record.group for record in records):
+        own = [record for record in records if record.group == group]
+        seconds = {r.method: r.median for r in own if r.metric == "seconds"}
+        merits = [r for r in own if r.metric in CHARTED]
+        if not merits:
+            continue
+        points = [Point(r.method, max(seconds[r.method], 1e-3), r.median, r.p95) for r in merits]
+        training = chosen.subject is Subject.train
+        charts[f"chart-{group.replace(' ', '-').replace(',', '')}.png"] = draw_chart(
+            points,
+            title=f"toonset bench {chosen.subject.value}, {group}: median, whisker to p95",
+            cost_label="seconds of training" if training else "seconds per sheet",
+            merit_label=f"{merits[0].metric} ({merits[0].unit})",
+            caption=f"n = {merits[0].n}, seed {chosen.seed}, {machine()}",
+            lower_is_better=merits[0].direction == "lower",
+        )
+    return charts
