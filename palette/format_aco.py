@@ -91,7 +91,7 @@ def _rgb(words: tuple[int, ...], where: str) -> RGB:
             within(b, -128, 128, where),
         )
     if space == 8:
-        gray = level(1 - first / FULL_GRAY, where)
+        gray = level(1 - within(first, 0, FULL_GRAY, where) / FULL_GRAY, where)
         return gray, gray, gray
     if space in CMYK_SPACES:
         raise no_cmyk(where)

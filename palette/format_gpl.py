@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from toonset.errors import PaletteError
-from toonset.palette.named import NamedColor, clean_name
+from toonset.palette.named import NamedColor, clean_name, levels_of
 from toonset.palette.palette import Palette
 from toonset.palette.text import lines_of
 
@@ -62,11 +62,5 @@ def _says_rgba(line: str) -> bool:
 
 def _row(line: str, count: int, where: str) -> tuple[list[int], str]:
     words = line.split(maxsplit=count)
-    numbers = [int(word) for word in words[:count] if word.isascii() and word.isdigit()]
-    if len(numbers) != count or max(numbers) > 255:
-        amount = "four numbers" if count == 4 else "three numbers"
-        raise PaletteError(
-            f"{where}: {line.strip()[:40]!r} is no colour; {amount} from 0 to 255 are needed"
-        )
     name = clean_name("".join(words[count:]))
-    return numbers, "" if name == UNNAMED else name
+    return levels_of(words, count, where), "" if name == UNNAMED else name

@@ -11,7 +11,7 @@ from __future__ import annotations
 import struct
 
 from toonset.errors import PaletteError
-from toonset.palette.named import NamedColor
+from toonset.palette.named import NamedColor, levels_of
 from toonset.palette.text import lines_of
 
 JASC, RIFF = b"JASC-PAL", b"RIFF"
@@ -46,13 +46,8 @@ def _jasc(lines: list[str], where: str) -> list[NamedColor]:
 
 
 def _jasc_color(words: list[str], where: str) -> NamedColor:
-    numbers = [int(word) for word in words[:4] if word.isascii() and word.isdigit()]
-    if not 3 <= len(numbers) == len(words) or max(numbers) > 255:  # Aseprite may add alpha
-        raise PaletteError(
-            f"{where}: {' '.join(words)[:40]!r} is no colour; three numbers from 0 to 255 are "
-            "needed"
-        )
-    return NamedColor((numbers[0], numbers[1], numbers[2]))
+    red, green, blue, *_ = levels_of(words, 4 if len(words) > 3 else 3, where)  # 4: with alpha
+    return NamedColor((red, green, blue))
 
 
 def _riff(data: bytes, where: str) -> list[NamedColor]:

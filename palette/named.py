@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toonset.errors import PaletteError
 
 MAX_NAME = 64  # characters; a palette row in GIMP or a swatch's label holds no more anyway
 ROUNDING = 1e-3  # of a range: how far a float may lie outside it before it is no slip of rounding
+LEVEL = re.compile(r"\d{1,3}", re.ASCII)
 
 RGB = tuple[int, int, int]
 
@@ -34,6 +37,21 @@ def one_line(text: str) -> str:
 def clean_name(text: str) -> str:
     """Return a foreign name as one printable line of at most 64 characters."""
     return one_line(text)[:MAX_NAME].strip()
+
+
+def levels_of(words: Sequence[str], count: int, where: str) -> list[int]:
+    """Return the first `count` words as 8-bit levels.
+
+    Raises:
+        PaletteError: fewer words, or one that is no whole number from 0 to 255.
+    """
+    numbers = [int(word) for word in words[:count] if LEVEL.fullmatch(word)]
+    if len(numbers) != count or max(numbers) > 255:
+        amount = "four numbers" if count == 4 else "three numbers"
+        raise PaletteError(
+            f"{where}: {' '.join(words)[:40]!r} is no colour; {amount} from 0 to 255 are needed"
+        )
+    return numbers
 
 
 def within(value: float, low: float, high: float, where: str) -> float:

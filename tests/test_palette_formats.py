@@ -174,7 +174,7 @@ REFUSED: list[tuple[Callable[[bytes, str], list[NamedColor]], bytes, str]] = [
     (
         read_aco,
         aco_section(1, "0008 2711" + 12 * "0").replace(b"\x27\x11", b"\xff\xff"),
-        "value -5",
+        "value 65535, 0 to 10000",
     ),
     (read_aco, b"\0\3\0\1", "is of version 3, 1 or 2 is needed"),
     (read_aco, b"\0\1", "is cut off"),
