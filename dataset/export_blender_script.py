@@ -46,10 +46,9 @@ def write_blender_script(
     """
     written = scene_views(views)
     pictures = [f"images/{view.name}" for view in written]
-    window = window_wh(written)
-    records = [_record(v, p, mesh, window) for v, p in zip(written, pictures, strict=True)]
+    records = [_record(v, p, written, mesh) for v, p in zip(written, pictures, strict=True)]
     text = SCRIPT.replace("@VERSION@", __version__)
-    text = text.replace("@WINDOW@", repr(window))
+    text = text.replace("@WINDOW@", repr(window_wh(written)))
     text = text.replace("@VIEWS@", json.dumps(records, indent=1, allow_nan=False))
     with new_folder(folder, force=force) as temporary:
         for view, picture in zip(written, pictures, strict=True):
@@ -60,11 +59,11 @@ def write_blender_script(
 
 
 def _record(
-    view: ExportView, picture: str, mesh: Mesh | None, window: tuple[int, int]
+    view: ExportView, picture: str, views: Sequence[ExportView], mesh: Mesh | None
 ) -> dict[str, Any]:
-    camera = view.camera
+    camera, window = view.camera, window_wh(views)
     width, height = camera.size_wh
-    near, far = clip_range(view, mesh)
+    near, far = clip_range(view, views, mesh)
     # Blender measures lens shift in widths of the window, to the right and up
     right = (width / 2 - float(camera.center[0])) / window[0]
     up = (float(camera.center[1]) - height / 2) / window[0]
@@ -77,5 +76,5 @@ def _record(
         "focal_widths": 0.0 if camera.is_orthographic else float(camera.K[0, 0]) / window[0],
         "shift": [right, up],
         "clip": [near, far],
-        "plane": plane_corners(view, mesh).tolist(),
+        "plane": plane_corners(view, views, mesh).tolist(),
     }

@@ -72,38 +72,41 @@ def _scene(views: Sequence[ExportView], mesh: Mesh | None) -> bytes:
         file.roots.append(add_mannequin(file, mesh))
     window = centred_window_wh(views)
     for view in views:
-        camera = _add_camera(file, view, mesh, window)
-        file.roots += [camera, add_plane(file, view, plane_corners(view, mesh))]
+        camera = _add_camera(file, view, mesh, window, clip_range(view, views, mesh))
+        file.roots += [camera, add_plane(file, view, plane_corners(view, views, mesh))]
     return file.encode({"window_px": list(window)})
 
 
-def _add_camera(file: Gltf, view: ExportView, mesh: Mesh | None, window: tuple[int, int]) -> int:
-    lens = _orthographic if view.camera.is_orthographic else _perspective
-    seen = middle_chosen(view) if view.camera.is_orthographic else view
-    near, far = clip_range(seen, mesh)
-    camera = file.add("cameras", name=view.name, **lens(seen.camera, window, near, far))
-    matrix = conventions.opengl_pose_from_opencv(stand(seen, mesh))
+def _add_camera(
+    file: Gltf,
+    view: ExportView,
+    mesh: Mesh | None,
+    window: tuple[int, int],
+    near_far: tuple[float, float],
+) -> int:
     exact = NativeCamera.of(view.camera).model_dump(mode="json")
+    if view.camera.is_orthographic:
+        view, lens = middle_chosen(view), _orthographic(view.camera, window)
+    else:
+        lens = _perspective(view.camera, window)
+    kind = str(lens["type"])
+    lens[kind] |= dict(zip(("znear", "zfar"), near_far, strict=True))
+    matrix = conventions.opengl_pose_from_opencv(stand(view, mesh))
     return file.add(
         "nodes",
         name=f"camera {view.name}",
-        camera=camera,
+        camera=file.add("cameras", name=view.name, **lens),
         matrix=matrix.T.ravel().tolist(),  # glTF lists columns
         extras={"toonset": exact},
     )
 
 
-def _orthographic(
-    camera: Camera, window: tuple[int, int], near: float, far: float
-) -> dict[str, Any]:
+def _orthographic(camera: Camera, window: tuple[int, int]) -> dict[str, Any]:
     half = {f"{axis}mag": n / 2 / camera.scale for axis, n in zip("xy", window, strict=True)}
-    return {"type": "orthographic", "orthographic": {**half, "znear": near, "zfar": far}}
+    return {"type": "orthographic", "orthographic": half}
 
 
-def _perspective(
-    camera: Camera, window: tuple[int, int], near: float, far: float
-) -> dict[str, Any]:
+def _perspective(camera: Camera, window: tuple[int, int]) -> dict[str, Any]:
     width, height = window
     angle = 2 * math.atan(height / 2 / float(camera.K[1, 1]))
-    lens = {"yfov": angle, "aspectRatio": width / height, "znear": near, "zfar": far}
-    return {"type": "perspective", "perspective": lens}
+    return {"type": "perspective", "perspective": {"yfov": angle, "aspectRatio": width / height}}

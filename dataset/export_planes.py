@@ -1,4 +1,9 @@
-"""Where drawings hang in a 3D scene: in register with the mannequin, seen by their cameras."""
+"""Where drawings hang in a 3D scene: in register with the mannequin, as their cameras see them.
+
+The drawings form a wide ring around mannequin and cameras, each behind the mannequin as its camera
+sees it. So no drawing stands between another camera and the mannequin, and neighbours stay out of
+each other's view.
+"""
 
 from __future__ import annotations
 
@@ -13,28 +18,37 @@ from toonset.dataset.export_lens import square_pixels
 from toonset.dataset.export_views import ExportView
 from toonset.mesh import Mesh
 
-GAP = 0.05  # of the mannequin's radius between it and the plane behind it
-STAND_OFF = 3.0  # radii of what is seen from the target to an orthographic camera
+STAND_OFF = 2.0  # radii of what is seen from the target to an orthographic camera
+RING = 4.0  # such radii from the target to the drawings: 22.5 degrees apart they do not meet
+PAST_PINHOLE = 1.2  # of the distance of a pinhole: the drawing opposite hangs behind it
 
 
-def plane_corners(view: ExportView, mesh: Mesh | None) -> Float[np.ndarray, "4 3"]:
-    """Return the world corners of a drawing behind the mannequin: top left, then counter-clockwise.
+def plane_corners(
+    view: ExportView, views: Sequence[ExportView], mesh: Mesh | None
+) -> Float[np.ndarray, "4 3"]:
+    """Return the world corners of a drawing: top left, then counter-clockwise.
 
     Seen through the view's camera every pixel of the plane covers that pixel of the picture.
     """
-    camera = view.camera
-    width, height = camera.size_wh
+    width, height = view.camera.size_wh
     corners = np.array([[0, 0], [0, height], [width, height], [width, 0]], dtype=np.float64)
-    return camera.unproject(corners, np.full(4, _depth_behind(camera, mesh)))
+    return view.camera.unproject(corners, np.full(4, ring_radius(views, mesh)))
 
 
-def reach(view: ExportView, mesh: Mesh | None) -> float:
-    """Return a radius around the target that holds mannequin and drawing."""
-    corners = np.linalg.norm(plane_corners(view, mesh) - view.camera.target, axis=1).max()
+def ring_radius(views: Sequence[ExportView], mesh: Mesh | None) -> float:
+    """Return how far behind its target every drawing hangs."""
+    far = [PAST_PINHOLE / view.camera.k for view in views if not view.camera.is_orthographic]
+    return max([RING * max(seen_radius(view, mesh) for view in views), *far])
+
+
+def seen_radius(view: ExportView, mesh: Mesh | None) -> float:
+    """Return a radius around the target that holds the mannequin and what the picture shows."""
+    camera = view.camera
+    farthest = np.abs(np.array([camera.center, np.array(camera.size_wh) - camera.center])).max(0)
+    shown = float(np.linalg.norm(farthest)) / camera.scale
     if mesh is None:
-        return float(corners)
-    body = np.linalg.norm(mesh.vertices - view.camera.target, axis=1).max()
-    return float(max(corners, body))
+        return shown
+    return max(shown, float(np.linalg.norm(mesh.vertices - camera.target, axis=1).max()))
 
 
 def stand(view: ExportView, mesh: Mesh | None) -> Float[np.ndarray, "4 4"]:
@@ -44,15 +58,17 @@ def stand(view: ExportView, mesh: Mesh | None) -> Float[np.ndarray, "4 4"]:
     """
     pose = view.camera.world_from_camera
     if view.camera.is_orthographic:
-        pose[:3, 3] -= STAND_OFF * reach(view, mesh) * view.camera.rotation[2]
+        pose[:3, 3] -= STAND_OFF * seen_radius(view, mesh) * view.camera.rotation[2]
     return pose
 
 
-def clip_range(view: ExportView, mesh: Mesh | None) -> tuple[float, float]:
-    """Return depths from `stand` between which everything lies."""
-    radius = reach(view, mesh)
+def clip_range(
+    view: ExportView, views: Sequence[ExportView], mesh: Mesh | None
+) -> tuple[float, float]:
+    """Return depths from `stand` between which mannequin and drawing lie."""
+    radius = seen_radius(view, mesh)
     distance = STAND_OFF * radius if view.camera.is_orthographic else 1 / view.camera.k
-    return max(distance - 2 * radius, distance / 1000), distance + 2 * radius
+    return max(distance - radius, distance / 1000) / 2, 1.1 * (distance + ring_radius(views, mesh))
 
 
 def scene_views(views: Sequence[ExportView]) -> tuple[ExportView, ...]:
@@ -80,10 +96,3 @@ def _around_axis(camera: Camera) -> tuple[int, int]:
     pairs = zip(camera.center, camera.size_wh, strict=True)
     width, height = (math.ceil(2 * max(c, size - c)) for c, size in pairs)
     return width, height
-
-
-def _depth_behind(camera: Camera, mesh: Mesh | None) -> float:
-    if mesh is None:
-        return max(camera.size_wh) / 2 / camera.scale
-    depths = camera.project(mesh.vertices)[1]
-    return float(depths.max()) + GAP * mesh.radius
