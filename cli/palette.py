@@ -133,7 +133,8 @@ def _foreground(picture: Picture, path: Path, printer: Printer) -> Picture:
 
 
 def _choose(pictures: list[Picture], colors: str | None, min_share: float) -> Palette:
-    from toonset.palette.extract import PaletteOptions, extract_palette, pick_palette
+    from toonset.palette.choice import PaletteOptions
+    from toonset.palette.extract import extract_palette, pick_palette
     from toonset.palette.files import parse_colors
 
     if colors is not None:

@@ -1,93 +1,62 @@
 """The paper's palette: the colours that make up at least 5 % of the character's pixels.
 
-Only flat pixels count: mixtures along edges are nobody's colour. Shades of one colour (gradients,
-noise of the file) count together.
+Which colours there are is read from flat paint (`toonset.palette.pixels`, `shades`); how much of
+each, from all opaque pixels: soft ones count for the nearest. Where the drawn lines are given, they
+count to their ink, and the rule weighs the other colours without them, so that an outline does not
+push a colour under 5 %. The ink itself is in the palette like any colour that makes up 5 %.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError
+from toonset.palette.choice import Amount, PaletteOptions, choose, measure
 from toonset.palette.labels import nearest_colors
-from toonset.palette.mixed import mixed_pixels, opaque_pixels
-from toonset.palette.names import name_of
-from toonset.palette.oklab import oklab_from_rgb
-from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor
-from toonset.palette.shades import Family, Histogram, count_colors, find_families
+from toonset.palette.names import hex_of, name_of
+from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
+from toonset.palette.pixels import Histogram, count_marked, count_pixels
+from toonset.palette.shades import find_paints
 
 LEAST_LISTED = 0.002  # of the pixels: what is rarer is not worth a line among the dropped
 
-
-@dataclass(frozen=True)
-class PaletteOptions:
-    """How colours are chosen.
-
-    Attributes:
-        min_share: least share of the character's flat pixels, 0 to 1; the paper's rule is 5 %.
-        merge_distance: in OKLab; shades whose peaks are nearer are one colour. 0.06 is three times
-            what is just noticeable side by side, and below the step from a base colour to its
-            painted shadow.
-    """
-
-    min_share: float = 0.05
-    merge_distance: float = 0.06
-
-    def __post_init__(self) -> None:
-        """Refuse shares and distances without a meaning.
-
-        Raises:
-            PaletteError: out of range.
-        """
-        if not 0 <= self.min_share <= 1:
-            raise PaletteError(f"min share {self.min_share:g}; it is a share from 0 to 1")
-        if not 0 < self.merge_distance <= 1:
-            raise PaletteError(f"merge distance {self.merge_distance:g}; above 0, at most 1")
+Images = Sequence[UInt8[np.ndarray, "_ _ 4"]]
+Masks = Sequence[Bool[np.ndarray, "_ _"]]
 
 
 def extract_palette(
-    images: Sequence[UInt8[np.ndarray, "_ _ 4"]], options: PaletteOptions | None = None
+    images: Images, options: PaletteOptions | None = None, contours: Masks | None = None
 ) -> Palette:
     """Return the colours of a character, the most frequent first.
 
-    The result does not depend on the order, orientation or size of the pictures beyond their
-    pixels. If no colour reaches the least share, the largest one is kept and a warning says so.
+    The result does not depend on the order or orientation of the pictures. If no colour reaches the
+    least share, the largest one is kept and a warning says so.
+
+    Args:
+        images: the character on transparent ground; one palette for all.
+        options: of the choice.
+        contours: the drawn lines of every picture, if known.
 
     Raises:
-        PaletteError: no picture, or no opaque pixel in them.
+        PaletteError: no picture, no opaque pixel in them, or nothing found near a colour to keep.
     """
     options = options or PaletteOptions()
     histogram = _histogram(images)
-    families = find_families(histogram, options.merge_distance)
-    total = int(histogram.counts.sum())
-    kept = [family for family in families if family.count >= options.min_share * total]
-    kept = kept[:MAX_COLORS]
-    warnings = []
-    if not kept:
-        kept = families[:1]
-        warnings.append(
-            f"no colour reaches {options.min_share:.1%} of the pixels; the largest, with "
-            f"{kept[0].count / total:.1%}, was kept alone: lower --min-share"
-        )
-    rule = (
-        f"at least {options.min_share:g} of the flat opaque pixels; "
-        f"shades within {options.merge_distance:g} in OKLab count together"
-    )
-    colors = tuple(
-        PaletteColor(family.rgb, family.count / total, name_of(family.rgb)) for family in kept
-    )
-    return Palette(
-        colors, rule, _dropped(families[len(kept) :], histogram, colors), tuple(warnings)
-    )
+    paints, evidence = find_paints(histogram)
+    marked = None if contours is None else count_marked(histogram, images, contours)
+    amounts, ink = measure(paints, marked, options)
+    kept, left, warnings = choose(amounts, options)
+    colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)
+    contour = None if ink is None else _contour(amounts[ink])
+    dropped = _dropped(left, histogram, colors)
+    return Palette(colors, _rule(options, ink is not None), dropped, warnings, contour, evidence)
 
 
-def pick_palette(
-    images: Sequence[UInt8[np.ndarray, "_ _ 4"]], rgb: UInt8[np.ndarray, "colors 3"]
-) -> Palette:
+def pick_palette(images: Images, rgb: UInt8[np.ndarray, "colors 3"]) -> Palette:
     """Return hand-picked colours with their shares in the pictures, in the order given.
 
     Raises:
@@ -97,45 +66,57 @@ def pick_palette(
     label = nearest_colors(histogram.colors, rgb)
     shares = np.bincount(label, histogram.counts, len(rgb)) / histogram.counts.sum()
     triples = [(int(red), int(green), int(blue)) for red, green, blue in rgb]
-    names = [name_of(triple) for triple in triples]
-    unused = [
-        f"#{r:02x}{g:02x}{b:02x}" for (r, g, b), s in zip(triples, shares, strict=True) if not s
-    ]
+    unused = [hex_of(triple) for triple, share in zip(triples, shares, strict=True) if not share]
     warnings = (f"no pixel is nearest to {', '.join(unused)}",) if unused else ()
     colors = tuple(
-        PaletteColor(triple, float(share), name)
-        for triple, share, name in zip(triples, shares, names, strict=True)
+        PaletteColor(triple, float(share), name_of(triple))
+        for triple, share in zip(triples, shares, strict=True)
     )
     return Palette(colors, "picked by hand", (), warnings)
 
 
-def _histogram(images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Histogram:
+def _histogram(images: Images) -> Histogram:
     if not images:
         raise PaletteError("palette: no picture given; name a bundle or pictures")
-    histogram = count_colors(
-        image[opaque_pixels(image) & ~mixed_pixels(image)][:, :3] for image in images
-    )
+    histogram = count_pixels(images)
     if not len(histogram.counts):
         raise PaletteError(
-            "palette: the pictures have no opaque flat pixel; cut the character out with "
+            "palette: the pictures have no opaque pixel; cut the character out with "
             "`toonset calibrate`, or save it with an opaque figure"
         )
     return histogram
 
 
+def _rule(options: PaletteOptions, lines: bool) -> str:
+    words = [f"at least {options.min_share:g} of the opaque pixels"]
+    if lines:
+        words = [f"at least {options.min_share:g} of the opaque pixels that are no drawn lines"]
+        words.append(
+            "the lines' colour by all pixels" if options.contour else "the lines' colour alike"
+        )
+    words.append(f"shades within {JUST_NOTICEABLE:g} in OKLab are one colour")
+    if options.keep:
+        words.append(f"kept by hand: {', '.join(map(hex_of, options.keep))}")
+    return "; ".join(words)
+
+
+def _contour(ink: Amount) -> ContourColor:
+    rgb = ink.paint.rgb
+    return ContourColor(rgb, ink.share - ink.cloth, ink.cloth, name_of(rgb))
+
+
 def _dropped(
-    families: list[Family], histogram: Histogram, colors: tuple[PaletteColor, ...]
+    left: list[Amount], histogram: Histogram, colors: tuple[PaletteColor, ...]
 ) -> tuple[DroppedColor, ...]:
     palette = np.array([color.rgb for color in colors], dtype=np.uint8)
-    total = int(histogram.counts.sum())
     result = []
-    for family in families:
-        if family.count < LEAST_LISTED * total:
+    for amount in left:
+        if amount.share < LEAST_LISTED:
             break
-        own = histogram.colors[family.members]
+        paint = amount.paint
+        own = histogram.colors[paint.members]
         given = palette[nearest_colors(own, palette)]
         away = np.linalg.norm(oklab_from_rgb(own) - oklab_from_rgb(given), axis=1)
-        cost = float(np.average(away, weights=histogram.counts[family.members]))
-        share = family.count / total
-        result.append(DroppedColor(family.rgb, share, name_of(family.rgb), cost))
+        cost = float(np.average(away, weights=histogram.counts[paint.members]))
+        result.append(DroppedColor(paint.rgb, amount.share, name_of(paint.rgb), cost))
     return tuple(result)

@@ -80,7 +80,7 @@ class ContourColor:
 class Evidence:
     """Why so many colours were told apart: their description is the shortest.
 
-    Bits to describe 1,024 independent pixels of the character, with the colours themselves.
+    Bits to describe 4,096 independent pixels of the character, with the colours themselves.
 
     Attributes:
         colors: told apart, those under the rule included.

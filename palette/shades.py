@@ -1,42 +1,38 @@
-"""From all colours that occur to families of shades: one family per colour a painter would name.
+"""From all colours that occur to paints: one paint per colour that a painter would name.
 
-Colours are counted in small cells of RGB. Every cell points to the nearest cell that is denser
-than itself, if that lies within the merging distance in OKLab; cells that point nowhere are the
-families' peaks. So noise and gradients run together to their peak, while two separate peaks never
-merge, however many stray pixels lie between them. Nothing depends on the order of pixels.
+Flat pixels are counted in small cells of RGB. Every cell points to the nearest cell that is denser
+than itself, if that lies within a just-noticeable distance; cells that point nowhere are peaks,
+each with its shades. Peaks whose shades touch (gradients, noise) are one paint unless two have the
+shorter description. Nothing depends on the order of pixels.
 Source: A. Vedaldi, S. Soatto, "Quick shift and kernel methods for mode seeking" (2008).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.blends import LEAST_FLAT, blends
+from toonset.palette.description import evidence_for, merge_peaks
+from toonset.palette.ink_color import Ink, find_ink, rounded
+from toonset.palette.oklab import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.palette import Evidence
+from toonset.palette.pixels import Histogram
 
 CELL = 4  # levels per side of a counting cell
-FLAT = 0.2  # of a family: so frequent an exact colour is its flat paint
+EXACT = 0.2  # of a paint: so frequent an exact colour is the paint itself
+MOST_CELLS = 4096  # the fullest; the others, of noisy pictures, join the nearest paint
+TOUCHING = 1.5 * JUST_NOTICEABLE  # shades with a wider gap between them are not of one paint
+LEAST_PEAK = 0.002  # of the flat pixels; less is no paint, but joins the nearest
+
+Owners = Int[np.ndarray, " cells"]
 
 
 @dataclass(frozen=True, eq=False)
-class Histogram:
-    """How often every colour occurs.
-
-    Attributes:
-        colors: (n, 3) sRGB, each once, sorted by their code.
-        counts: (n,) pixels.
-    """
-
-    colors: UInt8[np.ndarray, "n 3"]
-    counts: Int[np.ndarray, " n"]
-
-
-@dataclass(frozen=True, eq=False)
-class Family:
-    """Shades of one colour.
+class Paint:
+    """One colour with its shades.
 
     Attributes:
         rgb: the flat paint if there is one, else the mean around the peak.
@@ -49,78 +45,139 @@ class Family:
     count: int
 
 
-def count_colors(pixels: Iterable[UInt8[np.ndarray, "_ 3"]]) -> Histogram:
-    """Return how often every colour occurs in several pictures' pixels."""
-    codes, counts = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    for colors in pixels:
-        red, green, blue = colors.astype(np.int64).T
-        new, how_many = np.unique(red << 16 | green << 8 | blue, return_counts=True)
-        both, place = np.unique(np.concatenate([codes, new]), return_inverse=True)
-        counts = np.bincount(place, np.concatenate([counts, how_many]), len(both)).astype(np.int64)
-        codes = both
-    rgb = np.stack([codes >> 16, codes >> 8 & 255, codes & 255], axis=1).astype(np.uint8)
-    return Histogram(rgb, counts)
+def find_paints(histogram: Histogram) -> tuple[list[Paint], Evidence]:
+    """Return the paints, the largest first, and why there are so many.
 
-
-def find_families(histogram: Histogram, merge_distance: float) -> list[Family]:
-    """Return the families of shades, the largest first.
-
-    Args:
-        histogram: the colours that occur.
-        merge_distance: in OKLab; a peak this near to a higher one belongs to it.
+    Every colour of the histogram is a member of one paint: of the nearest.
     """
-    cell_of, colors, counts = _cells(histogram)
-    peaks = _peaks(oklab_from_rgb(colors), counts, merge_distance)
-    family_of = peaks[cell_of]
-    families = []
-    for peak in np.unique(peaks):
-        members = np.flatnonzero(family_of == peak)
-        rgb = _paint(histogram, members, cell_of[members] == peak)
-        families.append(Family(rgb, members, int(histogram.counts[members].sum())))
-    return sorted(families, key=lambda family: (-family.count, family.rgb))
+    ink = find_ink(histogram)
+    cells = _cells(histogram, ink)
+    owner = _peaks(cells)
+    owner = _only(cells, owner, _shares(cells, owner) >= LEAST_PEAK)
+    owner, dearest = merge_peaks(cells.places, cells.weights, owner, TOUCHING)
+    places = even_oklab_from_rgb(histogram.colors)
+    cell_of = _nearest(cells.places, places)
+    paints, solid = _paints(histogram, places, cells, owner[cell_of], owner)
+    rgb = np.array([paint.rgb for paint in paints], dtype=np.float64)
+    blended = blends(rgb, solid, histogram.noise)
+    if blended.any():
+        keep = np.zeros(len(owner), dtype=bool)
+        keep[np.unique(owner)[~blended]] = True
+        owner = _only(cells, owner, keep)
+        paints, _ = _paints(histogram, places, cells, owner[cell_of], owner)
+    evidence = evidence_for(cells.places, cells.weights, owner, dearest)
+    return sorted(paints, key=lambda paint: (-paint.count, paint.rgb)), evidence
 
 
-def _cells(histogram: Histogram) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return every colour's cell, and the cells' mean colours and counts."""
-    codes = (histogram.colors // CELL).astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Counting cells: where their flat pixels' mean colour lies in OKLab, and shares.
+
+    The ink, where there is one, is a cell of its own, the last.
+    """
+
+    places: Float[np.ndarray, "cells 3"]
+    weights: Float[np.ndarray, " cells"]
+    ink: Ink | None
+
+
+def _cells(histogram: Histogram, ink: Ink | None) -> _Cells:
+    seen = histogram.flat > 0
+    colors, flat = histogram.colors[seen], histogram.flat[seen]
+    codes = (colors // CELL).astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
     _, cell_of = np.unique(codes, return_inverse=True)
-    counts = np.bincount(cell_of, histogram.counts)
-    sums = [np.bincount(cell_of, histogram.counts * channel) for channel in histogram.colors.T]
-    return cell_of, np.rint(np.stack(sums, axis=1) / counts[:, None]).astype(np.uint8), counts
+    counts = np.bincount(cell_of, flat)
+    sums = [np.bincount(cell_of, flat * channel) for channel in colors.T]
+    means = np.rint(np.stack(sums, axis=1) / counts[:, None]).astype(np.uint8)
+    fullest = np.sort(np.argsort(-counts, kind="stable")[:MOST_CELLS])
+    means, counts = means[fullest], counts[fullest]
+    if ink is not None:
+        means = np.concatenate([means, np.array([ink.rgb], dtype=np.uint8)])
+        counts = np.append(counts, ink.pixels)
+    return _Cells(even_oklab_from_rgb(means), counts / counts.sum(), ink)
 
 
-def _peaks(places: np.ndarray, counts: np.ndarray, reach: float) -> np.ndarray:
+def _peaks(cells: _Cells) -> Owners:
     """Return for every cell the peak that its chain of pointers ends at."""
     from scipy.spatial import KDTree
 
-    tree = KDTree(places)
-    near = tree.query_pairs(reach / 2, output_type="ndarray")
-    density = counts.astype(np.float64)
-    np.add.at(density, near[:, 0], counts[near[:, 1]])
-    np.add.at(density, near[:, 1], counts[near[:, 0]])
-    rank = np.empty(len(places), dtype=np.int64)
-    rank[np.lexsort((np.arange(len(places)), -density))] = np.arange(len(places))
-    pairs = tree.query_pairs(reach, output_type="ndarray")
-    pairs = np.concatenate([pairs, pairs[:, ::-1]])
-    pairs = pairs[rank[pairs[:, 1]] < rank[pairs[:, 0]]]  # from each cell to denser ones
-    length = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    pairs = KDTree(cells.places).query_pairs(JUST_NOTICEABLE, output_type="ndarray")
+    length = np.linalg.norm(cells.places[pairs[:, 0]] - cells.places[pairs[:, 1]], axis=1)
+    near = 1 - length / JUST_NOTICEABLE
+    density = cells.weights.copy()
+    np.add.at(density, pairs[:, 0], near * cells.weights[pairs[:, 1]])
+    np.add.at(density, pairs[:, 1], near * cells.weights[pairs[:, 0]])
+    rank = np.empty(len(density), dtype=np.int64)
+    rank[np.lexsort((np.arange(len(density)), -density))] = np.arange(len(density))
+    pairs, length = np.concatenate([pairs, pairs[:, ::-1]]), np.concatenate([length, length])
+    upwards = rank[pairs[:, 1]] < rank[pairs[:, 0]]
+    pairs, length = pairs[upwards], length[upwards]
     pairs = pairs[np.lexsort((rank[pairs[:, 1]], length))[::-1]]  # nearest last, so that it stays
-    target = np.arange(len(places))
+    target = np.arange(len(density))
     target[pairs[:, 0]] = pairs[:, 1]
-    while True:
-        further = target[target]
-        if np.array_equal(further, target):
-            return target
-        target = further
+    while not np.array_equal(target[target], target):
+        target = target[target]
+    return target
 
 
-def _paint(histogram: Histogram, members: np.ndarray, in_peak: np.ndarray) -> tuple[int, int, int]:
-    counts = histogram.counts[members]
-    best = int(counts.argmax())
-    if counts[best] >= FLAT * counts.sum():
-        color = histogram.colors[members[best]].astype(np.float64)
-    else:
-        core = members[in_peak]
-        color = np.average(histogram.colors[core], axis=0, weights=histogram.counts[core])
-    red, green, blue = (round(float(channel)) for channel in color)
-    return red, green, blue
+def _shares(cells: _Cells, owner: Owners) -> Float[np.ndarray, " cells"]:
+    """Return the share of the flat pixels that every peak owns."""
+    return np.bincount(owner, cells.weights, len(owner))
+
+
+def _only(cells: _Cells, owner: Owners, kept: Bool[np.ndarray, " cells"]) -> Owners:
+    """Return owners among the kept peaks: others' cells go to the owner of the nearest cell."""
+    own = kept[owner]
+    if not own.any():
+        return owner
+    return owner[own][_nearest(cells.places[own], cells.places)]
+
+
+def _nearest(
+    given: Float[np.ndarray, "m 3"], wanted: Float[np.ndarray, "n 3"]
+) -> Int[np.ndarray, " n"]:
+    from scipy.spatial import KDTree
+
+    return np.asarray(KDTree(given).query(wanted)[1])
+
+
+def _paints(
+    histogram: Histogram,
+    places: Float[np.ndarray, "n 3"],
+    cells: _Cells,
+    owner_of: Int[np.ndarray, " n"],
+    owner: Owners,
+) -> tuple[list[Paint], Bool[np.ndarray, " paints"]]:
+    """Return the paints in the order of their peaks, and which are drawn flat or as ink."""
+    paints, solid = [], []
+    for peak in np.unique(owner):
+        members = np.flatnonzero(owner_of == peak)
+        flat, count = histogram.flat[members], int(histogram.counts[members].sum())
+        is_ink = cells.ink is not None and peak == owner[-1] and flat.sum() < cells.ink.pixels
+        if cells.ink is not None and is_ink:
+            rgb = cells.ink.rgb
+        else:
+            rgb = _rgb(histogram.colors[members], flat, places[members], cells.places[peak])
+        paints.append(Paint(rgb, members, count))
+        solid.append(is_ink or flat.sum() >= LEAST_FLAT * count)
+    return paints, np.array(solid)
+
+
+def _rgb(
+    colors: UInt8[np.ndarray, "n 3"],
+    flat: Int[np.ndarray, " n"],
+    places: Float[np.ndarray, "n 3"],
+    peak: Float[np.ndarray, " 3"],
+) -> tuple[int, int, int]:
+    """Return a paint's own colour from those of its pixels."""
+    best = int(flat.argmax())
+    if flat[best] >= EXACT * flat.sum():
+        return rounded(colors[best])
+    core = np.linalg.norm(places - peak, axis=1) <= JUST_NOTICEABLE
+    return rounded(np.array([_level(channel, flat[core]) for channel in colors[core].T]))
+
+
+def _level(levels: UInt8[np.ndarray, " n"], weights: Int[np.ndarray, " n"]) -> float:
+    """Return a channel's mean; its limit where noise was cut off there, which drags the mean."""
+    most = int(np.bincount(levels, weights).argmax())
+    return float(most) if most in (0, 255) else float(np.average(levels, weights=weights))

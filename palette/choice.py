@@ -1,0 +1,137 @@
+"""Which paints become the palette: the paper's rule, and what a person wants kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+
+from toonset.errors import PaletteError
+from toonset.palette.names import hex_of
+from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.palette import MAX_COLORS
+from toonset.palette.shades import Paint
+
+KEEP_REACH = (
+    4 * JUST_NOTICEABLE
+)  # in OKLab: so far a colour typed to be kept may be from a found one
+
+RGB = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class PaletteOptions:
+    """How colours are chosen.
+
+    Attributes:
+        min_share: least share of the character's pixels, 0 to 1; the paper's rule is 5 %.
+        max_colors: at most so many, the largest; 1 to 255, as many as a label can name.
+        keep: 8-bit sRGB: the found colours nearest to these stay, however small they are.
+        contour: count the drawn lines to their colour, as the paper does; False leaves that colour
+            to what else is painted with it. Matters only where the lines are given.
+    """
+
+    min_share: float = 0.05
+    max_colors: int = MAX_COLORS
+    keep: tuple[RGB, ...] = ()
+    contour: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse shares and numbers without a meaning.
+
+        Raises:
+            PaletteError: out of range.
+        """
+        if not 0 <= self.min_share <= 1:
+            raise PaletteError(f"min share {self.min_share:g}; it is a share from 0 to 1")
+        if not 1 <= self.max_colors <= MAX_COLORS:
+            raise PaletteError(f"max colours {self.max_colors}; 1 to {MAX_COLORS} are possible")
+        if len(self.keep) > self.max_colors:
+            raise PaletteError(
+                f"keep: {len(self.keep)} colours, but at most {self.max_colors} are wanted; "
+                "raise --max-colors"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Amount:
+    """How much of a paint there is.
+
+    Attributes:
+        paint: the paint.
+        share: of all pixels; drawn lines count to their ink alone.
+        cloth: of all pixels, without drawn lines.
+        weight: what the rule looks at: the share of pixels that are no lines; for the ink that of
+            all pixels.
+    """
+
+    paint: Paint
+    share: float
+    cloth: float
+    weight: float
+
+
+def measure(
+    paints: Sequence[Paint], marked: Int[np.ndarray, " n"] | None, options: PaletteOptions
+) -> tuple[list[Amount], int | None]:
+    """Return every paint's amount, and which paint is the lines' ink (None without lines).
+
+    Args:
+        paints: of a histogram.
+        marked: pixels of drawn lines, per colour of the histogram; None = not known.
+        options: whether lines count to their ink.
+    """
+    counts = np.array([paint.count for paint in paints], dtype=np.float64)
+    lines = np.zeros(len(paints))
+    if marked is not None:
+        lines = np.array([float(marked[paint.members].sum()) for paint in paints])
+    total, drawn = counts.sum(), lines.sum()
+    ink = int(lines.argmax()) if drawn else None
+    cloth = (counts - lines) / total
+    weights = (counts - lines) / max(total - drawn, 1)
+    shares = cloth.copy()
+    if ink is not None:
+        shares[ink] += drawn / total
+        weights[ink] = max(weights[ink], shares[ink] if options.contour else 0)
+    parts = zip(paints, shares.tolist(), cloth.tolist(), weights.tolist(), strict=True)
+    return [Amount(*part) for part in parts], ink
+
+
+def choose(
+    amounts: Sequence[Amount], options: PaletteOptions
+) -> tuple[list[Amount], list[Amount], tuple[str, ...]]:
+    """Return the amounts that stay and those left out, largest share first, and warnings.
+
+    Raises:
+        PaletteError: nothing found near a colour to keep.
+    """
+    wanted = [_nearest(amounts, rgb) for rgb in options.keep]
+    by_share = sorted(amounts, key=lambda amount: (-amount.share, amount.paint.rgb))
+    rule = [a for a in by_share if a.weight >= options.min_share and a not in wanted]
+    room = options.max_colors - len(set(map(id, wanted)))
+    stay = {id(amount) for amount in [*wanted, *rule[:room]]} or {id(by_share[0])}
+    kept = [amount for amount in by_share if id(amount) in stay]
+    left = [amount for amount in by_share if id(amount) not in stay]
+    if wanted or rule:
+        return kept, left, ()
+    warning = (
+        f"no colour reaches {options.min_share:.1%} of the pixels; the largest, with "
+        f"{kept[0].share:.1%}, was kept alone: lower --min-share"
+    )
+    return kept, left, (warning,)
+
+
+def _nearest(amounts: Sequence[Amount], rgb: RGB) -> Amount:
+    found = np.array([amount.paint.rgb for amount in amounts], dtype=np.uint8)
+    away = np.linalg.norm(
+        oklab_from_rgb(found) - oklab_from_rgb(np.array(rgb, dtype=np.uint8)), axis=1
+    )
+    nearest = amounts[int(away.argmin())]
+    if away.min() > KEEP_REACH:
+        raise PaletteError(
+            f"keep {hex_of(rgb)}: no such colour was found; the nearest is "
+            f"{hex_of(nearest.paint.rgb)}: name that one, or give the whole palette with --colors"
+        )
+    return nearest
