@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.palette.blends import LEAST_FLAT, blends
 from toonset.palette.description import evidence_for, merge_peaks
+from toonset.palette.false_paints import LEAST_FLAT, false_paints
 from toonset.palette.ink_color import Ink, find_ink, rounded
 from toonset.palette.oklab import JUST_NOTICEABLE, even_oklab_from_rgb
 from toonset.palette.palette import Evidence
@@ -59,7 +59,7 @@ def find_paints(histogram: Histogram) -> tuple[list[Paint], Evidence]:
     cell_of = _nearest(cells.places, places)
     paints, solid = _paints(histogram, places, cells, owner[cell_of], owner)
     rgb = np.array([paint.rgb for paint in paints], dtype=np.float64)
-    blended = blends(rgb, solid, histogram.noise)
+    blended = false_paints(rgb, solid, histogram.noise)
     if blended.any():
         keep = np.zeros(len(owner), dtype=bool)
         keep[np.unique(owner)[~blended]] = True
