@@ -16,7 +16,8 @@ from toonset.palette.format_aco import read_aco
 from toonset.palette.format_ase import read_ase, to_ase
 from toonset.palette.format_gpl import read_gpl, to_gpl
 from toonset.palette.format_hex import HEX, read_hex, rgb_of_hex, to_hex
-from toonset.palette.format_json import MAX_BYTES, read_json, read_palette_json, to_json
+from toonset.palette.format_json import read_json, read_palette_json, to_json
+from toonset.palette.format_kpl import MAX_BYTES as MAX_KPL_BYTES
 from toonset.palette.format_kpl import read_kpl
 from toonset.palette.format_pal import read_pal
 from toonset.palette.named import NamedColor
@@ -49,12 +50,14 @@ class Format:
         magic: how its content begins, leading spaces left out; () where anything may.
         read: the colours of a file's bytes; the second argument names the file in messages.
         write: the bytes of a palette with a title; None where toonset does not write it.
+        max_bytes: a longer file is refused; thousands of colours fit.
     """
 
     extensions: tuple[str, ...]
     magic: tuple[bytes, ...]
     read: Callable[[bytes, str], list[NamedColor]]
     write: Callable[[Palette, str], bytes] | None = None
+    max_bytes: int = 2**20
 
 
 def _json_bytes(palette: Palette, _: str) -> bytes:
@@ -66,11 +69,12 @@ FORMATS = (
     Format((".ase",), (b"ASEF",), read_ase, to_ase),
     Format((".aco",), (b"\0\1", b"\0\2"), read_aco),
     Format((".pal",), (b"JASC-PAL", b"RIFF"), read_pal),
-    Format((".kpl",), (b"PK\3\4",), read_kpl),
+    Format((".kpl",), (b"PK\3\4",), read_kpl, max_bytes=MAX_KPL_BYTES),
     Format((".json",), (b"[", b"{"), read_json, _json_bytes),
     Format((".hex", ".txt"), (), read_hex, lambda palette, _: to_hex(palette).encode()),
 )
 EXTENSIONS = tuple(extension for kind in FORMATS for extension in kind.extensions)
+LONGEST = max(kind.max_bytes for kind in FORMATS)
 WRITTEN = tuple(kind.extensions[0] for kind in FORMATS if kind.write is not None)
 
 
@@ -128,7 +132,7 @@ def encode_palette(palette: Palette, extension: str, title: str = "toonset") -> 
 
 
 def _read(path: Path) -> list[NamedColor]:
-    data = without_mark(read_whole(path, "palette", PaletteError, MAX_BYTES))
+    data = without_mark(read_whole(path, "palette", PaletteError, LONGEST))
     kinds = [
         kind for kind in FORMATS if kind.magic and data.lstrip(b" \t\r\n").startswith(kind.magic)
     ]
@@ -138,6 +142,11 @@ def _read(path: Path) -> list[NamedColor]:
     if not kinds:
         raise PaletteError(
             f"{path}: is {describe(data)}; a palette file ({', '.join(EXTENSIONS)}) is needed"
+        )
+    if len(data) > kinds[0].max_bytes:
+        raise PaletteError(
+            f"{path}: {len(data) / 2**20:.1f} MB, at most {kinds[0].max_bytes / 2**20:.0f} MB is "
+            "read of this format; make the palette smaller"
         )
     return kinds[0].read(data, str(path))
 

@@ -14,7 +14,7 @@ from toonset.reading import read_whole
 from toonset.strict_json import parse_json
 
 SCHEMA = "toonset-palette/1"  # see toonset.palette.palette_schema for what may change within it
-MAX_BYTES = 8 * 2**20
+MAX_BYTES = 2**20
 
 
 def read_json(data: bytes, where: str) -> list[NamedColor]:

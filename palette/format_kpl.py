@@ -24,20 +24,22 @@ from toonset.palette.named import RGB, NamedColor, clean_name, level, no_cmyk, o
 
 COLORSET = "colorset.xml"
 MAX_MEMBERS = 64  # two XML files and a profile per colour space
-MAX_XML = 4 * 2**20
+MAX_BYTES = 8 * 2**20  # of the archive: print profiles fill most of it
+MAX_XML = 2**20
 MAX_RATIO = 200  # text of colours packs about 10 to 1, a bomb 1000 to 1
 PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 BROKEN = (
     zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, RuntimeError, ValueError,
     LookupError, OverflowError, NotImplementedError,
 )  # fmt: skip
-SRGB = re.compile(r"srgb( built-in|.*srgbtrc(\.icc)?|)|srgb iec61966-2[-.]1", re.IGNORECASE)
+SRGB = re.compile(r"|srgb( built-in|.*srgbtrc(\.icc)?| iec61966-2[-.]1)?", re.IGNORECASE)
 LINEAR = re.compile(r"(sc|s)rgb(-elle-v\d-g10(\.icc)?| \(linear\))", re.IGNORECASE)
-GRAY = re.compile(r"(gray|grey)(.*srgbtrc(\.icc)?|)", re.IGNORECASE)
+PLACE = re.compile(r"\d{1,6}", re.ASCII)
+GRAY = re.compile(r"|gr[ae]y(.*srgbtrc(\.icc)?)?", re.IGNORECASE)
 
 
 def read_kpl(data: bytes, where: str) -> list[NamedColor]:
-    """Return the colours: those outside groups first, as Krita lists them.
+    """Return the colours as Krita shows them: those outside groups first, row by row.
 
     Raises:
         PaletteError: not a .kpl, damaged, too large, or a colour space other than sRGB (also
@@ -53,7 +55,7 @@ def read_kpl(data: bytes, where: str) -> list[NamedColor]:
         raise PaletteError(f"{where}: {COLORSET} holds no palette; export it from Krita again")
     version = root.get("version", "")
     groups = [root, *root.findall("Group")]
-    entries = [entry for group in groups for entry in group.findall("ColorSetEntry")]
+    entries = [entry for group in groups for entry in _rows(group)]
     return [_color(entry, version, where) for entry in entries]
 
 
@@ -92,6 +94,18 @@ def _member(archive: zipfile.ZipFile, where: str) -> bytes:
         )
     with archive.open(found[0]) as member:
         return member.read(MAX_XML + 1)
+
+
+def _rows(group: ElementTree.Element) -> list[ElementTree.Element]:
+    """Return a group's entries row by row, as they stand in Krita's grid; its files do not."""
+    return sorted(group.findall("ColorSetEntry"), key=_place)
+
+
+def _place(entry: ElementTree.Element) -> tuple[int, int]:
+    grid = entry.find("Position")
+    words = ("", "") if grid is None else (grid.get("row", ""), grid.get("column", ""))
+    row, column = (int(word) if PLACE.fullmatch(word) else 0 for word in words)
+    return row, column
 
 
 def _color(entry: ElementTree.Element, version: str, where: str) -> NamedColor:

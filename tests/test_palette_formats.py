@@ -155,6 +155,17 @@ def test_kpl_groups_and_spaces() -> None:
     ]
 
 
+def at(row: int, column: int) -> str:
+    value = f'<RGB r="{row / 255}" g="{column / 255}" b="0"/>'
+    return entry(value).replace('row="0" column="0"', f'row="{row}" column="{column}"')
+
+
+def test_kpl_is_read_row_by_row() -> None:
+    data = colorset(at(0, 0), at(10, 0), at(2, 0), at(0, 1), at(2, 1))
+    places = [color.rgb[:2] for color in read_kpl(data, "f")]
+    assert places == [(0, 0), (0, 1), (2, 0), (2, 1), (10, 0)]
+
+
 BOMB = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><ColorSet/>'
 REFUSED: list[tuple[Callable[[bytes, str], list[NamedColor]], bytes, str]] = [
     (read_ase, ase(1, ASE_CMYK), r"swatch 1 'Hi': is CMYK, .* convert the swatches to RGB"),

@@ -30,9 +30,11 @@ XML = (
 )
 
 
-def kpl(xml: bytes, members: int = 1, name: str = "colorset.xml") -> bytes:
+def kpl(
+    xml: bytes, packing: int = zipfile.ZIP_DEFLATED, members: int = 1, name: str = "colorset.xml"
+) -> bytes:
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(packed, "w", packing) as archive:
         archive.writestr(name, xml)
         for i in range(members):
             archive.writestr(f"../../out{i}.icc", b"outside")
@@ -205,9 +207,10 @@ HOSTILE = {
     "laughs.kpl": kpl(f'<!DOCTYPE x [<!ENTITY l0 "ha">{LAUGHS}]><x>&l9;</x>'.encode()),
     "outside.kpl": kpl(XML.encode(), name="../colorset.xml"),
     "absolute.kpl": kpl(XML.encode(), name="/colorset.xml"),
+    "lzma.kpl": kpl(XML.encode(), zipfile.ZIP_LZMA),
     "crowd.kpl": kpl(XML.encode(), members=2000),
     "encrypted.kpl": encrypted(),
-    "deep.kpl": kpl(b"<a>" * 100_000 + b"</a>" * 100_000),
+    "deep.kpl": kpl(b"<a>" * 100_000 + b"</a>" * 100_000, zipfile.ZIP_STORED),
     "utf16.kpl": kpl(XML.encode("utf-16")),
     "external.kpl": kpl(b'<!DOCTYPE x SYSTEM "file:///etc/passwd"><x/>'),
     "deep.json": b"[" * 500_000,
