@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import errno
 import importlib
+import keyword
 import os
 import sys
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
 from toonset import __version__
+from toonset.cli.help import Verb, Verbs
 from toonset.errors import ToonsetError
 
 VERBS = (
@@ -23,13 +25,16 @@ VERBS = (
     "train",
     "render",
     "evaluate",
+    "info",
+    "check",
     "export",
     "mannequin",
     "synth",
     "bench",
 )
 
-INTERRUPTED = 130
+INTERRUPTED, REFUSED = 130, 2
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name
 PLACES_AT_FAULT = (  # what the system says of a place that the user has named, wherever it is used
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP),
     *(errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ESTALE),
@@ -38,9 +43,9 @@ PLACES_AT_FAULT = (  # what the system says of a place that the user has named, 
 app = typer.Typer(
     name="toonset",
     help="Turn a hand-drawn character sheet into cameras, a palette and a turning character.",
-    no_args_is_help=True,
+    cls=Verbs,
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",  # a paragraph flows to the width of the terminal
+    rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
@@ -51,8 +56,9 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def toonset(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option(
@@ -61,10 +67,14 @@ def toonset(
     ] = False,
 ) -> None:
     """Turn a hand-drawn character sheet into cameras, a palette and a turning character."""
+    if context.invoked_subcommand is None:
+        print(context.get_help(), file=sys.stderr)
+        raise typer.Exit(REFUSED)
 
 
 for _verb in VERBS:
-    app.command(_verb)(getattr(importlib.import_module(f"toonset.cli.{_verb}"), _verb))
+    _name = f"{_verb}_" if keyword.iskeyword(_verb) else _verb  # of module and function
+    app.command(_verb, cls=Verb)(getattr(importlib.import_module(f"toonset.cli.{_name}"), _name))
 
 
 def main() -> None:
@@ -74,13 +84,11 @@ def main() -> None:
     # NumPy's matrices are small here, and torch has threads of its own; must precede numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        app()
+        code = app(prog_name="toonset", standalone_mode=False)
     except ToonsetError as error:
         _refuse(one_line(error))
-    except SystemExit as leaving:
-        if leaving.code == INTERRUPTED:  # typer has caught Ctrl-C
-            _say("interrupted")
-        raise
+    except UsageError as error:
+        _refuse(one_line(_usage(error)))
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -91,11 +99,21 @@ def main() -> None:
         _refuse(f"{place}: {reason}; free or choose another place")
     except MemoryError as error:
         _refuse(f"out of memory ({one_line(error)}); use smaller input")
+    if code == INTERRUPTED:  # typer has caught Ctrl-C
+        _say("interrupted")
+    if code:
+        sys.exit(code)
+
+
+def _usage(error: Any) -> str:
+    """Return what is wrong with the command line, and where its help is."""
+    said = error.format_message().replace("Value error, ", "").rstrip(". ")
+    return f"{said}; see `{error.ctx.command_path} -h`" if error.ctx is not None else said
 
 
 def _refuse(text: str) -> NoReturn:
     _say(text)
-    sys.exit(2)
+    sys.exit(REFUSED)
 
 
 def _say(text: str) -> None:

@@ -87,6 +87,26 @@ def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
     return labels
 
 
+def read_contour(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:
+    """Return how much of each pixel of a frame is drawn line (255 = all), None where not known.
+
+    Raises:
+        PictureError: it cannot be read.
+        BundleError: it has another size than its camera, or is not grey.
+    """
+    file = member(root, f"contours/{label_name(frame)}")
+    if file is None:
+        return None
+    rgba = load_rgba(file)
+    check_size(file, rgba, frame.camera, "transforms.json")
+    grey = rgba[..., 0]
+    if (rgba[..., 1:3] != grey[..., None]).any() or (rgba[..., 3] < 255).any():
+        raise BundleError(
+            f"{file}: is coloured or see-through, a grey picture is needed; save it as 8-bit grey"
+        )
+    return grey
+
+
 def label_name(frame: PosedPicture) -> str:
     """Return the file name of a frame's label map (and contour)."""
     return f"{Path(frame.file_path).stem}.png"

@@ -156,3 +156,104 @@ def trained(
 def run(trained: tuple[Path, Outcome], tmp_path: Path) -> Path:
     """Return an own copy of the trained run."""
     return Path(shutil.copytree(trained[0], tmp_path / "run"))
+
+
+@pytest.fixture(scope="session")
+def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a whole bundle of three tiny views, with palette, labels and contours; read only."""
+    import numpy as np
+    from PIL import Image
+
+    from toonset.camera import Camera
+    from toonset.dataset.bundle import write_bundle
+    from toonset.dataset.mesh_file import load_mesh
+    from toonset.dataset.picture import encode_indexed_png
+    from toonset.files import write_bytes, write_json
+    from toonset.palette.files import to_gpl, to_json
+    from toonset.palette.palette import Palette, PaletteColor
+    from toonset.view import View
+
+    folder = tmp_path_factory.mktemp("small") / "bundle"
+    obj = folder.parent / "body.obj"
+    obj.write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n")
+    cameras = [
+        Camera.looking_at(np.array([0.2, 1.0, 0.1]), yaw, 0.1, 9.0, (20, 24), k=k)
+        for yaw, k in ((0.0, 0.0), (1.5, 0.0), (3.0, 0.1))
+    ]
+    labels = np.full((24, 20), 255, np.uint8)
+    labels[4:12, 5:15], labels[12:20, 5:15] = 0, 1
+    colors = np.array([[200, 30, 20], [20, 60, 200]], np.uint8)
+    rgba = np.zeros((24, 20, 4), np.uint8)
+    rgba[4:20, 5:15, :3] = colors[labels[4:20, 5:15]]
+    rgba[4:20, 5:15, 3] = 255
+    views = [View(rgba, (20 * i, 0, 20, 24), 1.5, f"{i:03d}.png") for i in range(3)]
+    report = calibration_report([view.name for view in views], cameras)
+    write_bundle(folder, views, cameras, load_mesh(obj), report, rgba[..., :3])
+    named = [PaletteColor((200, 30, 20), 0.5, "red"), PaletteColor((20, 60, 200), 0.5, "blue")]
+    palette = Palette(tuple(named), "by hand")
+    write_json(folder / "palette.json", to_json(palette))
+    write_bytes(folder / "palette.gpl", to_gpl(palette).encode())
+    (folder / "contours").mkdir()
+    for view in views:
+        write_bytes(folder / "labels" / view.name, encode_indexed_png(labels, colors))
+        Image.fromarray(labels).save(folder / "contours" / view.name)
+    return folder
+
+
+def calibration_report(names: list[str], cameras: list[Any]) -> dict[str, Any]:
+    """Return what `toonset.calib.report` would say of these cameras."""
+    import math
+
+    from toonset.dataset.calibration_schema import SCHEMA, VERSION
+
+    def plain(camera: Any) -> dict[str, Any]:
+        angles = zip(("yaw_deg", "elevation_deg", "roll_deg"), camera.angles, strict=True)
+        return {
+            "model": "orthographic" if camera.is_orthographic else "pinhole",
+            **{name: math.degrees(angle) for name, angle in angles},
+            "camera_from_world_rotation": camera.rotation.tolist(),
+            "target": camera.target.tolist(),
+            "scale_px_per_unit": camera.scale,
+            "center_px": camera.center.tolist(),
+            "k": camera.k,
+            "size_wh": list(camera.size_wh),
+        }
+
+    spreads = ("yaw_deg", "elevation_deg", "roll_deg", "scale_relative", "shift_px")
+    views = [
+        {
+            "name": name,
+            "verdict": "ok",
+            "reason": "",
+            "camera": plain(camera),
+            "sigma": dict.fromkeys(spreads, 0.5),
+            "covariance": [[float(i == j) for j in range(6)] for i in range(6)],
+            "covariance_of": "rotation, shift, log scale",
+            "p_flip": 0.01,
+            "twin": plain(camera.twin()),
+            "alternatives": [{"probability": 0.1, "camera": plain(camera)}],
+            "outline_error_of_height": 0.01,
+            "outline_coverage": 0.98,
+        }
+        for name, camera in zip(names, cameras, strict=True)
+    ]
+    return {
+        "schema": f"{SCHEMA}/{VERSION}",
+        "verdict": "ok",
+        "reason": "",
+        "camera_model": {
+            "chosen": "orthographic",
+            "distance_heights": [None, None, 4.0],
+            "tried": [{"model": "perspective", "bic_gain": -3.0, "margin": 6.0, "unknowns": 1}],
+            "effective_samples": 100.0,
+        },
+        "outline_offset_of_height": 0.001,
+        "drawing_error_of_height": {"smooth": 0.002, "white": 0.001},
+        "drawings_contradiction_of_height": 0.0,
+        "views": views,
+        "seconds": {"search": 1.5},
+        "options": {"rounds": 3},
+        "seed": 0,
+        "versions": {"toonset": "0.1.0"},
+        "inputs": [{"name": "sheet.png", "sha256": "0" * 64, "role": "sheet"}],
+    }

@@ -1,0 +1,232 @@
+"""A bundle is what its schema says: read back wherever it lies, old versions too, lies refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from toonset.dataset.bundle_check import bundle_problems
+from toonset.dataset.calibration_file import read_calibration
+from toonset.dataset.scene_read import read_contour
+from toonset.dataset.transforms import read_scene
+from toonset.dataset.transforms_read import read_frames
+from toonset.errors import BundleError, ToonsetError
+from toonset.strict_json import parse_json
+
+Edit = Callable[[dict[str, Any]], Any]
+
+
+@pytest.fixture
+def place(small_bundle: Path, tmp_path: Path) -> Path:
+    """Return an own copy of the small bundle, elsewhere than it was written."""
+    return Path(shutil.copytree(small_bundle, tmp_path / "moved here" / "bündel"))
+
+
+def edit(place: Path, name: str, change: Edit) -> None:
+    content = json.loads((place / name).read_text())
+    change(content)
+    (place / name).write_text(json.dumps(content))
+
+
+def problems(place: Path) -> list[str]:
+    return [f"{problem.where}: {problem.what}" for problem in bundle_problems(place)]
+
+
+# ---- what is written is read, wherever it lies
+
+
+def test_a_moved_bundle_has_no_problem_and_names_no_place(place: Path, small_bundle: Path):
+    assert problems(place) == []
+    scene = read_scene(place)
+    assert len(scene.frames) == 3
+    assert scene.palette is not None
+    for frame in scene.frames:
+        assert frame.labels is not None
+        assert set(np.unique(frame.labels)) == {0, 1, 255}
+    for file in place.rglob("*.*"):
+        assert str(small_bundle.parent).encode() not in file.read_bytes(), file
+
+
+def test_calibration_holds_line_widths_and_no_seconds(place: Path):
+    content = json.loads((place / "calibration.json").read_text())
+    assert content["schema"] == "toonset-calibration/2"
+    assert "seconds" not in content
+    assert [view.line_width_px for view in read_calibration(place / "calibration.json").views] == [
+        1.5
+    ] * 3
+
+
+def test_contours_are_read_as_coverage(place: Path):
+    frame = read_frames(place / "transforms.json", need_pictures=True)[0]
+    contour = read_contour(place, frame)
+    assert contour is not None
+    assert np.array_equal(contour, np.asarray(Image.open(place / "contours" / "000.png")))
+    Image.new("RGB", (20, 24), "red").save(place / "contours" / "000.png")
+    with pytest.raises(BundleError, match=r"contours/000.png: is coloured"):
+        read_contour(place, frame)
+
+
+# ---- versions
+
+
+def as_first(content: dict[str, Any]) -> None:
+    """Turn a calibration into the shape that the first toonset wrote."""
+    content["schema"] = "toonset-calibration/1"
+    content["seconds"] = {"search": 1.0}
+    content["inputs"] = {one["name"]: one["sha256"] for one in content["inputs"]}
+    content["outline_noise_of_height"] = content.pop("drawing_error_of_height")["white"]
+    del content["drawings_contradiction_of_height"]
+    content["camera_model"] = {
+        "chosen": "orthographic",
+        "distance_heights": None,
+        "bic_gain_of_perspective": -5.7,
+        "bic_margin": 6.0,
+        "effective_samples": 200.0,
+    }
+    for view in content["views"]:
+        del view["line_width_px"]
+
+
+def as_second(content: dict[str, Any]) -> None:
+    """Turn a calibration into the shape in between: a list of models under one margin."""
+    content["schema"] = "toonset-calibration/1"
+    content["seconds"] = {"search": 1.0}
+    for one in content["inputs"]:
+        del one["role"]
+    for rung in content["camera_model"]["tried"]:
+        del rung["margin"]
+    content["camera_model"]["bic_margin"] = 6.0
+
+
+@pytest.mark.parametrize("older", [as_first, as_second])
+def test_calibrations_of_version_1_are_read(older, place: Path):
+    new = read_calibration(place / "calibration.json")
+    edit(place, "calibration.json", older)
+    old = read_calibration(place / "calibration.json")
+    assert problems(place) == []
+    assert [view.camera for view in old.views] == [view.camera for view in new.views]
+    assert old.camera_model.tried[0].margin == 6.0
+    assert len(old.camera_model.distance_heights) == 3
+    assert old.drawing_error_of_height.white == new.drawing_error_of_height.white
+    assert [one.sha256 for one in old.inputs] == ["0" * 64]
+
+
+@pytest.mark.parametrize(
+    ("name", "newest"),
+    [("transforms", 1), ("calibration", 2), ("palette", 1)],
+)
+def test_a_newer_major_version_is_refused_by_name(name, newest, place: Path):
+    edit(place, f"{name}.json", lambda c: c.update(schema=f"toonset-{name}/{newest}.7", new=[1]))
+    assert problems(place) == []  # a minor version only adds
+    edit(place, f"{name}.json", lambda c: c.update(schema=f"toonset-{name}/{newest + 1}"))
+    (said,) = problems(place)
+    assert said.startswith(f"{name}.json: ")
+    assert f"toonset-{name}/{newest + 1}" in said
+    edit(place, f"{name}.json", lambda c: c.update(schema="toonset-mannequin/1"))
+    assert "toonset-mannequin/1" in problems(place)[0]
+
+
+# ---- strict JSON
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (b'{"a": 1, "b": 2, "a": 3}', "the key 'a' is there twice"),
+        (b'{"a": [1, {"b": NaN}]}', "a.1.b is nan, a finite number is needed"),
+        (b'{"a": -Infinity}', "a is -inf"),
+        (b'{"a": 1e400}', "a is inf"),
+        (b"[" * 100_000, "nested too deep"),
+        (b"[" * 70 + b"]" * 70, "nested deeper than 64"),
+        (b'{"a": 123456789012345678901234567890}', "a has more than 63 bits"),
+        (b"[" + b"9" * 10_000 + b"]", "no valid JSON"),
+        (b'{"a": "\xff"}', "byte 7 is no UTF-8"),
+        ('{"a": 1}'.encode("utf-16"), "is no UTF-8"),
+        (b"", "Expecting value"),
+    ],
+)
+def test_json_that_two_readers_could_read_differently(text, words):
+    with pytest.raises(BundleError) as caught:
+        parse_json(text, "x.json", BundleError)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith("x.json: ")
+
+
+def test_plain_json_is_read_with_and_without_byte_order_mark():
+    for mark in (b"", b"\xef\xbb\xbf"):
+        assert parse_json(mark + b'{"a": [1, 2.5, "x", null]}', "x", BundleError) == {
+            "a": [1, 2.5, "x", None]
+        }
+
+
+# ---- check names every problem, each file on its own line
+
+
+def spoil_everything(place: Path) -> None:
+    edit(place, "transforms.json", lambda c: c["frames"][0].update(file_path="../000.png"))
+    edit(place, "calibration.json", lambda c: c["views"][1].update(p_flip=3, verdict="fine"))
+    Image.new("RGBA", (9, 9), "red").save(place / "images" / "001.png")
+    (place / "labels" / "002.png").unlink()
+    (place / "contours" / "notes.png").write_bytes(b"x")
+    (place / "overlay.png").write_bytes((place / "overlay.png").read_bytes()[:-20])
+    (place / "mannequin.obj").write_text("v 0 0 0\n")
+
+
+def test_check_finds_all_problems_at_once(place: Path):
+    spoil_everything(place)
+    found = problems(place)
+    for words in (
+        "transforms.json: frame 0 ('../000.png'): lies outside",
+        "images/001.png: is 9 x 9 px, transforms.json says 20 x 24",
+        "labels/002.png: is missing; run `toonset palette` again",
+        "contours/notes.png: belongs to no picture",
+        "calibration.json: field views.1.p_flip: ",
+        "calibration.json: field views.1.verdict: ",
+        "overlay.png: the PNG file is damaged or cut off",
+        "mannequin.obj: ",
+    ):
+        assert any(line.startswith(words) for line in found), (words, found)
+    assert all(line.isprintable() for line in found)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda p: edit(p, "calibration.json", lambda c: c["views"].pop()), "has other views"),
+        (lambda p: edit(p, "calibration.json", lambda c: c["views"].reverse()), "another order"),
+        (
+            lambda p: edit(p, "calibration.json", lambda c: c["views"][0]["camera"].update(k=0.2)),
+            "its camera is not transforms.json's",
+        ),
+        (lambda p: shutil.copy(p / "images/000.png", p / "images/000.PNG"), "in case only"),
+        (lambda p: (p / "palette.json").unlink(), "labels: is there but palette.json is not"),
+        (
+            lambda p: (p / "palette.gpl").write_text("GIMP Palette\n1 2 3 x\n"),
+            "palette.gpl: has other colours than palette.json",
+        ),
+        (
+            lambda p: edit(p, "transforms.json", lambda c: c["frames"].append(c["frames"][0])),
+            "2 pictures share labels/000.png",
+        ),
+    ],
+)
+def test_check_compares_the_files_with_each_other(change, words, place: Path):
+    change(place)
+    assert any(words in line for line in problems(place)), problems(place)
+
+
+@pytest.mark.parametrize("name", ["labels", "images", "palette.json", "contours/001.png"])
+def test_links_out_of_the_bundle_are_refused(name, place: Path, tmp_path: Path):
+    (place / name).rename(tmp_path / "elsewhere")
+    (place / name).symlink_to(tmp_path / "elsewhere")
+    assert any("out of the folder" in p or "outside of the folder" in p for p in problems(place))
+    if not name.startswith("contours"):  # which no stage but editing reads
+        with pytest.raises(ToonsetError, match="out"):
+            read_scene(place)
