@@ -12,7 +12,7 @@ from toonset.errors import PaletteError
 from toonset.palette.cie_lab import rgb_from_lab, rgb_from_linear
 from toonset.palette.format_aco import read_aco
 from toonset.palette.format_ase import read_ase, to_ase
-from toonset.palette.format_gpl import read_gpl
+from toonset.palette.format_gpl import read_gpl, to_gpl
 from toonset.palette.format_kpl import read_kpl
 from toonset.palette.format_pal import read_pal
 from toonset.palette.named import NamedColor
@@ -113,6 +113,13 @@ def test_gpl_of_aseprite_with_alpha_and_gimp_names() -> None:
     expected = [NamedColor((255, 0, 128), "Two words 4"), NamedColor((1, 2, 3), "bl\u00e9")]
     assert read_gpl(plain.encode("utf-8"), "f") == expected
     assert read_gpl(plain.encode("latin-1"), "f") == expected
+
+
+def test_our_gpl_has_what_krita_demands() -> None:
+    text = to_gpl(Palette((PaletteColor((1, 2, 3), 1, ""),), "rule"), "")
+    first, second, third, *_ = text.splitlines()
+    assert (first, second[:5], third) == ("GIMP Palette", "Name:", "Columns: 1")  # it divides by it
+    assert len(text) >= 50
 
 
 def kpl(xml: str, name: str = "colorset.xml") -> bytes:
