@@ -1,0 +1,106 @@
+"""`toonset import`: cameras and pictures of another program become a bundle."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    check_output,
+)
+
+if TYPE_CHECKING:
+    from toonset.dataset.import_bundle import ImportReport
+    from toonset.dataset.import_views import Imported
+    from toonset.mesh import Mesh
+
+WRITTEN = ("transforms.json", "images", "mannequin.obj")
+
+
+class Up(StrEnum):
+    """Which way is up in the world that is read."""
+
+    y = "y"
+    z = "z"
+
+
+def import_(
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="A nerfstudio, instant-ngp, Blender-synthetic or COLMAP folder, an OpenCV "
+            "cameras.yml or .xml, or any folder of `toonset export`."
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Bundle folder.", rich_help_panel=OUTPUT_PANEL)
+    ] = Path("bundle"),
+    images: Annotated[
+        Path | None,
+        typer.Option("--images", help="Pictures of a COLMAP model (default: images beside it)."),
+    ] = None,
+    masks: Annotated[
+        Path | None,
+        typer.Option("--masks", help="Folder of masks, white where the figure is: NAME.png."),
+    ] = None,
+    mesh: Annotated[
+        Path | None,
+        typer.Option("--mesh", help="The mannequin, in the world that is read."),
+    ] = None,
+    up: Annotated[
+        Up, typer.Option("--up", help="z: turn a world of Blender's (+Z up, front -Y) to ours.")
+    ] = Up.y,
+    force: ForceFlag = False,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Make a bundle of another program's cameras and pictures.
+
+    Pictures become RGBA: a mask becomes their alpha. Lens distortion is refused: undistort first.
+    Of toonset's own exports the exact cameras beside them are taken.
+    """
+    from toonset.dataset.import_bundle import write_imported
+    from toonset.dataset.import_views import read_import
+
+    printer = Printer(as_json, quiet)
+    check_output(out, [path, images, masks, mesh], WRITTEN, force=force)
+    imported = read_import(path, images, masks)
+    body = _mannequin(path, mesh)
+    report = write_imported(out, imported, body, z_up=up == Up.z, force=force)
+    printer.say(_summary(imported, report, has_mannequin=body is not None))
+    values = {"bundle": out, "format": imported.program, "views": list(report.views)}
+    printer.result({**values, "opaque": list(report.opaque), "masked": report.masked}, str(out))
+
+
+def _mannequin(path: Path, mesh: Path | None) -> Mesh | None:
+    """Return the mesh that was named, else the one beside the cameras, else None."""
+    from toonset.dataset.bundle import MANNEQUIN
+    from toonset.dataset.mesh_file import load_mesh
+
+    own = (path.parent if path.is_file() else path) / MANNEQUIN
+    body = mesh or (own if own.is_file() else None)
+    return None if body is None else load_mesh(body)
+
+
+def _summary(imported: Imported, report: ImportReport, *, has_mannequin: bool) -> str:
+    count = len(report.views)
+    exact = ", exact cameras of toonset.json" if imported.native is not None else ""
+    lines = [f"{count} {'view' if count == 1 else 'views'} of {imported.program}{exact}"]
+    if report.masked:
+        lines.append(f"{report.masked} with a mask as alpha")
+    if report.opaque:
+        lines.append(
+            f"{len(report.opaque)} without transparent background ({report.opaque[0]} ...): the "
+            "whole picture counts as figure; give --masks"
+        )
+    if not has_mannequin:
+        lines.append("no mannequin; --mesh puts one into the bundle")
+    return "\n".join(lines)
