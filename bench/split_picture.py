@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import cv2
@@ -17,18 +16,19 @@ TILE_WH = (620, 340)
 TITLE_PX = 20
 COLUMNS = 3
 TRUE, FOUND, LEFT_OUT = (0, 170, 0), (230, 30, 30), (40, 90, 230)
+GREY = (70, 70, 84)
 LIGHT, DARK, SQUARE_PX = 225, 200, 12  # checks under transparent sheets
 
 Rgb = UInt8[np.ndarray, "height width 3"]
 
 
 def tile(case: SplitCase, found: Found, title: str) -> Rgb:
-    """Return a small picture of a sheet with boxes and a title."""
+    """Return a small picture of a sheet with boxes and a title, as high as it must be."""
     height, width = case.rgba.shape[:2]
     factor = min(TILE_WH[0] / width, (TILE_WH[1] - TITLE_PX) / height, 1.0)
     size = max(round(width * factor), 1), max(round(height * factor), 1)
     small = cv2.resize(_over_checks(case.rgba), size, interpolation=cv2.INTER_AREA)
-    whole = Image.new("RGB", TILE_WH, (70, 70, 84))
+    whole = Image.new("RGB", (TILE_WH[0], size[1] + TITLE_PX + 4), GREY)
     whole.paste(Image.fromarray(small), (0, TITLE_PX))
     pen = ImageDraw.Draw(whole)
     pen.text((3, 3), title, "white", font=ImageFont.load_default(12))
@@ -44,12 +44,14 @@ def tile(case: SplitCase, found: Found, title: str) -> Rgb:
 
 def contact_sheet(tiles: Sequence[Rgb]) -> Rgb:
     """Return the tiles in rows; at least one is needed."""
-    rows = math.ceil(len(tiles) / COLUMNS)
-    sheet = np.zeros((rows * TILE_WH[1], COLUMNS * TILE_WH[0], 3), np.uint8)
-    for i, picture in enumerate(tiles):
-        y, x = i // COLUMNS * TILE_WH[1], i % COLUMNS * TILE_WH[0]
-        sheet[y : y + TILE_WH[1], x : x + TILE_WH[0]] = picture
-    return sheet
+    rows = []
+    for start in range(0, len(tiles), COLUMNS):
+        row = tiles[start : start + COLUMNS]
+        strip = np.full((max(len(t) for t in row), COLUMNS * TILE_WH[0], 3), GREY, np.uint8)
+        for i, picture in enumerate(row):
+            strip[: len(picture), i * TILE_WH[0] : (i + 1) * TILE_WH[0]] = picture
+        rows.append(strip)
+    return np.concatenate(rows)
 
 
 def _box(

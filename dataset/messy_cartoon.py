@@ -17,6 +17,7 @@ import numpy as np
 from toonset.dataset.messy_figure import Cast, Figure, Rgb, cut_figure
 
 SAMPLES = 4  # per pixel and axis
+FLOAT_GAPS = (0.04, 0.08)  # over the head, to a hat in the air
 INNER_PEN = 0.7  # of the contour's width: face lines
 ROUND = np.linspace(0, 2 * math.pi, 48, endpoint=False)
 Point = tuple[float, float, float]
@@ -97,13 +98,15 @@ def _head(
         eye = (0.14 * r, rng.uniform(0.14, 0.3) * r, 0.1 * r)
         parts.append(Ball((side * 0.4 * r, y, 0.86 * r), eye, black, "face"))
     parts.append(Ball((0, y - 0.5 * r, 0.83 * r), (0.3 * r, 0.06 * r, 0.1 * r), black, "face"))
-    if rng.random() < 0.5:
+    spiky = rng.random() < 0.5
+    if spiky:
         for angle in np.linspace(-1.2, 1.2, 5):  # a spiky fringe
             tip = (1.45 * r * math.sin(angle), y + 1.4 * r * math.cos(angle), -0.1 * r)
             root = (0.7 * r * math.sin(angle), y + 0.8 * r * math.cos(angle), -0.1 * r)
             parts.append(Limb(root, tip, 0.35 * r, 0.04 * r, hair, "head"))
     if floats or rng.random() < 0.35:
-        lift = y + (1.75 if floats else 0.85) * r
+        crown = y + (1.44 if spiky else 1.24) * r
+        lift = crown + 0.5 * r + rng.uniform(*FLOAT_GAPS) if floats else y + 0.85 * r
         parts.append(
             Limb((-1.1 * r, lift, 0), (1.1 * r, lift, 0), 0.12 * r, 0.12 * r, extra, "head")
         )
@@ -136,7 +139,8 @@ def _arms(
     rng: np.random.Generator, colors: tuple[Rgb, Rgb], width: float, shoulder: float, floats: bool
 ) -> list[Part]:
     shirt, skin = colors
-    angle, length = float(rng.uniform(0.2, 1.3)), float(rng.uniform(0.2, 0.28))
+    angle = float(rng.uniform(0.7 if floats else 0.2, 1.3))  # clear of the trunk
+    length = float(rng.uniform(0.2, 0.28))
     parts: list[Part] = []
     for side in (-1, 1):
         top = (side * 0.7 * width, shoulder - 0.05, 0.0)

@@ -24,8 +24,8 @@ def arrow(width_px: int, rgb: Rgb, pen_px: float, *, curved: bool, leftwards: bo
     covered = np.zeros((height * SAMPLES, width_px * SAMPLES), np.uint8)
     x = np.linspace(2 * pen_px, width_px - 2 - 0.8 * tip, 24)
     share = (x - x[0]) / np.ptp(x)
-    sag = (0.55 * height if curved else 0) * np.sin(np.pi * share)
     level = height - tip - 2 if curved else height / 2
+    sag = (level - pen_px - 1 if curved else 0) * np.sin(np.pi * share)
     line = np.stack([x, level - sag], axis=-1)
     _stroke(covered, line, pen_px)
     end, before = line[-1], line[-4]

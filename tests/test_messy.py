@@ -1,0 +1,238 @@
+"""Messy synthetic sheets: the truth is what is drawn, the seed decides, difficulties are drawn."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+
+from toonset.dataset.messy import MessySheet, make_messy_sheet
+from toonset.dataset.messy_cartoon import cartoon_cast
+from toonset.dataset.messy_figure import Figure, as_line_art, resized, tight_window, with_gaps
+from toonset.dataset.messy_ground import through_jpeg
+from toonset.dataset.messy_layout import reach
+from toonset.dataset.messy_options import (
+    DIFFICULTIES,
+    EXCLUSIVE,
+    GROUNDS,
+    MessyOptions,
+    checked,
+    mixture,
+)
+from toonset.dataset.messy_solids import solid_cast
+from toonset.errors import SheetError
+
+SMALL = MessyOptions(figure_px=(70, 90))
+COLORS = ((230, 180, 150), (90, 50, 40), (200, 60, 50), (50, 80, 150), (60, 60, 70), (90, 150, 70))
+TOUCH = {"touching", "overlap"}
+
+
+@cache  # most tests look at the same few
+def sheet(seed: int, *difficulties: str) -> MessySheet:
+    return make_messy_sheet(seed, difficulties, SMALL)
+
+
+def covered(made: MessySheet) -> np.ndarray:
+    """Return the sum of all true alphas, 0 to 1, on the sheet."""
+    total = np.zeros(made.rgba.shape[:2])
+    for (x, y, w, h), alpha in zip(made.boxes, made.alphas, strict=True):
+        total[y : y + h, x : x + w] += alpha / 255
+    return total
+
+
+def common_area(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> int:
+    width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+    height = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+    return max(width, 0) * max(height, 0)
+
+
+# ---- truth
+
+
+@pytest.mark.parametrize("difficulty", [None, *DIFFICULTIES])
+def test_truth_is_consistent(difficulty: str | None) -> None:
+    made = sheet(5, *([difficulty] if difficulty else []))
+    height, width = made.rgba.shape[:2]
+    assert len(made.boxes) == len(made.alphas)
+    for (x, y, w, h), alpha in zip(made.boxes, made.alphas, strict=True):
+        assert alpha.shape == (h, w)
+        assert min(x, y) >= 0
+        assert x + w <= width
+        assert y + h <= height
+        assert tight_window(alpha) == (slice(0, h), slice(0, w))
+        assert alpha.max() == 255
+    if not TOUCH & set(made.what):
+        assert all(common_area(a, b) == 0 for a, b in combinations(made.boxes, 2))
+    # neighbours' half-covered rims may add up to a little more than one
+    assert covered(made).max() <= 1 + 2 / 255
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("difficulty", ["rows", "overlap", "floating", "sizes", "one"])
+def test_on_a_transparent_sheet_alpha_is_the_truth(difficulty: str, seed: int) -> None:
+    made = sheet(seed, "transparent", difficulty)
+    np.testing.assert_allclose(made.rgba[..., 3] / 255, covered(made), atol=2 / 255)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_on_a_plain_sheet_nothing_but_figures_differs_from_it(seed: int) -> None:
+    made = sheet(seed, "tinted")
+    ground = made.rgba[0, 0, :3].astype(int)
+    away = np.abs(made.rgba[..., :3].astype(int) - ground).max(axis=-1)
+    assert not away[covered(made) == 0].any()
+    assert (away[covered(made) == 1] > 8).mean() > 0.5  # clothes may have the paper's colour
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_no_figure_is_not_in_the_truth(seed: int) -> None:
+    plain = sheet(seed, "plain")
+    for extra in ("captions", "title", "arrows", "swatches", "guides", "props", "heads", "shadows"):
+        made = sheet(seed, extra)
+        white = (made.rgba[..., :3] == 255).all(axis=-1)
+        assert (~white & (covered(made) == 0)).sum() > 15, extra
+        sizes = [alpha.shape for alpha in made.alphas]
+        assert sizes == [alpha.shape for alpha in plain.alphas], extra
+
+
+def test_reading_order_is_rows_from_the_top_each_from_the_left() -> None:
+    for seed in range(4):
+        boxes = sheet(seed, "rows", "heads", "props").boxes
+        for (x, y, _, h), (next_x, next_y, _, next_h) in pairwise(boxes):
+            same_row = abs((next_y + next_h) - (y + h)) <= 2
+            assert next_x > x if same_row else next_y > y + h - 2
+
+
+def test_overlapping_figures_hide_some_of_each_other() -> None:
+    apart, over = sheet(3, "transparent"), sheet(3, "transparent", "overlap")
+    assert len(apart.boxes) == len(over.boxes)
+    lost = sum(int(a.sum()) for a in apart.alphas) - sum(int(a.sum()) for a in over.alphas)
+    assert lost > 255
+    assert any(common_area(a, b) for a, b in combinations(over.boxes, 2))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_floating_parts_belong_to_their_figure(seed: int) -> None:
+    import cv2
+
+    for alpha in make_messy_sheet(seed, ["floating"], MessyOptions((150, 160))).alphas:
+        assert cv2.connectedComponents((alpha >= 128).astype(np.uint8))[0] - 1 >= 2
+
+
+# ---- seeds and names
+
+
+@pytest.mark.parametrize("difficulties", [(), ("paper", "jpeg", "rows"), ("transparent", "heads")])
+def test_same_seed_same_bytes_and_other_seeds_others(difficulties: tuple[str, ...]) -> None:
+    first, other = sheet(1, *difficulties), sheet(2, *difficulties)
+    solid_cast.cache_clear()
+    again = make_messy_sheet(1, difficulties, SMALL)
+    assert first.what == again.what
+    assert first.boxes == again.boxes
+    np.testing.assert_array_equal(first.rgba, again.rgba)
+    assert all((a == b).all() for a, b in zip(first.alphas, again.alphas, strict=True))
+    assert other.rgba.shape != first.rgba.shape or (other.rgba != first.rgba).any()
+
+
+@pytest.mark.parametrize("name", [name for name in DIFFICULTIES if name != "plain"])
+def test_every_difficulty_changes_the_sheet(name: str) -> None:
+    made, plain = sheet(5, name), sheet(5, "plain")
+    assert set(made.what) - {name} <= {"plain"}
+    assert made.rgba.shape != plain.rgba.shape or (made.rgba != plain.rgba).any()
+
+
+def test_mixtures_have_one_ground_and_hold_no_contradiction() -> None:
+    rng = np.random.default_rng(0)
+    seen: set[str] = set()
+    for _ in range(300):
+        chosen = mixture(MessyOptions(), rng)
+        assert len(chosen & set(GROUNDS)) == 1
+        assert 1 <= len(chosen - set(GROUNDS)) <= MessyOptions().mixed[1]
+        assert not any({a, b} <= chosen for a, b in EXCLUSIVE)
+        seen |= chosen
+    assert seen == set(DIFFICULTIES)
+
+
+@pytest.mark.parametrize(
+    ("asked", "match"),
+    [
+        (["fog"], "'fog'"),
+        (["jpeg", "transparent"], "go together"),
+        (["paper", "plain"], "go together"),
+        (["one", "arrows"], "go together"),
+    ],
+)
+def test_impossible_sheets_are_refused(asked: list[str], match: str) -> None:
+    with pytest.raises(SheetError, match=match):
+        make_messy_sheet(0, asked)
+
+
+def test_a_sheet_without_a_named_ground_is_plain() -> None:
+    assert checked(["rows"]) == {"rows", "plain"}
+    assert len(sheet(0, "one").boxes) == 1
+    assert 3 <= len(sheet(0, "rows").boxes) <= 16
+
+
+def test_jpeg_is_lossy_and_opaque() -> None:
+    clean = sheet(2, "gradient")
+    noisy = through_jpeg(clean.rgba, 60)
+    assert noisy.shape == clean.rgba.shape
+    assert (noisy[..., 3] == 255).all()
+    assert 0 < np.abs(noisy.astype(int) - clean.rgba.astype(int)).mean() < 10
+
+
+# ---- figures
+
+
+def front(outline_px: float = 3.0) -> Figure:
+    cast = cartoon_cast(3, 1, 200, outline_px, COLORS, floats=False, heads=False)
+    return cast.figures[0]
+
+
+def test_line_art_shows_paper_inside_and_ink_at_its_rim() -> None:
+    figure = front()
+    drawn = as_line_art(figure, (0, 0, 0))
+    np.testing.assert_array_equal(drawn.rgba[..., 3], figure.rgba[..., 3])
+    assert (drawn.paper[figure.rgba[..., 3] == 255] > 0.9).mean() > 0.5
+    rim = (figure.rgba[..., 3] > 0) & (figure.rgba[..., 3] < 200)
+    assert drawn.paper[rim].mean() < 0.2
+
+
+def test_gaps_open_the_contour() -> None:
+    import cv2
+
+    drawn = as_line_art(front(), (0, 0, 0))
+    opened = with_gaps(drawn, 3, 2.0, 3.0, np.random.default_rng(0))
+
+    def enclosed(figure: Figure) -> int:
+        """Return paper that cannot be reached from outside without crossing ink."""
+        ink = (figure.rgba[..., 3] / 255) * (1 - figure.paper)
+        free = np.pad((ink < 0.5).astype(np.uint8), 1, constant_values=1)
+        cv2.floodFill(free, None, (0, 0), 2)
+        return int((free == 1).sum())
+
+    assert enclosed(drawn) > 1.2 * enclosed(opened)
+    assert (opened.paper >= drawn.paper).all()
+    assert 5 < (opened.paper - drawn.paper).sum() < 150
+
+
+def test_reduced_line_art_is_still_line_art() -> None:
+    drawn = as_line_art(front(), (0, 0, 0))
+    small = resized(drawn, 0.9)
+    assert small.height == round(0.9 * drawn.height)
+    assert small.paper.mean() == pytest.approx(drawn.paper.mean(), abs=0.02)
+
+
+def test_figures_touch_at_the_reach_and_not_before() -> None:
+    a, b = front().rgba, front().rgba
+    width = a.shape[1] + b.shape[1]
+
+    def overlap(shift: int) -> int:
+        left, right = np.zeros((len(a), width), bool), np.zeros((len(a), width), bool)
+        left[:, : a.shape[1]] = a[..., 3] >= 128
+        right[:, shift : shift + b.shape[1]] = b[..., 3] >= 128
+        return int((left & right).sum())
+
+    assert overlap(reach(a, b)) == 0
+    assert overlap(reach(a, b) - 1) > 0
