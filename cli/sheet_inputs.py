@@ -66,8 +66,10 @@ def load_drawings(paths: Sequence[Path], cutting: Cutting, printer: Printer) -> 
     ]
     whole = _joined(parts)
     boxes = [("boxes", cutting.boxes)] if cutting.boxes is not None else []
-    notes = (*whole.notes, *odd_files(whole.split))
-    return _dropped(replace(whole, files=(*whole.files, *boxes), notes=notes), cutting.dropped)
+    kept = _dropped(replace(whole, files=(*whole.files, *boxes)), cutting.dropped)
+    if any(place.is_dir() for place in places):  # a split folder has been looked at
+        return kept
+    return replace(kept, notes=(*kept.notes, *odd_files(kept.split)))  # --drop settles a doubt
 
 
 def check_label_count(text: str, drawings: Drawings) -> None:

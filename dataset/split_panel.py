@@ -28,7 +28,7 @@ CHECK_PX = 12  # of the chequers that stand for see-through
 # tell apart with colour-blind eyes: blue, green, purple; orange is for what was left out
 FIGURES: tuple[Rgb, ...] = ((0, 90, 200), (0, 135, 90), (150, 40, 160))
 LEFT_OUT: Rgb = (215, 95, 0)
-MOST_KINDS = 80  # boxes of left-out things with their kind beside them; more would hide the sheet
+MOST_KINDS = 24  # the largest left-out things have their kind beside them; more would be clutter
 WHITE: Rgb = (255, 255, 255)
 
 
@@ -54,28 +54,25 @@ class Panel:
 
 
 def draw_panel(panel: Panel, *, alone: bool) -> UInt8[np.ndarray, "height width 3"]:
-    """Return a sheet with what was found on it, larger where it is the only one."""
+    """Return a sheet with what was found on it, larger where it is the only one.
+
+    Boxes go behind the figures and tags beside them, so that nothing drawn is hidden.
+    """
     zoom = _zoom(panel, alone=alone)
     ground, sheet = _painted(panel, zoom)
-    picture = _framed(ground)
-    inner = picture[HEAD : HEAD + sheet.shape[0], MARGIN : MARGIN + sheet.shape[1]]
-    costs = Costs(*picture.shape[:2])
-    boxes, masks = [], []
-    for view in panel.views:
-        corners, mask = _scaled(view, zoom, sheet.shape[:2])
-        left, top, right, bottom = corners
-        window = inner[top:bottom, left:right]
-        window[mask] = sheet[top:bottom, left:right][mask]
-        boxes.append((left + MARGIN, top + HEAD, right + MARGIN, bottom + HEAD))
-        masks.append(mask)
-        costs.add_figure(boxes[-1], mask)
-    for number, (box, mask) in enumerate(zip(boxes, masks, strict=True)):
-        color = FIGURES[number % len(FIGURES)]
-        _outline(picture, box, mask, color)
+    picture, whole = _framed(ground), _framed(sheet)
+    figures = [_scaled(view, zoom, sheet.shape[:2]) for view in panel.views]
+    others = [_moved(_corners(thing.box, zoom), 2) for thing in panel.left_out]
+    colors = [FIGURES[number % len(FIGURES)] for number in range(len(figures))]
+    for box in others:
+        _rectangle(picture, box, LEFT_OUT)
+    for (box, _), color in zip(figures, colors, strict=True):
         _rectangle(picture, box, color)
-    _draw_left_out(picture, costs, panel.left_out, zoom)
-    for number, (box, view, label) in enumerate(zip(boxes, panel.views, panel.labels, strict=True)):
-        draw_tag(picture, costs, box, _layouts(view, label), FIGURES[number % len(FIGURES)])
+    for (left, top, right, bottom), mask in figures:
+        picture[top:bottom, left:right][mask] = whole[top:bottom, left:right][mask]
+    for (box, mask), color in zip(figures, colors, strict=True):
+        _outline(picture, box, mask, color)
+    _write_tags(picture, panel, figures, others)
     return picture
 
 
@@ -132,23 +129,35 @@ def _framed(ground: np.ndarray) -> np.ndarray:
 
 
 def _corners(box: Sequence[int], zoom: float) -> Corners:
+    """Return the corners of a box in the scaled sheet."""
     x, y, width, height = box
     left, top = round(x * zoom), round(y * zoom)
     right, bottom = round((x + width) * zoom), round((y + height) * zoom)
     return left, top, max(right, left + 1), max(bottom, top + 1)
 
 
+def _moved(box: Corners, grown: int = 0) -> Corners:
+    """Return corners in the framed sheet, some pixels farther out."""
+    left, top, right, bottom = box
+    return (
+        left + MARGIN - grown,
+        top + HEAD - grown,
+        right + MARGIN + grown,
+        bottom + HEAD + grown,
+    )
+
+
 def _scaled(
     view: View, zoom: float, shape: tuple[int, ...]
 ) -> tuple[Corners, Bool[np.ndarray, "_ _"]]:
-    """Return a view's corners in the scaled sheet and its mask there."""
+    """Return a view's corners in the framed sheet and its mask there."""
     left, top, right, bottom = _corners(view.box, zoom)
     method = cv2.INTER_AREA if zoom < 1 else cv2.INTER_NEAREST
     coverage = cv2.resize(
         view.mask.astype(np.float32), (right - left, bottom - top), interpolation=method
     )
     right, bottom = min(right, shape[1]), min(bottom, shape[0])
-    return (left, top, right, bottom), coverage[: bottom - top, : right - left] >= 0.5
+    return _moved((left, top, right, bottom)), coverage[: bottom - top, : right - left] >= 0.5
 
 
 def _outline(picture: np.ndarray, box: Corners, mask: Bool[np.ndarray, "_ _"], color: Rgb) -> None:
@@ -169,16 +178,29 @@ def _rectangle(picture: np.ndarray, box: Corners, color: Rgb) -> None:
         cv2.rectangle(picture, (left, top), (right - 1, bottom - 1), ink, thick)
 
 
-def _draw_left_out(
-    picture: np.ndarray, costs: Costs, things: Sequence[LeftOut], zoom: float
+def _write_tags(
+    picture: np.ndarray,
+    panel: Panel,
+    figures: Sequence[tuple[Corners, np.ndarray]],
+    others: Sequence[Corners],
 ) -> None:
-    """Draw boxes of what was left out, each with its kind where there is room."""
-    for number, thing in enumerate(things):
-        left, top, right, bottom = _corners(thing.box, zoom)
-        box = (left + MARGIN - 2, top + HEAD - 2, right + MARGIN + 2, bottom + HEAD + 2)
-        _rectangle(picture, box, LEFT_OUT)
-        if number < MOST_KINDS:
-            draw_tag(picture, costs, box, [(Line(thing.kind, 13),)], LEFT_OUT, must=False)
+    """Number the figures, and name what was left out where there is room for it."""
+    costs = Costs(*picture.shape[:2])
+    for box, thing in zip(others, panel.left_out, strict=True):
+        if thing.kind != "frame":  # lines across the sheet may well be written on
+            costs.add_thing(box)
+    for box, mask in figures:
+        costs.add_figure(box, mask)
+    for number, (box, _) in enumerate(figures):
+        layouts = _layouts(panel.views[number], panel.labels[number])
+        draw_tag(picture, costs, box, layouts, FIGURES[number % len(FIGURES)])
+    named = sorted(zip(others, panel.left_out, strict=True), key=lambda pair: -_area(pair[0]))
+    for box, thing in named[:MOST_KINDS]:
+        draw_tag(picture, costs, box, [(Line(thing.kind, 13),)], LEFT_OUT, must=False)
+
+
+def _area(box: Corners) -> int:
+    return (box[2] - box[0]) * (box[3] - box[1])
 
 
 def _layouts(view: View, label: str) -> list[tuple[Line, ...]]:

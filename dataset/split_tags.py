@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-FIGURE, FACE, TAG, BOX = 1.0, 50.0, 1000.0, 1e-4  # cost of a covered pixel
+FIGURE, FACE, TAG, THING, BOX = 1.0, 50.0, 1000.0, 0.01, 1e-4  # cost of a covered pixel
 FACE_SHARE = 0.5  # of a figure's height, from its top: a face is there
 STEPS = 9  # places tried along a side
 PAD = 3  # pixels round the words of a tag
@@ -50,6 +50,12 @@ class Costs:
             weights[: rows[0] + round(FACE_SHARE * (rows[-1] + 1 - rows[0]))] = FACE
         window = self.map[top:bottom, left:right]
         np.maximum(window, np.where(mask, weights, BOX), out=window)
+
+    def add_thing(self, box: Corners) -> None:
+        """Keep tags off something that was left out, if there is another place."""
+        left, top, right, bottom = np.maximum(box, 0)
+        window = self.map[top:bottom, left:right]
+        np.maximum(window, THING, out=window)
 
     def cover(self, box: Corners) -> None:
         """Keep later tags off a place that is taken."""
@@ -136,6 +142,7 @@ def _line_height(line: Line) -> int:
 def _written(layout: Layout, size_wh: tuple[int, int], color: Rgb) -> np.ndarray:
     image = Image.new("RGB", size_wh, color)
     pen = ImageDraw.Draw(image)
+    pen.rectangle((0, 0, size_wh[0] - 1, size_wh[1] - 1), outline="white")
     y = PAD
     for line in layout:
         pen.text((PAD, y), line.text, fill="white", font=ImageFont.load_default(line.size))

@@ -89,13 +89,15 @@ BAD_PICTURES: dict[str, tuple[Callable[[Path, Image.Image], Any], str]] = {
 }
 
 
+@pytest.mark.parametrize("verb", ["calibrate", "split"])
 @pytest.mark.parametrize("name", BAD_PICTURES)
-def test_a_bad_sheet(name, drawn: Path, toonset, snapshot, tmp_path, monkeypatch):
+def test_a_bad_sheet(name, verb, drawn: Path, toonset, snapshot, tmp_path, monkeypatch):
     make, words = BAD_PICTURES[name]
     make(tmp_path / name, Image.open(drawn / "sheet.png").convert("RGB"))
     monkeypatch.chdir(tmp_path)
     before = snapshot(tmp_path)
-    reason = toonset("calibrate", name, "--mesh", drawn / "mannequin.obj").reason
+    mesh = ["--mesh", drawn / "mannequin.obj"] if verb == "calibrate" else []
+    reason = toonset(verb, name, *mesh).reason
     assert words in reason
     assert reason.startswith(" ".join(name.replace("\x1b", "?").split()))
     assert snapshot(tmp_path) == before
@@ -196,6 +198,10 @@ def test_a_bad_mesh(name, drawn: Path, toonset, snapshot, tmp_path, monkeypatch)
     [
         (["calibrate", "none.png", "--mesh", "mannequin.obj"], "none.png: no such file"),
         (["calibrate", "sheet.png", "--mesh", "sheet.png"], "sheet.png: is a PNG picture, no mesh"),
+        (["split", "none.png"], "none.png: no such file; check the name of the picture"),
+        (["split", "mannequin.obj"], "mannequin.obj: is text, no picture that can be read"),
+        (["split", "sheet.png", "--boxes", "mannequin.obj"], "mannequin.obj: "),
+        (["split", "sheet.png", "--drop", "9"], "--drop: there is no view 9"),
         (["palette"], "bundle"),
         (["train", "."], "holds no transforms.json; run `toonset calibrate` first"),
         (["render", ".", "--turntable", "2", "-o", "x"], "config.json: does not exist"),

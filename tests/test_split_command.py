@@ -1,0 +1,314 @@
+"""`toonset split`: what it writes and says, what it takes as input, and how it is corrected."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from toonset.dataset.split_files import SCHEMA
+from toonset.dataset.split_read import read_split
+
+COLORS = ((200, 60, 40), (40, 120, 200), (60, 160, 70), (220, 180, 40))
+COUNT = len(COLORS)
+PITCH, TOP, WIDE, HIGH = 110, 20, 60, 160  # of the figures on the sheet
+
+
+def draw_figure(pen: ImageDraw.ImageDraw, x: int, y: int, color: tuple[int, int, int]) -> None:
+    pen.ellipse((x + 10, y, x + 50, y + 45), color, "black", 3)
+    pen.rectangle((x, y + 43, x + WIDE, y + 110), color, "black", 3)
+    pen.rectangle((x + 8, y + 108, x + 26, y + HIGH), color, "black", 3)
+    pen.rectangle((x + 34, y + 108, x + 52, y + HIGH), color, "black", 3)
+
+
+def drawn_sheet(paper: str = "white", colors: tuple[tuple[int, int, int], ...] = COLORS):
+    image = Image.new("RGB", (PITCH * len(colors), HIGH + 2 * TOP), paper)
+    pen = ImageDraw.Draw(image)
+    for number, color in enumerate(colors):
+        draw_figure(pen, 25 + PITCH * number, TOP, color)
+    return image
+
+
+@pytest.fixture
+def sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a sheet of four figures in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    drawn_sheet().save("sheet.png")
+    return Path("sheet.png")
+
+
+@pytest.fixture
+def singles(sheet: Path) -> Path:
+    """Return a folder of one file per view, and other things."""
+    folder = Path("drawings")
+    folder.mkdir()
+    whole = Image.open(sheet)
+    for number in range(COUNT):
+        crop = whole.crop((PITCH * number, 0, PITCH * (number + 1), whole.height))
+        crop.save(folder / f"view{8 + number}.png")  # view8, view9, view10, view11
+    (folder / "notes.txt").write_text("mine")
+    (folder / ".DS_Store").write_bytes(b"\0")
+    return folder
+
+
+def color_of(view: Path) -> tuple[int, int, int]:
+    rgba = np.asarray(Image.open(view).convert("RGBA"))
+    inside = rgba[(rgba[..., 3] == 255) & (rgba[..., :3].max(axis=2) > 30)]
+    colors, counts = np.unique(inside, axis=0, return_counts=True)
+    red, green, blue = colors[counts.argmax()][:3]
+    return int(red), int(green), int(blue)
+
+
+def colors_of(folder: Path) -> list[tuple[int, int, int]]:
+    return [color_of(path) for path in sorted((folder / "images").iterdir())]
+
+
+# ---- what it writes and says
+
+
+def test_a_sheet_becomes_a_folder_to_look_at(sheet: Path, toonset, snapshot):
+    done = toonset("split", sheet, "--views", "front,3q,?,back")
+    assert (done.code, done.out) == (0, "views\n")
+    assert set(snapshot(Path("views"))) == {
+        *("images", "split.json", "overlay.png"),
+        *(f"images/{i:03d}.png" for i in range(COUNT)),
+    }
+    assert colors_of(Path("views")) == list(COLORS)
+    lines = done.err.splitlines()
+    assert lines[0] == f"sheet.png: {PITCH * COUNT} x 200 px, background #ffffff"
+    assert all(f"{i:03d}.png  at" in lines[1 + i] for i in range(COUNT))
+    assert lines[1].endswith("px  front")
+    assert lines[-1] == "look at views/overlay.png"
+    assert Image.open("views/overlay.png").width >= PITCH * COUNT
+
+
+def test_split_json_says_where_everything_is_from(sheet: Path, toonset):
+    done = toonset("split", sheet, "-o", "o", "--views", "front,3q,?,90", "--json", "--quiet")
+    assert (done.code, done.err) == (0, "")
+    content = json.loads(Path("o/split.json").read_text())
+    assert content["schema"] == SCHEMA == done.json["schema"]
+    assert done.json["folder"] == "o"
+    (source,) = content["sheets"]
+    assert source["name"] == "sheet.png"
+    assert source["sha256"] == sha256(sheet.read_bytes()).hexdigest()
+    assert source["size_wh"] == list(Image.open(sheet).size)
+    assert source["background"] == "#ffffff"
+    assert [view["label"] for view in content["views"]] == ["front", "3q", None, "90"]
+    for number, view in enumerate(content["views"]):
+        x, y, width, height = view["box"]
+        crop = Image.open(Path("o/images") / view["name"])
+        assert crop.size == (width, height)
+        left, top = 25 + PITCH * number, TOP
+        assert x <= left
+        assert y <= top
+        assert x + width > left + WIDE
+        assert y + height > top + HIGH
+        assert view["line_width_px"] == pytest.approx(3, abs=0.5)
+
+
+def test_the_same_sheet_gives_the_same_bytes(sheet: Path, toonset, snapshot):
+    assert toonset("split", sheet, "-o", "a").code == toonset("split", sheet, "-o", "b").code == 0
+    assert snapshot(Path("a")) == snapshot(Path("b"))
+
+
+def test_a_doubt_is_exit_code_3_and_is_drawn(sheet: Path, toonset):
+    shutil.copy(sheet, "other.png")
+    done = toonset("split", sheet, "other.png")
+    assert (done.code, done.out) == (3, "views\n")
+    assert "look: other.png is a copy of sheet.png: is one of them another view?" in done.err
+    assert len(read_split(Path("views"))[0].views) == 2 * COUNT
+
+
+# ---- corrections
+
+
+def test_dropped_views_go_and_the_others_are_numbered_anew(sheet: Path, toonset):
+    done = toonset("split", sheet, "--drop", "0,2", "--views", "3q,back")
+    assert done.code == 0
+    assert colors_of(Path("views")) == [COLORS[1], COLORS[3]]
+    found = read_split(Path("views"))[0]
+    assert found.labels == ("3q", "back")
+    assert [left.kind for left in found.sources[0].left_out] == ["dropped"] * 2
+    assert "left out: 2 dropped" in done.err
+    assert "numbered anew" in done.err
+
+
+@pytest.mark.parametrize("text", ["1-3", "001, 2 3", "003.png;1-2"])
+def test_numbers_to_drop_may_be_written_in_several_ways(text, sheet: Path, toonset):
+    assert toonset("split", sheet, "--drop", text, "-q").code == 0
+    assert colors_of(Path("views")) == [COLORS[0]]
+
+
+@pytest.mark.parametrize("grid", [f"{COUNT}x1", f"{COUNT}x", f"{COUNT}"])
+def test_a_strip_is_cut_by_its_grid(grid, sheet: Path, toonset):
+    whole = Image.open(sheet)
+    whole.paste("white", (PITCH, 0, 2 * PITCH, whole.height))  # an empty cell is no view
+    whole.save("strip.png")
+    assert toonset("split", "strip.png", "--grid", grid).code in (0, 3)
+    assert colors_of(Path("views")) == [COLORS[0], COLORS[2], COLORS[3]]
+
+
+def test_cells_that_do_not_divide_the_sheet_are_a_doubt(sheet: Path, toonset):
+    done = toonset("split", sheet, "--grid", "3x1")
+    assert done.code == 3
+    assert "440 px wide, which 3 cells do not divide evenly: is it the right --grid?" in done.err
+
+
+def test_a_known_background_is_used(sheet: Path, toonset):
+    drawn_sheet("#a0b0c0").save("tinted.png")
+    assert toonset("split", "tinted.png", "--background", "#A0B0C0").code == 0
+    assert read_split(Path("views"))[0].sources[0].background == (0xA0, 0xB0, 0xC0)
+    assert colors_of(Path("views")) == list(COLORS)
+
+
+# ---- inputs
+
+
+def test_a_folder_of_views_is_read_in_the_order_people_count(singles: Path, toonset):
+    done = toonset("split", singles)
+    assert done.code == 0
+    assert colors_of(Path("views")) == list(COLORS)
+    assert "drawings: no pictures, left out: notes.txt\n" in done.err
+    assert ".DS_Store" not in done.err
+    names = [source.name for source in read_split(Path("views"))[0].sources]
+    assert names == ["view8.png", "view9.png", "view10.png", "view11.png"]
+
+
+def test_files_and_folders_are_joined_in_the_order_given(singles: Path, toonset):
+    drawn_sheet(colors=((90, 20, 120), (20, 90, 90))).save("two.png")
+    done = toonset("split", "two.png", singles, "--drop", "0")
+    assert done.code == 0
+    assert colors_of(Path("views")) == [(20, 90, 90), *COLORS]
+    assert [view.name for view in read_split(Path("views"))[0].views][-1] == "004.png"
+
+
+def test_a_sheet_among_its_views_is_a_doubt(singles: Path, sheet: Path, toonset):
+    shutil.copy(sheet, singles / "all.png")
+    done = toonset("split", singles)
+    assert done.code == 3
+    assert "all.png shows 4 figures, the others one: is it a sheet of the same views?" in done.err
+
+
+def test_a_view_at_another_scale_is_a_doubt(singles: Path, toonset):
+    small = Image.open(singles / "view9.png")
+    small.resize((small.width // 2, small.height // 2)).save(singles / "view9.png")
+    done = toonset("split", singles)
+    assert done.code == 3
+    assert "view9.png: " in done.err
+    assert "is it drawn at another scale?" in done.err
+
+
+def test_one_blank_file_of_many_is_refused_by_name(singles: Path, toonset, snapshot):
+    Image.new("RGB", (110, 200), "white").save(singles / "view9.png")
+    before = snapshot(Path())
+    reason = toonset("split", singles, "-q").reason
+    assert reason.startswith("drawings/view9.png: the sheet is blank")
+    assert snapshot(Path()) == before
+
+
+def test_a_corrected_folder_is_read_again(sheet: Path, toonset):
+    assert toonset("split", sheet, "--views", "front,3q,side,back").code == 0
+    Path("views/images/001.png").unlink()
+    done = toonset("split", "views", "-o", "again")
+    assert done.code == 3  # a changed folder is worth a look
+    assert "look: views: images/001.png is gone: the view is left out" in done.err
+    found, notes = read_split(Path("again"))
+    assert notes == ()
+    assert found.labels == ("front", "side", "back")
+    assert [source.name for source in found.sources] == ["sheet.png"]
+    assert toonset("split", "again/split.json", "-o", "third").code == 0
+    assert colors_of(Path("third")) == [COLORS[0], COLORS[2], COLORS[3]]
+
+
+# ---- what cannot be
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["sheet.png", "--drop", "4"], "--drop: there is no view 4; the 4 views are numbered from"),
+        (["sheet.png", "--drop", "0-3"], "--drop: leaves none of 4 views; keep at least one"),
+        (["sheet.png", "--drop", "first"], "--drop: 'first' is no number of a view; write them"),
+        (["sheet.png", "--drop", "3-1"], "--drop: '3-1' ends before it starts; write 1-3"),
+        (["sheet.png", "--background", "whit"], "--background: 'whit' is no colour; write '#rr"),
+        (["sheet.png", "--grid", "8by1"], "--grid: '8by1' is no grid of 1 to 1000 cells; write"),
+        (["sheet.png", "--grid", "0x1"], "--grid: '0x1' is no grid"),
+        (["sheet.png", "--grid", "x8"], "--grid: 'x8' is no grid"),
+        (["sheet.png", "--views", "front,3q"], "--views: 2 labels for 4 views"),
+        (
+            ["sheet.png", "--drop", "0", "--views", "front,3q,side,back"],
+            "--views: 4 labels for 3 views (--drop left 3 of 4); give one per kept view",
+        ),
+        (["sheet.png", "--views", "front,3q,sde,back"], "'sde' is no direction; did you mean"),
+        (["sheet.png", "--boxes", "none.json"], "none.json: no such file; check the name of the"),
+        (["sheet.png", "--boxes", "far.csv"], "--boxes: box 1 (x 400, y 0, 60 x 160 px) leaves"),
+        (["sheet.png", "--boxes", "flat.csv"], "flat.csv:1: 60 x 0 px is empty"),
+        (["sheet.png", "--boxes", "sheet.png"], "sheet.png: is a PNG picture, no file of boxes"),
+        (["sheet.png", "copy.png", "--boxes", "far.csv"], "has boxes of 1 sheet(s), 2 are given"),
+        (["sheet.png", "sheet.png"], "sheet.png: is given twice; name every drawing once"),
+        (["sheet.png", "./sheet.png"], "sheet.png: is given twice"),
+        (["sheet.png", "none.png"], "none.png: no such file"),
+        (["empty"], "empty: is a folder without pictures; name a sheet, or its folder"),
+        (["bundle"], "bundle: holds transforms.json, so it is no folder of sheets; give bundle/im"),
+        (["done", "--grid", "4x1"], "--grid: done is cut already; give the sheet that it was cut"),
+        (["broken"], "broken/split.json: is no valid JSON"),
+        (["sheet.png", "-o", "sheet.png"], "sheet.png: is a file, a folder is needed"),
+        (["sheet.png", "-o", "done"], "done: exists already; pass --force to replace it"),
+        (["done", "-o", "done", "--force"], "done: holds done, --force would delete it"),
+        (["sheet.png", "-o", "empty/..", "--force"], "which this command does not write"),
+    ],
+)
+def test_a_mistake_is_one_line(arguments, words, sheet: Path, toonset, snapshot):
+    for name in ("empty", "bundle", "broken"):
+        Path(name).mkdir()
+    Path("bundle/transforms.json").write_text("{}")
+    Path("broken/split.json").write_text("{")
+    Path("far.csv").write_text("x,y,w,h\n0,0,60,160\n400,0,60,160\n")
+    Path("flat.csv").write_text("10,10,60,0\n")
+    Image.open(sheet).crop((0, 0, 300, 200)).save("copy.png")
+    assert toonset("split", sheet, "-o", "done", "-q").code == 0
+    before = snapshot(Path())
+    assert words in toonset("split", *arguments).reason
+    assert snapshot(Path()) == before
+
+
+def test_boxes_and_a_grid_contradict(sheet: Path, toonset):
+    done = toonset("split", sheet, "--boxes", "b.csv", "--grid", "4x1")
+    assert (done.code, done.out) == (2, "")
+    said = " ".join(done.err.replace("│", " ").split())
+    assert "--boxes and --grid both say where the figures are; drop one" in said
+
+
+# ---- calibrate takes the same
+
+
+def test_calibrate_takes_a_split_folder_with_its_labels(drawn: Path, toonset, tmp_path):
+    views, out, mesh = tmp_path / "views", tmp_path / "b", drawn / "mannequin.obj"
+    labels = "0,72,144,216,288"
+    assert toonset("split", drawn / "sheet.png", "-o", views, "--views", labels).code in (0, 3)
+    (views / "images" / "003.png").unlink()
+    done = toonset("calibrate", views, "--mesh", mesh, "-o", out, "--json")
+    assert done.code in (0, 3)
+    assert "images/003.png is gone: the view is left out" in done.err
+    assert done.json["options"]["views"] == "0,72,144,288"
+    roles = [given["role"] for given in done.json["inputs"]]
+    assert roles == ["split", *["view"] * 4, "mesh"]
+    yaws = [view["camera"]["yaw_deg"] % 360 for view in done.json["views"]]
+    off = [(a - b + 180) % 360 - 180 for a, b in zip(yaws, (0, 72, 144, 288), strict=True)]
+    assert max(map(abs, off)) < 5
+
+
+def test_calibrate_drops_views_and_keeps_what_was_said(drawn: Path, toonset, tmp_path):
+    mesh, out = drawn / "mannequin.obj", tmp_path / "b"
+    common = ("calibrate", drawn / "sheet.png", "--mesh", mesh, "--drop", "1,3-4", "-o", out)
+    wrong = toonset(*common, "--views", "0,72,144,216,288", "-q")
+    assert "--views: 5 labels for 2 views (--drop left 2 of 5)" in wrong.reason
+    done = toonset(*common, "--views", "0,144", "--json")
+    assert done.code in (0, 3)
+    assert done.json["options"]["drop"] == "1,3-4"
+    assert len(done.json["views"]) == 2
