@@ -29,9 +29,7 @@ BESIDE = np.array([1.4, 2.5, 2.5])  # JPEG's noise next to an edge, over that tw
 SURE = 2.5  # times the noise towards a neighbour's colour: a blend
 LOST = 4.0  # times the noise from every colour around: a blend of what is not seen
 LOST_AT_RIM = 12.0  # where the figure ends: JPEG lets the paper in
-STRAY = (
-    3.0  # times the noise (in squares): a colour that begins nowhere near must be so much nearer
-)
+STRAY = 3.0  # times the noise (in squares) that a colour with no area nearby must be nearer
 SIGMA = 0.683  # quantile of absolute deviations that is one sigma
 FEW = 50  # pixels from which a colour cannot be told
 SAMPLE = 1 << 17  # pixels that noise is told from
