@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from toonset.mesh import Mesh
 
 COLMAP_PANEL = "COLMAP"
+ASTRAY_PX = 0.1  # a principal point is worth a word from here
 
 
 class Layout(StrEnum):
@@ -143,6 +144,16 @@ def _summary(to: Format, job: Job, views: Sequence[ExportView], error_px: float)
     if any(old.rgba.shape != new.rgba.shape for old, new in pairs):
         width, height = views[0].camera.size_wh
         lines.append(f"pictures padded to {width} x {height} px, enlarged by {grown:.3f} at most")
+    astray = max(
+        abs(float(2 * c - size)) / 2
+        for view in views
+        for c, size in zip(view.camera.center, view.camera.size_wh, strict=True)
+    )
+    if to == Format.colmap and astray > ASTRAY_PX:
+        lines.append(
+            f"principal points up to {astray:.1f} px off the pictures' middles; for Gaussian "
+            "splatting's own reader, which takes them to be there, add --centre"
+        )
     if target.wants_points and job.points is None:
         lines.append("no points; give a mannequin that the drawings show as --mesh")
     elif job.points is not None:

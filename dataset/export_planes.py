@@ -20,7 +20,7 @@ from toonset.mesh import Mesh
 
 STAND_OFF = 2.0  # radii of what is seen from the target to an orthographic camera
 RING = 4.0  # such radii from the target to the drawings: 22.5 degrees apart they do not meet
-PAST_PINHOLE = 1.2  # of the distance of a pinhole: the drawing opposite hangs behind it
+PAST_PINHOLE = 3.0  # distances of a pinhole: the drawing opposite hangs behind it
 
 
 def plane_corners(
