@@ -19,8 +19,8 @@ from toonset.view import View
 
 WIDEST, HIGHEST = 2400, 3200  # pixels of a sheet in the overlay
 CELL_HEIGHT = 420  # of one sheet among several
+ENLARGED = 1600  # pixels: a small sheet is enlarged to at most this height
 LARGEST_ZOOM = 8  # of a sprite
-READABLE = 120  # pixels: a figure narrower than this is enlarged, for its tag
 MARGIN, HEAD = 20, 84  # pixels round a sheet; above it, where the tags of its first row fit
 OUTLINE = 2  # pixels, of the line along a mask
 FADE = 0.6  # of what is no figure, towards the background
@@ -79,11 +79,11 @@ def draw_panel(panel: Panel, *, alone: bool) -> UInt8[np.ndarray, "height width 
 def _zoom(panel: Panel, *, alone: bool) -> float:
     """Return the size of a sheet in the overlay relative to its own; above 1 it is whole."""
     height, width = panel.rgba.shape[:2]
-    most = min(WIDEST / width, (HIGHEST if alone else CELL_HEIGHT) / height)
-    if most < 1 or not panel.views:
-        return min(most, 1.0)
-    narrow = float(np.median([view.box[2] for view in panel.views]))
-    return float(np.clip(np.ceil(READABLE / narrow), 1, min(int(most), LARGEST_ZOOM)))
+    highest = HIGHEST if alone else CELL_HEIGHT
+    if width > WIDEST or height > highest:
+        return min(WIDEST / width, highest / height)
+    room = min(WIDEST // width, (ENLARGED if alone else CELL_HEIGHT) // height)
+    return float(np.clip(room, 1, LARGEST_ZOOM))
 
 
 def _painted(panel: Panel, zoom: float) -> tuple[np.ndarray, np.ndarray]:

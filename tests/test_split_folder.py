@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
+from toonset.dataset.boxes_file import read_boxes
 from toonset.dataset.line_width import contour_width_px
 from toonset.dataset.picture import encode_png
 from toonset.dataset.picture_folder import natural_key, picture_files
@@ -303,3 +304,34 @@ def test_pictures_of_a_folder_come_in_the_order_people_count(tmp_path: Path):
 def test_natural_keys_of_any_names_compare():
     names = ["", "1", "a1", "1a", "a", "1.10.2", "1.9", "²", "٣", "view", "ä2"]
     assert sorted(sorted(names), key=natural_key) == sorted(reversed(names), key=natural_key)
+
+
+# ---- files that came to harm
+
+
+def mutated(rng: np.random.Generator, data: bytes) -> bytes:
+    """Return a file with some bytes changed, moved, removed or repeated."""
+    changed = bytearray(data)
+    for _ in range(rng.integers(1, 4)):
+        start = int(rng.integers(len(changed) + 1))
+        end = start + int(rng.integers(1, 12))
+        swap = rng.choice([b'"', b"9" * 400, b"-1", b"null", b"[]", b"{}", b"\xff", b"1e999", b""])
+        changed[start:end] = rng.choice([bytes(swap), bytes(changed[end : 2 * end])])
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("name", ["split.json", "images/001.png", "boxes.json"])
+def test_harmed_files_are_read_or_refused_with_one_line(name, folder: Path):
+    boxes = json.dumps({"boxes": [list(view.box) for view in cut().views]})
+    (folder / "boxes.json").write_text(boxes)
+    whole = (folder / name).read_bytes()
+    rng = np.random.default_rng(4)
+    reasons = []
+    for _ in range(300):
+        (folder / name).write_bytes(mutated(rng, whole))
+        try:
+            read_boxes(folder / name) if name == "boxes.json" else read_split(folder)
+        except (SheetError, PictureError) as error:
+            reasons.append(str(error))
+    assert len(reasons) > 100
+    assert all(reason.startswith(str(folder)) for reason in reasons)

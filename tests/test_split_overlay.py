@@ -47,26 +47,33 @@ def rows_of(columns: int, rows: int, gap: int) -> tuple[list[View], tuple[int, i
     return views, (gap + columns * (SIDE + gap), gap + rows * (SIDE + gap))
 
 
+def inner(one: Panel, *, enlarged: bool = False) -> np.ndarray:
+    """Return the overlay at the sheet's own size, without the room round it."""
+    picture = draw_panel(one, alone=enlarged)[HEAD:-MARGIN, MARGIN:-MARGIN]
+    zoom = picture.shape[1] // one.rgba.shape[1]
+    assert (zoom > 1) == enlarged
+    return picture[zoom // 2 :: zoom, zoom // 2 :: zoom]
+
+
 def shown(picture: np.ndarray, color: tuple[int, int, int]) -> np.ndarray:
     return (picture == color).all(axis=2)
 
 
 @pytest.mark.parametrize("paper", [(255, 255, 255), (12, 14, 20), (128, 60, 60), None])
-@pytest.mark.parametrize(("columns", "rows"), [(1, 1), (4, 1), (3, 3)])
+@pytest.mark.parametrize(("columns", "rows"), [(1, 1), (4, 1), (2, 2)])
 def test_every_pixel_of_every_figure_shows_where_there_is_room(columns, rows, paper):
     views, size = rows_of(columns, rows, gap=90)
-    picture = draw_panel(panel(views, size, paper), alone=True)
-    inner = picture[HEAD:, MARGIN:]
+    picture = inner(panel(views, size, paper), enlarged=True)
     for one in views:
         x, y, width, height = one.box
-        assert shown(inner[y : y + height, x : x + width], INK)[one.mask].all()
+        assert shown(picture[y : y + height, x : x + width], INK)[one.mask].all()
 
 
 def test_packed_figures_keep_their_upper_halves():
     """No gap at all between the figures: tags must go on them, but never on a face."""
     views, size = rows_of(4, 4, gap=0)
     full = [View(np.full_like(v.rgba, 255), v.box, 2.0, v.name) for v in views]
-    picture = draw_panel(panel(full, size, (255, 255, 255)), alone=True)[HEAD:, MARGIN:]
+    picture = inner(panel(full, size, (255, 255, 255)), enlarged=True)
     for one in full:
         x, y, width, _ = one.box
         upper = picture[y + 8 : y + SIDE // 2 - 4, x + 8 : x + width - 8]
@@ -79,11 +86,11 @@ def test_a_wrong_cut_shows():
     half = View(whole.rgba * (np.arange(300)[:, None, None] < 150), whole.box, 2.0, "000.png")
     cut = panel([whole], (200, 340), (255, 255, 255))
     cut = Panel(cut.title, cut.rgba, cut.background, (half,), ("",))
-    inner = draw_panel(cut, alone=True)[HEAD:, MARGIN:]
-    assert shown(inner[24:170, 24:166], INK).all()
-    assert not shown(inner[170:320], INK).any()
-    assert shown(inner[171:173, 24:166], FIGURES[0]).any(axis=0).all()  # along the cut
-    assert (inner[250, 60] == np.rint(0.4 * np.array(INK) + 0.6 * 255)).all()  # faded
+    picture = inner(cut)
+    assert shown(picture[24:170, 24:166], INK).all()
+    assert not shown(picture[170:320], INK).any()
+    assert shown(picture[171:173, 24:166], FIGURES[0]).any(axis=0).all()  # along the cut
+    assert (picture[250, 60] == np.rint(0.4 * np.array(INK) + 0.6 * 255)).all()  # faded
 
 
 def test_holes_have_an_outline():
@@ -91,16 +98,16 @@ def test_holes_have_an_outline():
     rgba = ring.rgba.copy()
     rgba[100:140, 60:100] = 0
     holed = View(rgba, ring.box, 0.0, "000.png")
-    inner = draw_panel(panel([holed], (200, 340), (255, 255, 255)), alone=True)[HEAD:, MARGIN:]
-    assert shown(inner[120:160, 80:82], FIGURES[0]).all()
+    picture = inner(panel([holed], (200, 340), (255, 255, 255)))
+    assert shown(picture[120:160, 80:82], FIGURES[0]).all()
 
 
 def test_what_was_left_out_is_orange_and_dropped_views_too():
     views = [view(0, 20, 20, 150, 300)]
     left = (LeftOut((200, 40, 120, 60), "text"), LeftOut((200, 150, 120, 150), "dropped"))
-    picture = draw_panel(panel(views, (340, 340), (255, 255, 255), left), alone=True)
+    picture = inner(panel(views, (340, 340), (255, 255, 255), left))
     for x, y, width, _ in (thing.box for thing in left):
-        row = picture[HEAD + y - 2, MARGIN + x : MARGIN + x + width]
+        row = picture[y - 2, x : x + width]
         assert (row == LEFT_OUT).all(axis=1).mean() > 0.5
 
 
@@ -123,7 +130,7 @@ def test_many_files_stand_side_by_side():
 
 def test_a_sheet_of_which_every_view_was_dropped_is_still_shown():
     picture = draw_split([panel([], (300, 200), (255, 255, 255))], ["word " * 400])
-    assert picture.shape[1] == 300 + 2 * MARGIN
+    assert picture.shape[1] == 8 * 300 + 2 * MARGIN
 
 
 def test_a_tag_takes_the_fullest_layout_that_hides_nothing():
