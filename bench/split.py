@@ -23,13 +23,16 @@ TABLE_HEAD = (
     "of",
     "mask IoU",
     "p5",
+    "masks",
     "s/sheet",
     "s/MP",
     "silent",
     "false alarms",
 )
+GOOD_MASK = 0.95  # IoU: a mask without a missing shirt
 LEGEND = (
     "right: all figures found, in order, every box within 2 px or IoU >= 0.97",
+    "masks: share of figures whose mask has IoU >= 0.95",
     "silent: wrong, without a warning, and what was missed is not shown as left out",
     "false alarms: right, but with a warning; seconds are of processor time",
 )
@@ -86,6 +89,7 @@ def _records(results: Sequence[Score], recorder: Recorder) -> list[Record]:
     return [
         *recorder.share("exactly right", [not result.fault for result in results]),
         recorder.samples("mask IoU", ious, "1", "higher"),
+        *recorder.share("mask IoU at least 0.95", [iou >= GOOD_MASK for iou in ious]),
         *recorder.share("wrong and announced", [result.announced for result in wrong]),
         *recorder.share("right but warned", [result.warned for result in right], "lower"),
         recorder.samples("seconds", [result.seconds for result in results], "s"),
@@ -124,6 +128,7 @@ def _row(group: str, name: str, results: Sequence[Score]) -> tuple[str, ...]:
         str(len(results)),
         f"{np.median(ious):.3f}",
         f"{np.percentile(ious, 5):.3f}",
+        f"{np.mean([iou >= GOOD_MASK for iou in ious]):.0%}",
         f"{np.median([r.seconds for r in results]):.3f}",
         f"{np.median([r.seconds / r.megapixels for r in results]):.3f}",
         str(len(silent)),

@@ -110,7 +110,7 @@ def with_gaps(
     on_line = np.argwhere((np.abs(depth - outline_px / 2) < 0.75) & (figure.paper < 0.5))
     if len(on_line) == 0:
         return figure
-    radius = float(np.hypot(outline_px / 2, gap_px / 2)) + 0.5
+    radius = float(np.hypot(outline_px / 2, gap_px / 2))  # so wide is the gap at the line's rim
     y, x = np.mgrid[: figure.height, : figure.width].astype(np.float32)
     paper = figure.paper
     for row, column in on_line[rng.integers(len(on_line), size=gaps)]:

@@ -163,6 +163,7 @@ def test_records_count_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     assert ours["wrong and announced"].value == pytest.approx(1 / 2)
     assert ours["right but warned"].value == 1.0
     assert (ours["mask IoU"].n, ours["mask IoU"].median) == (9, 1.0)
+    assert ours["mask IoU at least 0.95"].value == pytest.approx(5 / 9)
     assert (ours["seconds"].median, ours["seconds"].seed) == (0.5, 3)
     assert len(result.wrong) == 2
     theirs = {r.metric: r for r in result.records if r.method == "corner colour"}
