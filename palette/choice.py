@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
 
 from toonset.errors import PaletteError
+from toonset.palette.areas import Areas
 from toonset.palette.names import hex_of
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.palette import MAX_COLORS
@@ -17,6 +17,7 @@ from toonset.palette.shades import Paint
 KEEP_REACH = (
     4 * JUST_NOTICEABLE
 )  # in OKLab: so far a colour typed to be kept may be from a found one
+OPEN = 0.25  # of a colour's blends: the deviation of an even spread over 0 to 1, in its favour
 
 RGB = tuple[int, int, int]
 
@@ -63,8 +64,8 @@ class Amount:
         paint: the paint.
         share: of all pixels; drawn lines count to their ink alone.
         cloth: of all pixels, without drawn lines.
-        weight: what the rule looks at: the share of pixels that are no lines; for the ink that of
-            all pixels.
+        weight: what the rule looks at: the share of pixels that are no lines, as much as blends
+            may hold of it; for the ink the share of all pixels.
     """
 
     paint: Paint
@@ -74,26 +75,25 @@ class Amount:
 
 
 def measure(
-    paints: Sequence[Paint], marked: Int[np.ndarray, " n"] | None, options: PaletteOptions
+    paints: Sequence[Paint],
+    areas: Areas,
+    options: PaletteOptions,
 ) -> tuple[list[Amount], int | None]:
     """Return every paint's amount, and which paint is the lines' ink (None without lines).
 
     Args:
-        paints: of a histogram.
-        marked: pixels of drawn lines, per colour of the histogram; None = not known.
+        paints: all of a character.
+        areas: their pixels.
         options: whether lines count to their ink.
     """
-    counts = np.array([paint.count for paint in paints], dtype=np.float64)
-    lines = np.zeros(len(paints))
-    if marked is not None:
-        lines = np.array([float(marked[paint.members].sum()) for paint in paints])
-    total, drawn = counts.sum(), lines.sum()
-    ink = int(lines.argmax()) if drawn else None
-    cloth = (counts - lines) / total
-    weights = (counts - lines) / max(total - drawn, 1)
+    lines = int(areas.drawn.sum())
+    total = int(areas.painted.sum()) + lines
+    ink = int(areas.drawn.argmax()) if lines else None
+    cloth = areas.painted / total
+    weights = (areas.painted + OPEN * areas.soft) / max(total - lines, 1)
     shares = cloth.copy()
     if ink is not None:
-        shares[ink] += drawn / total
+        shares[ink] += lines / total
         weights[ink] = max(weights[ink], shares[ink] if options.contour else 0)
     parts = zip(paints, shares.tolist(), cloth.tolist(), weights.tolist(), strict=True)
     return [Amount(*part) for part in parts], ink

@@ -1,9 +1,9 @@
 """The paper's palette: the colours that make up at least 5 % of the character's pixels.
 
 Which colours there are is read from flat paint (`toonset.palette.pixels`, `shades`); how much of
-each, from all opaque pixels: soft ones count for the nearest. Where the drawn lines are given, they
-count to their ink, and the rule weighs the other colours without them, so that an outline does not
-push a colour under 5 %. The ink itself is in the palette like any colour that makes up 5 %.
+each, from all of the figure's (`areas`). Where the drawn lines are given, they count to their ink,
+and the rule weighs the other colours without them, so that an outline does not push a colour under
+5 %. The ink itself is in the palette like any colour that makes up 5 %.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError
+from toonset.palette.areas import paint_areas
 from toonset.palette.choice import Amount, PaletteOptions, choose, measure
 from toonset.palette.labels import nearest_colors
 from toonset.palette.names import hex_of, name_of
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
-from toonset.palette.pixels import Histogram, count_marked, count_pixels
+from toonset.palette.pixels import Histogram, count_pixels
 from toonset.palette.shades import find_paints
 
 LEAST_LISTED = 0.002  # of the pixels: what is rarer is not worth a line among the dropped
@@ -47,8 +48,8 @@ def extract_palette(
     options = options or PaletteOptions()
     histogram = _histogram(images)
     paints, evidence = find_paints(histogram)
-    marked = None if contours is None else count_marked(histogram, images, contours)
-    amounts, ink = measure(paints, marked, options)
+    areas = paint_areas(images, histogram, paints, contours)
+    amounts, ink = measure(paints, areas, options)
     kept, left, warnings = choose(amounts, options)
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)
     contour = None if ink is None else _contour(amounts[ink])
@@ -88,9 +89,9 @@ def _histogram(images: Images) -> Histogram:
 
 
 def _rule(options: PaletteOptions, lines: bool) -> str:
-    words = [f"at least {options.min_share:g} of the opaque pixels"]
+    words = [f"at least {options.min_share:g} of the figure's pixels"]
     if lines:
-        words = [f"at least {options.min_share:g} of the opaque pixels that are no drawn lines"]
+        words = [f"at least {options.min_share:g} of the figure's pixels that are no drawn lines"]
         words.append(
             "the lines' colour by all pixels" if options.contour else "the lines' colour alike"
         )

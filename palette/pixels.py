@@ -51,9 +51,9 @@ class Histogram:
 
 def count_pixels(images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Histogram:
     """Return how often every colour occurs in the opaque pixels of several pictures."""
-    pictures = [_words(image) for image in images]
+    pictures = [words_of(image)[box_of(image)] for image in images]
     noise = _noise(pictures)
-    runs = [run for words in pictures for run in _runs(words, noise)]
+    runs = [_runs(band, noise) for words in pictures for band in bands(words, noise)]
     marked = np.concatenate([np.zeros(0, dtype=np.uint32), *(codes for codes, _ in runs)])
     lengths = np.concatenate([np.zeros(0, dtype=np.int64), *(lengths for _, lengths in runs)])
     codes, place = _distinct(marked & RGB)
@@ -67,66 +67,66 @@ def count_pixels(images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Histogram:
     return Histogram(colors, counts, flat if flat.any() else counts, thin, noise)
 
 
-def count_marked(
-    histogram: Histogram,
-    images: Sequence[UInt8[np.ndarray, "_ _ 4"]],
-    masks: Sequence[Bool[np.ndarray, "_ _"]],
-) -> Int[np.ndarray, " n"]:
-    """Return how many of every colour's opaque pixels the masks mark.
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Some rows of a picture, with a row of the bands before and after.
 
-    Args:
-        histogram: of the same pictures.
-        images: the pictures.
-        masks: one for each.
+    Attributes:
+        words: the pixels.
+        flat: which of them are flat.
+        inner: the band's own rows.
     """
-    known = histogram.colors.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)
-    totals = np.zeros(len(known), dtype=np.int64)
-    for image, mask in zip(images, masks, strict=True):
-        words = np.ascontiguousarray(image).view("<u4")[..., 0]
-        codes, counts = np.unique(words[mask & (words >= OPAQUE_WORD)] & RGB, return_counts=True)
-        totals[np.searchsorted(known, codes)] += counts
-    return totals
+
+    words: Words
+    flat: Bool[np.ndarray, "rows columns"]
+    inner: slice
 
 
-def _words(rgba: UInt8[np.ndarray, "height width 4"]) -> Words:
-    """Return the character's box with one word per pixel: alpha, blue, green, red."""
-    words = np.ascontiguousarray(rgba).view("<u4")[..., 0]
-    opaque = words >= OPAQUE_WORD
+def words_of(rgba: UInt8[np.ndarray, "height width 4"]) -> Words:
+    """Return one word per pixel: alpha, blue, green, red; no copy where the picture allows."""
+    return np.ascontiguousarray(rgba).view("<u4")[..., 0]
+
+
+def box_of(rgba: UInt8[np.ndarray, "height width 4"]) -> tuple[slice, slice]:
+    """Return rows and columns of the box round the opaque pixels."""
+    opaque = words_of(rgba) >= OPAQUE_WORD
     rows, columns = np.flatnonzero(opaque.any(axis=1)), np.flatnonzero(opaque.any(axis=0))
     if not len(rows):
-        return words[:0]
-    return words[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        return slice(0), slice(0)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def bands(words: Words, noise: int) -> Iterator[Band]:
+    """Yield a picture's rows in bands."""
+    height = max(1, BAND_PIXELS // max(words.shape[1], 1))
+    for top in range(0, len(words), height):
+        above, end = max(top - 1, 0), min(top + height, len(words))
+        window = words[above : end + 1]
+        flat = _flat(window, noise) & (window >= OPAQUE_WORD)
+        yield Band(window, flat, slice(top - above, end - above))
 
 
 def _noise(pictures: Sequence[Words]) -> int:
     """Return the levels by which neighbours of one paint may differ in these pictures."""
     steps = np.zeros(256, dtype=np.int64)
-    for words in pictures:
+    for words in [view for picture in pictures for view in (picture, picture.T)]:
         rows = np.ascontiguousarray(words[:: max(1, words.size // BAND_PIXELS)])
         both = (rows[:, 1:] >= OPAQUE_WORD) & (rows[:, :-1] >= OPAQUE_WORD)
-        away = _difference(rows[:, 1:], rows[:, :-1])[..., :3].max(axis=-1)
-        steps += np.bincount(away[both], minlength=256)
+        away = _difference(rows[:, 1:], rows[:, :-1])[both][:, :3].max(axis=-1, initial=0)
+        steps += np.bincount(away, minlength=256)
     typical = int(np.searchsorted(np.cumsum(steps), TYPICAL * steps.sum()))
     return int(np.clip(round(NOISE_SPREAD * typical), LEAST_NOISE, MOST_NOISE))
 
 
-def _runs(
-    words: Words, noise: int
-) -> Iterator[tuple[UInt32[np.ndarray, " runs"], Int[np.ndarray, " runs"]]]:
-    """Yield, band by band, runs of alike opaque pixels: colour with marks, and length."""
-    if not words.size:
-        return
-    band = max(1, BAND_PIXELS // words.shape[1])
-    for top in range(0, len(words), band):
-        above, end = max(top - 1, 0), min(top + band, len(words))
-        window = words[above : end + 1]  # with a row of the bands before and after
-        marked = (window & RGB) | _flat(window, noise) * FLAT | _thin(window, noise) * THIN
-        marked[window < OPAQUE_WORD] = NOTHING
-        codes = marked[top - above : end - above].ravel()
-        starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]]))
-        lengths = np.diff(starts, append=codes.size)
-        seen = codes[starts] != NOTHING
-        yield codes[starts][seen], lengths[seen]
+def _runs(band: Band, noise: int) -> tuple[UInt32[np.ndarray, " runs"], Int[np.ndarray, " runs"]]:
+    """Return runs of alike opaque pixels: colour with marks, and length."""
+    marked = (band.words & RGB) | band.flat * FLAT | _thin(band.words, noise) * THIN
+    marked[band.words < OPAQUE_WORD] = NOTHING
+    codes = marked[band.inner].ravel()
+    starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]]))
+    lengths = np.diff(starts, append=codes.size)
+    seen = codes[starts] != NOTHING
+    return codes[starts][seen], lengths[seen]
 
 
 def _flat(words: Words, noise: int) -> Bool[np.ndarray, "rows columns"]:

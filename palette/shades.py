@@ -36,19 +36,19 @@ class Paint:
 
     Attributes:
         rgb: the flat paint if there is one, else the mean around the peak.
-        members: positions in the histogram.
-        count: pixels.
+        members: positions in the histogram of the colours that are nearest to it.
+        is_ink: thin dark strokes are drawn with it.
     """
 
     rgb: tuple[int, int, int]
     members: Int[np.ndarray, " members"]
-    count: int
+    is_ink: bool = False
 
 
 def find_paints(histogram: Histogram) -> tuple[list[Paint], Evidence]:
-    """Return the paints, the largest first, and why there are so many.
+    """Return the paints in no useful order, and why there are so many.
 
-    Every colour of the histogram is a member of one paint: of the nearest.
+    Every colour of the histogram is a member of one paint.
     """
     ink = find_ink(histogram)
     cells = _cells(histogram, ink)
@@ -59,14 +59,13 @@ def find_paints(histogram: Histogram) -> tuple[list[Paint], Evidence]:
     cell_of = _nearest(cells.places, places)
     paints, solid = _paints(histogram, places, cells, owner[cell_of], owner)
     rgb = np.array([paint.rgb for paint in paints], dtype=np.float64)
-    blended = false_paints(rgb, solid, histogram.noise)
-    if blended.any():
+    false = false_paints(rgb, solid, histogram.noise, ink)
+    if false.any():
         keep = np.zeros(len(owner), dtype=bool)
-        keep[np.unique(owner)[~blended]] = True
+        keep[np.unique(owner)[~false]] = True
         owner = _only(cells, owner, keep)
         paints, _ = _paints(histogram, places, cells, owner[cell_of], owner)
-    evidence = evidence_for(cells.places, cells.weights, owner, dearest)
-    return sorted(paints, key=lambda paint: (-paint.count, paint.rgb)), evidence
+    return paints, evidence_for(cells.places, cells.weights, owner, dearest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,12 +152,12 @@ def _paints(
     for peak in np.unique(owner):
         members = np.flatnonzero(owner_of == peak)
         flat, count = histogram.flat[members], int(histogram.counts[members].sum())
-        is_ink = cells.ink is not None and peak == owner[-1] and flat.sum() < cells.ink.pixels
-        if cells.ink is not None and is_ink:
+        is_ink = cells.ink is not None and peak == owner[-1]
+        if cells.ink is not None and is_ink and flat.sum() < cells.ink.pixels:
             rgb = cells.ink.rgb
         else:
             rgb = _rgb(histogram.colors[members], flat, places[members], cells.places[peak])
-        paints.append(Paint(rgb, members, count))
+        paints.append(Paint(rgb, members, is_ink))
         solid.append(is_ink or flat.sum() >= LEAST_FLAT * count)
     return paints, np.array(solid)
 
