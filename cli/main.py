@@ -19,18 +19,9 @@ from toonset import __version__
 from toonset.cli.help import Verb, Verbs
 from toonset.errors import ToonsetError
 
-VERBS = (
-    "calibrate",
-    "palette",
-    "train",
-    "render",
-    "evaluate",
-    "info",
-    "check",
-    "export",
-    "mannequin",
-    "synth",
-    "bench",
+VERBS = (  # in the order in which they are used
+    *("split", "calibrate", "palette", "train", "render", "evaluate"),
+    *("info", "check", "export", "import", "mannequin", "synth", "bench"),
 )
 
 INTERRUPTED, REFUSED = 130, 2

@@ -19,8 +19,8 @@ from toonset.dataset.mesh_file import load_mesh, save_obj
 from toonset.dataset.transforms import read_cameras
 
 VERBS = (
-    *("calibrate", "palette", "train", "render", "evaluate"),
-    *("info", "check", "export", "mannequin", "synth", "bench"),
+    *("split", "calibrate", "palette", "train", "render", "evaluate"),
+    *("info", "check", "export", "import", "mannequin", "synth", "bench"),
 )
 BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"}
 VIEWS = 5

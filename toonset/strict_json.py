@@ -56,20 +56,22 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _check(value: Any) -> None:
     """Refuse numbers that are not finite or too long, and deep nesting; say where."""
-    pending: list[tuple[tuple[object, ...], Any]] = [((), value)]
+    pending: list[tuple[tuple[object, ...], Any]] = [((), {"the whole": value})]
     while pending:
-        path, item = pending.pop()
-        if isinstance(item, float) and not math.isfinite(item):
-            raise ValueError(f"{_place(path)} is {item}, a finite number is needed")
-        if isinstance(item, int) and abs(item) >= LARGEST_INT:
-            raise ValueError(f"{_place(path)} has more than 63 bits")
-        if len(path) > MAX_DEPTH:
+        path, holder = pending.pop()
+        inner = []
+        for key, item in holder.items() if isinstance(holder, dict) else enumerate(holder):
+            if isinstance(item, dict | list):
+                inner.append(((*path, key), item))
+            elif isinstance(item, float) and not math.isfinite(item):
+                raise ValueError(f"{_place((*path, key))} is {item}, a finite number is needed")
+            elif isinstance(item, int) and abs(item) >= LARGEST_INT:
+                raise ValueError(f"{_place((*path, key))} has more than 63 bits")
+        if inner and len(path) >= MAX_DEPTH:
             raise ValueError(f"nested deeper than {MAX_DEPTH}")
-        if isinstance(item, dict | list):
-            pairs = item.items() if isinstance(item, dict) else enumerate(item)
-            pending += reversed([((*path, key), inner) for key, inner in pairs])
+        pending += reversed(inner)
 
 
 def _place(path: tuple[object, ...]) -> str:
-    text = ".".join(str(part)[:40] for part in path) or "the number"
+    text = ".".join(str(part)[:40] for part in path[1:] or path)
     return "".join(c if c.isprintable() else "?" for c in text)
