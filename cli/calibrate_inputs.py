@@ -139,11 +139,8 @@ def load_sheets(paths: Sequence[Path], hints: Hints, printer: Printer) -> Sheets
         PictureError, SheetError: see `load_drawings`; or --views has not one label per view.
     """
     drawings = load_drawings(paths, hints.cutting, printer)
-    for source in drawings.split.sources:
-        for warning in source.warnings:
-            printer.say(f"{source.name}: {warning}")
-    for note in drawings.notes:
-        printer.say(note)
+    for doubt in drawings.doubts:
+        printer.say(doubt)
     check_label_count(hints.labels, drawings)
     labels = hints.labels or drawings.split.label_text
     return Sheets(drawings.split.views, labels, drawings.files)

@@ -43,6 +43,21 @@ class Drawings:
     files: tuple[tuple[str, Path], ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Return what a person should look at.
+
+        All warnings count: of the splitter (figures that touch or are cut, a background that is
+        not plain) and of the files (copies, cells that do not divide the sheet, a changed folder).
+        What was left out of a sheet (text, frames, specks, views of --drop) is no doubt: it is
+        ordinary, and the overlay shows it. Nor is what a split folder says of its sheets: a person
+        has had the chance to look.
+        """
+        sheets = zip(self.split.sources, self.pictures, strict=True)
+        cut_now = [source for source, picture in sheets if picture is not None]
+        warned = [f"{source.name}: {text}" for source in cut_now for text in source.warnings]
+        return (*warned, *self.notes)
+
 
 def load_drawings(paths: Sequence[Path], cutting: Cutting, printer: Printer) -> Drawings:
     """Return the views of all sheets, in order and named through.

@@ -72,7 +72,7 @@ def split(
     check_output(out, [*sheets, boxes], WRITTEN, force=force)
     drawings = load_drawings(sheets, cutting, printer)
     named = _labelled(drawings, labels)
-    doubts = _doubts(drawings)
+    doubts = drawings.doubts
     _write(out, named, drawings, cutting, doubts, force=force)
     _say(named, cutting, doubts, out, printer)
     if doubts:
@@ -95,19 +95,6 @@ def _labelled(drawings: Drawings, text: str) -> Split:
     parse_labels(text, len(drawings.split.views))
     words = [word.strip() for word in text.split(",")]
     return replace(drawings.split, labels=tuple("" if word == "?" else word for word in words))
-
-
-def _doubts(drawings: Drawings) -> tuple[str, ...]:
-    """Return what a person should look at.
-
-    All warnings count: of the splitter (figures that touch or are cut, a background that is not
-    plain) and of the files (copies, cells that do not divide the sheet, a changed folder). What
-    was left out of a sheet (text, frames, specks, views of --drop) is no doubt: it is ordinary,
-    and the overlay shows it.
-    """
-    sources = drawings.split.sources
-    warned = [f"{s.name}: {warning}" for s in sources for warning in s.warnings]
-    return (*warned, *drawings.notes)
 
 
 def _write(

@@ -22,6 +22,7 @@ from typing import Any
 
 from toonset.errors import SheetError
 from toonset.reading import describe, read_whole
+from toonset.strict_json import BOM, parse_json
 
 Box = tuple[int, int, int, int]
 
@@ -40,14 +41,10 @@ def read_boxes(path: Path) -> tuple[tuple[Box, ...], ...]:
         SheetError: the file is missing, broken or without boxes, or a box is none.
     """
     data = read_whole(path, "box", SheetError, MAX_BYTES)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise SheetError(
-            f"{path}: is {describe(data)}, no file of boxes; write JSON or CSV"
-        ) from error
-    is_json = text.lstrip()[:1] in ("[", "{")
-    sheets = _from_json(path, text) if is_json else (_from_csv(path, text),)
+    if data.removeprefix(BOM).lstrip()[:1] in (b"[", b"{"):
+        sheets = _from_json(path, parse_json(data, str(path), SheetError))
+    else:
+        sheets = (_from_csv(path, data),)
     count = sum(len(boxes) for boxes in sheets)
     if not 0 < count <= MOST_BOXES:
         raise SheetError(f"{path}: {count} boxes, 1 to {MOST_BOXES} are needed; correct the file")
@@ -79,11 +76,7 @@ def check_boxes(boxes: Sequence[Box], size_wh: tuple[int, int], where: str) -> N
             )
 
 
-def _from_json(path: Path, text: str) -> tuple[tuple[Box, ...], ...]:
-    try:
-        content = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise SheetError(f"{path}: is no valid JSON ({error}); correct it") from error
+def _from_json(path: Path, content: Any) -> tuple[tuple[Box, ...], ...]:
     if isinstance(content, dict) and "views" in content:
         return _of_split(path, content)
     entries = content.get("boxes") if isinstance(content, dict) else content
@@ -107,9 +100,14 @@ def _of_split(path: Path, content: Mapping[str, Any]) -> tuple[tuple[Box, ...], 
     return tuple(tuple(boxes) for boxes in found)
 
 
-def _from_csv(path: Path, text: str) -> tuple[Box, ...]:
+def _from_csv(path: Path, data: bytes) -> tuple[Box, ...]:
     try:
+        text = data.decode("utf-8-sig")
         rows = list(enumerate(csv.reader(text.splitlines(), _dialect(text)), 1))
+    except UnicodeDecodeError as error:
+        raise SheetError(
+            f"{path}: is {describe(data)}, no file of boxes; write JSON or CSV"
+        ) from error
     except csv.Error as error:
         raise SheetError(f"{path}: is no valid CSV ({error}); correct it") from error
     lines = [

@@ -9,7 +9,6 @@ The folder may be corrected by hand; `toonset.dataset.split_read` reads it back.
 
 from __future__ import annotations
 
-import json
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -26,6 +25,7 @@ from toonset.dataset.transforms import validation_reason
 from toonset.errors import SheetError
 from toonset.files import new_folder, write_bytes, write_json
 from toonset.reading import read_whole
+from toonset.strict_json import parse_json
 
 SCHEMA = "toonset-split/1"
 SPLIT_FILE, IMAGES, OVERLAY = "split.json", "images", "overlay.png"
@@ -139,11 +139,9 @@ def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ..
     file = folder / SPLIT_FILE
     data = read_whole(file, "split", SheetError, MAX_JSON_BYTES)
     try:
-        found = _SplitFile.model_validate(json.loads(data.decode("utf-8-sig")))
+        found = _SplitFile.model_validate(parse_json(data, str(file), SheetError))
     except ValidationError as error:
         raise SheetError(f"{file}: {validation_reason(error)}") from error
-    except (ValueError, RecursionError) as error:
-        raise SheetError(f"{file}: is no valid JSON ({error}); split the sheet again") from error
     for view in found.views:
         if view.sheet >= len(found.sheets):
             raise SheetError(
