@@ -23,6 +23,8 @@ TRANSPARENT = 0.01  # of the sheet: less see-through area is an accident, not a 
 HALO_WIDTH = 8  # levels: noise of the file falls off within about so many
 CLEAR_HALO = 4.0  # times as many pixels as a little farther from the background: noise at all
 HALO = 2.0  # times as many pixels as a little farther: still noise
+RARE = 3.0  # times the 80th percentile of noise: where its 99th may lie
+SLOPE_RIPPLE = 3  # levels of second difference: rounding of a smooth slope
 LEAST_SURE = 0.3  # of the border: less in one colour is no background
 WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
 WORTH_LEVELS = 2.0  # and less by so many levels
@@ -126,9 +128,13 @@ def halo_tolerance(away: UInt8[np.ndarray, "height width"]) -> int:
     """Return how far, in levels, compression has spread the background's colour near figures.
 
     A soft edge passes all differences from the background equally often; ringing around edges
-    (JPEG) adds small ones, the smaller the more. The level is where that decay ends.
+    (JPEG) adds small ones, the smaller the more. The level is where that decay ends. Slopes without
+    ripples are shadows or shading, not noise.
     """
-    often = cv2.calcHist([away], [0], None, [256], [0, 256]).ravel().astype(np.float64)
+    ripple = cv2.Laplacian(away, cv2.CV_16S, ksize=1)
+    rippled = cv2.inRange(ripple, -SLOPE_RIPPLE, SLOPE_RIPPLE) == 0
+    often = cv2.calcHist([away], [0], rippled.view(np.uint8), [256], [0, 256]).ravel()
+    often = often.astype(np.float64)
     for level in range(1, MOST_TOLERANCE):
         here = often[level : level + 3].mean()
         beyond = np.median(often[level + HALO_WIDTH : level + 3 * HALO_WIDTH])
@@ -182,9 +188,10 @@ def _richest_worth_it(
 def _is_worth_it(richer: Background, simpler: Background) -> bool:
     quieter = richer.tolerance <= WORTH * simpler.tolerance
     quieter &= richer.tolerance / 2 <= simpler.tolerance / 2 - WORTH_LEVELS
-    return richer.sure >= simpler.sure + WORTH_SHARE or (
-        quieter and richer.sure >= simpler.sure - WORTH_SHARE
-    )
+    if quieter:
+        return richer.sure >= simpler.sure - WORTH_SHARE
+    no_noisier = richer.tolerance <= simpler.tolerance / WORTH
+    return no_noisier and richer.sure >= simpler.sure + WORTH_SHARE
 
 
 def _judged(
@@ -197,8 +204,10 @@ def _judged(
     """Return a background with its share of the border and the tolerance that its noise asks."""
     away = np.abs(colors - expected.astype(np.float32)).max(axis=1)
     near = away <= CLUSTER_RADIUS
-    # 99 % of the border's noise, doubled: noise near figures (JPEG) is stronger than far away
-    noise = float(np.percentile(away[near], 99)) if near.any() else 0.0
+    # 99 % of the border's noise, doubled: noise near figures (JPEG) is stronger than far away;
+    # but no more than the common noise explains, lest a shadow in the border counts as noise
+    common, rare = np.percentile(away[near], [80, 99]) if near.any() else (0.0, 0.0)
+    noise = min(float(rare), RARE * float(common) + LEAST_TOLERANCE)
     tolerance = int(np.clip(np.ceil(2 * noise), LEAST_TOLERANCE, MOST_TOLERANCE))
     return Background(rgb, field, kind, float(near.mean()), tolerance)
 

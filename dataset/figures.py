@@ -28,6 +28,9 @@ LEAST_PART = 0.004  # of the figure's area: smaller things beside a figure are m
 LEAST_SPECK = 4  # cells: smaller things are noise
 LISTED_SPECK = 0.0005  # of the figure's area: smaller ones are counted, not listed
 FAMILIAR = 0.8  # of a part's pixels in colours that its figure has
+DARK = 110  # level: ink is no lighter
+OFF_INK = 24  # levels from the mixtures of ink and paper: noise
+ONE_INK = 0.95  # of a patch's pixels in its ink
 STROKE = 0.12  # of its box's diagonal: a thing no thicker is a stroke
 SWATCH = 0.9  # of its box that a swatch fills
 DISC = (0.74, 0.83)  # of its box that a disc fills
@@ -201,7 +204,7 @@ def _is_part(
         return False
     if _share_within(own, main) >= WITHIN:
         return True
-    if is_letter:
+    if is_letter or _is_ink(rgb[blobs.window(number)][blobs.mask(number)]):
         return False
     if gap <= NEAR * main[3]:
         return True
@@ -224,6 +227,19 @@ def _is_stroke(mask: Bool[np.ndarray, "height width"]) -> bool:
     """Return whether a patch is thin everywhere: an arrow's shaft, a flourish."""
     depth = cv2.distanceTransform(np.pad(mask, 1).view(np.uint8), cv2.DIST_L2, 3).max()
     return bool(2 * depth <= STROKE * np.hypot(*mask.shape))
+
+
+def _is_ink(colors: UInt8[np.ndarray, "n 3"]) -> bool:
+    """Return whether pixels are one dark ink and its soft edges: lettering, an arrow."""
+    luma = colors.mean(axis=1)
+    ink = np.median(colors[luma <= np.percentile(luma, 25)], axis=0)
+    if ink.mean() > DARK:
+        return False
+    spread = colors - ink  # soft edges lie between the ink and one paper
+    paper = np.median(spread[luma >= np.percentile(luma, 95)], axis=0)
+    along = np.clip(spread @ paper / max(float(paper @ paper), 1.0), 0, 1)
+    off = np.abs(spread - along[:, None] * paper).max(axis=1)
+    return bool((off <= OFF_INK).mean() >= ONE_INK)
 
 
 def _in_its_colors(blobs: Blobs, number: int, body: int, rgb: np.ndarray) -> bool:

@@ -4,6 +4,7 @@ A picture alone cannot always tell; these rules say what is assumed. A patch is 
 between arm and body) if all of this holds:
 
 - it is larger than a small share of the figure,
+- it does not lie in the figure's top: a white patch there is hair, a face or a hat,
 - nothing lies inside it (an eye has a pupil),
 - its border looks like the figure's outline: as inked as that, and without soft shades beside it
   (a white shirt has folds and borders on skin without the contour line),
@@ -24,6 +25,7 @@ LEAST_HOLE_PX = 9
 LEAST_ISLAND_PX = 4
 LINE_ART = 0.5  # of the figure: more of it in the background's colour is a line drawing
 INK_LUMA = 64  # of 255: darker is ink
+HEAD = 0.25  # of the figure's height from its top: no holes there
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
 AS_INKED = 0.5  # of the outline's share of ink
 SLACK = 0.05  # of the border: the shares of a short border are rough
@@ -106,8 +108,12 @@ def open_holes(
         enclosed.astype(np.uint8), connectivity=4
     )
     result, opened = mask.copy(), 0
+    rows = np.flatnonzero(mask.any(axis=1))
+    top, height = int(rows[0]), int(rows[-1] - rows[0]) + 1
     for number in range(1, len(stats)):
         if stats[number, cv2.CC_STAT_AREA] < max(least_share * area, LEAST_HOLE_PX):
+            continue
+        if stats[number, cv2.CC_STAT_TOP] < top + HEAD * height:
             continue
         window = _window(stats[number], labels.shape)
         patch = labels[window] == number

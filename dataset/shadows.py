@@ -2,7 +2,7 @@
 
 A shadow is the paper, darker: every channel dimmed by one factor, without inner structure. Grey
 shoes are that, too, so a shadow must also lie as a shadow lies: in the lower half of its figure,
-with the figure standing in it (feet reach below its middle) and whole without it.
+with the figure standing in it (feet reach below its top) and whole without it.
 """
 
 from __future__ import annotations
@@ -16,20 +16,21 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.dataset.figures import Blobs
 
 DARKEST = 0.25  # of the paper's light
-LIGHTEST = 0.985
+LIGHTEST = 0.998
 OFF_PAPER = 2.0  # levels, beyond the noise: a channel dimmed otherwise is paint
 STEEPEST = 0.06  # of the light per cell: a shadow's inside is smooth
 LEAST_AREA = 0.01  # of the figure's area
 TOP = 0.4  # of the figure's height from its top: no shadow reaches higher
 WHOLE = 0.9  # of the figure without the shadow that is still one piece
-FEET = 0.5  # of the shadow's height from its top: the figure reaches lower
+ENCLOSED = 0.5  # of the shadow that the figure surrounds: more is a patch of its clothes
+FEET = 0.2  # of the shadow's height from its top: the figure reaches lower
 EDGE = 0.02  # of the figure's height: a shadow's own edge is no wider
 BLACK = 40  # levels: a shadow on transparency is no lighter
 OPAQUE = 230  # alpha: and less opaque
 GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, nothing is known
 TONE = 0.03  # of the paper's light: tones so near are one
-BESIDE = 0.3  # of a shadow's border that is paper
-OFTEN = 0.5  # of the views that show a shadow, if one does
+BESIDE = 0.2  # of a shadow's border that is paper
+OFTEN = 0.75  # of the views that show a shadow, if one does
 
 
 def find_shadows(
@@ -39,7 +40,7 @@ def find_shadows(
     ground: UInt8[np.ndarray, "height width 3"] | None,
     tolerance: int,
 ) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels of cast shadows; none unless at least half of the views have one.
+    """Return the pixels of cast shadows; none unless most of the views have one.
 
     Args:
         blobs: patches of paint, shadows included.
@@ -63,8 +64,7 @@ def find_shadows(
         return found
     shaded = 0
     for (window, body), dim in zip(looks, lights, strict=True):
-        room = body & (dim.light >= tone - TONE)
-        shadow = _shadow_of(body, dim.mask & room, dim.smooth & room)
+        shadow = _shadow_of(body, dim, tone)
         found[window] |= shadow
         shaded += bool(shadow.any())
     return found if shaded >= max(1.0, OFTEN * len(mains)) else np.zeros_like(found)
@@ -107,7 +107,10 @@ def _dimmed(
 
 def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
     """Return the light of the darkest shadow; None if the figures' own upper parts have it."""
-    pieces = [_pieces(body, dim.smooth & body) for body, dim in zip(bodies, dims, strict=True)]
+    pieces = [
+        _pieces(body, dim.mask & body, dim.smooth & body)
+        for body, dim in zip(bodies, dims, strict=True)
+    ]
     deep = np.concatenate([dim.light[own] for dim, own in zip(dims, pieces, strict=True)])
     if not len(deep):
         return None
@@ -121,14 +124,20 @@ def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
 
 
 def _pieces(
-    body: Bool[np.ndarray, "height width"], smooth: Bool[np.ndarray, "height width"]
+    body: Bool[np.ndarray, "height width"],
+    dim: Bool[np.ndarray, "height width"],
+    smooth: Bool[np.ndarray, "height width"],
 ) -> Bool[np.ndarray, "height width"]:
-    """Return the smooth patches that are large and low enough for shadows."""
+    """Return the smooth patches that are large, low and open enough for shadows."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(smooth.view(np.uint8), connectivity=8)
     large = stats[:, cv2.CC_STAT_AREA] >= LEAST_AREA * body.sum()
-    chosen = large & (stats[:, cv2.CC_STAT_TOP] >= TOP * body.shape[0])
-    chosen[0] = False
-    return chosen[labels]
+    able = np.flatnonzero(large & (stats[:, cv2.CC_STAT_TOP] >= TOP * body.shape[0]))
+    pieces = [labels == number for number in able[able > 0]]
+    reach = EDGE * body.shape[0]
+    return np.any(
+        [np.zeros_like(body), *(p for p in pieces if _borders_paper(_grown(p, reach, dim), body))],
+        axis=0,
+    )
 
 
 def _opened(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
@@ -137,20 +146,39 @@ def _opened(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height 
 
 
 def _shadow_of(
-    body: Bool[np.ndarray, "height width"],
-    dim: Bool[np.ndarray, "height width"],
-    smooth: Bool[np.ndarray, "height width"],
+    body: Bool[np.ndarray, "height width"], dim: Dim, tone: float
 ) -> Bool[np.ndarray, "height width"]:
     """Return the smooth patches that lie as a shadow lies, with their own edges."""
-    shadow = _pieces(body, smooth)
+    room = body & (dim.light >= tone - TONE)
+    shadow = _pieces(body, dim.mask & room, dim.smooth & room)
     if not shadow.any():
         return shadow
+    middle = float(np.median(dim.light[shadow]))
+    shadow |= _toned(dim.smooth & room, dim.light, middle, int(TOP * body.shape[0]))
     reach = EDGE * body.shape[0]
-    _, labels = cv2.connectedComponents(smooth.view(np.uint8), connectivity=8)
-    beside = np.unique(labels[_grown(shadow, reach, dim)])
-    shadow = _grown(shadow | (np.isin(labels, beside[beside > 0])), reach, dim)
-    fits = _borders_paper(shadow, body) and _stands_in(body & ~shadow, shadow)
-    return shadow if fits else np.zeros_like(body)
+    shadow |= _mostly(dim.smooth & body, _grown(shadow, reach, dim.mask & room))
+    shadow = _grown(shadow, reach, dim.mask & body)
+    return shadow if _stands_in(body & ~shadow, shadow) else np.zeros_like(body)
+
+
+def _mostly(
+    smooth: Bool[np.ndarray, "height width"], shadow: Bool[np.ndarray, "height width"]
+) -> Bool[np.ndarray, "height width"]:
+    """Return the smooth patches of which most is shadow already: with its darker core."""
+    count, labels = cv2.connectedComponents(smooth.view(np.uint8), connectivity=8)
+    sizes = np.bincount(labels.ravel(), minlength=count)
+    inside = np.bincount(labels[shadow], minlength=count) > 0.5 * sizes
+    inside[0] = False
+    return inside[labels]
+
+
+def _toned(
+    smooth: np.ndarray, light: np.ndarray, tone: float, top: int
+) -> Bool[np.ndarray, "height width"]:
+    """Return the low smooth patches of the shadow's tone: those between the legs."""
+    same = smooth & (np.abs(light - tone) <= TONE)
+    same[:top] = False
+    return _opened(same)
 
 
 def _grown(
@@ -179,4 +207,12 @@ def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray) -> bo
     bottom = largest[cv2.CC_STAT_TOP] + largest[cv2.CC_STAT_HEIGHT]
     rows = np.flatnonzero(shadow.any(axis=1))
     level = rows[0] + FEET * (rows[-1] - rows[0])
-    return bool(bottom >= level and largest[cv2.CC_STAT_AREA] >= WHOLE * rest.sum())
+    outlines, _ = cv2.findContours(
+        np.ascontiguousarray(rest).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+    )
+    filled = cv2.drawContours(np.zeros(rest.shape, np.uint8), outlines, -1, 1, cv2.FILLED) > 0
+    return bool(
+        bottom >= level
+        and largest[cv2.CC_STAT_AREA] >= WHOLE * rest.sum()
+        and (shadow & filled).sum() <= ENCLOSED * shadow.sum()
+    )

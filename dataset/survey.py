@@ -85,7 +85,7 @@ def survey(
     if shadow.any():
         paper = reached(~painted | ruled | shadow)
         blobs = find_blobs(~paper)
-    blobs, cuts = part_touching(blobs)
+    blobs, cuts = part_touching(blobs, small[..., :3])
     grouping = group_blobs(blobs, find_mains(blobs), small[..., :3])
     return Survey(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
 

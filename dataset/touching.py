@@ -1,8 +1,9 @@
 """Figures that touch or overlap a little: cut apart along the thinnest place.
 
 The cut is a path from the top to the bottom of the patch that crosses as little paint as it can,
-found by dynamic programming as in seam carving. It counts if both sides are then as high as a
-figure and no mere limb: a hand in a hand is crossed in a few per cent of the height, a body never.
+found by dynamic programming as in seam carving; to run along an outline or the border of two colours
+costs little. It counts if both sides are then as high as a figure, of its colours, and no mere limb:
+a hand in a hand is crossed in a few per cent of the height, a body never.
 Source: S. Avidan, A. Shamir, "Seam carving for content-aware image resizing" (2007).
 """
 
@@ -12,16 +13,19 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.figures import Blobs, find_mains
 
-THINNEST = 0.14  # of the patch's height in paint: the most that a cut may cross
+DEAREST = 0.12  # of the patch's height in paint: the most that a cut may cost
 AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
-AS_LARGE = 0.25  # of the patch's area: the same, for two figures of equal size less
-WIDER = 1.35  # times the other figures' median width: a patch that may be two figures
-WIDE_ALONE = 0.6  # times its own height: the same where there are no others
+AS_LARGE = 0.3  # of the patch's area: the same, for two figures of equal size less
+WIDER = 1.2  # times the narrowest figure's width: a patch that may be two figures
+WIDE_ALONE = 0.5  # times its own height: the same where there are no others
 DETOUR = 0.02  # cost of a step aside, in pixels of paint
+ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
+EDGE = 0.8  # of the cost of paint that an edge along the cut saves
+STRONG_EDGE = 60.0  # levels
 MOST_ROWS = 600  # of the picture on which cuts are sought
 
 
@@ -38,8 +42,10 @@ class Cut:
     crossed: float
 
 
-def part_touching(blobs: Blobs) -> tuple[Blobs, list[Cut]]:
-    """Return the patches with touching figures apart, and the cuts."""
+def part_touching(
+    blobs: Blobs, rgb: UInt8[np.ndarray, "height width 3"]
+) -> tuple[Blobs, list[Cut]]:
+    """Return the patches of a sheet with touching figures apart, and the cuts."""
     mains, cuts = find_mains(blobs), list[Cut]()
     widths = blobs.boxes[mains, 2]
     labels, top = blobs.labels, len(blobs.areas)
@@ -50,7 +56,7 @@ def part_touching(blobs: Blobs) -> tuple[Blobs, list[Cut]]:
         if not _is_wide(box, widths):
             continue
         mask = labels[y : y + height, x : x + width] == label
-        found = _best_cut(mask)
+        found = _best_cut(mask, rgb[y : y + height, x : x + width])
         if found is None:
             continue
         labels = labels.copy() if not cuts else labels
@@ -78,29 +84,52 @@ def _boxes(labels: Int[np.ndarray, "height width"]) -> Int[np.ndarray, "blobs 4"
 
 
 def _is_wide(box: tuple[int, int, int, int], widths: Int[np.ndarray, " mains"]) -> bool:
-    if len(widths) >= 3 and box[2] < WIDER * float(np.median(widths)):
+    if len(widths) >= 3 and box[2] < WIDER * float(widths.min()):
         return False
     return box[2] >= WIDE_ALONE * box[3]
 
 
+def _upright_edges(
+    rgb: UInt8[np.ndarray, "height width 3"],
+) -> Float[np.ndarray, "height width"]:
+    """Return how strongly colours change sideways, 0 to 1: outlines and borders of colours."""
+    slope = np.abs(cv2.Sobel(rgb, cv2.CV_32F, 1, 0, ksize=3, scale=0.25)).max(axis=2)
+    return np.clip(slope / STRONG_EDGE, 0, 1)
+
+
 def _best_cut(
-    mask: Bool[np.ndarray, "height width"],
+    mask: Bool[np.ndarray, "height width"], rgb: UInt8[np.ndarray, "height width 3"]
 ) -> tuple[Int[np.ndarray, " height"], float] | None:
     """Return the column right of the cut for every row, and what it crosses; None for no cut."""
     height, width = mask.shape
     shrink = min(1.0, MOST_ROWS / height)
     size = max(8, round(width * shrink)), max(8, round(height * shrink))
-    paint = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    down, up = _costs(paint), _costs(paint[::-1])[::-1]
-    through = down + up - paint
-    middle = through[size[1] // 2]
-    for column in _valleys(middle):
+    paint, edges = (
+        cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+        for picture in (mask.astype(np.float32), _upright_edges(rgb))
+    )
+    price = paint * (1 - EDGE * edges)
+    down, up = _costs(price), _costs(price[::-1])[::-1]
+    rows = np.minimum((np.arange(height) * shrink).astype(int), size[1] - 1)
+    for column in _valleys((down + up - price)[size[1] // 2]):
         path = _path(down, up, column)
         crossed = float(paint[np.arange(size[1]), path].sum()) / size[1]
-        if crossed <= THINNEST and _are_figures(paint, path):
-            rows = np.minimum((np.arange(height) * shrink).astype(int), size[1] - 1)
-            return np.rint(path[rows] / shrink).astype(int), crossed
+        cost = float(price[np.arange(size[1]), path].sum()) / size[1]
+        if cost <= DEAREST and _are_figures(paint, path):
+            cut = np.rint(path[rows] / shrink).astype(int)
+            right = np.arange(width) >= cut[:, None]
+            if _shared_colors(rgb[mask & right], rgb[mask & ~right]) >= ALIKE:
+                return cut, crossed
     return None
+
+
+def _shared_colors(a: UInt8[np.ndarray, "_ 3"], b: UInt8[np.ndarray, "_ 3"]) -> float:
+    """Return how much of their colours two figures share: the histograms' intersection."""
+    counts = []
+    for colors in (a, b):
+        codes = (colors // 64).astype(np.int64) @ np.array([16, 4, 1])
+        counts.append(np.bincount(codes, minlength=64) / max(len(codes), 1))
+    return float(np.minimum(*counts).sum())
 
 
 def _costs(paint: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
