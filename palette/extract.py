@@ -48,7 +48,7 @@ def extract_palette(
     options = options or PaletteOptions()
     histogram = _histogram(images)
     paints, evidence = find_paints(histogram)
-    areas = paint_areas(images, histogram, paints, contours)
+    areas = paint_areas(histogram, paints, contours)
     amounts, ink = measure(paints, areas, options)
     kept, left, warnings = choose(amounts, options)
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)

@@ -16,23 +16,54 @@ from jaxtyping import Bool, Int, UInt8, UInt32
 
 from toonset.palette.mixed import OPAQUE
 
+COVERED = 128  # of 255: a pixel of the rim counts if the figure covers half of it
 LEAST_NOISE = 2  # levels: a painted gradient's step from one pixel to the next
 MOST_NOISE = 12  # levels: more is an edge, in whatever file
 TYPICAL = 0.4  # of the steps between neighbours: less than half, for edges are steps, too
 NOISE_SPREAD = 1.5  # noise's typical step times this holds most of them
 BAND_PIXELS = 2**18  # worked on at a time: stays in the processor's cache
-TABLE_RUNS = 2**20  # from so many on, counting in a table of all colours beats sorting
-FLAT, THIN = np.uint32(1 << 24), np.uint32(1 << 25)  # marks in the byte that held alpha
-NOTHING = np.uint32(0xFFFFFFFF)
-OPAQUE_WORD = np.uint32(OPAQUE << 24)
-RGB = np.uint32(0xFFFFFF)
+TABLE_RUNS = 2**17  # from so many on, a table of all colours beats sorting
+FLAT = np.uint32(1 << 24)  # a mark in the byte that held alpha
+OPAQUE_WORD, COVERED_WORD = np.uint32(OPAQUE << 24), np.uint32(COVERED << 24)
+NOTHING, RGB = np.uint32(0xFFFFFFFF), np.uint32(0xFFFFFF)
+BESIDE = ((0, -1), (0, 1), (-1, 0), (1, 0))  # rows, columns; opposite ones follow each other
 
 Words = UInt32[np.ndarray, "rows columns"]
+Places = Int[np.ndarray, " places"]
+Runs = tuple[UInt32[np.ndarray, " runs"], Int[np.ndarray, " runs"]]
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """The character's box in one picture.
+
+    Attributes:
+        words: one word per pixel: alpha, blue, green, red.
+        box: rows and columns in the picture.
+        rough: places of the covered pixels that are not flat, counted row by row.
+    """
+
+    words: Words
+    box: tuple[slice, slice]
+    rough: Places
+
+    def around(self, places: Places) -> list[UInt32[np.ndarray, " places"]]:
+        """Return the words to the left, right, above and below; at the border those there."""
+        rows, columns = np.divmod(places, self.words.shape[1])
+        height, width = self.words.shape
+        return [
+            self.words[np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)]
+            for down, right in BESIDE
+        ]
+
+    def at(self, places: Places) -> UInt32[np.ndarray, " places"]:
+        """Return the words at some places."""
+        return self.words[np.divmod(places, self.words.shape[1])]
 
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """How often every colour occurs.
+    """How often every colour occurs in the opaque pixels.
 
     Attributes:
         colors: (n, 3) sRGB, each once, sorted by blue, then green, then red.
@@ -40,6 +71,7 @@ class Histogram:
         flat: (n,) pixels within flat paint; all, where a picture has none.
         thin: (n,) pixels in the middle of thin dark strokes.
         noise: levels by which neighbours of one paint may differ.
+        pictures: that were counted.
     """
 
     colors: UInt8[np.ndarray, "n 3"]
@@ -47,132 +79,42 @@ class Histogram:
     flat: Int[np.ndarray, " n"]
     thin: Int[np.ndarray, " n"]
     noise: int
+    pictures: tuple[Picture, ...]
+
+    @property
+    def codes(self) -> UInt32[np.ndarray, " n"]:
+        """Return the colours as words without alpha, ascending."""
+        return self.colors.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)
 
 
 def count_pixels(images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Histogram:
     """Return how often every colour occurs in the opaque pixels of several pictures."""
-    pictures = [words_of(image)[box_of(image)] for image in images]
-    noise = _noise(pictures)
-    runs = [_runs(band, noise) for words in pictures for band in bands(words, noise)]
+    boxed = [_boxed(image) for image in images]
+    noise = _noise([words for words, _ in boxed])
+    runs: list[Runs] = []
+    pictures = []
+    for words, box in boxed:
+        bands = list(_bands(words, noise))
+        runs += [run for run, _ in bands]
+        rough = [np.zeros(0, dtype=np.int64), *(places for _, places in bands)]
+        pictures.append(Picture(words, box, np.concatenate(rough)))
     marked = np.concatenate([np.zeros(0, dtype=np.uint32), *(codes for codes, _ in runs)])
     lengths = np.concatenate([np.zeros(0, dtype=np.int64), *(lengths for _, lengths in runs)])
-    codes, place = _distinct(marked & RGB)
-
-    def total(of: Int[np.ndarray, " runs"]) -> Int[np.ndarray, " n"]:
-        return np.bincount(place, of, len(codes)).astype(np.int64)
-
+    codes, place = distinct(marked & RGB)
+    counts = _total(place, lengths, len(codes))
+    flat = _total(place, lengths * (marked >= FLAT), len(codes))
+    strokes = np.concatenate(
+        [np.zeros(0, dtype=np.uint32), *(_middles(picture, noise) for picture in pictures)]
+    )
+    thin = np.bincount(np.searchsorted(codes, strokes), minlength=len(codes))
     colors = np.stack([codes & 255, codes >> 8 & 255, codes >> 16], axis=1).astype(np.uint8)
-    flat, thin = (total(lengths * ((marked & bit) > 0)) for bit in (FLAT, THIN))
-    counts = total(lengths)
-    return Histogram(colors, counts, flat if flat.any() else counts, thin, noise)
+    return Histogram(colors, counts, flat if flat.any() else counts, thin, noise, tuple(pictures))
 
 
-@dataclass(frozen=True, eq=False)
-class Band:
-    """Some rows of a picture, with a row of the bands before and after.
-
-    Attributes:
-        words: the pixels.
-        flat: which of them are flat.
-        inner: the band's own rows.
-    """
-
-    words: Words
-    flat: Bool[np.ndarray, "rows columns"]
-    inner: slice
-
-
-def words_of(rgba: UInt8[np.ndarray, "height width 4"]) -> Words:
-    """Return one word per pixel: alpha, blue, green, red; no copy where the picture allows."""
-    return np.ascontiguousarray(rgba).view("<u4")[..., 0]
-
-
-def box_of(rgba: UInt8[np.ndarray, "height width 4"]) -> tuple[slice, slice]:
-    """Return rows and columns of the box round the opaque pixels."""
-    opaque = words_of(rgba) >= OPAQUE_WORD
-    rows, columns = np.flatnonzero(opaque.any(axis=1)), np.flatnonzero(opaque.any(axis=0))
-    if not len(rows):
-        return slice(0), slice(0)
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
-
-
-def bands(words: Words, noise: int) -> Iterator[Band]:
-    """Yield a picture's rows in bands."""
-    height = max(1, BAND_PIXELS // max(words.shape[1], 1))
-    for top in range(0, len(words), height):
-        above, end = max(top - 1, 0), min(top + height, len(words))
-        window = words[above : end + 1]
-        flat = _flat(window, noise) & (window >= OPAQUE_WORD)
-        yield Band(window, flat, slice(top - above, end - above))
-
-
-def _noise(pictures: Sequence[Words]) -> int:
-    """Return the levels by which neighbours of one paint may differ in these pictures."""
-    steps = np.zeros(256, dtype=np.int64)
-    for words in [view for picture in pictures for view in (picture, picture.T)]:
-        rows = np.ascontiguousarray(words[:: max(1, words.size // BAND_PIXELS)])
-        both = (rows[:, 1:] >= OPAQUE_WORD) & (rows[:, :-1] >= OPAQUE_WORD)
-        away = _difference(rows[:, 1:], rows[:, :-1])[both][:, :3].max(axis=-1, initial=0)
-        steps += np.bincount(away, minlength=256)
-    typical = int(np.searchsorted(np.cumsum(steps), TYPICAL * steps.sum()))
-    return int(np.clip(round(NOISE_SPREAD * typical), LEAST_NOISE, MOST_NOISE))
-
-
-def _runs(band: Band, noise: int) -> tuple[UInt32[np.ndarray, " runs"], Int[np.ndarray, " runs"]]:
-    """Return runs of alike opaque pixels: colour with marks, and length."""
-    marked = (band.words & RGB) | band.flat * FLAT | _thin(band.words, noise) * THIN
-    marked[band.words < OPAQUE_WORD] = NOTHING
-    codes = marked[band.inner].ravel()
-    starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]]))
-    lengths = np.diff(starts, append=codes.size)
-    seen = codes[starts] != NOTHING
-    return codes[starts][seen], lengths[seen]
-
-
-def _flat(words: Words, noise: int) -> Bool[np.ndarray, "rows columns"]:
-    """Return where a pixel equals a neighbour at one side, and one above or below."""
-    beside, over = np.zeros(words.shape, dtype=bool), np.zeros(words.shape, dtype=bool)
-    same = _near(words[:, 1:], words[:, :-1], noise)
-    beside[:, 1:] |= same
-    beside[:, :-1] |= same
-    same = _near(words[1:], words[:-1], noise)
-    over[1:] |= same
-    over[:-1] |= same
-    return beside & over
-
-
-def _thin(words: Words, noise: int) -> Bool[np.ndarray, "rows columns"]:
-    """Return where a pixel is darker than both neighbours on two opposite sides."""
-    channels = _channels(words).astype(np.uint16)
-    light = channels[..., 0] + channels[..., 1] + channels[..., 2]
-    light[words < OPAQUE_WORD] = 4 * 255  # what lies beside the figure is paper
-    darker = light + np.uint16(3 * noise)
-    thin = np.zeros(words.shape, dtype=bool)
-    thin[:, 1:-1] = (darker[:, 1:-1] < light[:, :-2]) & (darker[:, 1:-1] < light[:, 2:])
-    thin[1:-1] |= (darker[1:-1] < light[:-2]) & (darker[1:-1] < light[2:])
-    return thin
-
-
-def _near(a: Words, b: Words, noise: int) -> Bool[np.ndarray, "rows columns"]:
-    """Return where two pictures' pixels are equal but for the noise."""
-    far = _difference(a, b) > noise
-    same: np.ndarray = far.view("<u4")[..., 0] == 0  # its four channels at once
-    return same
-
-
-def _difference(a: Words, b: Words) -> UInt8[np.ndarray, "rows columns 4"]:
-    first, second = _channels(a), _channels(b)
-    return np.maximum(first, second) - np.minimum(first, second)
-
-
-def _channels(words: Words) -> UInt8[np.ndarray, "rows columns 4"]:
-    return np.ascontiguousarray(words)[..., None].view(np.uint8)
-
-
-def _distinct(
-    codes: UInt32[np.ndarray, " runs"],
-) -> tuple[UInt32[np.ndarray, " n"], Int[np.ndarray, " runs"]]:
-    """Return every code once, sorted, and each code's place among them."""
+def distinct(
+    codes: UInt32[np.ndarray, " codes"],
+) -> tuple[UInt32[np.ndarray, " n"], Int[np.ndarray, " codes"]]:
+    """Return every 24-bit code once, ascending, and each code's place among them."""
     if len(codes) < TABLE_RUNS:
         return np.unique(codes, return_inverse=True)
     seen = np.zeros(1 << 24, dtype=bool)
@@ -181,3 +123,94 @@ def _distinct(
     rank = np.zeros(1 << 24, dtype=np.int32)
     rank[found] = np.arange(len(found))
     return found.astype(np.uint32), rank[codes]
+
+
+def _total(place: Places, amounts: Places, n: int) -> Int[np.ndarray, " n"]:
+    return np.bincount(place, amounts, n).astype(np.int64)
+
+
+def _boxed(rgba: UInt8[np.ndarray, "height width 4"]) -> tuple[Words, tuple[slice, slice]]:
+    """Return the box round the covered pixels as words, no copy where possible, and where it is."""
+    words = np.ascontiguousarray(rgba).view("<u4")[..., 0]
+    covered = words >= COVERED_WORD
+    rows, columns = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
+    box = slice(0), slice(0)
+    if len(rows):
+        box = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    return words[box], box
+
+
+def _noise(pictures: Sequence[Words]) -> int:
+    """Return the levels by which neighbours of one paint may differ in these pictures."""
+    steps = np.zeros(256, dtype=np.int64)
+    for words in [view for picture in pictures for view in (picture, picture.T)]:
+        rows = np.ascontiguousarray(words[:: max(1, words.size // BAND_PIXELS)])
+        both = (rows[:, 1:] >= OPAQUE_WORD) & (rows[:, :-1] >= OPAQUE_WORD)
+        away = _difference(rows[:, 1:][both], rows[:, :-1][both])[:, :3].max(axis=1, initial=0)
+        steps += np.bincount(away, minlength=256)
+    typical = int(np.searchsorted(np.cumsum(steps), TYPICAL * steps.sum()))
+    return int(np.clip(round(NOISE_SPREAD * typical), LEAST_NOISE, MOST_NOISE))
+
+
+def _bands(words: Words, noise: int) -> Iterator[tuple[Runs, Places]]:
+    """Yield, some rows at a time, runs of alike opaque pixels, and the places of rough ones.
+
+    A run is a colour, marked where it is flat, and a length.
+    """
+    height = max(1, BAND_PIXELS // max(words.shape[1], 1))
+    for top in range(0, len(words), height):
+        above, end = max(top - 1, 0), min(top + height, len(words))
+        window = np.ascontiguousarray(words[above : end + 1])  # with a row of the bands beside
+        inner = slice(top - above, end - above)
+        own, flat = window[inner].ravel(), _flat(window, noise)[inner].ravel()
+        codes = np.where(own >= OPAQUE_WORD, (own & RGB) | flat * FLAT, NOTHING)
+        starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]]))
+        lengths = np.diff(starts, append=codes.size)
+        seen = codes[starts] != NOTHING
+        rough = (own >= COVERED_WORD) & ~(flat & (own >= OPAQUE_WORD))
+        yield (codes[starts][seen], lengths[seen]), np.flatnonzero(rough) + top * words.shape[1]
+
+
+def _flat(words: Words, noise: int) -> Bool[np.ndarray, "rows columns"]:
+    """Return where a pixel equals a neighbour at one side, and one above or below."""
+    like_left, like_above = np.zeros((2, *words.shape), dtype=bool)
+    line = words.ravel()
+    like_left.ravel()[1:] = _near(line[1:], line[:-1], noise)
+    like_left[:, 0] = False
+    like_above[1:] = _near(words[1:], words[:-1], noise)
+    beside, over = like_left.copy(), like_above.copy()
+    beside[:, :-1] |= like_left[:, 1:]
+    over[:-1] |= like_above[1:]
+    return beside & over
+
+
+def _middles(picture: Picture, noise: int) -> UInt32[np.ndarray, " middles"]:
+    """Return the colours of opaque pixels darker than both neighbours on two opposite sides."""
+    own = picture.at(picture.rough)
+    opaque = own >= OPAQUE_WORD
+    places, own = picture.rough[opaque], own[opaque]
+    light = _light(own) + 3 * noise
+    left, right, above, below = (light < _light(words) for words in picture.around(places))
+    return own[(left & right) | (above & below)] & RGB
+
+
+def _light(words: UInt32[np.ndarray, " words"]) -> Int[np.ndarray, " words"]:
+    """Return the sum of the channels; what lies beside the figure is as light as paper."""
+    light = (words & 255) + (words >> 8 & 255) + (words >> 16 & 255)
+    return np.where(words >= OPAQUE_WORD, light, 4 * 255).astype(np.int32)
+
+
+def _near(
+    a: UInt32[np.ndarray, "*shape"], b: UInt32[np.ndarray, "*shape"], noise: int
+) -> Bool[np.ndarray, "*shape"]:
+    """Return where two pictures' pixels are equal but for the noise."""
+    far = _difference(a, b) > noise
+    same: np.ndarray = far.view("<u4")[..., 0] == 0  # its four channels at once
+    return same
+
+
+def _difference(
+    a: UInt32[np.ndarray, "*shape"], b: UInt32[np.ndarray, "*shape"]
+) -> UInt8[np.ndarray, "*shape 4"]:
+    first, second = (np.ascontiguousarray(x)[..., None].view(np.uint8) for x in (a, b))
+    return np.maximum(first, second) - np.minimum(first, second)

@@ -19,7 +19,7 @@ from toonset.palette.false_paints import LEAST_FLAT, false_paints
 from toonset.palette.ink_color import Ink, find_ink, rounded
 from toonset.palette.oklab import JUST_NOTICEABLE, even_oklab_from_rgb
 from toonset.palette.palette import Evidence
-from toonset.palette.pixels import Histogram
+from toonset.palette.pixels import Histogram, distinct
 
 CELL = 4  # levels per side of a counting cell
 EXACT = 0.2  # of a paint: so frequent an exact colour is the paint itself
@@ -51,20 +51,18 @@ def find_paints(histogram: Histogram) -> tuple[list[Paint], Evidence]:
     Every colour of the histogram is a member of one paint.
     """
     ink = find_ink(histogram)
-    cells = _cells(histogram, ink)
+    cells, cell_of = _cells(histogram, ink)
     owner = _peaks(cells)
     owner = _only(cells, owner, _shares(cells, owner) >= LEAST_PEAK)
     owner, dearest = merge_peaks(cells.places, cells.weights, owner, TOUCHING)
-    places = even_oklab_from_rgb(histogram.colors)
-    cell_of = _nearest(cells.places, places)
-    paints, solid = _paints(histogram, places, cells, owner[cell_of], owner)
+    paints, solid = _paints(histogram, cells, owner[cell_of], owner)
     rgb = np.array([paint.rgb for paint in paints], dtype=np.float64)
     false = false_paints(rgb, solid, histogram.noise, ink)
     if false.any():
         keep = np.zeros(len(owner), dtype=bool)
         keep[np.unique(owner)[~false]] = True
         owner = _only(cells, owner, keep)
-        paints, _ = _paints(histogram, places, cells, owner[cell_of], owner)
+        paints, _ = _paints(histogram, cells, owner[cell_of], owner)
     return paints, evidence_for(cells.places, cells.weights, owner, dearest)
 
 
@@ -80,20 +78,21 @@ class _Cells:
     ink: Ink | None
 
 
-def _cells(histogram: Histogram, ink: Ink | None) -> _Cells:
-    seen = histogram.flat > 0
-    colors, flat = histogram.colors[seen], histogram.flat[seen]
-    codes = (colors // CELL).astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
-    _, cell_of = np.unique(codes, return_inverse=True)
-    counts = np.bincount(cell_of, flat)
-    sums = [np.bincount(cell_of, flat * channel) for channel in colors.T]
-    means = np.rint(np.stack(sums, axis=1) / counts[:, None]).astype(np.uint8)
-    fullest = np.sort(np.argsort(-counts, kind="stable")[:MOST_CELLS])
-    means, counts = means[fullest], counts[fullest]
+def _cells(histogram: Histogram, ink: Ink | None) -> tuple[_Cells, Int[np.ndarray, " n"]]:
+    """Return the fullest cells of flat pixels, and which of them is nearest to every colour."""
+    codes = (histogram.colors // CELL).astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32)
+    _, cell_of = distinct(codes)
+    flat = np.bincount(cell_of, histogram.flat)
+    weights = np.where(flat[cell_of] > 0, histogram.flat, histogram.counts)
+    sums = np.stack([np.bincount(cell_of, weights * c) for c in histogram.colors.T], axis=1)
+    means = np.rint(sums / np.bincount(cell_of, weights)[:, None]).astype(np.uint8)
+    places = even_oklab_from_rgb(means)
+    fullest = np.argsort(-flat, kind="stable")[: min(MOST_CELLS, int((flat > 0).sum()))]
+    own, flat = places[np.sort(fullest)], flat[np.sort(fullest)]
     if ink is not None:
-        means = np.concatenate([means, np.array([ink.rgb], dtype=np.uint8)])
-        counts = np.append(counts, ink.pixels)
-    return _Cells(even_oklab_from_rgb(means), counts / counts.sum(), ink)
+        own = np.concatenate([own, even_oklab_from_rgb(np.array([ink.rgb], dtype=np.uint8))])
+        flat = np.append(flat, ink.pixels)
+    return _Cells(own, flat / flat.sum(), ink), _nearest(own, places)[cell_of]
 
 
 def _peaks(cells: _Cells) -> Owners:
@@ -141,11 +140,7 @@ def _nearest(
 
 
 def _paints(
-    histogram: Histogram,
-    places: Float[np.ndarray, "n 3"],
-    cells: _Cells,
-    owner_of: Int[np.ndarray, " n"],
-    owner: Owners,
+    histogram: Histogram, cells: _Cells, owner_of: Int[np.ndarray, " n"], owner: Owners
 ) -> tuple[list[Paint], Bool[np.ndarray, " paints"]]:
     """Return the paints in the order of their peaks, and which are drawn flat or as ink."""
     paints, solid = [], []
@@ -156,23 +151,21 @@ def _paints(
         if cells.ink is not None and is_ink and flat.sum() < cells.ink.pixels:
             rgb = cells.ink.rgb
         else:
-            rgb = _rgb(histogram.colors[members], flat, places[members], cells.places[peak])
+            rgb = _rgb(histogram.colors[members], flat, cells.places[peak])
         paints.append(Paint(rgb, members, is_ink))
         solid.append(is_ink or flat.sum() >= LEAST_FLAT * count)
     return paints, np.array(solid)
 
 
 def _rgb(
-    colors: UInt8[np.ndarray, "n 3"],
-    flat: Int[np.ndarray, " n"],
-    places: Float[np.ndarray, "n 3"],
-    peak: Float[np.ndarray, " 3"],
+    colors: UInt8[np.ndarray, "n 3"], flat: Int[np.ndarray, " n"], peak: Float[np.ndarray, " 3"]
 ) -> tuple[int, int, int]:
     """Return a paint's own colour from those of its pixels."""
     best = int(flat.argmax())
     if flat[best] >= EXACT * flat.sum():
         return rounded(colors[best])
-    core = np.linalg.norm(places - peak, axis=1) <= JUST_NOTICEABLE
+    colors, flat = colors[flat > 0], flat[flat > 0]
+    core = np.linalg.norm(even_oklab_from_rgb(colors) - peak, axis=1) <= JUST_NOTICEABLE
     return rounded(np.array([_level(channel, flat[core]) for channel in colors[core].T]))
 
 
