@@ -18,7 +18,7 @@ from toonset.cli.output import (
 )
 from toonset.dataset.synth_options import SynthOptions
 
-WRITTEN = ("sheet.png", "views", "labels", "mannequin.obj", "truth.json")
+WRITTEN = ("sheet.png", "views", "labels", "ink", "mannequin.obj", "truth.json")
 DEFAULT = SynthOptions()
 
 
@@ -65,7 +65,7 @@ def synth(
 ) -> None:
     """Draw a turnaround sheet of a mesh, with errors of a hand as asked, and write its truth.
 
-    Writes sheet.png, views/ with transforms.json, labels/, mannequin.obj and truth.json.
+    Writes sheet.png, views/ with transforms.json, labels/, ink/, mannequin.obj and truth.json.
     """
     options = SynthOptions(
         views=views,

@@ -37,7 +37,8 @@ class Drawing:
 
     Attributes:
         rgba: (height, width, 4) sRGB, straight alpha.
-        labels: (height, width) palette index; 255 on background, ink and mixed pixels.
+        labels: (height, width) palette index; 255 on background, ink and mixed pixels. A pixel
+            whose bytes are its colour's is not mixed, however thinly a line or edge grazes it.
         ink: (height, width) coverage of the lines, 0 to 255.
     """
 
@@ -84,15 +85,21 @@ def draw(
         half = outline_px * supersample / 2
         for distance, reach in ((lines.silhouette, half), (lines.inner, INNER_LINE * half)):
             ink = np.maximum(ink, np.clip(np.float32(reach + 0.5) - distance, 0, 1))
-    flat = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[labels]
+    flat = _colors(palette)[labels]
     alpha = _shrink(np.maximum(figure, ink), supersample)
     colors = _shrink(flat * (figure * (1 - ink))[..., None], supersample)
     straight = colors / np.where(alpha > 0, alpha, 1)[..., None]
-    rgba = np.concatenate([straight, 255 * alpha[..., None]], axis=-1)
-    coverage = _shrink(ink, supersample)
-    pure = _unmixed(labels, supersample) & (coverage == 0)
+    rgba = _bytes(np.concatenate([straight, 255 * alpha[..., None]], axis=-1))
+    coverage = _bytes(255 * _shrink(ink, supersample))
     sampled = labels[::supersample, ::supersample]
-    return Drawing(_bytes(rgba), np.where(pure, sampled, UNLABELLED), _bytes(255 * coverage))
+    same = (rgba[..., :3] == _colors(palette)[sampled]).all(axis=-1) & (rgba[..., 3] == 255)
+    pure = _unmixed(labels, supersample) & same & (coverage < 128)
+    return Drawing(rgba, np.where(pure, sampled, UNLABELLED), coverage)
+
+
+def _colors(palette: np.ndarray) -> UInt8[np.ndarray, "256 3"]:
+    """Return a colour for every label; those without one are black."""
+    return np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])
 
 
 def _mark(

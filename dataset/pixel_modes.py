@@ -14,6 +14,7 @@ from toonset.errors import PictureError
 
 PLAIN_MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBa", "La", "RGBX", "YCbCr")
 GREY_16_MODES = ("I;16", "I;16L", "I;16B", "I;16N")
+ROWS = 64  # of a picture, copied at once
 SRGB_TOLERANCE = 2  # levels: a profile that moves no colour further is sRGB itself
 
 
@@ -39,11 +40,21 @@ def rgba_of(image: Image.Image, path: Path) -> UInt8[np.ndarray, "height width 4
     _refuse_wide_transparency(image, path)
     if image.mode == "La":
         image = image.convert("LA")
-    rgba = np.asarray(image.convert("RGBA")).copy()
+    rgba = _array(image if image.mode == "RGBA" else image.convert("RGBA"))
     if profile:
         grey = image.mode in ("1", "L", "LA", "La")
         rgba[..., :3] = _to_srgb(Image.fromarray(rgba[..., :3]), profile, grey, path)
     return rgba
+
+
+def _array(image: Image.Image) -> UInt8[np.ndarray, "height width 4"]:
+    """Return an RGBA picture's pixels, some rows at a time: Pillow's own way holds them thrice."""
+    width, height = image.size
+    pixels = np.empty((height, width, 4), dtype=np.uint8)
+    for top in range(0, height, ROWS):
+        bottom = min(top + ROWS, height)
+        pixels[top:bottom] = np.asarray(image.crop((0, top, width, bottom)))
+    return pixels
 
 
 def _grey_8(image: Image.Image) -> Image.Image:

@@ -3,6 +3,7 @@
 sheet.png           the drawn sheet
 views/000.png ..    its cells on transparent ground, with transforms.json (exact cameras)
 labels/000.png ..   indexed PNG per cell, 255 = background, ink or mixed pixel
+ink/000.png ..      grey PNG per cell: how far lines cover each pixel
 mannequin.obj       the mesh that was drawn, with its colours
 truth.json          cameras, yaws, boxes, palette, options, seed
 """
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from toonset.dataset.mesh_file import save_obj
-from toonset.dataset.picture import encode_indexed_png, encode_png
+from toonset.dataset.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.dataset.synthetic import Turnaround
 from toonset.dataset.transforms import NativeCamera, transforms_dict
 from toonset.files import new_folder, write_bytes, write_json
@@ -41,12 +42,13 @@ def write_turnaround(turnaround: Turnaround, folder: Path, *, force: bool = Fals
         write_bytes(temporary / "mannequin.obj", save_obj(mesh))
         write_json(temporary / "truth.json", truth_dict(turnaround))
         named = []
-        for view, camera, labels in zip(
-            turnaround.views, turnaround.cameras, turnaround.labels, strict=True
+        for view, camera, labels, ink in zip(
+            turnaround.views, turnaround.cameras, turnaround.labels, turnaround.ink, strict=True
         ):
             write_bytes(temporary / "views" / view.name, encode_png(view.rgba))
             picture = encode_indexed_png(labels, turnaround.palette)
             write_bytes(temporary / "labels" / view.name, picture)
+            write_bytes(temporary / "ink" / view.name, encode_grey_png(ink))
             named.append((view.name, camera))
         cameras = transforms_dict(named, mesh.height, mesh.radius)
         write_json(temporary / "views" / "transforms.json", cameras)

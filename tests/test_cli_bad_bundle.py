@@ -54,7 +54,7 @@ BAD_CAMERAS: dict[str, tuple[Callable[[Path], Any], str]] = {
     "long": (edited(lambda f: f.update(file_path="a" * 300)), "is no file name; correct file_path"),
     "huge": (
         edited(lambda f: f["toonset"].update(size_wh=[100_000, 100_000])),
-        "size 1e+05 x 1e+05 px, at most 64 megapixels",
+        "size 1e+05 x 1e+05 px, at most 80 megapixels",
     ),
     "far": (edited(lambda f: f["toonset"].update(k=1e300)), "camera: 1e+300, at most 1e+09"),
 }

@@ -64,7 +64,7 @@ BAD_PICTURES: dict[str, tuple[Callable[[Path, Image.Image], Any], str]] = {
     "empty.png": (text(""), "is empty (0 bytes); export the picture again"),
     "cut.png": (cut("PNG"), "PNG file is damaged or cut off"),
     "cut.jpg": (cut("JPEG"), "JPEG file is damaged or cut off"),
-    "bomb.png": (bomb, "its header announces far more than 64 megapixels"),
+    "bomb.png": (bomb, "its header announces far more than 80 megapixels"),
     "text.png": (text("not a picture"), "is text, no picture that can be read; save it as PNG"),
     "sheet.svg": (text("<svg xmlns='http://www.w3.org/2000/svg'/>"), "an SVG drawing, no picture"),
     "sheet.kra": (lambda path, _: path.write_bytes(b"PK\x03\x04" + b"\0" * 99), "a zip archive"),
