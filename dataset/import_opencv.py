@@ -123,17 +123,20 @@ def _matrix(node: Any, root: Any, name: str, size: int) -> np.ndarray:
 
 def _values(node: Any, name: str) -> np.ndarray:
     """Return the numbers of a matrix or of a plain list."""
+    found: np.ndarray | None = None
     if node.isSeq():
         items = [node.at(i) for i in range(min(node.size(), 100))]
         found = np.array([item.real() for item in items if item.isReal() or item.isInt()])
-    else:
-        found = node.mat() if node.isMap() else None
+    elif node.isMap():
+        found = node.mat()
     if found is None or found.dtype.kind not in "fiu":
         raise BundleError(f"{name} is missing or no matrix of numbers")
     values = found.astype(np.float64).ravel()
+    if not np.isfinite(values).all():
+        raise BundleError(f"{name} holds a number that is not finite")
     check_numbers(values.tolist())
     return values
 
 
 def _first_words(error: Exception) -> str:
-    return " ".join(str(error).split())[:80]
+    return " ".join(str(error.__cause__ or error).split())[:80]

@@ -104,15 +104,15 @@ def _holds_colmap(path: Path) -> bool:
 
 
 def _colmap_views(path: Path, images: Path | None) -> list[ImportView]:
-    """Return a model's views; pictures and masks are looked for beside it and two folders up."""
-    around = [path, path.parent, path.parent.parent]
-    folders = [place / "images" for place in around] if images is None else [images]
-    masks = [place / "masks" for place in around]
+    """Return a model's views; pictures and masks lie in images/ and masks/ of the dataset."""
+    root = path.parent if path.name == "0" else path
+    root = root.parent if root.name == "sparse" else root
+    folders = [root / "images", path] if images is None else [images]
     views = []
     for name, camera in read_colmap(path):
         where = f"{path}: image {name[:80]!r}"
-        picture = find_picture([*folders, path], name, where)
-        views.append(ImportView(name, camera, picture, find_mask(masks, name)))
+        picture = find_picture(folders, name, where)
+        views.append(ImportView(name, camera, picture, find_mask([root / "masks"], name)))
     return views
 
 

@@ -1,0 +1,428 @@
+"""Imports: other programs' folders become bundles; what cannot be honoured is refused by name."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pycolmap
+import pytest
+
+from toonset.camera import Camera
+from toonset.dataset.colmap import write_colmap
+from toonset.dataset.export_blender_script import write_blender_script
+from toonset.dataset.export_blender_synthetic import write_blender_synthetic
+from toonset.dataset.export_gltf import write_gltf
+from toonset.dataset.export_opencv import write_opencv
+from toonset.dataset.export_transforms import write_transforms
+from toonset.dataset.export_views import ExportView
+from toonset.dataset.import_bundle import write_imported
+from toonset.dataset.import_views import read_import, turned
+from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.picture import encode_png, load_rgba
+from toonset.dataset.transforms import read_scene
+from toonset.errors import BundleError, ToonsetError
+from toonset.files import write_bytes, write_json
+from toonset.mesh import Mesh
+
+TARGET = np.array([0.1, 0.9, -0.05])
+MODELS = pytest.mark.parametrize("k", [0.0, 0.2], ids=["orthographic", "pinhole"])
+Writer = Callable[[Path, tuple[ExportView, ...], Mesh], object]
+WRITERS: dict[str, Writer] = {
+    "colmap": lambda out, views, mesh: write_colmap(out, views, None, mesh),
+    "colmap-old": lambda out, views, mesh: write_colmap(out, views, None, mesh, old_layout=True),
+    "colmap-text": lambda out, views, mesh: write_colmap(out, views, None, mesh, text=True),
+    "nerfstudio": lambda out, views, mesh: write_transforms(out, views, None, mesh),
+    "instant-ngp": lambda out, views, mesh: write_transforms(
+        out, views, None, mesh, instant_ngp=True
+    ),
+    "blender-synthetic": lambda out, views, mesh: write_blender_synthetic(out, views, None, mesh),
+    "blender": write_blender_script,
+    "gltf": write_gltf,
+    "opencv": write_opencv,
+    "opencv-xml": lambda out, views, mesh: write_opencv(out, views, mesh, xml=True),
+}
+OWN_CAMERAS = [name for name in WRITERS if name not in ("blender", "gltf")]
+EVERY = pytest.mark.parametrize("kind", WRITERS)
+
+
+def views_all_round(count: int = 4, *, k: float = 0.0) -> tuple[ExportView, ...]:
+    views = []
+    for i in range(count):
+        size = (60 + 3 * i, 80 - 2 * i)
+        camera = Camera.looking_at(
+            TARGET,
+            yaw=2 * math.pi * i / count + 0.2,
+            elevation=0.1 * i - 0.2,
+            roll=0.05 * i,
+            scale=37.0 + i,
+            size_wh=size,
+            center=np.array([31.3 + i, 38.7]),
+            k=k,
+        )
+        rng = np.random.default_rng(i)
+        rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
+        rgba[..., 3] = np.where(np.add.outer(np.arange(size[1]), np.arange(size[0])) > 40, 255, 0)
+        views.append(ExportView(f"{i:03d}.png", rgba, camera, 180.0 if k == 0 else 1 / k, 1.0))
+    return tuple(views)
+
+
+def tetrahedron() -> Mesh:
+    vertices = np.array([[0.0, 0, 0], [0.4, 0, 0.1], [0.1, 1.8, 0], [0, 0.2, 0.5]])
+    return Mesh(vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+
+
+def around() -> np.ndarray:
+    """Return 1,000 points within 1 of the target."""
+    rng = np.random.default_rng(5)
+    direction = rng.normal(size=(1000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return TARGET + direction * rng.random((1000, 1)) ** (1 / 3)
+
+
+def off_px(a: Camera, b: Camera) -> float:
+    points = around()
+    return float(np.linalg.norm(a.project(points)[0] - b.project(points)[0], axis=1).max())
+
+
+# ---- round trips
+
+
+@MODELS
+@EVERY
+def test_exact_cameras_return_from_every_export(tmp_path: Path, kind: str, k: float) -> None:
+    views = views_all_round(k=k)
+    written = WRITERS[kind](tmp_path / "out", views, tetrahedron())
+    expected = written if isinstance(written, tuple) else views
+    write_imported(tmp_path / "back", read_import(tmp_path / "out"), None)
+    frames = read_scene(tmp_path / "back").frames
+    for frame, view in zip(frames, expected, strict=True):
+        assert frame.name == view.name
+        assert off_px(frame.camera, view.camera) < 1e-9
+        assert frame.camera.is_orthographic == (k == 0)
+        opaque = view.rgba[..., 3] == 255
+        np.testing.assert_array_equal(frame.rgba[..., 3] == 255, opaque)
+        np.testing.assert_array_equal(frame.rgba[opaque], view.rgba[opaque])
+
+
+@MODELS
+@pytest.mark.parametrize("kind", OWN_CAMERAS)
+def test_pinholes_return_within_a_hundredth_pixel(tmp_path: Path, kind: str, k: float) -> None:
+    """Without toonset.json an export is what any other program would have written."""
+    views = views_all_round(k=k)
+    written = WRITERS[kind](tmp_path / "out", views, tetrahedron())
+    expected = written if isinstance(written, tuple) else views
+    (tmp_path / "out" / "toonset.json").unlink()
+    write_imported(tmp_path / "back", read_import(tmp_path / "out"), None)
+    frames = read_scene(tmp_path / "back").frames
+    for frame, view in zip(frames, expected, strict=True):
+        assert not frame.camera.is_orthographic
+        assert off_px(frame.camera, view.pinhole) < 0.01
+        assert off_px(frame.camera, view.camera) <= view.error_px + 0.01
+
+
+def test_far_pinholes_of_a_round_trip_stand_where_they_stood(tmp_path: Path) -> None:
+    views = views_all_round()
+    write_opencv(tmp_path / "out", views)
+    write_imported(tmp_path / "back", read_import(tmp_path / "out"), None)
+    frames = json.loads((tmp_path / "back" / "transforms.json").read_text())["frames"]
+    for frame, view in zip(frames, views, strict=True):
+        assert frame["toonset"]["pinhole_error_px"] == pytest.approx(view.error_px)
+        centre = np.array(frame["transform_matrix"])[:3, 3]
+        np.testing.assert_allclose(centre, view.pinhole.world_from_camera[:3, 3], atol=1e-6)
+
+
+# ---- other programs' ways
+
+
+def test_a_whole_synthetic_scene_is_one_bundle(tmp_path: Path) -> None:
+    """Pictures of train, val and test, each once, though val and train share names."""
+    written = write_blender_synthetic(tmp_path / "out", views_all_round(k=0.2))
+    out = tmp_path / "out"
+    (out / "toonset.json").unlink()
+    shutil.copytree(out / "train", out / "val")
+    content = json.loads((out / "transforms_val.json").read_text())
+    for frame in content["frames"]:
+        frame["file_path"] = frame["file_path"].replace("train", "val")
+    write_json(out / "transforms_val.json", content)
+    imported = read_import(out)
+    assert len(imported.views) == 2 * len(written)
+    names = [view.name for view in imported.views]
+    assert {"train_000.png", "val_000.png"} < set(names)
+
+
+def test_masks_become_alpha(toonset, tmp_path: Path) -> None:
+    views = views_all_round(k=0.2)
+    write_colmap(tmp_path / "out", views)
+    shutil.move(tmp_path / "out" / "masks", tmp_path / "masks")
+    bare = toonset("import", tmp_path / "out", "-o", tmp_path / "bare", "--json")
+    assert len(bare.json["opaque"]) == 4
+    assert "the whole picture counts as figure; give --masks" in bare.err
+    done = toonset(
+        *("import", tmp_path / "out", "-o", tmp_path / "back", "--json"),
+        *("--masks", tmp_path / "masks"),
+    )
+    assert (done.json["opaque"], done.json["masked"]) == ([], 4)
+    for view in views:
+        alpha = load_rgba(tmp_path / "back" / "images" / view.name)[..., 3]
+        np.testing.assert_array_equal(alpha, view.rgba[..., 3])
+
+
+def test_mask_path_of_nerfstudio_is_used(tmp_path: Path) -> None:
+    views = views_all_round(k=0.2)
+    write_transforms(tmp_path / "out", views)
+    (tmp_path / "out" / "toonset.json").unlink()
+
+    def edit(content: dict[str, Any]) -> None:
+        for frame, view in zip(content["frames"], views, strict=True):
+            frame["mask_path"] = f"masks/{view.name}"
+            half = np.zeros(view.rgba.shape[:2], np.uint8)
+            half[:40] = 255
+            write_bytes(tmp_path / "out" / "masks" / view.name, encode_png(half))
+
+    change(tmp_path / "out" / "transforms.json", edit)
+    write_imported(tmp_path / "back", read_import(tmp_path / "out"), None)
+    for view in views:
+        alpha = load_rgba(tmp_path / "back" / "images" / view.name)[..., 3]
+        np.testing.assert_array_equal(alpha[:40], view.rgba[:40, :, 3])
+        assert (alpha[40:] == 0).all()
+
+
+def test_colmap_pictures_in_folders_elsewhere(tmp_path: Path) -> None:
+    views = views_all_round(2, k=0.2)
+    write_colmap(tmp_path / "out", views)
+    sparse = tmp_path / "out" / "sparse" / "0"
+    model = pycolmap.Reconstruction(sparse)
+    for number, image in model.images.items():
+        image.name = f"rig{number}/shot.png"
+        write_bytes(tmp_path / "photos" / image.name, encode_png(views[number - 1].rgba))
+    model.write(sparse)
+    imported = read_import(sparse, tmp_path / "photos")
+    assert [view.name for view in imported.views] == ["rig1_shot.png", "rig2_shot.png"]
+
+
+def test_z_up_worlds_are_turned(tmp_path: Path) -> None:
+    """A camera before a character that faces -Y in a world with +Z up is at yaw 0 afterwards."""
+    facing_y = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    blender = Camera(facing_y, np.array([0, 0, 0.9]), 40.0, np.array([30.0, 40.0]), (60, 80), 0.2)
+    ours = turned(blender)
+    np.testing.assert_allclose(ours.angles, (0, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(ours.target, (0, 0.9, 0))
+    head_and_nose = np.array([[0, 0, 1.8], [0, -0.2, 1.7]])
+    turned_points = np.array([[0, 1.8, 0], [0, 1.7, 0.2]])
+    np.testing.assert_allclose(ours.project(turned_points)[0], blender.project(head_and_nose)[0])
+
+
+def test_the_mannequin_turns_with_its_world(toonset, tmp_path: Path) -> None:
+    write_opencv(tmp_path / "out", views_all_round(2, k=0.2), tetrahedron())
+    own = toonset("import", tmp_path / "out", "-o", tmp_path / "back", "--up", "z")
+    assert "leave out --up z" in own.reason
+    (tmp_path / "out" / "toonset.json").unlink()
+    done = toonset("import", tmp_path / "out", "-o", tmp_path / "back", "--up", "z", "--json")
+    assert done.code == 0, done
+    vertices = load_mesh(tmp_path / "back" / "mannequin.obj").vertices
+    expected = tetrahedron().vertices[:, [0, 2, 1]] * [1, 1, -1]
+    np.testing.assert_allclose(np.sort(vertices, axis=0), np.sort(expected, axis=0))
+
+
+def test_opencv_lists_and_shared_lenses_are_read(tmp_path: Path) -> None:
+    """What others write: plain lists, one lens for all views, rvec alone."""
+    view = views_all_round(1, k=0.2)[0]
+    write_bytes(tmp_path / "a.png", encode_png(view.rgba))
+    K, pose = view.camera.K, view.camera.camera_from_world
+    rows = [K[0, 0], 0, K[0, 2] - 0.5, 0, K[1, 1], K[1, 2] - 0.5, 0, 0, 1]
+    text = f"%YAML:1.0\n---\ncamera_matrix: [ {', '.join(map(str, rows))} ]\nviews:\n"
+    text += f"  - {{ image: a.png, R: [ {', '.join(map(str, pose[:3, :3].ravel()))} ],"
+    text += f" tvec: [ {', '.join(map(str, pose[:3, 3]))} ] }}\n"
+    write_bytes(tmp_path / "rig.yaml", text.encode())
+    (read,) = read_import(tmp_path / "rig.yaml").views
+    assert off_px(read.camera, view.camera) < 1e-6
+
+
+# ---- the verb
+
+
+@pytest.fixture
+def colmap(tmp_path: Path) -> Path:
+    views = views_all_round(6, k=0.2)
+    for view in views:
+        view.rgba[..., :3] = (200, 30, 20)
+    write_colmap(tmp_path / "out", views, None, tetrahedron())
+    return tmp_path / "out"
+
+
+def test_an_imported_bundle_is_a_bundle(toonset, colmap: Path, tmp_path: Path) -> None:
+    done = toonset("import", colmap, "-o", tmp_path / "b")
+    assert (done.code, done.out.strip()) == (0, str(tmp_path / "b"))
+    assert "6 views of COLMAP, exact cameras of toonset.json" in done.err
+    assert "exists already" in toonset("import", colmap, "-o", tmp_path / "b").reason
+    assert toonset("palette", tmp_path / "b", "-q").code == 0
+    assert toonset("check", tmp_path / "b").code == 0
+    assert toonset("info", tmp_path / "b").code == 0
+
+
+@pytest.mark.slow
+def test_an_imported_bundle_trains(toonset, colmap: Path, tmp_path: Path) -> None:
+    assert toonset("import", colmap, "-o", tmp_path / "b").code == 0
+    few = ("--steps", 2, "--threads", 1, "--device", "cpu", "-q")
+    assert toonset("train", tmp_path / "b", *few).code == 0
+
+
+# ---- what cannot be read
+
+
+def change(file: Path, edit: Callable[[Any], object]) -> None:
+    content = json.loads(file.read_text())
+    edit(content)
+    write_json(file, content)
+
+
+@pytest.fixture
+def opencv(tmp_path: Path) -> Path:
+    write_opencv(tmp_path / "out", views_all_round(2, k=0.2))
+    (tmp_path / "out" / "toonset.json").unlink()
+    return tmp_path / "out"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("data: [ 0., 0., 0., 0., 0. ]", "data: [ .1, 0., 0., 0., 0. ]", "undistort the pictures"),
+        ("images/000.png", "../000.png", "lies outside of the folder"),
+        ("images/000.png", "images/9.png", "the picture does not exist"),
+        ("image_width: 60", "image_width: 61", "its camera says 61 x 80"),
+        ("image_width: 60", "image_width: -1", "must be positive"),
+        ("image_width: 60", "image_width: 2000000000", "megapixels"),
+        ("views:", "shots:", "0 entries in its list `views`"),
+        ("camera_matrix:", "lens:", "camera_matrix is missing or no matrix"),
+        ("R: !!opencv", "Q: !!opencv", None),  # rvec is left
+        ("tvec: !!opencv", "t: !!opencv", "tvec is missing"),
+        ("rows: 3", "rows: 9999999", "no OpenCV YAML"),
+        ("%YAML 1.2", "hello", "no OpenCV YAML"),
+        ("dt: d", "dt: u", None),
+        ("0., 0., 1. ]", ".Nan, 0., 1. ]", "not finite"),
+        ("data: [ 185", "data: [ -185", "camera_matrix is not"),
+        ("-\n      name", "name", None),
+    ],
+)
+def test_damaged_opencv_files_are_refused(
+    toonset, opencv: Path, tmp_path: Path, old: str, new: str, words: str | None
+) -> None:
+    file = opencv / "cameras.yml"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    done = toonset("import", opencv, "-o", tmp_path / "b")
+    if words is None:
+        assert done.code in (0, 2)
+    else:
+        assert words in done.reason
+        assert not (tmp_path / "b").exists()
+
+
+def test_cut_off_opencv_files_are_refused_or_whole(toonset, opencv: Path, tmp_path: Path) -> None:
+    data = (opencv / "cameras.yml").read_bytes()
+    rng = np.random.default_rng(2)
+    for number in range(40):
+        cut = bytearray(data[: rng.integers(1, len(data))])
+        for _ in range(3):
+            cut[rng.integers(len(cut))] = rng.integers(256)
+        (opencv / "cameras.yml").write_bytes(cut)
+        done = toonset("import", opencv, "-o", tmp_path / f"b{number}")
+        assert done.code == 0 or "cameras.yml" in done.reason or "images" in done.reason
+
+
+@EVERY
+def test_cameras_that_were_changed_beside_toonset_json_are_refused(
+    tmp_path: Path, kind: str
+) -> None:
+    if kind not in OWN_CAMERAS:
+        return
+    WRITERS[kind](tmp_path / "out", views_all_round(k=0.2), tetrahedron())
+
+    def edit(content: dict[str, Any]) -> None:
+        content["views"][1]["camera"]["target"][0] += 0.3
+
+    change(tmp_path / "out" / "toonset.json", edit)
+    with pytest.raises(BundleError, match=r"disagree; remove toonset\.json"):
+        read_import(tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (lambda c: c.update(schema="toonset-export/2"), "newer than this toonset"),
+        (lambda c: c["views"][0].update(picture="../../etc/passwd"), "lies outside"),
+        (lambda c: c["views"][0].pop("camera"), "field views.0.camera"),
+        (lambda c: c["views"][0]["camera"].update(scale=-1), "must be positive"),
+        (lambda c: c["views"][0].update(pinhole_distance=0), "pinhole_distance"),
+        (lambda c: c.update(views=[]), "views"),
+    ],
+)
+def test_damaged_records_are_refused(
+    tmp_path: Path, edit: Callable[[Any], object], words: str
+) -> None:
+    write_gltf(tmp_path / "out", views_all_round(2))
+    change(tmp_path / "out" / "toonset.json", edit)
+    with pytest.raises(ToonsetError, match=words):
+        read_import(tmp_path / "out")
+
+
+def test_a_bundle_is_no_import(toonset, tmp_path: Path) -> None:
+    write_opencv(tmp_path / "out", views_all_round(2))
+    bundle = tmp_path / "bundle"
+    write_imported(bundle, read_import(tmp_path / "out"), None)
+    assert "is of a bundle already" in toonset("import", bundle, "-o", tmp_path / "b").reason
+
+
+def test_what_holds_no_cameras_is_refused(toonset, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    out = tmp_path / "b"
+    assert "holds no cameras" in toonset("import", tmp_path / "empty", "-o", out).reason
+    assert "does not exist" in toonset("import", tmp_path / "none", "-o", out).reason
+    (tmp_path / "x.png").write_bytes(encode_png(np.zeros((2, 2, 4), np.uint8)))
+    assert "holds no cameras" in toonset("import", tmp_path / "x.png", "-o", out).reason
+    assert not out.exists()
+
+
+def test_distorted_colmap_cameras_are_refused_by_name(toonset, tmp_path: Path) -> None:
+    write_colmap(tmp_path / "out", views_all_round(2, k=0.2))
+    sparse = tmp_path / "out" / "sparse" / "0"
+    model = pycolmap.Reconstruction(sparse)
+    lens = model.cameras[1]
+    lens.model = pycolmap.CameraModelId.OPENCV
+    lens.params = [100.0, 100.0, 30.0, 40.0, 0.1, 0, 0, 0]
+    model.write(sparse)
+    reason = toonset("import", tmp_path / "out", "-o", tmp_path / "b").reason
+    assert "OPENCV camera" in reason
+    assert "undistort" in reason
+
+
+def test_equal_names_in_one_folder_are_refused(tmp_path: Path) -> None:
+    views = views_all_round(2, k=0.2)
+    write_transforms(tmp_path / "out", views)
+    (tmp_path / "out" / "toonset.json").unlink()
+    write_bytes(tmp_path / "out" / "images" / "000.bmp", b"")
+
+    def edit(content: dict[str, Any]) -> None:
+        content["frames"][1]["file_path"] = "images/000.bmp"
+
+    change(tmp_path / "out" / "transforms.json", edit)
+    with pytest.raises(BundleError, match=r"2 pictures would be named images_000\.png"):
+        read_import(tmp_path / "out")
+
+
+def test_pictures_of_another_size_are_refused(toonset, tmp_path: Path) -> None:
+    views = views_all_round(2, k=0.2)
+    write_colmap(tmp_path / "out", views)
+    small = replace(views[0], rgba=views[0].rgba[:9, :9])
+    write_bytes(tmp_path / "out" / "images" / "000.png", encode_png(small.rgba))
+    reason = toonset("import", tmp_path / "out", "-o", tmp_path / "b").reason
+    assert "is 9 x 9 px, its camera says 60 x 80" in reason
+    assert not (tmp_path / "b").exists()
