@@ -228,6 +228,22 @@ def test_a_corrected_folder_is_read_again(sheet: Path, toonset):
 # ---- what cannot be
 
 
+@pytest.fixture(scope="module")
+def prepared(toonset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a sheet, what was split from it, and things that are broken."""
+    here = tmp_path_factory.mktemp("prepared")
+    drawn_sheet().save(here / "sheet.png")
+    drawn_sheet(colors=COLORS[:2]).save(here / "copy.png")
+    for name in ("empty", "bundle", "broken"):
+        (here / name).mkdir()
+    (here / "bundle" / "transforms.json").write_text("{}")
+    (here / "broken" / "split.json").write_text("{")
+    (here / "far.csv").write_text("x,y,w,h\n0,0,60,160\n400,0,60,160\n")
+    (here / "flat.csv").write_text("10,10,60,0\n")
+    assert toonset("split", here / "sheet.png", "-o", here / "done", "-q").code == 0
+    return here
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -263,15 +279,10 @@ def test_a_corrected_folder_is_read_again(sheet: Path, toonset):
         (["sheet.png", "-o", "empty/..", "--force"], "which this command does not write"),
     ],
 )
-def test_a_mistake_is_one_line(arguments, words, sheet: Path, toonset, snapshot):
-    for name in ("empty", "bundle", "broken"):
-        Path(name).mkdir()
-    Path("bundle/transforms.json").write_text("{}")
-    Path("broken/split.json").write_text("{")
-    Path("far.csv").write_text("x,y,w,h\n0,0,60,160\n400,0,60,160\n")
-    Path("flat.csv").write_text("10,10,60,0\n")
-    Image.open(sheet).crop((0, 0, 300, 200)).save("copy.png")
-    assert toonset("split", sheet, "-o", "done", "-q").code == 0
+def test_a_mistake_is_one_line(
+    arguments, words, prepared: Path, toonset, snapshot, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(shutil.copytree(prepared, tmp_path / "here"))
     before = snapshot(Path())
     assert words in toonset("split", *arguments).reason
     assert snapshot(Path()) == before
