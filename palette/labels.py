@@ -2,7 +2,7 @@
 
 Colours repeat, so each is looked up once: a table over all 2^24 colours holds the nearest palette
 colour of those that occur. What lies inside an area of one label is done; only the pixels along
-borders are looked at more closely (`toonset.palette.blends`).
+borders are looked at more closely (`toonset.palette.mixed`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.palette.blends import settle_borders
-from toonset.palette.mixed import OPAQUE
+from toonset.palette.mixed import OPAQUE, settle_borders
 from toonset.palette.oklab import oklab_from_rgb
 
 Space = Literal["rgb", "oklab"]

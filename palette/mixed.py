@@ -1,14 +1,59 @@
-"""Which pixels are mixtures: the soft pixels between two colours, which are nobody's colour."""
+"""Which pixels are blends: the soft pixels between two colours, which are nobody's colour.
+
+They lie along the borders between labels. Every pixel there is compared with the colours that begin beside it, in units of the picture's own
+noise: a clean picture tells a blend of one part in a hundred, a JPEG only what rises above its
+ringing. Let a be the nearest of those colours and b another one next to the pixel x. How far x has
+gone from a towards b is
+
+    (|x - a|^2 + |a - b|^2 - |x - b|^2) / (2 |a - b|).
+
+Lightness and chroma are weighed apart, for JPEG smears chroma over two pixels.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-from jaxtyping import Bool, UInt8
+import itertools
+from dataclasses import dataclass
 
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+NONE = 255
 OPAQUE = 250  # of 255: less alpha is an edge of the figure
-LEAST_STEP = 24.0  # levels (L2 over channels) between two colours for a blend to matter
-ON_PATH = 1.1  # detour over the pixel, as a multiple of the straight way: more is no blend
-DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
+# JPEG's lightness and chroma of 8-bit RGB (ITU-T T.871), without offsets
+YCC_FROM_RGB = np.array(
+    [[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]]
+)
+ROUNDING = 1 / np.sqrt(12)  # levels: the noise of 8 bits
+BESIDE = np.array([1.4, 2.5, 2.5])  # JPEG's noise next to an edge, over that two pixels away
+SURE = 2.5  # times the noise towards a neighbour's colour: a blend
+LOST = 4.0  # times the noise from every colour around: a blend of what is not seen
+LOST_AT_RIM = 12.0  # where the figure ends: JPEG lets the paper in
+STRAY = 3.0  # times the noise (in squares) that a colour with no area nearby must be nearer
+SIGMA = 0.683  # quantile of absolute deviations that is one sigma
+FEW = 50  # pixels from which a colour cannot be told
+SAMPLE = 1 << 17  # pixels that noise is told from
+CELLS = 1 << 21  # distances held at once
+REACH = 2  # pixels to where a colour must begin
+WINDOW = tuple(itertools.product(range(-REACH, REACH + 1), repeat=2))
+NEIGHBOURS = tuple(o for o in itertools.product((-1, 0, 1), repeat=2) if o != (0, 0))
+BLOCKS = tuple(itertools.product((-1, 1), repeat=2))  # the 2 x 2 blocks that a pixel is in
+
+
+@dataclass(frozen=True, eq=False)
+class Paints:
+    """The palette as drawn, in units of noise.
+
+    Attributes:
+        units: (3, 3) from 8-bit RGB.
+        places: (colors, 3) as drawn.
+        apart: (colors, colors) distances.
+    """
+
+    units: Float[np.ndarray, "3 3"]
+    places: Float[np.ndarray, "colors 3"]
+    apart: Float[np.ndarray, "colors colors"]
 
 
 def opaque_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
@@ -16,27 +61,116 @@ def opaque_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray,
     return rgba[..., 3] >= OPAQUE
 
 
-def mixed_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels whose colour lies between those of two opposite neighbours.
+def settle_borders(
+    nearest: UInt8[np.ndarray, "height width"],
+    rgba: UInt8[np.ndarray, "height width 4"],
+    palette: UInt8[np.ndarray, "colors 3"],
+) -> UInt8[np.ndarray, "height width"]:
+    """Return the labels with blends marked 255, and strays given to a colour that begins nearby.
 
-    Neighbours that are not opaque say nothing. A line's core is no mixture: it lies at the end,
-    not between; nor is a shade within a slow gradient, whose neighbours hardly differ.
+    Args:
+        nearest: nearest palette colour of every pixel, 255 = not opaque.
+        rgba: the picture.
+        palette: its colours.
     """
-    opaque = np.pad(opaque_pixels(rgba), 1)
-    colors = np.pad(rgba[..., :3], ((1, 1), (1, 1), (0, 0))).astype(np.float32)
+    padded = np.pad(nearest, REACH, constant_values=NONE)
+    inner = _inner(padded)
+    border = np.flatnonzero((padded != NONE) & ~inner)
+    paints = _paints(padded, inner, rgba, palette)
+    result = nearest.copy()
+    step = max(1, CELLS // len(palette))
+    for start in range(0, len(border), step):
+        rows, columns = np.divmod(border[start : start + step], padded.shape[1])
+        settled = _settled(rows, columns, padded, inner, rgba, paints)
+        result[rows - REACH, columns - REACH] = settled
+    return result
+
+
+def _inner(padded: UInt8[np.ndarray, "height width"]) -> np.ndarray:
+    """Return where a pixel and its eight neighbours have the same label."""
+    square = np.ones((3, 3), dtype=np.uint8)
+    same = cv2.erode(padded, square) == cv2.dilate(padded, square)
+    return same & (padded != NONE)
+
+
+def _paints(padded: np.ndarray, inner: np.ndarray, rgba: np.ndarray, palette: np.ndarray) -> Paints:
+    """Return what the palette's colours look like in the picture, and its noise beside edges."""
+    edge = ((padded != NONE) & ~inner).astype(np.uint8)
+    ring = np.flatnonzero(inner & (cv2.dilate(edge, np.ones((5, 5), dtype=np.uint8)) > 0))
+    ring = ring[:: max(1, len(ring) // SAMPLE)]
+    rows, columns = np.divmod(ring, padded.shape[1])
+    labels = padded[rows, columns]
+    seen = rgba[rows - REACH, columns - REACH, :3] @ YCC_FROM_RGB.T
+    places = palette @ YCC_FROM_RGB.T
+    for label in np.flatnonzero(np.bincount(labels, minlength=len(palette)) >= FEW):
+        places[label] = np.median(seen[labels == label], axis=0)
+    noise = np.zeros(3)
+    if len(ring) >= FEW:
+        noise = np.quantile(np.abs(seen - places[labels]), SIGMA, axis=0)
+    units = YCC_FROM_RGB / np.hypot(BESIDE * noise, ROUNDING)[:, None]
+    places = places / np.hypot(BESIDE * noise, ROUNDING)
+    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    return Paints(units, places, np.maximum(apart, 1e-9))
+
+
+def _settled(
+    rows: Int[np.ndarray, " n"],
+    columns: Int[np.ndarray, " n"],
+    padded: np.ndarray,
+    inner: np.ndarray,
+    rgba: np.ndarray,
+    paints: Paints,
+) -> UInt8[np.ndarray, " n"]:
+    """Return the labels of some border pixels, given by their places in the padded picture."""
+    from scipy.spatial.distance import cdist
+
+    colors = rgba[rows - REACH, columns - REACH, :3] @ paints.units.T
+    away = cdist(colors, paints.places)
+    first = _first(rows, columns, padded, inner, away)
+    every = np.arange(len(rows))
+    near = away[every, first]
+    rim = np.zeros(len(rows), dtype=bool)
+    blend = np.zeros(len(rows), dtype=bool)
+    for down, right in NEIGHBOURS:
+        other = padded[rows + down, columns + right]
+        rim |= other == NONE
+        ours = np.where(other == NONE, first, other)
+        apart = paints.apart[first, ours]
+        gone = (near**2 + apart**2 - away[every, ours] ** 2) / (2 * apart)
+        blend |= (ours != first) & (gone > SURE)
+    blend |= near > np.where(rim, LOST_AT_RIM, LOST)
+    blend[blend] = ~_in_flat_block(rows[blend] - REACH, columns[blend] - REACH, rgba)
+    return np.where(blend, np.uint8(NONE), first)
+
+
+def _first(
+    rows: np.ndarray, columns: np.ndarray, padded: np.ndarray, inner: np.ndarray, away: np.ndarray
+) -> UInt8[np.ndarray, " n"]:
+    """Return the nearest colour that begins nearby, or one that is nearer by far."""
+    own = padded[rows, columns]
+    every = np.arange(len(rows))
+    best, least = own.copy(), np.full(len(rows), np.inf)
+    for down, right in WINDOW:
+        there = rows + down, columns + right
+        begins = inner[there]
+        label = np.where(begins, padded[there], own)
+        distance = np.where(begins, away[every, label], np.inf)
+        closer = distance < least
+        best[closer] = label[closer]
+        least[closer] = distance[closer]
+    return np.where(away[every, own] ** 2 + STRAY**2 < least**2, own, best)
+
+
+def _in_flat_block(rows: np.ndarray, columns: np.ndarray, rgba: np.ndarray) -> np.ndarray:
+    """Return which pixels lie in a 2 x 2 block of one colour: painted or scaled up, no blend."""
     height, width = rgba.shape[:2]
-    here = colors[1:-1, 1:-1]
-    mixed = np.zeros((height, width), dtype=bool)
-    for down, right in DIRECTIONS:
-        before = (slice(1 - down, height + 1 - down), slice(1 - right, width + 1 - right))
-        after = (slice(1 + down, height + 1 + down), slice(1 + right, width + 1 + right))
-        way = _distance(colors[before], colors[after])
-        first, second = _distance(here, colors[before]), _distance(here, colors[after])
-        between = (first + second <= ON_PATH * way) & (np.minimum(first, second) > 0.1 * way)
-        mixed |= between & (way > LEAST_STEP) & opaque[before] & opaque[after]
-    return mixed & opaque[1:-1, 1:-1]
-
-
-def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    difference = a - b
-    return np.sqrt(np.einsum("hwc,hwc->hw", difference, difference))
+    flat = np.zeros(len(rows), dtype=bool)
+    here = rgba[rows, columns]
+    for down, right in BLOCKS:
+        below, beside = rows + down, columns + right
+        within = (below >= 0) & (below < height) & (beside >= 0) & (beside < width)
+        below, beside = below.clip(0, height - 1), beside.clip(0, width - 1)
+        for place in ((below, columns), (rows, beside), (below, beside)):
+            within &= (rgba[place] == here).all(axis=1)
+        flat |= within
+    return flat

@@ -14,7 +14,6 @@ from toonset.palette.extract import (
     pick_palette,
 )
 from toonset.palette.labels import label_image, nearest_colors
-from toonset.palette.mixed import mixed_pixels
 from toonset.palette.names import NAMED, name_of
 from toonset.palette.oklab import oklab_from_rgb
 from toonset.palette.palette import Palette, PaletteColor
@@ -140,18 +139,6 @@ def test_jpeg_noise_does_not_shatter_colours(quality: int) -> None:
         away = drawn - oklab_from_rgb(np.array(color.rgb, dtype=np.uint8))
         near_black = max(color.rgb) <= 16  # the ink, but for the noise
         assert near_black or np.linalg.norm(away, axis=1).min() < 0.02
-
-
-def test_mixtures_are_found_and_lines_are_not() -> None:
-    row = [(200, 30, 40)] * 6 + [(150, 33, 75)] + [(20, 60, 180)] * 6
-    blend = np.dstack(
-        [np.tile(np.array(row, np.uint8), (9, 1, 1)), np.full((9, 13), 255, np.uint8)]
-    )
-    assert mixed_pixels(blend)[1:-1, 6].all()
-    assert mixed_pixels(blend).sum() == 9
-    row[6] = (10, 10, 10)
-    line = np.dstack([np.tile(np.array(row, np.uint8), (9, 1, 1)), np.full((9, 13), 255, np.uint8)])
-    assert not mixed_pixels(line).any()
 
 
 def test_if_nothing_reaches_the_share_the_largest_is_kept_and_said() -> None:
