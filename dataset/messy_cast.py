@@ -16,13 +16,18 @@ from toonset.dataset.messy_figure import (
     as_line_art,
     resized,
     shaded,
+    with_colored_lines,
     with_gaps,
 )
-from toonset.dataset.messy_ground import DARK, clothes, luma
+from toonset.dataset.messy_ground import DARK, LIGHT, clothes, luma
 from toonset.dataset.messy_options import MessyOptions
 from toonset.dataset.messy_solids import MOST_VIEWS, solid_cast
 
 UNLINED = 0.15  # of coloured sheets have figures without lines
+COLORED_LINES = 0.25  # of them have lines of a dark colour
+BLACK: Rgb = (0, 0, 0)
+CHALK: Rgb = (238, 238, 240)
+PENCIL: Rgb = (112, 112, 116)
 SHADED = 0.3  # of coloured sheets are lit softly
 CHARACTERS = 1_000  # numbers to choose from
 Style = Callable[[Figure], Figure]
@@ -85,14 +90,25 @@ def cast_of(
         figures = [resized(figure, float(rng.uniform(0.9, 1.0))) for figure in figures]
     whole = replace(casts[0], figures=tuple(figures))
     if chosen & {"line art", "open contour"}:
-        return _inked(whole, luma(ground[0]) < DARK, "open contour" in chosen, rng)
-    strength = float(rng.uniform(0.1, 0.3)) if rng.random() < SHADED else 0.0
-    return _styled(whole, lambda figure: shaded(figure, strength)) if strength else whole
+        return _inked(whole, min(map(luma, ground)), "open contour" in chosen, rng)
+    return _painted(whole, min(map(luma, ground)), rng)
 
 
-def _inked(cast: Cast, dark: bool, is_open: bool, rng: np.random.Generator) -> Cast:
+def _painted(cast: Cast, ground_luma: float, rng: np.random.Generator) -> Cast:
+    """Return the cast in its colours, at times with coloured lines or lit softly."""
+    colored, lit = rng.random(2) < (COLORED_LINES, SHADED)
+    red, green, blue = (int(v) for v in rng.integers(20, 90, size=3))
+    strength = float(rng.uniform(0.1, 0.3))
+    if colored and ground_luma >= LIGHT:
+        cast = _styled(cast, lambda figure: with_colored_lines(figure, (red, green, blue)))
+    return _styled(cast, lambda figure: shaded(figure, strength)) if lit else cast
+
+
+def _inked(cast: Cast, ground_luma: float, is_open: bool, rng: np.random.Generator) -> Cast:
     """Return the cast as line art, some contours of it interrupted."""
-    inks: list[Rgb] = [(238, 238, 240)] if dark else [(0, 0, 0), (40, 36, 48), (70, 44, 30)]
+    inks: tuple[Rgb, ...] = (BLACK, (40, 36, 48), (70, 44, 30), PENCIL)
+    if ground_luma < LIGHT:
+        inks = (CHALK if ground_luma < DARK else BLACK,)
     ink = inks[int(rng.integers(len(inks)))]
     drawn = _styled(cast, lambda figure: as_line_art(figure, ink))
     if not is_open:

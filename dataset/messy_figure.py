@@ -93,6 +93,13 @@ def as_line_art(figure: Figure, ink_rgb: Rgb) -> Figure:
     return replace(figure, rgba=rgba, paper=(1 - covered).astype(np.float32))
 
 
+def with_colored_lines(figure: Figure, line_rgb: Rgb) -> Figure:
+    """Return a painted figure with lines of a colour instead of black ones."""
+    covered = np.minimum(figure.ink / np.maximum(figure.rgba[..., 3], 1), 1.0)[..., None]
+    rgb = np.minimum(figure.rgba[..., :3] + covered * line_rgb, 255)
+    return replace(figure, rgba=np.dstack([np.rint(rgb).astype(np.uint8), figure.rgba[..., 3]]))
+
+
 def with_gaps(
     figure: Figure, gaps: int, gap_px: float, outline_px: float, rng: np.random.Generator
 ) -> Figure:

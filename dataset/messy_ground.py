@@ -19,6 +19,7 @@ CONTRAST = (
     45  # in some channel: what a painter leaves between a figure without lines and its ground
 )
 DARK = 110  # luma: on darker grounds black ink is hardly seen
+LIGHT = 170  # luma: on darker grounds pencil and coloured lines are hardly seen
 
 
 def luma(rgb: Rgb) -> float:
@@ -68,7 +69,7 @@ def clothes(ground: tuple[Rgb, ...], outlined: bool, rng: np.random.Generator) -
     Without a black line that is seen, every colour keeps a distance from the ground's; with one, a
     shirt may be as white as the paper.
     """
-    seen = outlined and luma(ground[0]) >= DARK
+    seen = outlined and min(map(luma, ground)) >= DARK
     found: list[Rgb] = []
     while len(found) < 6:
         skin = not found

@@ -10,7 +10,14 @@ import pytest
 
 from toonset.dataset.messy import MessySheet, make_messy_sheet
 from toonset.dataset.messy_cartoon import cartoon_cast
-from toonset.dataset.messy_figure import Figure, as_line_art, resized, tight_window, with_gaps
+from toonset.dataset.messy_figure import (
+    Figure,
+    as_line_art,
+    resized,
+    tight_window,
+    with_colored_lines,
+    with_gaps,
+)
 from toonset.dataset.messy_ground import through_jpeg
 from toonset.dataset.messy_layout import reach
 from toonset.dataset.messy_options import (
@@ -197,6 +204,14 @@ def test_line_art_shows_paper_inside_and_ink_at_its_rim() -> None:
     assert (drawn.paper[figure.rgba[..., 3] == 255] > 0.9).mean() > 0.5
     rim = (figure.rgba[..., 3] > 0) & (figure.rgba[..., 3] < 200)
     assert drawn.paper[rim].mean() < 0.2
+
+
+def test_coloured_lines_change_lines_alone() -> None:
+    figure = front()
+    colored = with_colored_lines(figure, (80, 20, 30))
+    no_line, line = figure.ink == 0, (figure.ink == 255) & (figure.rgba[..., 3] == 255)
+    np.testing.assert_array_equal(colored.rgba[no_line], figure.rgba[no_line])
+    assert set(map(tuple, colored.rgba[line].tolist())) == {(80, 20, 30, 255)}
 
 
 def test_gaps_open_the_contour() -> None:
