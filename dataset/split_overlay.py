@@ -27,13 +27,13 @@ def draw_split(
         rows[-1].append(picture)
     width = max(sum(p.shape[1] for p in row) for row in rows)
     parts = [_beside(row, width) for row in rows]
-    parts += [_caption(note, width, 15, LEFT_OUT) for note in notes]
+    parts += [_caption(note, width, 18, LEFT_OUT) for note in notes]
     return np.concatenate([*parts, np.full((6, width, 3), 255, np.uint8)])
 
 
 def _titled(panel: Panel, *, alone: bool) -> UInt8[np.ndarray, "height width 3"]:
     picture = draw_panel(panel, alone=alone)
-    return np.concatenate([picture, _caption(_title(panel), picture.shape[1], 17, GREY)])
+    return np.concatenate([picture, _caption(_title(panel), picture.shape[1], 20, GREY)])
 
 
 def _title(panel: Panel) -> str:

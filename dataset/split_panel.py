@@ -21,7 +21,7 @@ WIDEST, HIGHEST = 2400, 3200  # pixels of a sheet in the overlay
 CELL_HEIGHT = 420  # of one sheet among several
 ENLARGED = 1600  # pixels: a small sheet is enlarged to at most this height
 LARGEST_ZOOM = 8  # of a sprite
-MARGIN, HEAD = 20, 84  # pixels round a sheet; above it, where the tags of its first row fit
+MARGIN, HEAD = 20, 104  # pixels round a sheet; above it, where the tags of its first row fit
 OUTLINE = 2  # pixels, of the line along a mask
 FADE = 0.6  # of what is no figure, towards the background
 CHECK_PX = 12  # of the chequers that stand for see-through
@@ -196,7 +196,7 @@ def _write_tags(
         draw_tag(picture, costs, box, layouts, FIGURES[number % len(FIGURES)])
     named = sorted(zip(others, panel.left_out, strict=True), key=lambda pair: -_area(pair[0]))
     for box, thing in named[:MOST_KINDS]:
-        draw_tag(picture, costs, box, [(Line(thing.kind, 13),)], LEFT_OUT, must=False)
+        draw_tag(picture, costs, box, [(Line(thing.kind, 15),)], LEFT_OUT, must=False)
 
 
 def _area(box: Corners) -> int:
@@ -205,13 +205,13 @@ def _area(box: Corners) -> int:
 
 def _layouts(view: View, label: str) -> list[tuple[Line, ...]]:
     """Return what a view's tag may say, the fullest first."""
-    number = Line(str(int(view.name[:-4])), 24)
+    number = Line(str(int(view.name[:-4])), 28)
     size = f"{view.box[2]} x {view.box[3]} px"
     line = f"line {view.line_width_px:.1f} px" if view.line_width_px else "no line"
-    named = [Line(label, 15)] if label else []
+    named = [Line(label, 18)] if label else []
     return [
-        (number, *named, Line(f"{size}, {line}", 13)),
-        (number, *named, Line(size, 13), Line(line, 13)),
+        (number, *named, Line(f"{size}, {line}", 16)),
+        (number, *named, Line(size, 16), Line(line, 16)),
         (number, *named),
         (number,),
     ]
