@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int, UInt16, UInt32
 
-from toonset.palette.pixels import COVERED_WORD, OPAQUE_WORD, RGB, Histogram, Picture
+from toonset.palette.pixels import OPAQUE_WORD, RGB, Histogram, Picture
 from toonset.palette.shades import Paint
 
 SOFT = np.uint16(1 << 15)  # marks a colour that no flat pixel has
 NONE = np.uint16(SOFT - 1)  # no paint
+FAR = np.int32(4 * 255**2)  # squared levels: farther than any two colours are
 
 Table = UInt16[np.ndarray, " colors"]
 Counts = Int[np.ndarray, " paints"]
@@ -56,16 +57,15 @@ def paint_areas(
     soft, drawn = np.zeros((2, len(paints)), dtype=np.int64)
     table = _table(histogram, paints)
     for number, picture in enumerate(histogram.pictures):
-        blends = picture.rough[_is_soft(picture.at(picture.rough), table)]
+        blend = _is_soft(picture.own, table)
         if lines is not None:
-            mask = lines[number][picture.box].ravel()
-            line = np.flatnonzero(mask & (picture.words.ravel() >= COVERED_WORD))
-            words = picture.at(line)
+            mask = lines[number][picture.top : picture.top + len(picture.words)].ravel()
+            words = picture.words.ravel()[mask]
             own = table[words[words >= OPAQUE_WORD] & RGB]
             drawn += _count(own & ~SOFT, paints)
             painted -= _count(own[own < SOFT], paints)
-            blends = blends[~mask[blends]]
-        soft += _count(_of_blends(picture, blends, table, paints), paints)
+            blend &= ~mask[picture.rough]
+        soft += _count(_of_blends(picture, blend, table, paints), paints)
     return Areas(painted + soft, soft, drawn)
 
 
@@ -88,28 +88,29 @@ def _count(paint: UInt16[np.ndarray, " n"], paints: Sequence[Paint]) -> Counts:
 
 
 def _of_blends(
-    picture: Picture, places: Int[np.ndarray, " n"], table: Table, paints: Sequence[Paint]
-) -> UInt16[np.ndarray, " n"]:
+    picture: Picture, blend: Bool[np.ndarray, " rough"], table: Table, paints: Sequence[Paint]
+) -> UInt16[np.ndarray, " blends"]:
     """Return the nearest, in RGB, of four neighbours' paints and the ink.
 
     Without such neighbours: what an opaque pixel's colour is nearest to; NONE on the rim.
     """
-    rgb = np.array([one.rgb for one in paints], dtype=np.int32)
-    words = picture.at(places)
-    colors = words[:, None].view(np.uint8)[:, :3].astype(np.int32)
-    best = np.where(words >= OPAQUE_WORD, table[words & RGB] & ~SOFT, NONE)
-    least = np.full(len(words), np.iinfo(np.int32).max, dtype=np.int32)
-    candidates = [
-        np.where(_is_soft(beside, table), NONE, table[beside & RGB])
-        for beside in picture.around(places)
-    ]
+    own = picture.own[blend]
+    best = np.where(own >= OPAQUE_WORD, table[own & RGB] & ~SOFT, NONE)
+    candidates = []
+    for beside in picture.beside:
+        words = beside[blend]
+        candidates.append(np.where(_is_soft(words, table), NONE, table[words & RGB]))
     known = np.min(candidates, axis=0) < NONE
     candidates += [
         np.where(known, np.uint16(number), NONE) for number, one in enumerate(paints) if one.is_ink
     ]
+    channels = own[:, None].view(np.uint8)[:, :3].astype(np.int32).T
+    rgb = np.array([*(one.rgb for one in paints), (0, 0, 0)], dtype=np.int32).T
+    least = np.full(len(own), FAR, dtype=np.int32)
     for candidate in candidates:
-        ok = candidate < NONE
-        away = ((colors - rgb[np.where(ok, candidate, 0)]) ** 2).sum(axis=1, dtype=np.int32)
-        closer = ok & ((away < least) | ((away == least) & (candidate < best)))
-        best[closer], least[closer] = candidate[closer], away[closer]
+        place = np.minimum(candidate, len(paints))
+        away = sum((c - r[place]) ** 2 for c, r in zip(channels, rgb, strict=True))
+        away = np.where(candidate < NONE, away, FAR)
+        closer = (away < least) | ((away == least) & (away < FAR) & (candidate < best))
+        best, least = np.where(closer, candidate, best), np.minimum(away, least)
     return best

@@ -26,7 +26,6 @@ TABLE_RUNS = 2**17  # from so many on, a table of all colours beats sorting
 FLAT = np.uint32(1 << 24)  # a mark in the byte that held alpha
 OPAQUE_WORD, COVERED_WORD = np.uint32(OPAQUE << 24), np.uint32(COVERED << 24)
 NOTHING, RGB = np.uint32(0xFFFFFFFF), np.uint32(0xFFFFFF)
-BESIDE = ((0, -1), (0, 1), (-1, 0), (1, 0))  # rows, columns; opposite ones follow each other
 
 Words = UInt32[np.ndarray, "rows columns"]
 Places = Int[np.ndarray, " places"]
@@ -35,30 +34,21 @@ Runs = tuple[UInt32[np.ndarray, " runs"], Int[np.ndarray, " runs"]]
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """The character's box in one picture.
+    """The rows of one picture that the character covers, and its pixels that are not flat.
 
     Attributes:
         words: one word per pixel: alpha, blue, green, red.
-        box: rows and columns in the picture.
-        rough: places of the covered pixels that are not flat, counted row by row.
+        top: the first of the rows in the picture.
+        rough: places of covered pixels that are not flat, counted row by row.
+        own: their words.
+        beside: the words to their left and right, above and below; at the border their own.
     """
 
     words: Words
-    box: tuple[slice, slice]
+    top: int
     rough: Places
-
-    def around(self, places: Places) -> list[UInt32[np.ndarray, " places"]]:
-        """Return the words to the left, right, above and below; at the border those there."""
-        rows, columns = np.divmod(places, self.words.shape[1])
-        height, width = self.words.shape
-        return [
-            self.words[np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)]
-            for down, right in BESIDE
-        ]
-
-    def at(self, places: Places) -> UInt32[np.ndarray, " places"]:
-        """Return the words at some places."""
-        return self.words[np.divmod(places, self.words.shape[1])]
+    own: UInt32[np.ndarray, " places"]
+    beside: UInt32[np.ndarray, "4 places"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +79,15 @@ class Histogram:
 
 def count_pixels(images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Histogram:
     """Return how often every colour occurs in the opaque pixels of several pictures."""
-    boxed = [_boxed(image) for image in images]
-    noise = _noise([words for words, _ in boxed])
+    covered = [_covered_rows(image) for image in images]
+    noise = _noise([words for words, _ in covered])
     runs: list[Runs] = []
     pictures = []
-    for words, box in boxed:
+    for words, top in covered:
         bands = list(_bands(words, noise))
         runs += [run for run, _ in bands]
-        rough = [np.zeros(0, dtype=np.int64), *(places for _, places in bands)]
-        pictures.append(Picture(words, box, np.concatenate(rough)))
+        rough = np.concatenate([np.zeros(0, dtype=np.int64), *(places for _, places in bands)])
+        pictures.append(_picture(words, top, rough))
     marked = np.concatenate([np.zeros(0, dtype=np.uint32), *(codes for codes, _ in runs)])
     lengths = np.concatenate([np.zeros(0, dtype=np.int64), *(lengths for _, lengths in runs)])
     codes, place = distinct(marked & RGB)
@@ -129,15 +119,29 @@ def _total(place: Places, amounts: Places, n: int) -> Int[np.ndarray, " n"]:
     return np.bincount(place, amounts, n).astype(np.int64)
 
 
-def _boxed(rgba: UInt8[np.ndarray, "height width 4"]) -> tuple[Words, tuple[slice, slice]]:
-    """Return the box round the covered pixels as words, no copy where possible, and where it is."""
+def _covered_rows(rgba: UInt8[np.ndarray, "height width 4"]) -> tuple[Words, int]:
+    """Return the rows from first to last covered pixel as words, and the first one's number."""
     words = np.ascontiguousarray(rgba).view("<u4")[..., 0]
-    covered = words >= COVERED_WORD
-    rows, columns = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
-    box = slice(0), slice(0)
-    if len(rows):
-        box = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
-    return words[box], box
+    rows = np.flatnonzero(words.max(axis=1, initial=0) >= COVERED_WORD)
+    if not len(rows):
+        return words[:0], 0
+    return words[rows[0] : rows[-1] + 1], int(rows[0])
+
+
+def _picture(words: Words, top: int, rough: Places) -> Picture:
+    width = words.shape[1]
+    line = words.ravel()
+    column = rough % max(width, 1)
+    own = line[rough]
+    beside = np.stack(
+        [
+            line.take(rough + step, mode="clip") if len(line) else own
+            for step in (-1, 1, -width, width)
+        ]
+    )
+    beside[0, column == 0] = own[column == 0]
+    beside[1, column == width - 1] = own[column == width - 1]
+    return Picture(words, top, rough, own, beside)
 
 
 def _noise(pictures: Sequence[Words]) -> int:
@@ -186,12 +190,10 @@ def _flat(words: Words, noise: int) -> Bool[np.ndarray, "rows columns"]:
 
 def _middles(picture: Picture, noise: int) -> UInt32[np.ndarray, " middles"]:
     """Return the colours of opaque pixels darker than both neighbours on two opposite sides."""
-    own = picture.at(picture.rough)
-    opaque = own >= OPAQUE_WORD
-    places, own = picture.rough[opaque], own[opaque]
-    light = _light(own) + 3 * noise
-    left, right, above, below = (light < _light(words) for words in picture.around(places))
-    return own[(left & right) | (above & below)] & RGB
+    light = _light(picture.own) + 3 * noise
+    left, right, above, below = (light < _light(words) for words in picture.beside)
+    middle = ((left & right) | (above & below)) & (picture.own >= OPAQUE_WORD)
+    return picture.own[middle] & RGB
 
 
 def _light(words: UInt32[np.ndarray, " words"]) -> Int[np.ndarray, " words"]:
