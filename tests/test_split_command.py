@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
+from toonset.dataset.sheet import SheetOptions, split_sheet
 from toonset.dataset.split_files import SCHEMA
 from toonset.dataset.split_read import read_split
 
@@ -142,6 +143,38 @@ def test_dropped_views_go_and_the_others_are_numbered_anew(sheet: Path, toonset)
 def test_numbers_to_drop_may_be_written_in_several_ways(text, sheet: Path, toonset):
     assert toonset("split", sheet, "--drop", text, "-q").code == 0
     assert colors_of(Path("views")) == [COLORS[0]]
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[SheetOptions]:
+    """Return with which options sheets are split, while they are."""
+    seen: list[SheetOptions] = []
+
+    def spy(rgba, options):
+        seen.append(options)
+        return split_sheet(rgba, SheetOptions())
+
+    monkeypatch.setattr("toonset.dataset.sheet.split_sheet", spy)
+    return seen
+
+
+def test_what_is_typed_reaches_the_splitter(sheet: Path, toonset, asked):
+    drawn_sheet(colors=COLORS[:2]).save("two.png")
+    assert toonset("split", sheet, "two.png", "-o", "a", "--drop", "3").code == 0
+    boxes = ("--boxes", "a/split.json")
+    assert toonset("split", sheet, "two.png", "-o", "b", *boxes, "--background", "#fff").code == 0
+    assert toonset("split", sheet, "-o", "c", "--grid", "4X1", "--background", "00ff10").code == 0
+    found = read_split(Path("a"))[0]
+    of_sheet = [
+        tuple(v.box for v, of in zip(found.views, found.source_of, strict=True) if of == n)
+        for n in (0, 1)
+    ]
+    assert [len(boxes) for boxes in of_sheet] == [3, 2]
+    assert asked == [
+        *(SheetOptions(),) * 2,
+        *(SheetOptions(boxes=of, background_rgb=(255, 255, 255)) for of in of_sheet),
+        SheetOptions(grid=(4, 1), background_rgb=(0, 255, 16)),
+    ]
 
 
 @pytest.mark.parametrize("grid", [f"{COUNT}x1", f"{COUNT}x", f"{COUNT}"])
