@@ -46,11 +46,9 @@ def read_calibration(file: Path) -> CalibrationFile:
         )
     found = validated(CalibrationFile, upgraded(content) if version == 1 else content, file)
     for number, view in enumerate(found.views):
-        others = [other.camera for other in view.alternatives]
-        for camera in (view.camera, view.twin, *others):
-            try:
-                camera.camera()
-            except (CameraError, BundleError) as error:
-                where = f"{file}: view {number} ({view.name[:80]!r})"
-                raise BundleError(f"{where}: {error}; calibrate again") from error
+        try:
+            view.check()
+        except (CameraError, BundleError) as error:
+            where = f"{file}: view {number} ({view.name[:80]!r})"
+            raise BundleError(f"{where}: {error}; calibrate again") from error
     return found

@@ -15,8 +15,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from toonset.camera import Camera
 from toonset.dataset.native_camera import Pair, Rotation, Row, check_numbers, check_range
 from toonset.dataset.transforms_schema import MAX_FRAMES
+from toonset.errors import BundleError
 
 SCHEMA, VERSION = "toonset-calibration", 2
+SAME_ANGLE_DEG = 1e-3
+ROUNDING = 1e-6  # of a covariance, relative to its largest number
 
 Verdict = Literal["ok", "weak", "ambiguous", "failed"]
 Probability = Annotated[float, Field(ge=0, le=1 + 1e-6)]  # sums of probabilities round
@@ -48,7 +51,8 @@ class CalibratedCamera(_Record):
         """Return the camera.
 
         Raises:
-            CameraError, BundleError: it is none, or none that can be computed with.
+            CameraError, BundleError: it is none, none that can be computed with, or not as it is
+                described.
         """
         rotation, target = np.array(self.camera_from_world_rotation), np.array(self.target)
         numbers = [*rotation.flat, *self.target, *self.center_px, self.scale_px_per_unit, self.k]
@@ -56,6 +60,12 @@ class CalibratedCamera(_Record):
         center = np.array(self.center_px)
         camera = Camera(rotation, target, self.scale_px_per_unit, center, self.size_wh, self.k)
         check_range(camera)
+        if camera.is_orthographic != (self.model == "orthographic"):
+            raise BundleError(f"camera: is called {self.model} but k is {self.k:g}")
+        said = np.array([self.yaw_deg, self.elevation_deg, self.roll_deg])
+        off = (np.degrees(camera.angles) - said + 180) % 360 - 180
+        if np.abs(off).max() > SAME_ANGLE_DEG:
+            raise BundleError("camera: yaw, elevation and roll are not those of its rotation")
         return camera
 
 
@@ -92,6 +102,21 @@ class ViewRecord(_Record):
     outline_error_of_height: Spread
     outline_coverage: Probability
     line_width_px: Spread | None = None
+
+    def check(self) -> None:
+        """Refuse what no calibration writes.
+
+        Raises:
+            CameraError, BundleError: a camera is none, or the covariance is none.
+        """
+        for camera in (self.camera, self.twin, *(other.camera for other in self.alternatives)):
+            camera.camera()
+        covariance = np.array(self.covariance)
+        covariance = covariance / max(float(np.abs(covariance).max()), 1e-300)
+        if np.abs(covariance - covariance.T).max() > ROUNDING:
+            raise BundleError("covariance is not symmetric")
+        if np.linalg.eigvalsh(covariance).min() < -ROUNDING:
+            raise BundleError("covariance has a negative variance")
 
 
 class TriedModel(_Record):

@@ -102,5 +102,6 @@ def _problems(error: ValidationError, most: int) -> list[str]:
 
 def _problem(path: tuple[object, ...], message: str) -> str:
     place = ".".join(str(part)[:60] for part in path)
-    text = f"field {place}: {message}" if place else f"the whole: {message}"
+    plain = re.sub(r" or instance of \w+| after validation", "", message).replace("tuple", "list")
+    text = f"field {place}: {plain}" if place else f"the whole: {plain}"
     return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))

@@ -133,6 +133,27 @@ def test_a_newer_major_version_is_refused_by_name(name, newest, place: Path):
     assert "toonset-mannequin/1" in problems(place)[0]
 
 
+def covariance(row: int, column: int, value: float) -> Edit:
+    return lambda c: c["views"][2]["covariance"][row].__setitem__(column, value)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda c: c["views"][2]["camera"].update(yaw_deg=12.0), "not those of its rotation"),
+        (lambda c: c["views"][2]["twin"].update(model="orthographic"), "but k is 0.1"),
+        (lambda c: c["views"][2]["twin"].update(scale_px_per_unit=1e-12), "at most 1e+09"),
+        (covariance(0, 1, 0.5), "covariance is not symmetric"),
+        (covariance(3, 3, -0.5), "covariance has a negative variance"),
+    ],
+)
+def test_a_calibration_that_no_calibration_writes_is_refused(change, words, place: Path):
+    edit(place, "calibration.json", change)
+    (said,) = problems(place)
+    assert said.startswith("calibration.json: view 2 ('002.png'): ")
+    assert words in said
+
+
 # ---- strict JSON
 
 
@@ -146,7 +167,7 @@ def test_a_newer_major_version_is_refused_by_name(name, newest, place: Path):
         (b"[" * 100_000, "nested too deep"),
         (b"[" * 70 + b"]" * 70, "nested deeper than 64"),
         (b'{"a": 123456789012345678901234567890}', "a has more than 63 bits"),
-        (b"[" + b"9" * 10_000 + b"]", "no valid JSON"),
+        (b"[" + b"9" * 10_000 + b"]", "a number of 10000 digits"),
         (b'{"a": "\xff"}', "byte 7 is no UTF-8"),
         ('{"a": 1}'.encode("utf-16"), "is no UTF-8"),
         (b"", "Expecting value"),
@@ -202,7 +223,7 @@ def test_check_finds_all_problems_at_once(place: Path):
         (lambda p: edit(p, "calibration.json", lambda c: c["views"].pop()), "has other views"),
         (lambda p: edit(p, "calibration.json", lambda c: c["views"].reverse()), "another order"),
         (
-            lambda p: edit(p, "calibration.json", lambda c: c["views"][0]["camera"].update(k=0.2)),
+            lambda p: edit(p, "calibration.json", lambda c: c["views"][2]["camera"].update(k=0.2)),
             "its camera is not transforms.json's",
         ),
         (lambda p: shutil.copy(p / "images/000.png", p / "images/000.PNG"), "in case only"),

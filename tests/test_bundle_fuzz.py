@@ -307,7 +307,7 @@ def test_verbs_refuse_mutated_bundles_in_one_line(
     outside.mkdir()
     (outside / "canary.png").write_bytes(b"mine")
     kept = snapshot(outside)
-    for number in range(50_000, 50_060):
+    for number in range(50_000, 50_030):
         place = Path(shutil.copytree(small_bundle, tmp_path / "bundle"))
         rng = random.Random(number)
         rng.choices(*zip(*SPOILERS, strict=True))[0](place, rng)

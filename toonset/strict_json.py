@@ -15,6 +15,7 @@ from toonset.errors import ToonsetError
 
 MAX_DEPTH = 64  # camera files nest eight deep
 LARGEST_INT = 2**63  # beyond, other programs' integers end
+MAX_DIGITS = 400  # as a float's longest; Python itself refuses 4300
 BOM = b"\xef\xbb\xbf"
 
 
@@ -32,7 +33,7 @@ def parse_json(data: bytes, where: str, error_type: type[ToonsetError]) -> Any:
     """
     try:
         text = data.removeprefix(BOM).decode("utf-8")
-        value = json.loads(text, object_pairs_hook=_object)
+        value = json.loads(text, object_pairs_hook=_object, parse_int=_whole)
         _check(value)
     except RecursionError as error:
         raise error_type(f"{where}: is no valid JSON that is read (nested too deep)") from error
@@ -52,6 +53,12 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice = next(key for key in keys if keys.count(key) > 1)
         raise ValueError(f"the key {twice[:40]!r} is there twice")
     return found
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > MAX_DIGITS:
+        raise ValueError(f"a number of {len(digits)} digits")
+    return int(digits)
 
 
 def _check(value: Any) -> None:
