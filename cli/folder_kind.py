@@ -28,6 +28,6 @@ def kind_of(path: Path) -> str:
     if kind is None:
         raise BundleError(
             f"{path}: holds no transforms.json, split.json or config.json; name a folder that "
-            "`toonset calibrate`, `split` or `train` has written, or one with cameras"
+            "`toonset calibrate`, `split` or `train` has written (`toonset import` reads others)"
         )
     return kind

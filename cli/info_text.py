@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 from toonset.cli.info_folders import run_line
@@ -39,13 +40,15 @@ _PLAIN = ("view", "size", "camera", "position", "field of view")
 
 
 def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows as lines, columns under each other."""
-    count = max(map(len, rows))
-    full = [[*row, *[""] * (count - len(row))] for row in rows]
-    widths = [max(len(row[i]) for row in full) for i in range(count)]
+    """Return rows as lines, columns under each other; the first is the head.
+
+    Columns with nothing under their head are left out.
+    """
+    columns = [c for c in zip_longest(*rows, fillvalue="") if any(c[1:])]
+    widths = [max(map(len, column)) for column in columns]
     return [
         "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in full
+        for row in zip(*columns, strict=True)
     ]
 
 
@@ -89,6 +92,10 @@ def _size(view: dict[str, Any]) -> str:
     return f"{view['size_wh'][0]} x {view['size_wh'][1]}"
 
 
+def _yaw(view: dict[str, Any]) -> str:
+    return f"{round(view['yaw_deg'], 1) % 360:.1f}"
+
+
 def _judged_row(view: dict[str, Any]) -> tuple[str, ...]:
     line = view["line_width_px"]
     verdict = view["verdict"] + (f": {view['reason']}" if view["reason"] else "")
@@ -96,7 +103,7 @@ def _judged_row(view: dict[str, Any]) -> tuple[str, ...]:
         view["name"],
         _size(view),
         "" if line is None else f"{line:.1f} px" if line else "none",
-        f"{round(view['yaw_deg'], 1) % 360:5.1f} +- {view['yaw_sigma_deg']:.1f}",
+        f"{_yaw(view):>5} +- {view['yaw_sigma_deg']:.1f}",
         f"{view['elevation_deg']:5.1f} +- {view['elevation_sigma_deg']:.1f}",
         f"{view['p_flip']:.2f}",
         verdict,
@@ -105,7 +112,7 @@ def _judged_row(view: dict[str, Any]) -> tuple[str, ...]:
 
 def _plain_row(view: dict[str, Any]) -> tuple[str, ...]:
     if view["orthographic"]:
-        turn = f"yaw {view['yaw_deg']:.1f}, elevation {view['elevation_deg']:.1f}"
+        turn = f"yaw {_yaw(view)}, elevation {view['elevation_deg']:.1f}"
         return view["name"], _size(view), f"orthographic, {turn}"
     position = " ".join(f"{x:.4g}" for x in view["position"])
     return view["name"], _size(view), "pinhole", position, f"{view['field_of_view_deg']:.1f}"
