@@ -1,7 +1,8 @@
-"""`toonset palette`: a character's colours and a label map per picture."""
+"""`toonset palette`: a character's colours, and label and contour maps of every picture."""
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,27 +14,93 @@ if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import UInt8
 
+    from toonset.cli.palette_inputs import Drawn
+    from toonset.palette.choice import PaletteOptions
     from toonset.palette.palette import Palette
 
-    Picture = UInt8[np.ndarray, "_ _ 4"]
+    Map = UInt8[np.ndarray, "_ _"]
 
-WRITTEN = ("palette.json", "palette.gpl", "labels")
+FORMATS = (".ase", ".hex")  # beside .json and .gpl
+SWATCHES = "palette.png"
+WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", SWATCHES)
+FOLDERS = ("labels", "contours")
 BUNDLE, OUT = Path("bundle"), Path("palette")
-HUNDRED = 100.0
+LINE = 128  # of 255: covered by half, a pixel is a drawn line's
+CHOICE_PANEL = "Choice of colours"
+
+
+class Method(StrEnum):
+    """Who finds the colours."""
+
+    toonset = "toonset"
+    extcolors = "extcolors"
+
+
+class ColorSpace(StrEnum):
+    """In which the nearest colour of a pixel is meant."""
+
+    rgb = "rgb"
+    oklab = "oklab"
 
 
 def palette(
     inputs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[BUNDLE|IMAGE...]", help="A bundle (default: ./bundle) or images."),
+        typer.Argument(
+            metavar="[BUNDLE|FOLDER|IMAGE...]",
+            help="A bundle (default: ./bundle), a folder that `split` wrote, folders, images.",
+        ),
     ] = None,
     colors: Annotated[
         str | None,
-        typer.Option("--colors", help="Your own: '#aabbcc,#123', or a .gpl, .hex, .txt, .json."),
+        typer.Option(
+            "--colors",
+            help="Your own: '#aabbcc,#123', or a palette file.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
     ] = None,
     min_share: Annotated[
-        float, typer.Option("--min-share", help="Least share of the character's pixels.")
+        float,
+        typer.Option(
+            "--min-share",
+            help="Least share of the character's pixels.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
     ] = 0.05,
+    max_colors: Annotated[
+        int,
+        typer.Option(
+            "--max-colors", help="At most so many, the largest.", rich_help_panel=CHOICE_PANEL
+        ),
+    ] = 255,
+    keep: Annotated[
+        str,
+        typer.Option(
+            "--keep",
+            metavar="COLOURS",
+            help="Keep these of the left-out colours: '#aabbcc,...'.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = "",
+    contour: Annotated[
+        bool,
+        typer.Option(
+            "--contour/--no-contour",
+            help="Count drawn lines to their colour; without, only what is painted with it.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = True,
+    method: Annotated[
+        Method,
+        typer.Option(
+            "--method",
+            help="Ours, or the paper's tool for comparison.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = Method.toonset,
+    space: Annotated[
+        ColorSpace, typer.Option("--space", help="In which labels are the nearest colour.")
+    ] = ColorSpace.rgb,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -49,114 +116,98 @@ def palette(
 ) -> None:
     """List the colours that make up at least 5 % of the character, and label every pixel.
 
-    Writes palette.json, palette.gpl and labels/ into the bundle, replacing those of an earlier run;
-    for images, or with -o, into a folder of their own.
+    Writes palette.json, .gpl, .ase, .hex, .png, labels/ and contours/ into the bundle, replacing
+    those of an earlier run; for images and other folders, or with -o, into a folder of their own.
     """
-    from toonset.dataset.palette_files import write_palette
+    from toonset.cli.palette_inputs import bundle_of, load_drawn
     from toonset.files import new_folder
-    from toonset.palette.labels import label_image
 
     printer = Printer(as_json, quiet)
     places = inputs or [BUNDLE]
-    bundle = _bundle_of(places)
+    bundle = bundle_of(places)
     target = out or bundle or OUT
     if target != bundle:
-        check_output(target, places, WRITTEN, force=force)
-    named = _pictures(places, bundle, printer)
-    found = _choose([picture for _, picture in named], colors, min_share)
-    labels = [(name, label_image(picture, found.rgb)) for name, picture in named]
+        check_output(target, places, (*WRITTEN, *FOLDERS), force=force)
+    options = _options(min_share, max_colors, keep, contour)
+    drawn = load_drawn(places, printer)
+    contours = _contours(drawn)
+    found = _choose(drawn, contours, colors, options, method)
+    labels = _labels(drawn, contours, found, space)
     if target == bundle:
-        write_palette(target, found, labels)
+        _write(target, drawn, found, labels, contours)
     else:
         with new_folder(target, force=force) as folder:
-            write_palette(folder, found, labels)
+            _write(folder, drawn, found, labels, contours)
     _report(found, target, printer)
 
 
-def _bundle_of(places: list[Path]) -> Path | None:
-    """Return the bundle's folder, or None where pictures are given."""
-    from toonset.errors import BundleError
-
-    folders = [place for place in places if _is_meant_as_bundle(place)]
-    if not folders and places != [BUNDLE]:
-        return None
-    if len(places) > 1:
-        raise BundleError(
-            f"{(folders or places)[0]}: a bundle stands alone; name one bundle, or only pictures"
-        )
-    return places[0].parent if places[0].suffix.lower() == ".json" else places[0]
-
-
-def _is_meant_as_bundle(place: Path) -> bool:
-    missing = not place.suffix and not place.exists()  # the bundle's reader says so
-    return missing or place.is_dir() or place.suffix.lower() == ".json"
-
-
-def _pictures(
-    places: list[Path], bundle: Path | None, printer: Printer
-) -> list[tuple[str, Picture]]:
-    """Return label file name and foreground of every picture."""
-    from toonset.dataset.picture import load_rgba
-    from toonset.dataset.transforms import picture_paths
-    from toonset.errors import BundleError
-
-    paths = places if bundle is None else list(picture_paths(places[0]))
-    names = [f"{path.stem if bundle else format(i, '03d')}.png" for i, path in enumerate(paths)]
-    if len(set(names)) < len(names):
-        raise BundleError(f"{places[0]}: two pictures have the same file name; rename one")
-    return [
-        (name, _foreground(load_rgba(path), path, printer))
-        for name, path in zip(names, paths, strict=True)
-    ]
-
-
-def _foreground(picture: Picture, path: Path, printer: Printer) -> Picture:
-    """Return the picture with its plain background made transparent, if it is opaque."""
-    import numpy as np
-
-    from toonset.dataset.sheet import split_sheet
-    from toonset.errors import SheetError
-
-    if (picture[..., 3] < 255).any():
-        return picture
-    try:
-        sheet = split_sheet(picture)
-    except SheetError as error:
-        printer.say(f"{path.name}: every pixel counts as the character's ({error})")
-        return picture
-    whole = np.zeros_like(picture)
-    for view in sheet.views:
-        x, y, width, height = view.box
-        window = whole[y : y + height, x : x + width]
-        window[view.rgba[..., 3] > 0] = view.rgba[view.rgba[..., 3] > 0]
-    return whole
-
-
-def _choose(pictures: list[Picture], colors: str | None, min_share: float) -> Palette:
+def _options(min_share: float, max_colors: int, keep: str, contour: bool) -> PaletteOptions:
     from toonset.palette.choice import PaletteOptions
-    from toonset.palette.extract import extract_palette, pick_palette
     from toonset.palette.files import parse_colors
 
+    kept = parse_colors(keep).tolist() if keep else []
+    return PaletteOptions(min_share, max_colors, tuple((r, g, b) for r, g, b in kept), contour)
+
+
+def _contours(drawn: Drawn) -> list[Map]:
+    from toonset.palette.contour import find_contour
+
+    return [find_contour(picture) for picture in drawn.pictures]
+
+
+def _choose(
+    drawn: Drawn, contours: list[Map], colors: str | None, options: PaletteOptions, method: Method
+) -> Palette:
+    from toonset.palette.extcolors_palette import extcolors_palette
+    from toonset.palette.extract import extract_palette, pick_palette
+    from toonset.palette.files import parse_colors
+    from toonset.palette.patches import with_places
+
+    if colors is not None and (options.keep or method is not Method.toonset):
+        raise typer.BadParameter("--colors is the whole palette; leave --keep and --method away")
+    if options.keep and method is not Method.toonset:
+        raise typer.BadParameter("--keep belongs to --method toonset")
     if colors is not None:
-        return pick_palette(pictures, parse_colors(colors))
-    return extract_palette(pictures, PaletteOptions(min_share=min_share))
+        return pick_palette(drawn.pictures, parse_colors(colors))
+    if method is Method.extcolors:
+        return with_places(extcolors_palette(drawn.pictures, options), drawn.pictures)
+    lines = [contour >= LINE for contour in contours]
+    return with_places(extract_palette(drawn.pictures, options, lines), drawn.pictures)
+
+
+def _labels(drawn: Drawn, contours: list[Map], found: Palette, space: ColorSpace) -> list[Map]:
+    """Return the label maps; lines whose colour is not in the palette are unlabelled."""
+    from toonset.palette.labels import UNLABELLED, label_image
+
+    labels = [label_image(p, found.rgb, space=space.value) for p in drawn.pictures]
+    ink = found.contour
+    if ink is not None and ink.rgb not in [color.rgb for color in found.colors]:
+        for values, contour in zip(labels, contours, strict=True):
+            values[contour >= LINE] = UNLABELLED
+    return labels
+
+
+def _write(
+    folder: Path, drawn: Drawn, found: Palette, labels: list[Map], contours: list[Map]
+) -> None:
+    from toonset.dataset.palette_files import write_palette
+    from toonset.dataset.picture import encode_png
+    from toonset.files import write_bytes
+    from toonset.palette.files import encode_palette
+    from toonset.palette.swatch import draw_swatches
+
+    for extension in FORMATS:
+        write_bytes(folder / f"palette{extension}", encode_palette(found, extension))
+    write_bytes(folder / SWATCHES, encode_png(draw_swatches(found)))
+    named = list(zip(drawn.names, labels, strict=True))
+    write_palette(folder, found, named, list(zip(drawn.names, contours, strict=True)))
 
 
 def _report(found: Palette, target: Path, printer: Printer) -> None:
+    from toonset.cli.palette_report import palette_lines
     from toonset.palette.files import to_json
-    from toonset.palette.names import hex_of
 
     for warning in found.warnings:
         printer.say(warning)
-    lines = [
-        f"{hex_of(color.rgb)}  {HUNDRED * color.share:5.1f} %  {color.name}"
-        for color in found.colors
-    ]
-    if found.dropped:
-        lines.append("left out (with the mean OKLab error that this costs their pixels):")
-        lines += [
-            f"{hex_of(color.rgb)}  {HUNDRED * color.share:5.1f} %  {color.name}  {color.cost:.3f}"
-            for color in found.dropped
-        ]
-    lines.append(str(target))
-    printer.result({"out": target, **to_json(found)}, "\n".join(lines))
+    text = "\n".join([*palette_lines(found), str(target)])
+    printer.result({"out": target, **to_json(found)}, text)

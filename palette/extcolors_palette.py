@@ -3,10 +3,10 @@
 What it does, read from its source (version 1.0.0): every colour that is not wholly transparent is
 counted, then, from the most frequent on, each takes over all later colours within a tolerance (32)
 in CIE L*a*b* 1976, ten times what is just noticeable, and keeps its own exact value. So near paints
-merge (two greens of one outfit), blends along edges are colours like any other, and colours of equal
-frequency come in the order in which the pixels do. Its own pixel count, the denominator of the
-shares that it prints, includes transparent pixels; here shares are of the pixels that it counted.
-Time grows with pixels, in Python, and with the square of the distinct colours.
+merge (two greens of one outfit), blends along edges are colours like any other, and of equally
+frequent colours the order of the pixels decides. Its own pixel count, the denominator of the shares
+that it prints, includes transparent pixels; here shares are of the pixels that it counted. Time
+grows with pixels, in Python, and with the square of the distinct colours.
 """
 
 from __future__ import annotations

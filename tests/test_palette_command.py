@@ -47,7 +47,9 @@ def test_a_bundle_gets_its_palette_and_labels(
     monkeypatch.chdir(tmp_path)
     palette()
     shown = capsys.readouterr().out.splitlines()
-    assert shown == ["#c81e28   70.0 %  red", "#143cb4   30.0 %  royal blue", "bundle"]
+    assert shown[:2] == ["#c81e28   70.0 %  red", "#143cb4   30.0 %  royal blue"]
+    assert shown[2].startswith("told apart: 2; one less costs +")
+    assert shown[3:] == ["bundle"]
     scene = read_scene(tmp_path / "bundle")
     assert scene.palette is not None
     assert scene.palette.tolist() == [list(RED), list(BLUE)]
@@ -88,11 +90,9 @@ def test_pictures_go_into_a_folder_of_their_own(
     result = json.loads(capsys.readouterr().out)
     assert [color["hex"] for color in result["colors"]] == ["#c81e28", "#143cb4"]
     assert tree(out) == {
-        "labels",
-        "labels/000.png",
-        "labels/001.png",
-        "palette.gpl",
-        "palette.json",
+        *("contours", "contours/000.png", "contours/001.png"),
+        *("labels", "labels/000.png", "labels/001.png"),
+        *(f"palette.{extension}" for extension in ("ase", "gpl", "hex", "json", "png")),
     }
     assert (load_indexed_png(out / "labels" / "000.png")[0] == 255).all()
     with pytest.raises(ToonsetError, match="exists already; pass --force"):
