@@ -151,8 +151,12 @@ def calibrate(
     _write(out, views, body.mesh, found, report, force=force)
     _say_result(found, out, printer)
     printer.result({"bundle": out, **report}, str(out))
-    if found.verdict != "ok" or any(view.verdict != "ok" for view in found.views):
+    if not _is_certain(found):
         raise typer.Exit(UNCERTAIN)
+
+
+def _is_certain(found: Calibration) -> bool:
+    return all(verdict == "ok" for verdict in (found.verdict, *(v.verdict for v in found.views)))
 
 
 def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
@@ -233,5 +237,6 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
     printer.say(model_line(found))
     for view in found.views:
         printer.say(view_line(view))
-    printer.say(f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else ""))
+    sheet = f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else "")
+    (printer.say if _is_certain(found) else printer.doubt)(sheet)
     printer.say(f"look at {out / 'overlay.png'}")

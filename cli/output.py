@@ -22,7 +22,9 @@ JsonFlag = Annotated[
 ]
 QuietFlag = Annotated[
     bool,
-    typer.Option("--quiet", "-q", help="Print results only.", rich_help_panel=OUTPUT_PANEL),
+    typer.Option(
+        "--quiet", "-q", help="Print results and reasons only.", rich_help_panel=OUTPUT_PANEL
+    ),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
 ForceFlag = Annotated[
@@ -73,7 +75,7 @@ def check_output(
 
 @dataclass
 class Printer:
-    """One command's voice: `say` for people, `result` once at the end."""
+    """One command's voice: `say` for people, `doubt` why exit 3, `result` once at the end."""
 
     as_json: bool = False
     quiet: bool = False
@@ -82,8 +84,12 @@ class Printer:
     def say(self, text: str) -> None:
         """Print a line for people on stderr, unless quiet."""
         if not self.quiet:
-            self._clear()
-            print(text, file=sys.stderr, flush=True)
+            self.doubt(text)
+
+    def doubt(self, text: str) -> None:
+        """Print on stderr why the exit code will not be 0; quiet or not."""
+        self._clear()
+        print(text, file=sys.stderr, flush=True)
 
     def progress(self, text: str) -> None:
         """Show where the work stands: one live line on a terminal, a line every 5 s in a log."""

@@ -153,7 +153,7 @@ def _say(
             listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
             printer.say(f"  left out: {listed}")
     for doubt in doubts:
-        printer.say(f"look: {doubt}")
+        printer.doubt(f"look: {doubt}")
     if cutting.drop:
         printer.say("views are numbered anew; --drop counts as in the overlay without it")
     printer.say(f"look at {out / 'overlay.png'}")

@@ -169,6 +169,10 @@ def test_a_single_figure_is_fitted_and_called_weak(drawn: Path, toonset, tmp_pat
     assert done.code == 3
     assert done.out == f"{tmp_path / 'b'}\n"
     assert "sheet: weak (" in done.err  # with the reason
+    mesh = ("--mesh", drawn / "mannequin.obj", "-o", tmp_path / "q", "--quiet")
+    quiet = toonset("calibrate", drawn / "single.png", *mesh)
+    assert (quiet.code, quiet.err.count("\n")) == (3, 1)  # only why
+    assert quiet.err.startswith("sheet: weak (")
     assert {path.name for path in (tmp_path / "b").iterdir()} == BUNDLE_FILES
     assert json.loads((tmp_path / "b" / "calibration.json").read_text())["verdict"] == "weak"
 
