@@ -27,6 +27,7 @@ LEAST_FILLED = 10  # levels: less covers nothing
 INK = 20  # percentile of the lightness in lines: thin lines' cores are not pure
 DARK = 0.25  # of the way from ink to white: as dark as ink
 OUTLINED = 0.7  # of the rim that must be dark for an outline all round
+SEEN = 0.3  # of the rim that must be a line by itself, for the rest to go on
 ROUND = 0.5  # of the rim that must be a line for its width to be told
 DARKEST = 100  # lightness of 255: a lighter rim is no ink
 WIDEST = 0.04  # of the figure's height: wider is a limb
@@ -48,19 +49,20 @@ def find_contour(
     """
     light = _lightness(rgba)
     mask = rgba[..., 3] >= 128
+    none = np.zeros(mask.shape, dtype=np.uint8)
     width = rim_line_px(light, mask) if line_width_px is None else line_width_px
     if width <= 0 or not mask.any():
-        return np.zeros(mask.shape, dtype=np.uint8)
+        return none
     closed = _closed(light, _reach(width))
     filled = closed - light
     if filled.max() < LEAST_DEPTH:
-        return np.zeros(mask.shape, dtype=np.uint8)
+        return none
     ink = _ink(light, filled)
     cover = _coverage(light, closed, ink)
     _soften(cover, light, closed, ink)
     rim = mask & ~_eroded(mask, 1)
     dark = light <= ink + DARK * (255 - ink)
-    if dark[rim].mean() > OUTLINED:
+    if dark[rim].mean() > OUTLINED and (cover[rim] >= 128).mean() > SEEN:
         cover[mask & ~_eroded(mask, round(width)) & dark] = 255
     return cover
 
@@ -77,6 +79,8 @@ def rim_line_px(
         mask: the figure.
     """
     rim = mask & ~_eroded(mask, 1)
+    if not rim.any():
+        return 0.0
     tall = int(mask.any(axis=1).sum())
     dark = light[rim] <= DARKEST
     before = 0.0

@@ -1,13 +1,14 @@
 """Which pixels are blends: the soft pixels between two colours, which are nobody's colour.
 
-They lie along the borders between labels. Every pixel there is compared with the colours that begin beside it, in units of the picture's own
-noise: a clean picture tells a blend of one part in a hundred, a JPEG only what rises above its
-ringing. Let a be the nearest of those colours and b another one next to the pixel x. How far x has
-gone from a towards b is
+They lie along the borders between labels. Every pixel there is compared with the colours that begin
+beside it, in units of the picture's own noise: a clean picture tells a blend of one part in a
+hundred, a JPEG only what rises above its ringing. Let a be the nearest of those colours and b
+another one next to the pixel x. How far x has gone from a towards b is
 
     (|x - a|^2 + |a - b|^2 - |x - b|^2) / (2 |a - b|).
 
-Lightness and chroma are weighed apart, for JPEG smears chroma over two pixels.
+Lightness and chroma are weighed apart, for JPEG smears chroma over two pixels. A line so faint that
+all of it is nearest to the colour around it keeps that colour.
 """
 
 from __future__ import annotations
@@ -80,9 +81,9 @@ def settle_borders(
     result = nearest.copy()
     step = max(1, CELLS // len(palette))
     for start in range(0, len(border), step):
-        rows, columns = np.divmod(border[start : start + step], padded.shape[1])
-        settled = _settled(rows, columns, padded, inner, rgba, paints)
-        result[rows - REACH, columns - REACH] = settled
+        at = border[start : start + step]
+        settled = _settled(at, padded, inner, rgba, paints)
+        result[at // padded.shape[1] - REACH, at % padded.shape[1] - REACH] = settled
     return result
 
 
@@ -114,51 +115,65 @@ def _paints(padded: np.ndarray, inner: np.ndarray, rgba: np.ndarray, palette: np
 
 
 def _settled(
-    rows: Int[np.ndarray, " n"],
-    columns: Int[np.ndarray, " n"],
+    at: Int[np.ndarray, " n"],
     padded: np.ndarray,
     inner: np.ndarray,
     rgba: np.ndarray,
     paints: Paints,
 ) -> UInt8[np.ndarray, " n"]:
-    """Return the labels of some border pixels, given by their places in the padded picture."""
+    """Return the labels of some border pixels, given by their places in the flat padded picture."""
     from scipy.spatial.distance import cdist
 
-    colors = rgba[rows - REACH, columns - REACH, :3] @ paints.units.T
-    away = cdist(colors, paints.places)
-    first = _first(rows, columns, padded, inner, away)
-    every = np.arange(len(rows))
-    near = away[every, first]
-    rim = np.zeros(len(rows), dtype=bool)
-    blend = np.zeros(len(rows), dtype=bool)
-    for down, right in NEIGHBOURS:
-        other = padded[rows + down, columns + right]
-        rim |= other == NONE
-        ours = np.where(other == NONE, first, other)
-        apart = paints.apart[first, ours]
-        gone = (near**2 + apart**2 - away[every, ours] ** 2) / (2 * apart)
-        blend |= (ours != first) & (gone > SURE)
-    blend |= near > np.where(rim, LOST_AT_RIM, LOST)
-    blend[blend] = ~_in_flat_block(rows[blend] - REACH, columns[blend] - REACH, rgba)
-    return np.where(blend, np.uint8(NONE), first)
+    rows, columns = at // padded.shape[1] - REACH, at % padded.shape[1] - REACH
+    away = cdist(rgba[rows, columns, :3] @ paints.units.T, paints.places)
+    first = _first(at, padded, inner, away)
+    near = np.take_along_axis(away, first[:, None].astype(np.intp), axis=1)[:, 0]
+    off = np.flatnonzero(near > SURE)  # nearer ones have gone less far towards any other
+    off = off[_gone(at[off], padded, first[off], away[off], paints.apart)]
+    off = off[~_in_flat_block(rows[off], columns[off], rgba)]
+    first[off] = NONE
+    return first
 
 
 def _first(
-    rows: np.ndarray, columns: np.ndarray, padded: np.ndarray, inner: np.ndarray, away: np.ndarray
+    at: np.ndarray, padded: np.ndarray, inner: np.ndarray, away: np.ndarray
 ) -> UInt8[np.ndarray, " n"]:
     """Return the nearest colour that begins nearby, or one that is nearer by far."""
-    own = padded[rows, columns]
-    every = np.arange(len(rows))
-    best, least = own.copy(), np.full(len(rows), np.inf)
+    first = padded.ravel()[at]
+    own = np.take_along_axis(away, first[:, None].astype(np.intp), axis=1)[:, 0]
+    rival = np.sort(away, axis=1)[:, 1] if away.shape[1] > 1 else np.full(len(at), np.inf)
+    open_ones = np.flatnonzero(own**2 + STRAY**2 >= rival**2)
+    at, away, label = at[open_ones], away[open_ones], first[open_ones]
+    best, least = label.copy(), np.full(len(at), np.inf)
+    every = np.arange(len(at))
     for down, right in WINDOW:
-        there = rows + down, columns + right
-        begins = inner[there]
-        label = np.where(begins, padded[there], own)
-        distance = np.where(begins, away[every, label], np.inf)
+        there = at + down * padded.shape[1] + right
+        begins = inner.ravel()[there]
+        beside = np.where(begins, padded.ravel()[there], label)
+        distance = np.where(begins, away[every, beside], np.inf)
         closer = distance < least
-        best[closer] = label[closer]
+        best[closer] = beside[closer]
         least[closer] = distance[closer]
-    return np.where(away[every, own] ** 2 + STRAY**2 < least**2, own, best)
+    keeps = own[open_ones] ** 2 + STRAY**2 < least**2
+    first[open_ones] = np.where(keeps, label, best)
+    return first
+
+
+def _gone(
+    at: np.ndarray, padded: np.ndarray, first: np.ndarray, away: np.ndarray, apart: np.ndarray
+) -> Bool[np.ndarray, " n"]:
+    """Return which pixels have gone from their colour towards a neighbour's, or are lost."""
+    every = np.arange(len(at))
+    near = away[every, first]
+    rim, gone = np.zeros(len(at), dtype=bool), np.zeros(len(at), dtype=bool)
+    for down, right in NEIGHBOURS:
+        beside = padded.ravel()[at + down * padded.shape[1] + right]
+        rim |= beside == NONE
+        other = np.where(beside == NONE, first, beside)
+        way = apart[first, other]
+        far = (near**2 + way**2 - away[every, other] ** 2) / (2 * way)
+        gone |= (other != first) & (far > SURE)
+    return gone | (near > np.where(rim, LOST_AT_RIM, LOST))
 
 
 def _in_flat_block(rows: np.ndarray, columns: np.ndarray, rgba: np.ndarray) -> np.ndarray:
