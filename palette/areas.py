@@ -17,8 +17,8 @@ from jaxtyping import Bool, Int, UInt16, UInt32
 from toonset.palette.pixels import OPAQUE_WORD, RGB, Histogram, Picture
 from toonset.palette.shades import Paint
 
-SOFT = np.uint16(1 << 15)  # marks a colour that no flat pixel has
-NONE = np.uint16(SOFT - 1)  # no paint
+SETTLED = np.uint16(1 << 15)  # marks a colour that flat pixels have, too
+NONE = np.uint16(SETTLED - 1)  # no paint
 FAR = np.int32(4 * 255**2)  # squared levels: farther than any two colours are
 
 Table = UInt16[np.ndarray, " colors"]
@@ -62,25 +62,25 @@ def paint_areas(
             mask = lines[number][picture.top : picture.top + len(picture.words)].ravel()
             words = picture.words.ravel()[mask]
             own = table[words[words >= OPAQUE_WORD] & RGB]
-            drawn += _count(own & ~SOFT, paints)
-            painted -= _count(own[own < SOFT], paints)
+            drawn += _count(own & ~SETTLED, paints)
+            painted -= _count(own[own >= SETTLED] & ~SETTLED, paints)
             blend &= ~mask[picture.rough]
         soft += _count(_of_blends(picture, blend, table, paints), paints)
     return Areas(painted + soft, soft, drawn)
 
 
 def _table(histogram: Histogram, paints: Sequence[Paint]) -> Table:
-    """Return every colour's paint, with a mark where no flat pixel has the colour."""
+    """Return every colour's paint, with a mark where flat pixels have the colour, too."""
     paint_of = np.zeros(len(histogram.counts), dtype=np.uint16)
     for number, paint in enumerate(paints):
         paint_of[paint.members] = number
-    table = np.full(1 << 24, SOFT | NONE, dtype=np.uint16)
-    table[histogram.codes] = paint_of | np.where(histogram.flat > 0, np.uint16(0), SOFT)
+    table = np.zeros(1 << 24, dtype=np.uint16)
+    table[histogram.codes] = paint_of | (histogram.flat > 0) * SETTLED
     return table
 
 
 def _is_soft(words: UInt32[np.ndarray, " n"], table: Table) -> Bool[np.ndarray, " n"]:
-    return (table[words & RGB] >= SOFT) | (words < OPAQUE_WORD)
+    return (table[words & RGB] < SETTLED) | (words < OPAQUE_WORD)
 
 
 def _count(paint: UInt16[np.ndarray, " n"], paints: Sequence[Paint]) -> Counts:
@@ -95,11 +95,11 @@ def _of_blends(
     Without such neighbours: what an opaque pixel's colour is nearest to; NONE on the rim.
     """
     own = picture.own[blend]
-    best = np.where(own >= OPAQUE_WORD, table[own & RGB] & ~SOFT, NONE)
+    best = np.where(own >= OPAQUE_WORD, table[own & RGB] & ~SETTLED, NONE)
     candidates = []
     for beside in picture.beside:
         words = beside[blend]
-        candidates.append(np.where(_is_soft(words, table), NONE, table[words & RGB]))
+        candidates.append(np.where(_is_soft(words, table), NONE, table[words & RGB] & ~SETTLED))
     known = np.min(candidates, axis=0) < NONE
     candidates += [
         np.where(known, np.uint16(number), NONE) for number, one in enumerate(paints) if one.is_ink

@@ -11,6 +11,7 @@ grows with pixels, in Python, and with the square of the distinct colours.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,9 +39,9 @@ def extcolors_palette(
     Raises:
         PaletteError: no picture, or only transparent pixels.
     """
-    import extcolors
     from PIL import Image
 
+    extcolors = importlib.import_module("extcolors")  # untyped
     options = options or PaletteOptions()
     seen = [image[image[..., 3] > 0] for image in images]
     pixels = np.concatenate([np.zeros((0, 4), dtype=np.uint8), *seen])

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.palette.labels import nearest_labels
-from toonset.palette.palette import Palette, Place
+from toonset.palette.palette import MAX_COLORS, Palette, Place
 
 BLOCK = np.ones((2, 2), dtype=np.uint8)  # blends along an edge are thinner
 
@@ -27,7 +27,8 @@ def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) 
     """
     if not palette.dropped:
         return palette
-    listed = [color.rgb for color in (*palette.colors, *palette.dropped)][:255]
+    kept, left = ([c.rgb for c in palette.colors], [c.rgb for c in palette.dropped])
+    listed = [*kept, *left][:MAX_COLORS]
     labels = [nearest_labels(image, np.array(listed, dtype=np.uint8)) for image in images]
     counts = np.array([np.bincount(own.ravel(), minlength=256) for own in labels])
     dropped = []
