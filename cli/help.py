@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
+import typer
 from typer.core import TyperCommand, TyperGroup
+
+NOTHING_ASKED = 2  # exit code, as of any wrong use
 
 
 class Verb(TyperCommand):
@@ -31,6 +35,13 @@ class Verb(TyperCommand):
 
 class Verbs(TyperGroup):
     """The program's help: every verb with the whole first paragraph of its own."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Show the help where nothing is asked for."""
+        if not args:
+            print(ctx.get_help(), file=sys.stderr)
+            raise typer.Exit(NOTHING_ASKED)
+        return super().parse_args(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write all verbs in the order in which they are used."""

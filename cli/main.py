@@ -47,9 +47,8 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback(invoke_without_command=True)
+@app.callback()
 def toonset(
-    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option(
@@ -58,9 +57,6 @@ def toonset(
     ] = False,
 ) -> None:
     """Turn a hand-drawn character sheet into cameras, a palette and a turning character."""
-    if context.invoked_subcommand is None:
-        print(context.get_help(), file=sys.stderr)
-        raise typer.Exit(REFUSED)
 
 
 for _verb in VERBS:

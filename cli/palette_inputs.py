@@ -54,7 +54,8 @@ def _is_meant_as_bundle(place: Path) -> bool:
     from toonset.dataset.transforms_read import NAMES
 
     if place.is_dir():
-        return any((place / name).is_file() for name in NAMES) or not any(place.iterdir())
+        marks = (*NAMES, "calibration.json")  # a bundle that has lost its cameras is broken
+        return any((place / name).is_file() for name in marks) or not any(place.iterdir())
     if place.suffix.lower() == ".json":
         return place.name != "split.json"
     return not place.suffix and not place.exists()  # the bundle's reader says so
