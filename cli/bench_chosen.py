@@ -18,6 +18,7 @@ class Subject(StrEnum):
     train = "train"
     stability = "stability"
     splitting = "split"  # a string has a method `split`
+    palette = "palette"
 
 
 class Baseline(StrEnum):
@@ -55,5 +56,7 @@ class Chosen:
         alone = self.subject is Subject.calib and self.sprites is not None
         if alone and (self.cases is not None or self.baseline is not None):
             raise typer.BadParameter("--sprites goes without --cases and --baseline")
+        if self.subject is Subject.palette and (self.only or self.count):
+            raise typer.BadParameter("--only and --count do not belong to `palette`")
         if self.cases is not None and self.subject is Subject.stability:
             raise typer.BadParameter("--cases does not belong to `stability`")

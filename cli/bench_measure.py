@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from toonset.cli.bench_charts import charts_by_group, charts_of_colors
 from toonset.cli.bench_chosen import DEFAULT_COUNT, Baseline, Chosen, Subject
 from toonset.cli.output import Printer
 from toonset.errors import BundleError
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from toonset.bench.record import Record
     from toonset.bench.split_cases import SplitCase
 
-CHARTED = ("rotation error modulo twin", "yaw error", "held-out PSNR")
 WRONG_SPLITS = "wrong.png"
 
 
@@ -35,11 +35,13 @@ def measure(chosen: Chosen, printer: Printer) -> Measured:
     """
     if chosen.subject is Subject.splitting:
         return _splitting(chosen, printer)
-    records, text = _stage(chosen, printer)
-    return Measured(records, text, _charts(chosen, records))
+    if chosen.subject is Subject.palette:
+        return _palettes(chosen, printer)
+    records, text = _cameras_or_fields(chosen, printer)
+    return Measured(records, text, charts_by_group(chosen, records))
 
 
-def _stage(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
+def _cameras_or_fields(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
     if chosen.subject is Subject.train:
         return _training(chosen, printer)
     if chosen.sprites is not None:
@@ -107,29 +109,14 @@ def _split_cases(chosen: Chosen) -> Iterator[SplitCase]:
         yield from messy_cases(chosen.seed, count, chosen.only)
 
 
+def _palettes(chosen: Chosen, printer: Printer) -> Measured:
+    from toonset.bench.palette import bench_palette
+
+    records, text = bench_palette(
+        chosen.cases, chosen.seed, quick=chosen.quick, progress=printer.progress
+    )
+    return Measured(records, text, charts_of_colors(chosen, records))
+
+
 def _none_of(chosen: Chosen) -> BundleError:
     return BundleError(f"no case's name contains {chosen.only!r}; correct --only")
-
-
-def _charts(chosen: Chosen, records: list[Record]) -> dict[str, bytes]:
-    from toonset.bench.chart import Point, draw_chart
-    from toonset.bench.record import machine
-
-    charts = {}
-    for group in dict.fromkeys(record.group for record in records):
-        own = [record for record in records if record.group == group]
-        seconds = {r.method: r.median for r in own if r.metric == "seconds"}
-        merits = [r for r in own if r.metric in CHARTED]
-        if not merits:
-            continue
-        points = [Point(r.method, max(seconds[r.method], 1e-3), r.median, r.p95) for r in merits]
-        training = chosen.subject is Subject.train
-        charts[f"chart-{group.replace(' ', '-').replace(',', '')}.png"] = draw_chart(
-            points,
-            title=f"toonset bench {chosen.subject.value}, {group}: median, whisker to p95",
-            cost_label="seconds of training" if training else "seconds per sheet",
-            merit_label=f"{merits[0].metric} ({merits[0].unit})",
-            caption=f"n = {merits[0].n}, seed {chosen.seed}, {machine()}",
-            lower_is_better=merits[0].direction == "lower",
-        )
-    return charts
