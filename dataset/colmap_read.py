@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from toonset.camera import Camera
+from toonset.dataset.colmap_check import check_lengths
 from toonset.errors import BundleError, CameraError
 
 MODELS = ("PINHOLE", "SIMPLE_PINHOLE")
-LEAST_BYTES = {"cameras": 24, "images": 73, "points3D": 51, "rigs": 8, "frames": 8}  # per record
 ONLY_FATAL = 3  # pycolmap's log level; what goes wrong reaches us as an exception
 
 
@@ -45,29 +45,14 @@ def _load(folder: Path) -> Any:
     import pycolmap
 
     pycolmap.logging.minloglevel = ONLY_FATAL
-    _check_counts(folder)
+    check_lengths(folder)
     try:
         return pycolmap.Reconstruction(folder)
     except (RuntimeError, ValueError, IndexError, MemoryError) as error:
-        reason = str(error).splitlines()[0]
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise BundleError(
             f"{folder}: is no complete COLMAP model ({reason}); export it again"
         ) from error
-
-
-def _check_counts(folder: Path) -> None:
-    """Refuse a file that announces more records than it can hold: pycolmap would fill memory."""
-    for name, least in LEAST_BYTES.items():
-        file = folder / f"{name}.bin"
-        if not file.is_file():
-            continue
-        with file.open("rb") as opened:
-            head = opened.read(8)
-        count = int.from_bytes(head, "little")
-        if len(head) < 8 or 8 + least * count > file.stat().st_size:
-            raise BundleError(
-                f"{file}: is no complete COLMAP model (cut off or damaged); export it again"
-            )
 
 
 def _camera_of(image: Any, model: Any, folder: Path) -> Camera:
@@ -80,7 +65,9 @@ def _camera_of(image: Any, model: Any, folder: Path) -> Camera:
     pose = np.eye(4)
     pose[:3] = image.cam_from_world().inverse().matrix()
     try:
-        size = (int(lens.width), int(lens.height))
-        return Camera.from_pinhole(pose, lens.calibration_matrix(), size)
+        size, K = (int(lens.width), int(lens.height)), lens.calibration_matrix()
+        if not min(K[0, 0], K[1, 1]) > 0:  # NaN neither
+            raise CameraError(f"camera: focal lengths {K[0, 0]:g}, {K[1, 1]:g} must be positive")
+        return Camera.from_pinhole(pose, K, size)
     except CameraError as error:
         raise BundleError(f"{folder}: {image.name}: {error}; export the model again") from error

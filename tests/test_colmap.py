@@ -234,6 +234,34 @@ def test_a_damaged_model_is_refused(dataset: Path, name: str) -> None:
         read_colmap(dataset)
 
 
+@pytest.mark.parametrize("old", [False, True], ids=["new", "old"])
+@pytest.mark.parametrize("text", [False, True], ids=["bin", "txt"])
+def test_flipped_bits_end_in_one_line_or_a_camera(tmp_path: Path, text: bool, old: bool) -> None:
+    """A damaged count must not fill memory, whichever file it stands in."""
+    mesh, frames = random_body(3), [replace(f, rgba=np.full_like(f.rgba, 255)) for f in posed(2)]
+    views = [ExportView(f.name, f.rgba, f.camera, 180.0, RADIUS) for f in frames]
+    cameras = [view.pinhole for view in views]
+    points = track_points(sample_surface(mesh, 20, 0), mesh, frames, cameras)
+    write_colmap(tmp_path / "out", views, points, text=text, old_layout=old)
+    files = sorted((tmp_path / "out" / "sparse" / "0").iterdir())
+    rng = np.random.default_rng(8)
+    reasons = []
+    for _ in range(60):
+        file = files[rng.integers(len(files))]
+        whole = file.read_bytes()
+        damaged = bytearray(whole[: rng.integers(1, len(whole))] if rng.random() < 0.3 else whole)
+        for _ in range(rng.integers(1, 4)):
+            damaged[rng.integers(len(damaged))] ^= 1 << rng.integers(8)
+        file.write_bytes(damaged)
+        try:
+            read_colmap(tmp_path / "out")
+        except BundleError as error:
+            reasons.append(str(error))
+        file.write_bytes(whole)
+    assert len(reasons) > 5
+    assert not any("\n" in reason for reason in reasons)
+
+
 def test_a_model_without_rigs_of_an_older_colmap_is_read(dataset: Path) -> None:
     before = read_colmap(dataset)
     for name in ("rigs.bin", "frames.bin"):
