@@ -71,7 +71,7 @@ def palette_cases(folder: Path | None, seed: int, *, quick: bool) -> Iterator[Pa
         BundleError: the folder holds no character with known colours.
     """
     sizes = SIZES_PX[:1] if quick else SIZES_PX
-    for mesh in _characters(folder, seed, quick=quick):
+    for mesh in characters(folder, seed, quick=quick):
         for size, lined in product(sizes, (False, True)):
             options = SynthOptions(
                 cell_px=size, outline_px=OUTLINE * size if lined else 0.0, elevation_deg=5
@@ -102,7 +102,12 @@ def random_paints(rng: np.random.Generator, count: int) -> list[RGB]:
     return paints
 
 
-def _characters(folder: Path | None, seed: int, *, quick: bool) -> Iterator[Mesh]:
+def characters(folder: Path | None, seed: int, *, quick: bool) -> Iterator[Mesh]:
+    """Yield the characters of a folder, or random bodies in random paints.
+
+    Raises:
+        BundleError: the folder holds no character with known colours.
+    """
     if folder is None:
         for i in range(2 if quick else 8):
             yield _painted_body(seed + i)

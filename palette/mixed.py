@@ -28,7 +28,7 @@ YCC_FROM_RGB = np.array(
 )
 ROUNDING = 1 / np.sqrt(12)  # levels: the noise of 8 bits
 BESIDE = np.array([1.4, 2.5, 2.5])  # JPEG's noise next to an edge, over that two pixels away
-SURE = 2.5  # times the noise towards a neighbour's colour: a blend
+SURE = 3.0  # times the noise towards a neighbour's colour: a blend
 LOST = 4.0  # times the noise from every colour around: a blend of what is not seen
 LOST_AT_RIM = 12.0  # where the figure ends: JPEG lets the paper in
 STRAY = 3.0  # times the noise (in squares) that a colour with no area nearby must be nearer
