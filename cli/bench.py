@@ -53,7 +53,7 @@ def bench(
         Baseline | None,
         typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer settings.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer settings or cases.")] = False,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Output folder.", rich_help_panel=OUTPUT_PANEL)
     ] = Path("bench-results"),

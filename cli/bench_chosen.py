@@ -19,6 +19,7 @@ class Subject(StrEnum):
     stability = "stability"
     splitting = "split"  # a string has a method `split`
     palette = "palette"
+    labels = "labels"
 
 
 class Baseline(StrEnum):
@@ -56,7 +57,8 @@ class Chosen:
         alone = self.subject is Subject.calib and self.sprites is not None
         if alone and (self.cases is not None or self.baseline is not None):
             raise typer.BadParameter("--sprites goes without --cases and --baseline")
-        if self.subject is Subject.palette and (self.only or self.count):
-            raise typer.BadParameter("--only and --count do not belong to `palette`")
+        of_colors = self.subject in (Subject.palette, Subject.labels)
+        if of_colors and (self.only or self.count):
+            raise typer.BadParameter("--only and --count do not belong to `palette` and `labels`")
         if self.cases is not None and self.subject is Subject.stability:
             raise typer.BadParameter("--cases does not belong to `stability`")

@@ -37,6 +37,8 @@ def measure(chosen: Chosen, printer: Printer) -> Measured:
         return _splitting(chosen, printer)
     if chosen.subject is Subject.palette:
         return _palettes(chosen, printer)
+    if chosen.subject is Subject.labels:
+        return _labels(chosen, printer)
     records, text = _cameras_or_fields(chosen, printer)
     return Measured(records, text, charts_by_group(chosen, records))
 
@@ -116,6 +118,15 @@ def _palettes(chosen: Chosen, printer: Printer) -> Measured:
         chosen.cases, chosen.seed, quick=chosen.quick, progress=printer.progress
     )
     return Measured(records, text, charts_of_colors(chosen, records))
+
+
+def _labels(chosen: Chosen, printer: Printer) -> Measured:
+    from toonset.bench.labels import bench_labels
+
+    records, text = bench_labels(
+        chosen.cases, chosen.seed, quick=chosen.quick, progress=printer.progress
+    )
+    return Measured(records, text)
 
 
 def _none_of(chosen: Chosen) -> BundleError:

@@ -266,6 +266,7 @@ def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
         ["train", "--sprites", "x"],
         ["palette", "--only", "x"],
         ["palette", "--count", "3"],
+        ["labels", "--only", "x"],
     ],
 )
 def test_options_of_other_subjects_are_refused(toonset, tmp_path, wrong):
