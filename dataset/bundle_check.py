@@ -33,7 +33,8 @@ from toonset.dataset.transforms_read import PosedPicture, check_total, frame_of,
 from toonset.dataset.transforms_schema import read_records
 from toonset.palette.files import parse_colors
 
-PALETTE_JSON, PALETTE_GPL = "palette.json", "palette.gpl"
+PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
+PALETTE_COPIES = ("palette.gpl", "palette.ase", "palette.hex")
 SAME_CAMERA = 1e-6  # relative: both files are written from the same numbers
 
 Colors = UInt8[np.ndarray, "colors 3"]
@@ -72,7 +73,8 @@ def bundle_problems(path: Path) -> list[Problem]:
         _check_calibration(log, file, frames)
         _check_strays(log, IMAGES, frames.names)
     _check_alone(log, MANNEQUIN, load_mesh)
-    _check_alone(log, OVERLAY, load_rgba)
+    for name in (OVERLAY, SWATCHES):
+        _check_alone(log, name, load_rgba)
     return log.problems
 
 
@@ -102,7 +104,7 @@ def _check_colors(log: ProblemLog, file: Path, frames: _Frames) -> None:
     if frames.posed:
         log.attempt(file.name, check_label_names, file, frames.posed)
     _check_maps(log, LABELS, frames, lambda frame: read_labels(log.root, frame, len(palette)))
-    _check_gpl(log, palette)
+    _check_copies(log, palette)
 
 
 def _check_contours(log: ProblemLog, frames: _Frames) -> None:
@@ -122,15 +124,17 @@ def _check_maps(
     _check_strays(log, folder, names and [f"{Path(name).stem}.png" for name in names])
 
 
-def _check_gpl(log: ProblemLog, palette: Colors) -> None:
-    found = log.attempt(PALETTE_GPL, member, log.root, PALETTE_GPL)
-    colors = log.attempt(PALETTE_GPL, parse_colors, str(found)) if found else None
-    if colors is not None and set(map(tuple, colors)) != set(map(tuple, palette)):
-        log.add(
-            PALETTE_GPL,
-            "has other colours than palette.json, which counts; run `toonset palette` with "
-            "--colors palette.gpl to use them",
-        )
+def _check_copies(log: ProblemLog, palette: Colors) -> None:
+    """Compare the palette's copies for other programs with palette.json."""
+    for name in PALETTE_COPIES:
+        found = log.attempt(name, member, log.root, name)
+        colors = log.attempt(name, parse_colors, str(found)) if found else None
+        if colors is not None and set(map(tuple, colors)) != set(map(tuple, palette)):
+            log.add(
+                name,
+                "has other colours than palette.json, which counts; run `toonset palette` with "
+                f"--colors {name} to use them",
+            )
 
 
 def _check_calibration(log: ProblemLog, file: Path, frames: _Frames) -> None:

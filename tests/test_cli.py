@@ -323,6 +323,14 @@ def test_force_replaces_an_earlier_result_only(run: Path, toonset, snapshot, tmp
     assert set(snapshot(tmp_path / "turn")) == {"000.png"}
 
 
+def test_force_replaces_a_bundle_with_its_palette(drawn: Path, bundle: Path, toonset):
+    assert toonset("palette", bundle, "-q").code == 0
+    arguments = ("calibrate", drawn / "single.png", "--mesh", drawn / "mannequin.obj", "-o", bundle)
+    assert "exists already; pass --force to replace it" in toonset(*arguments, "-q").reason
+    assert toonset(*arguments, "-q", "--force").code == 3  # a single drawing
+    assert {path.name for path in bundle.iterdir()} == BUNDLE_FILES
+
+
 @pytest.mark.parametrize(
     ("out", "words"),
     [
