@@ -139,4 +139,5 @@ def _values(node: Any, name: str) -> np.ndarray:
 
 
 def _first_words(error: Exception) -> str:
-    return " ".join(str(error.__cause__ or error).split())[:80]
+    words = " ".join(str(error.__cause__ or error).split())
+    return (words.partition("error: ")[2] or words)[:80]  # OpenCV names its source file first
