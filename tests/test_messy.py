@@ -104,7 +104,7 @@ def test_what_is_no_figure_is_not_in_the_truth(seed: int) -> None:
 
 
 def test_reading_order_is_rows_from_the_top_each_from_the_left() -> None:
-    for seed in range(4):
+    for seed in range(3):
         boxes = sheet(seed, "rows", "heads", "props").boxes
         for (x, y, _, h), (next_x, next_y, _, next_h) in pairwise(boxes):
             same_row = abs((next_y + next_h) - (y + h)) <= 2
@@ -119,7 +119,7 @@ def test_overlapping_figures_hide_some_of_each_other() -> None:
     assert any(common_area(a, b) for a, b in combinations(over.boxes, 2))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_floating_parts_belong_to_their_figure(seed: int) -> None:
     import cv2
 
@@ -130,7 +130,7 @@ def test_floating_parts_belong_to_their_figure(seed: int) -> None:
 # ---- seeds and names
 
 
-@pytest.mark.parametrize("difficulties", [(), ("paper", "jpeg", "rows"), ("transparent", "heads")])
+@pytest.mark.parametrize("difficulties", [(), ("paper", "jpeg", "heads")])
 def test_same_seed_same_bytes_and_other_seeds_others(difficulties: tuple[str, ...]) -> None:
     first, other = sheet(1, *difficulties), sheet(2, *difficulties)
     solid_cast.cache_clear()
