@@ -144,7 +144,7 @@ def _say(
         printer.say(_source_line(source))
         for view, of, label in zip(named.views, named.source_of, named.labels, strict=True):
             if of == index:
-                x, y, width, height = view.box
+                x, y, width, height = view.figure_box
                 line = f"line {view.line_width_px:4.1f} px" if view.line_width_px else "no line"
                 text = f"{view.name}  at {x:5d},{y:5d}  {width:5d} x {height:4d} px  {line}"
                 printer.say(f"  {text}  {label}".rstrip())
@@ -152,6 +152,8 @@ def _say(
         if kinds:
             listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
             printer.say(f"  left out: {listed}")
+        for remark in source.remarks:
+            printer.say(f"  {remark}")
     for doubt in doubts:
         printer.doubt(f"look: {doubt}")
     if cutting.drop:

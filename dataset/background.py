@@ -6,7 +6,7 @@ field (`toonset.dataset.background_field`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -30,6 +30,9 @@ WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
 WORTH_LEVELS = 2.0  # and less by so many levels
 WORTH_SHARE = 0.05  # of the border: or explain so much more of it
 CLEARLY = 0.98  # of the border in one colour with less noise than that: nothing to gain
+RING = 0.02  # of the shorter side: the border that is looked at
+INSETS = (0.0, 0.02, 0.04)  # of the shorter side: where it is looked for
+COMMON = 0.15  # of the sheet: a colour that covers less is no background but a frame
 MOST_SAMPLES = 200_000  # border pixels that are looked at
 
 
@@ -44,6 +47,7 @@ class Background:
         sure: share of the border that is background, 0 to 1.
         tolerance: largest difference of a channel, in levels, that is still background.
         evidence: why this kind and not a simpler one, for people; "" for the simplest.
+        inset: share of the shorter side at which it begins: more than 0 inside of a thick frame.
     """
 
     rgb: tuple[int, int, int] | None
@@ -52,6 +56,7 @@ class Background:
     sure: float
     tolerance: int
     evidence: str = ""
+    inset: float = 0.0
 
     def colors(self, box: Box) -> UInt8[np.ndarray, "height width 3"]:
         """Return the background's colour in a window (x, y, width, height) of the sheet."""
@@ -82,14 +87,15 @@ def find_background(
     Raises:
         SheetError: the border has no dominant colour.
     """
-    ring = ring_of(rgba.shape[0], rgba.shape[1])
     if is_transparent(rgba) and known_rgb is None:
-        return Background(None, None, "transparent", _sure_of_alpha(rgba, ring), 0)
-    places = _samples(ring)
+        return Background(None, None, "transparent", _sure_of_alpha(rgba), 0)
+    inset = _inset(rgba)
+    places = _samples(ring_of(*rgba.shape[:2], inset))
     colors = rgba[places][:, :3]
     if known_rgb is not None:
-        return _judged("plain", None, known_rgb, colors, np.array(known_rgb))
-    found = _richest_worth_it(rgba, places, colors)
+        known = _judged("plain", None, known_rgb, colors, np.array(known_rgb))
+        return replace(known, inset=inset)
+    found = replace(_richest_worth_it(rgba, places, colors), inset=inset)
     if found.sure < LEAST_SURE:
         raise SheetError(
             f"the background is not one colour (the commonest takes {found.sure:.0%} of the "
@@ -144,16 +150,36 @@ def halo_tolerance(away: UInt8[np.ndarray, "height width"]) -> int:
     return MOST_TOLERANCE
 
 
-def ring_of(height: int, width: int) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels near the border: 2 % of the shorter side, so a thin frame is outvoted."""
-    thick = max(3, round(0.02 * min(height, width)))
-    ring = np.ones((height, width), dtype=bool)
-    ring[thick : height - thick, thick : width - thick] = False
+def ring_of(height: int, width: int, inset: float = 0.0) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels near the border: 2 % of the shorter side, so a thin frame is outvoted.
+
+    Args:
+        height: of the sheet.
+        width: of the sheet.
+        inset: share of the shorter side at which the ring begins.
+    """
+    begin = round(inset * min(height, width))
+    end = begin + max(3, round(RING * min(height, width)))
+    ring = np.zeros((height, width), dtype=bool)
+    ring[begin : height - begin, begin : width - begin] = True
+    ring[end : height - end, end : width - end] = False
     return ring
 
 
-def _sure_of_alpha(rgba: np.ndarray, ring: np.ndarray) -> float:
-    return float((rgba[..., 3][ring] < 128).mean())
+def _sure_of_alpha(rgba: np.ndarray) -> float:
+    return float((rgba[..., 3][ring_of(*rgba.shape[:2])] < 128).mean())
+
+
+def _inset(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
+    """Return where the background begins: inside of frames, whose colour is on the rim alone."""
+    step = max(1, round((rgba.shape[0] * rgba.shape[1] / MOST_SAMPLES) ** 0.5))
+    everywhere = rgba[::step, ::step, :3].reshape(-1, 3)
+    for inset in INSETS:
+        rim = _dominant(rgba[_samples(ring_of(*rgba.shape[:2], inset))][:, :3])
+        near = np.abs(everywhere - np.array(rim, dtype=np.int16)).max(axis=1) <= CLUSTER_RADIUS
+        if near.mean() >= COMMON:
+            return inset
+    return 0.0
 
 
 def _samples(ring: Bool[np.ndarray, "height width"]) -> tuple[np.ndarray, np.ndarray]:

@@ -18,20 +18,27 @@ from toonset.dataset.letters import find_letters
 LOWEST = 0.7  # of the views' median height: lower drawings are studies or props
 HIGHEST = 1.45  # of the same: higher ones, too
 LEAST_AREA = 0.25  # of the views' median area: a side view is rarely below a third of a front view
+SMALLER = 0.85  # of the views' median height or area
+STRANGE = 0.6  # of what the views commonly share of their colours: less is another thing
 RECTANGLE = 0.96  # of its box that a patch fills: a block of colour, no character
 WITHIN = 0.5  # of a patch that lies in a figure's box: its part
 NEAR = 0.02  # of the figure's height: a part this near to the figure is the figure's
 ABOVE = 0.08  # of the figure's height: so near something above or below it may be its part
 BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
+FARTHEST = 0.3  # of the figure's height: a part that most views have is no farther
+SAME_LEVEL = 0.08  # of the figure's height
+SAME_SIZE = 2.5  # times, of shares of the figure's area
+OFTEN = 0.45  # times the views: in some a hand lies before the body, in some there are two
 PART_AREA = 0.35  # of the figure's area: a larger thing apart is a drawing of its own
 LEAST_PART = 0.004  # of the figure's area: smaller things beside a figure are marks
 LEAST_SPECK = 4  # cells: smaller things are noise
 LISTED_SPECK = 0.0005  # of the figure's area: smaller ones are counted, not listed
 FAMILIAR = 0.8  # of a part's pixels in colours that its figure has
-DARK = 110  # level: ink is no lighter
+DARK = 170  # level: ink is no lighter
+LETTER_HEIGHT = 0.07  # of the figure's height
 OFF_INK = 24  # levels from the mixtures of ink and paper: noise
 ONE_INK = 0.95  # of a patch's pixels in its ink
-STROKE = 0.12  # of its box's diagonal: a thing no thicker is a stroke
+STROKE = 0.12  # of its box's squared diagonal: a thing that covers no more is a stroke
 SWATCH = 0.9  # of its box that a swatch fills
 DISC = (0.74, 0.83)  # of its box that a disc fills
 
@@ -100,6 +107,31 @@ def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
     return large
 
 
+def without_strangers(
+    blobs: Blobs, mains: Int[np.ndarray, " mains"], rgb: UInt8[np.ndarray, "height width 3"]
+) -> Int[np.ndarray, " mains"]:
+    """Return the bodies without smaller ones in other colours: a sword as high as its bearer."""
+    if len(mains) < 3:
+        return mains
+    looks = np.array([_look(rgb[blobs.window(int(n))][blobs.mask(int(n))]) for n in mains])
+    others = (looks.sum(axis=0) - looks) / (len(mains) - 1)
+    shared = np.minimum(looks, others).sum(axis=1)
+    heights, areas = blobs.boxes[mains, 3], blobs.areas[mains]
+    smaller = (heights <= SMALLER * np.median(heights)) | (areas <= SMALLER * np.median(areas))
+    return mains[~smaller | (shared >= STRANGE * np.median(shared))]
+
+
+def shared_colors(a: UInt8[np.ndarray, "_ 3"], b: UInt8[np.ndarray, "_ 3"]) -> float:
+    """Return how much of their colours two figures share: the histograms' intersection."""
+    return float(np.minimum(_look(a), _look(b)).sum())
+
+
+def _look(colors: UInt8[np.ndarray, "_ 3"]) -> Float[np.ndarray, " 64"]:
+    """Return the shares of 64 colours."""
+    codes = (colors // 64).astype(np.int64) @ np.array([16, 4, 1])
+    return np.bincount(codes, minlength=64) / max(len(codes), 1)
+
+
 def group_blobs(
     blobs: Blobs, mains: Int[np.ndarray, " mains"], rgb: UInt8[np.ndarray, "height width 3"]
 ) -> Grouping:
@@ -119,11 +151,17 @@ def group_blobs(
         nearest, gap = _nearest_main(blobs, mains, small)
         letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[mains, 3])))
         typical = float(np.median(blobs.areas[mains]))
+        bodies = mains[nearest]
         for i, number in enumerate(small):
-            body = int(mains[nearest[i]])
-            if _is_part(blobs, int(number), body, float(gap[i]), bool(letters[i]), rgb):
+            if _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), bool(letters[i]), rgb):
                 figure[number] = nearest[i]
-            elif letters[i]:
+        loose = np.flatnonzero((figure[small] < 0) & ~letters)
+        again = _come_again(blobs, small[loose], bodies[loose], gap[loose], len(mains), rgb)
+        figure[small[loose[again]]] = nearest[loose[again]]
+        for i, number in enumerate(small):
+            if figure[number] >= 0:
+                continue
+            if letters[i]:
                 kinds[number] = "text"
             elif blobs.areas[number] >= LISTED_SPECK * typical:
                 kinds[number] = _kind(blobs, int(number), typical)
@@ -204,16 +242,49 @@ def _is_part(
         return False
     if _share_within(own, main) >= WITHIN:
         return True
-    if is_letter or _is_ink(rgb[blobs.window(number)][blobs.mask(number)]):
+    if is_letter:
         return False
     if gap <= NEAR * main[3]:
         return True
     if area < LEAST_PART or _is_stroke(blobs.mask(number)):
         return False
+    if _is_lettering(blobs, number, body, rgb):
+        return False
     middle = own[0] + own[2] / 2
     if main[0] <= middle <= main[0] + main[2]:
         return gap <= ABOVE * main[3]
     return gap <= BESIDE * main[3] and _in_its_colors(blobs, number, body, rgb)
+
+
+def _come_again(
+    blobs: Blobs,
+    numbers: Int[np.ndarray, " n"],
+    bodies: Int[np.ndarray, " n"],
+    gaps: Float[np.ndarray, " n"],
+    views: int,
+    rgb: np.ndarray,
+) -> Bool[np.ndarray, " n"]:
+    """Return which patches are parts because most views have the like at the same level.
+
+    So hands without arms and hats in the air are found, farther away than a single thing may be.
+    """
+    result = np.zeros(len(numbers), dtype=bool)
+    own, main = blobs.boxes[numbers], blobs.boxes[bodies]
+    middle = own[:, :2] + own[:, 2:] / 2 - main[:, :2]
+    level = middle[:, 1] / main[:, 3]
+    size = blobs.areas[numbers] / blobs.areas[bodies]
+    above = (middle[:, 0] >= 0) & (middle[:, 0] <= main[:, 2])
+    able = (gaps <= FARTHEST * main[:, 3]) & (size >= LEAST_PART) & (size <= PART_AREA)
+    for i in np.flatnonzero(able):
+        number, body = int(numbers[i]), int(bodies[i])
+        drawn = not _is_lettering(blobs, number, body, rgb) and not _is_stroke(blobs.mask(number))
+        able[i] = drawn and (above[i] or _in_its_colors(blobs, number, body, rgb))
+    for i in np.flatnonzero(able):
+        alike = able & (np.abs(level - level[i]) <= SAME_LEVEL) & (above == above[i])
+        alike &= (size <= SAME_SIZE * size[i]) & (size >= size[i] / SAME_SIZE)
+        if len(np.unique(bodies[alike])) >= 2 and alike.sum() >= OFTEN * views:
+            result[i] = True
+    return result
 
 
 def _share_within(own: np.ndarray, main: np.ndarray) -> float:
@@ -224,9 +295,16 @@ def _share_within(own: np.ndarray, main: np.ndarray) -> float:
 
 
 def _is_stroke(mask: Bool[np.ndarray, "height width"]) -> bool:
-    """Return whether a patch is thin everywhere: an arrow's shaft, a flourish."""
-    depth = cv2.distanceTransform(np.pad(mask, 1).view(np.uint8), cv2.DIST_L2, 3).max()
-    return bool(2 * depth <= STROKE * np.hypot(*mask.shape))
+    """Return whether a patch is thin for its length: an arrow, a flourish."""
+    height, width = mask.shape
+    return bool(mask.sum() <= STROKE * (height**2 + width**2))
+
+
+def _is_lettering(blobs: Blobs, number: int, body: int, rgb: np.ndarray) -> bool:
+    """Return whether a patch is of one ink, and low or thin: a word, a figure, an arrow."""
+    mask = blobs.mask(number)
+    low = mask.shape[0] <= LETTER_HEIGHT * blobs.boxes[body, 3]
+    return (low or _is_stroke(mask)) and _is_ink(rgb[blobs.window(number)][mask])
 
 
 def _is_ink(colors: UInt8[np.ndarray, "n 3"]) -> bool:

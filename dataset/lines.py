@@ -1,7 +1,8 @@
 """Ruled lines of a sheet: frames round it or round each figure, tables, ground and height lines.
 
-A line is a thin straight run with paper along most of it. It counts if it crosses most of the
-sheet, or if it closes a rectangle with other lines; so a spear, a belt or a letter is none.
+A line is a thin straight run with paper along most of it, or a row of dashes. It counts if it
+crosses most of the sheet, or if it closes a rectangle with other lines; so a spear, a belt or a
+letter is none.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ CROSSING = 0.6  # of the sheet: a line this long needs no others
 LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
 ALIKE = 0.8  # overlap of the runs of neighbouring rows
 OPEN = 0.5  # of the line's length with paper beside it, on the better side
+DASHES = 6  # flat pieces in a row: a dashed line
+LONGEST_DASH = 0.1  # of the sheet's side
 JOINT = 0.02  # of the shorter side: corners may miss each other by so much
 BROKEN_PX = 5  # gaps in a run that noise may leave
 
@@ -58,8 +61,11 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
     """
     height, width = paint.shape
     thickest = max(THICKEST_PX, round(THICKEST * min(height, width)))
-    lines = _straight(paint, thickest, vertical=False)
-    lines += _straight(np.ascontiguousarray(paint.T), thickest, vertical=True)
+    lines = []
+    for vertical in (False, True):
+        turned = np.ascontiguousarray(paint.T) if vertical else paint
+        lines += _straight(turned, thickest, vertical=vertical)
+        lines += _dashed(turned, thickest, vertical=vertical)
     free = [line for line in lines if _crosses(line, paint.shape)]
     closed = _closed(lines, free, JOINT * min(height, width) + thickest)
     shortest = LEAST_SIDE * min(height, width)
@@ -97,6 +103,23 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
     return [line for line in lines if _is_open(paint, line)]
 
 
+def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
+    """Return rows of dashes: many thin flat pieces on one level that span most of the sheet."""
+    stats = cv2.connectedComponentsWithStats(paint.view(np.uint8), connectivity=8)[2][1:]
+    left, top, width, height = stats[:, :4].T
+    flat = (height <= thickest) & (width >= 1.5 * height) & (width <= LONGEST_DASH * paint.shape[1])
+    lines = []
+    for level in np.unique(top[flat]):
+        own = flat & (np.abs(top - level) <= 1)
+        start, stop = int(left[own].min()), int((left + width)[own].max())
+        if own.sum() < DASHES or stop - start < CROSSING * paint.shape[1]:
+            continue
+        last = int((top + height)[own].max()) - 1
+        if not lines or lines[-1].last < level - 1:
+            lines.append(Line(int(level), last, 0, paint.shape[1], vertical))
+    return lines
+
+
 def _stacked(runs: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]]:
     """Return (first row, last row, start, stop) of runs that lie below each other."""
     done: list[tuple[int, int, int, int]] = []
@@ -116,8 +139,13 @@ def _stacked(runs: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]
 
 
 def _is_open(paint: np.ndarray, line: Line) -> bool:
-    above, below = _beside(paint, line)
-    return bool(np.mean(~above & ~below) >= OPEN)
+    columns = slice(line.start, line.stop)
+    reach = line.last - line.first + 2
+    above = paint[max(line.first - 1 - reach, 0) : max(line.first - 1, 0), columns]
+    below = paint[line.last + 2 : line.last + 2 + reach, columns]
+    closed_above = above.all(axis=0) & bool(len(above))
+    closed_below = below.all(axis=0) & bool(len(below))
+    return bool(np.mean(~closed_above & ~closed_below) >= OPEN)
 
 
 def _beside(paint: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:

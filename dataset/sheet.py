@@ -7,21 +7,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.background import Background, find_background, flattened, is_transparent
+from toonset.dataset.crops import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.cutout import cut_out, edge_softness_px
 from toonset.dataset.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.letters import words
 from toonset.dataset.line_width import contour_width_px
-from toonset.dataset.survey import Survey, figure_cells, find_paint, in_pixels, joined, survey
+from toonset.dataset.survey import Survey, find_paint, survey
 from toonset.errors import SheetError
 from toonset.view import View
 
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
 SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
+NEARLY_A_VIEW = 0.5  # of the views' height: something left out that a person should look at
 WIDE = 1.8  # times the median width: two figures that touch
 
 NAMES = {
@@ -41,8 +42,6 @@ class SheetOptions:
 
     Attributes:
         margin_px: empty pixels around every figure.
-        least_figure: share of the largest figure's area from which a patch is a figure of its
-            own; a side view is rarely below a third of a front view.
         least_hole: share of the figure's area from which an enclosed patch in the background's
             colour is a hole.
         most_figures: more are refused; a sheet of letters or a pattern is no character sheet.
@@ -53,7 +52,6 @@ class SheetOptions:
     """
 
     margin_px: int = 4
-    least_figure: float = 0.2
     least_hole: float = 0.001
     most_figures: int = 64
     background_rgb: tuple[int, int, int] | None = None
@@ -83,8 +81,9 @@ class Sheet:
         views: in reading order, rows from the top, each from left to right.
         background: the sheet's colour; None where it is transparent.
         sure: share of the sheet's border that is background, 0 to 1.
-        warnings: what was dropped or doubtful, for people.
+        warnings: what a person should look at, for a view may be wrong.
         left_out: what was seen but is no view.
+        remarks: what was done besides, for people.
     """
 
     views: tuple[View, ...]
@@ -92,6 +91,7 @@ class Sheet:
     sure: float
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def split_sheet(
@@ -113,30 +113,17 @@ def split_sheet(
     paint, ground = find_paint(rgba, ground)
     found = survey(rgba, paint, ground)
     _check(found, ground, options)
-    crops = _crops(found, paint, options.margin_px)
+    crops = _crops(found, paint, options)
     views, holes = _views(rgba, ground, crops, options)
+    by_hand = bool(options.boxes) or options.grid is not None
     return Sheet(
         tuple(views),
         ground.rgb,
         ground.sure,
-        _warnings(ground, found, views, holes),
-        _left_out(found),
+        _doubts(ground, views) + (() if by_hand else _doubts_of_figures(found, views)),
+        () if by_hand else _left_out(found),
+        _remarks(ground, found, holes),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class Crop:
-    """Where a figure stands, and its pixels there.
-
-    Attributes:
-        box: (x, y, width, height) in the sheet.
-        solid: what the figure covers with all that it encloses.
-        enclosed: background-coloured pixels within.
-    """
-
-    box: Box
-    solid: Bool[np.ndarray, "height width"]
-    enclosed: Bool[np.ndarray, "height width"]
 
 
 def _check(found: Survey, ground: Background, options: SheetOptions) -> None:
@@ -150,52 +137,22 @@ def _check(found: Survey, ground: Background, options: SheetOptions) -> None:
             f"no figure on the {color} background: the largest patch is {width} x {height} px, "
             f"{LEAST_FIGURE_PX} x {LEAST_FIGURE_PX} is needed; use a larger picture"
         )
-    if found.grouping.count > options.most_figures:
+    by_hand = bool(options.boxes) or options.grid is not None
+    if found.grouping.count > options.most_figures and not by_hand:
         raise SheetError(
             f"found {found.grouping.count} figures, at most {options.most_figures} are read; crop "
             "the sheet to one character"
         )
 
 
-def _crops(found: Survey, paint: Bool[np.ndarray, "height width"], margin_px: int) -> list[Crop]:
-    cells = figure_cells(found)
-    bare = found.ruled | found.shadow
-    crops = []
-    for number in range(found.grouping.count):
-        box = _box(found, number, paint.shape, margin_px)
-        drawn = _window(paint, box) & ~in_pixels(bare, found.cell_px, box)
-        if found.cell_px == 1:
-            solid = _window(cells, box) == number + 1
-        else:
-            own = _own_pixels(cells, number, found.cell_px, box)
-            paper = in_pixels(found.paper, found.cell_px, box)
-            solid = own & ~joined(~drawn, paper & ~drawn)
-        solid &= ~in_pixels(found.shadow, found.cell_px, box)
-        crops.append(Crop(box, solid, solid & ~drawn))
-    return crops
-
-
-def _own_pixels(
-    cells: Int[np.ndarray, "rows columns"], number: int, cell_px: int, box: Box
-) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels of a figure's cells and of those beside them that are nobody's."""
-    x, y, width, height = box
-    rows = slice(max(y // cell_px - 1, 0), (y + height) // cell_px + 2)
-    columns = slice(max(x // cell_px - 1, 0), (x + width) // cell_px + 2)
-    near = cells[rows, columns]
-    grown = cv2.dilate((near == number + 1).view(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    own = grown & ((near == 0) | (near == number + 1))
-    local = (x - columns.start * cell_px, y - rows.start * cell_px, width, height)
-    return np.asarray(in_pixels(own, cell_px, local), dtype=bool)
-
-
-def _box(found: Survey, number: int, shape: tuple[int, ...], margin: int) -> Box:
-    """Return the box of a figure with its margin, in pixels of the sheet."""
-    boxes = found.blobs.boxes[found.grouping.figure_of_blob == number] * found.cell_px
-    left, top = np.maximum(boxes[:, :2].min(axis=0) - margin, 0)
-    right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0) + margin
-    right, bottom = min(right, shape[1]), min(bottom, shape[0])
-    return int(left), int(top), int(right - left), int(bottom - top)
+def _crops(
+    found: Survey, paint: Bool[np.ndarray, "height width"], options: SheetOptions
+) -> list[Crop]:
+    if options.boxes:
+        return boxed_crops(found, paint, options.boxes, options.margin_px)
+    if options.grid is not None:
+        return grid_crops(found, paint, options.grid, options.margin_px)
+    return found_crops(found, paint, options.margin_px)
 
 
 def _window(picture: np.ndarray, box: Box) -> np.ndarray:
@@ -267,24 +224,44 @@ def _as_box(box: Int[np.ndarray, " 4"]) -> Box:
     return x, y, width, height
 
 
-def _warnings(ground: Background, found: Survey, views: list[View], holes: int) -> tuple[str, ...]:
+def _doubts(ground: Background, views: list[View]) -> tuple[str, ...]:
     said = []
     if ground.rgb is not None and ground.sure < SURE_ENOUGH:
         said.append(f"only {ground.sure:.0%} of the sheet's border is background")
-    kinds = found.grouping.kinds
-    for kind, what in NAMES.items():
-        if kind in kinds:
-            said.append(f"{what} left out ({kinds.count(kind)} patches)")
-    if holes:
-        said.append(f"{holes} enclosed patches in the background's colour became holes")
+    return tuple(said)
+
+
+def _doubts_of_figures(found: Survey, views: list[View]) -> tuple[str, ...]:
+    said = []
     for cut in found.cuts:
         x, y, width, height = (value * found.cell_px for value in cut.box)
         said.append(
             f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "
             f"through {cut.crossed:.1%} of their height: look whether the cut is right"
         )
-    median = float(np.median([view.box[2] for view in views]))
-    for view in views:
-        if len(views) >= 3 and view.box[2] > WIDE * median:
+    widths = [view.figure_box[2] for view in views]
+    for view, width in zip(views, widths, strict=True):
+        if len(views) >= 3 and width > WIDE * float(np.median(widths)):
             said.append(f"view {view.name} is unusually wide: do two figures touch?")
+    height = float(np.median([view.figure_box[3] for view in views]))
+    for thing in _left_out(found):
+        if thing.kind == "study" and thing.box[3] >= NEARLY_A_VIEW * height:
+            x, y = thing.box[:2]
+            said.append(
+                f"a drawing at {x}, {y} of {thing.box[3] / height:.0%} of the views' height was "
+                "left out: if it is a view, give all views with --boxes"
+            )
+    return tuple(said)
+
+
+def _remarks(ground: Background, found: Survey, holes: int) -> tuple[str, ...]:
+    said = [] if ground.kind in ("plain", "transparent") else [str(ground)]
+    kinds = found.grouping.kinds
+    said += [f"{NAMES[kind]} left out ({kinds.count(kind)})" for kind in NAMES if kind in kinds]
+    if found.lines:
+        said.append(f"ruled lines were taken for paper ({len(found.lines)})")
+    if found.shadow.any():
+        said.append("shadows on the ground were left out")
+    if holes:
+        said.append(f"enclosed patches in the background's colour became holes ({holes})")
     return tuple(said)

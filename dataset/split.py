@@ -24,6 +24,7 @@ class Source:
         background: its colour; None where it is transparent.
         warnings: what was doubtful in it, for people.
         left_out: what was seen in it but is no view.
+        remarks: what was done besides, for people.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Source:
     background: tuple[int, int, int] | None = None
     warnings: tuple[str, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,15 @@ def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Shee
         sheet: what was found in it.
     """
     digest = sha256(data).hexdigest()
-    source = Source(name, digest, size_wh, sheet.background, sheet.warnings, sheet.left_out)
+    source = Source(
+        name,
+        digest,
+        size_wh,
+        sheet.background,
+        sheet.warnings,
+        sheet.left_out,
+        sheet.remarks,
+    )
     count = len(sheet.views)
     return Split((source,), sheet.views, (0,) * count, ("",) * count)
 
@@ -94,7 +104,7 @@ def without(split: Split, dropped: frozenset[int]) -> Split:
     sources = list(split.sources)
     for number in sorted(dropped):
         index = split.source_of[number]
-        left = LeftOut(split.views[number].box, DROPPED)
+        left = LeftOut(split.views[number].figure_box, DROPPED)
         sources[index] = replace(sources[index], left_out=(*sources[index].left_out, left))
     kept = [number for number in range(len(split.views)) if number not in dropped]
     return Split(

@@ -41,7 +41,7 @@ def _other_scales(split: Split) -> tuple[str, ...]:
     """Return a line for every file whose figures are much higher or lower than most."""
     if len(split.sources) < 2:
         return ()
-    heights = [view.box[3] for view in split.views]
+    heights = [view.figure_box[3] for view in split.views]
     usual = median(heights)
     lines = []
     for index, source in enumerate(split.sources):

@@ -47,15 +47,27 @@ class _SourceRecord(BaseModel):
     size_wh: tuple[_Length, _Length]
     background: Annotated[str, Field(pattern="^#[0-9a-f]{6}$")] | None = None
     warnings: list[str] = []
+    remarks: list[str] = []
     left_out: list[_LeftOutRecord] = []
 
 
 class ViewRecord(BaseModel):
-    """One view as split.json has it; `sha256` is that of its picture file."""
+    """One view as split.json has it.
+
+    Attributes:
+        name: of its picture.
+        sheet: number of its sheet.
+        box: (x, y, width, height) of the figure in its sheet.
+        crop: the same of its picture, which has a margin.
+        line_width_px: of the drawn contour; 0 where there is none.
+        label: what it shows, where a person has said.
+        sha256: of its picture file.
+    """
 
     name: str
     sheet: Annotated[int, Field(strict=True, ge=0)]
     box: _Box
+    crop: _Box
     line_width_px: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     label: Annotated[str, Field(max_length=40, pattern="^[^,]*$")] | None = None
     sha256: str = ""
@@ -77,7 +89,8 @@ def split_dict(split: Split, options: dict[str, Any]) -> dict[str, Any]:
             {
                 "name": view.name,
                 "sheet": index,
-                "box": list(view.box),
+                "box": list(view.figure_box),
+                "crop": list(view.box),
                 "line_width_px": round(view.line_width_px, 3),
                 "label": label or None,
             }
@@ -125,6 +138,7 @@ def _source_dict(source: Source) -> dict[str, Any]:
         "size_wh": list(source.size_wh),
         "background": None if background is None else "#{:02x}{:02x}{:02x}".format(*background),
         "warnings": list(source.warnings),
+        "remarks": list(source.remarks),
         "left_out": [{"kind": left.kind, "box": list(left.box)} for left in source.left_out],
     }
 
@@ -164,4 +178,5 @@ def _source(record: _SourceRecord) -> Source:
         background,
         tuple(record.warnings),
         left_out,
+        tuple(record.remarks),
     )

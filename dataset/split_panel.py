@@ -66,8 +66,8 @@ def draw_panel(panel: Panel, *, alone: bool) -> UInt8[np.ndarray, "height width 
     colors = [FIGURES[number % len(FIGURES)] for number in range(len(figures))]
     for box in others:
         _rectangle(picture, box, LEFT_OUT)
-    for (box, _), color in zip(figures, colors, strict=True):
-        _rectangle(picture, box, color)
+    for view, color in zip(panel.views, colors, strict=True):
+        _rectangle(picture, _moved(_corners(view.figure_box, zoom), 2), color)
     for (left, top, right, bottom), mask in figures:
         picture[top:bottom, left:right][mask] = whole[top:bottom, left:right][mask]
     for (box, mask), color in zip(figures, colors, strict=True):
@@ -206,7 +206,7 @@ def _area(box: Corners) -> int:
 def _layouts(view: View, label: str) -> list[tuple[Line, ...]]:
     """Return what a view's tag may say, the fullest first."""
     number = Line(str(int(view.name[:-4])), 28)
-    size = f"{view.box[2]} x {view.box[3]} px"
+    size = "{} x {} px".format(*view.figure_box[2:])
     line = f"line {view.line_width_px:.1f} px" if view.line_width_px else "no line"
     named = [Line(label, 18)] if label else []
     return [

@@ -7,7 +7,7 @@ split.json only knows where a picture came from. When both disagree:
 - a picture was renamed: it keeps its box and label, its name gives its place in the order;
 - a picture was repainted at the same size: it keeps its box and label, its line is measured again;
 - a picture was repainted at another size, or is new: it is a sheet of its own, of one figure;
-- a box was changed: refused, for the picture is cut already (`--boxes split.json` cuts it anew).
+- a crop was changed: refused, for the picture is cut already (`--boxes split.json` cuts it anew).
 """
 
 from __future__ import annotations
@@ -121,21 +121,21 @@ def _view(folder: Path, picture: _Picture) -> tuple[View, Source | None, str]:
     rgba = decode_rgba(picture.data, picture.path)
     height, width = rgba.shape[:2]
     record, name = picture.record, picture.path.name
-    same_size = record is not None and record.box[2:] == (width, height)
+    same_size = record is not None and record.crop[2:] == (width, height)
     if record is not None and picture.digest == record.sha256:
         if not same_size:
             raise SheetError(
-                f"{folder / SPLIT_FILE}: {record.name}: its box is {record.box[2]} x "
-                f"{record.box[3]} px, its picture {width} x {height}; correct it, or cut the sheet "
-                f"anew with `toonset split SHEET --boxes {SPLIT_FILE}`"
+                f"{folder / SPLIT_FILE}: {record.name}: its crop is {record.crop[2]} x "
+                f"{record.crop[3]} px, its picture {width} x {height}; correct it, or cut the "
+                f"sheet anew with `toonset split SHEET --boxes {SPLIT_FILE}`"
             )
         note = "" if name == record.name else f"was {record.name}: it keeps its box and label"
-        return View(rgba, record.box, record.line_width_px, name), None, note
+        return View(rgba, record.crop, record.line_width_px, name), None, note
     figure = _figure(rgba, picture.path)
     line = contour_width_px(figure)
     if record is not None and same_size:
         note = f"was repainted: its line width is now {line:.1f} px"
-        return View(figure, record.box, line, name), None, note
+        return View(figure, record.crop, line, name), None, note
     note = f"is not from the sheet: its place is unknown ({width} x {height} px)"
     source = Source(picture.shown, picture.digest, (width, height))
     return View(figure, (0, 0, width, height), line, name), source, note

@@ -13,7 +13,14 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.background import Background, difference, halo_tolerance, ring_of
-from toonset.dataset.figures import Blobs, Grouping, find_blobs, find_mains, group_blobs
+from toonset.dataset.figures import (
+    Blobs,
+    Grouping,
+    find_blobs,
+    find_mains,
+    group_blobs,
+    without_strangers,
+)
 from toonset.dataset.lines import Line, find_lines, line_pixels
 from toonset.dataset.shadows import find_shadows
 from toonset.dataset.touching import Cut, part_touching
@@ -75,7 +82,8 @@ def survey(
     lines = find_lines(painted)
     ruled = line_pixels(painted, lines)
     shadow = np.zeros_like(painted)
-    paper = reached(~painted | ruled)
+    ring = ring_of(*painted.shape, ground.inset)
+    paper = joined(~painted | ruled, ring)
     blobs = find_blobs(~paper)
     small = np.ascontiguousarray(rgba[::cell, ::cell])
     if len(blobs.areas):
@@ -83,16 +91,12 @@ def survey(
         colors = None if ground.rgb is None else ground.colors(box)[::cell, ::cell]
         shadow = find_shadows(blobs, find_mains(blobs), small, colors, ground.tolerance)
     if shadow.any():
-        paper = reached(~painted | ruled | shadow)
+        paper = joined(~painted | ruled | shadow, ring)
         blobs = find_blobs(~paper)
     blobs, cuts = part_touching(blobs, small[..., :3])
-    grouping = group_blobs(blobs, find_mains(blobs), small[..., :3])
+    mains = without_strangers(blobs, find_mains(blobs), small[..., :3])
+    grouping = group_blobs(blobs, mains, small[..., :3])
     return Survey(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
-
-
-def reached(free: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
-    """Return the free pixels that are connected to the sheet's rim through free pixels."""
-    return joined(free, ring_of(*free.shape))
 
 
 def joined(

@@ -1,9 +1,9 @@
 """Figures that touch or overlap a little: cut apart along the thinnest place.
 
 The cut is a path from the top to the bottom of the patch that crosses as little paint as it can,
-found by dynamic programming as in seam carving; to run along an outline or the border of two colours
-costs little. It counts if both sides are then as high as a figure, of its colours, and no mere limb:
-a hand in a hand is crossed in a few per cent of the height, a body never.
+found by dynamic programming as in seam carving; to run along an outline or the border of two
+colours costs little. It counts if both sides are then as high as a figure, of its colours, and no
+mere limb: a hand in a hand is crossed in a few per cent of the height, a body never.
 Source: S. Avidan, A. Shamir, "Seam carving for content-aware image resizing" (2007).
 """
 
@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.dataset.figures import Blobs, find_mains
+from toonset.dataset.figures import Blobs, find_mains, shared_colors
 
 DEAREST = 0.12  # of the patch's height in paint: the most that a cut may cost
 AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
@@ -118,18 +118,9 @@ def _best_cut(
         if cost <= DEAREST and _are_figures(paint, path):
             cut = np.rint(path[rows] / shrink).astype(int)
             right = np.arange(width) >= cut[:, None]
-            if _shared_colors(rgb[mask & right], rgb[mask & ~right]) >= ALIKE:
+            if shared_colors(rgb[mask & right], rgb[mask & ~right]) >= ALIKE:
                 return cut, crossed
     return None
-
-
-def _shared_colors(a: UInt8[np.ndarray, "_ 3"], b: UInt8[np.ndarray, "_ 3"]) -> float:
-    """Return how much of their colours two figures share: the histograms' intersection."""
-    counts = []
-    for colors in (a, b):
-        codes = (colors // 64).astype(np.int64) @ np.array([16, 4, 1])
-        counts.append(np.bincount(codes, minlength=64) / max(len(codes), 1))
-    return float(np.minimum(*counts).sum())
 
 
 def _costs(paint: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:

@@ -209,8 +209,9 @@ def test_apart_parts_join_and_captions_and_specks_do_not() -> None:
     sheet = split_sheet(drawing.rgba)
     assert len(sheet.views) == 4
     assert (sheet.views[0].rgba[:10, :, 2] == 180).any()
-    assert any(warning.startswith("text beside the figures") for warning in sheet.warnings)
-    assert "small patches that belong to no figure were left out (1 patches)" in sheet.warnings
+    assert [left.kind for left in sheet.left_out] == ["text", "speck"]
+    assert sheet.remarks[1] == "small patches that belong to no figure were left out (1)"
+    assert sheet.warnings == ()
     assert sheet.views[0].box[1] + sheet.views[0].box[3] < 126  # no letter in the crop
 
 

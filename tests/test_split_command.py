@@ -101,14 +101,15 @@ def test_split_json_says_where_everything_is_from(sheet: Path, toonset):
     assert source["background"] == "#ffffff"
     assert [view["label"] for view in content["views"]] == ["front", "3q", None, "90"]
     for number, view in enumerate(content["views"]):
-        x, y, width, height = view["box"]
+        x, y, width, height = view["crop"]
         crop = Image.open(Path("o/images") / view["name"])
         assert crop.size == (width, height)
         left, top = 25 + PITCH * number, TOP
-        assert x <= left
-        assert y <= top
-        assert x + width > left + WIDE
-        assert y + height > top + HIGH
+        assert view["box"] == [left, top, WIDE + 1, HIGH + 1]  # PIL draws both corners
+        assert x < left
+        assert y < top
+        assert x + width > left + WIDE + 1
+        assert y + height > top + HIGH + 1
         assert view["line_width_px"] == pytest.approx(3, abs=0.5)
 
 
@@ -166,7 +167,7 @@ def test_what_is_typed_reaches_the_splitter(sheet: Path, toonset, asked):
     assert toonset("split", sheet, "-o", "c", "--grid", "4X1", "--background", "00ff10").code == 0
     found = read_split(Path("a"))[0]
     of_sheet = [
-        tuple(v.box for v, of in zip(found.views, found.source_of, strict=True) if of == n)
+        tuple(v.figure_box for v, of in zip(found.views, found.source_of, strict=True) if of == n)
         for n in (0, 1)
     ]
     assert [len(boxes) for boxes in of_sheet] == [3, 2]
@@ -356,3 +357,30 @@ def test_calibrate_drops_views_and_keeps_what_was_said(drawn: Path, toonset, tmp
     assert done.code in (0, 3)
     assert done.json["options"]["drop"] == "1,3-4"
     assert len(done.json["views"]) == 2
+
+
+def test_boxes_by_hand_are_the_views_in_their_order(sheet: Path, toonset):
+    boxes = [[20 + PITCH * n, 15, 70, 171] for n in (2, 0)]
+    Path("boxes.json").write_text(json.dumps(boxes))
+    assert toonset("split", sheet, "--boxes", "boxes.json").code in (0, 3)
+    assert colors_of(Path("views")) == [COLORS[2], COLORS[0]]
+    found = read_split(Path("views"))[0]
+    for view, (x, y, width, height) in zip(found.views, boxes, strict=True):
+        assert x <= view.figure_box[0]
+        assert y <= view.figure_box[1]
+        assert view.figure_box[0] + view.figure_box[2] <= x + width
+        assert view.figure_box[1] + view.figure_box[3] <= y + height
+    content = json.loads(Path("views/split.json").read_text())
+    assert content["options"] == {"boxes": "boxes.json"}
+
+
+def test_a_corrected_split_json_cuts_anew(sheet: Path, toonset):
+    assert toonset("split", sheet).code == 0
+    content = json.loads(Path("views/split.json").read_text())
+    del content["views"][1]
+    Path("mine.json").write_text(json.dumps(content))
+    assert toonset("split", sheet, "--boxes", "mine.json", "-o", "again").code in (0, 3)
+    first, second = (read_split(Path(name))[0] for name in ("views", "again"))
+    assert [v.box for v in second.views] == [first.views[i].box for i in (0, 2, 3)]
+    for number, again in zip((0, 2, 3), second.views, strict=True):
+        assert np.array_equal(first.views[number].mask, again.mask)

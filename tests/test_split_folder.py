@@ -204,8 +204,8 @@ BROKEN: dict[str, tuple[Callable[[Path], object], str]] = {
     "two labels": (edited(lambda c: c["views"][1].update(label="front,back")), "views.1.label"),
     "no sheet": (edited(lambda c: c["views"][3].update(sheet=1)), "003.png is of sheet 1, but"),
     "moved box": (
-        edited(lambda c: c["views"][2].update(box=[10, 5, 61, 100])),
-        "002.png: its box is 61 x 100 px, its picture 60 x 100; correct it, or cut the sheet anew",
+        edited(lambda c: c["views"][2].update(crop=[10, 5, 61, 100])),
+        "002.png: its crop is 61 x 100 px, its picture 60 x 100; correct it, or cut the sheet anew",
     ),
     "no images": (no_images, "has no folder images; split the sheet again"),
     "no pictures": (emptied, "images: holds no picture; split the sheet again"),
@@ -256,7 +256,7 @@ def test_dropping_numbers_anew_and_keeps_a_record():
     assert [view.box for view in kept.views] == [cut().views[i].box for i in (1, 3)]
     assert kept.labels == ("", "90")
     dropped = [left.box for left in kept.sources[0].left_out if left.kind == "dropped"]
-    assert dropped == [cut().views[i].box for i in (0, 2)]
+    assert dropped == [cut().views[i].figure_box for i in (0, 2)]
 
 
 def test_joined_sheets_number_through():

@@ -36,6 +36,14 @@ class View:
             raise SheetError(f"view {self.name}: no opaque pixel; crop the sheet to the figures")
 
     @property
+    def figure_box(self) -> tuple[int, int, int, int]:
+        """Return (x, y, width, height) in the sheet of what the figure covers at all."""
+        rows = np.flatnonzero(self.rgba[..., 3].any(axis=1))
+        columns = np.flatnonzero(self.rgba[..., 3].any(axis=0))
+        x, y = self.box[0] + int(columns[0]), self.box[1] + int(rows[0])
+        return x, y, int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
+
+    @property
     def mask(self) -> Bool[np.ndarray, "height width"]:
         """Return which pixels the figure covers by at least half."""
         return self.rgba[..., 3] >= 128
