@@ -21,7 +21,7 @@ from toonset.bench.record import Record, summarise
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
 
 SHEETS_WH = ((150, 150), (1200, 600), (4096, 2048))
-TIMED_GROUP = "600 px, lines, png"
+TIMED_CONDITION = "lines, png"
 REPEATS = 3  # the least counts; once for what takes over a second
 SLOW_S = 1.0
 
@@ -59,16 +59,16 @@ def bench_palette(
         progress: told what is measured.
     """
     scores: dict[tuple[str, str], list[Score]] = {}
-    sheet_of: PaletteCase | None = None
+    timed: dict[int, PaletteCase] = {}
     for case in palette_cases(cases, seed, quick=quick):
         progress(f"palette {case.name}, {case.group}")
-        sheet_of = sheet_of or case if quick or case.group == TIMED_GROUP else sheet_of
+        if case.group.endswith(TIMED_CONDITION):
+            timed.setdefault(len(case.images[0]), case)
         count = int((case.shares >= LEAST_SHARE).sum())
         for name, method in METHODS.items():
             result = score(method(case.images, count), case)
             scores.setdefault((case.group, name), []).append(result)
-    assert sheet_of is not None
-    seconds = _all_seconds(sheet_of, SHEETS_WH[: 2 if quick else None], progress)
+    seconds = _all_seconds(timed, SHEETS_WH[: 2 if quick else None], progress)
     records = [r for (group, name), of in scores.items() for r in _records(of, name, group, seed)]
     records += [
         summarise(
@@ -110,12 +110,21 @@ def sheet_of_size(
 
 
 def _all_seconds(
-    case: PaletteCase, sizes: Sequence[tuple[int, int]], progress: Callable[[str], None]
+    timed: dict[int, PaletteCase],
+    sizes: Sequence[tuple[int, int]],
+    progress: Callable[[str], None],
 ) -> dict[tuple[str, str], list[float]]:
-    """Return processor seconds per sheet and method, from a decoded picture on."""
+    """Return processor seconds per sheet and method, from a decoded picture on.
+
+    Args:
+        timed: a character by the size of its cells; the largest that fit make a sheet.
+        sizes: of the sheets.
+        progress: told what is measured.
+    """
     seconds = {}
-    count = int((case.shares >= LEAST_SHARE).sum())
     for width, height in sizes:
+        case = timed[max(size for size in timed if size <= height)]
+        count = int((case.shares >= LEAST_SHARE).sum())
         sheet = [sheet_of_size(case, width, height)]
         for name, method in METHODS.items():
             progress(f"seconds {width} x {height}, {name}")

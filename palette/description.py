@@ -1,8 +1,8 @@
 """How many paints there are: as many as make the shortest description of the pixels.
 
 Two touching clouds of shades are one paint if a single hump describes them about as well as two. A
-cloud is described by the best one-humped density along the line between the two peaks (isotonic
-regression), to a quarter of a just-noticeable distance. Two humps cost one more colour, 24 bits and
+cloud is described by the best one-humped density (isotonic regression) along the line that parts
+both best, to a quarter of a just-noticeable distance. Two humps cost one more colour, 24 bits and
 its share; they save
 
     bits(one hump for both) - bits(a hump each) - bits(which of both)
@@ -38,7 +38,8 @@ def merge_peaks(
 ) -> tuple[Owners, float]:
     """Return every cell's peak after all merges that shorten the description.
 
-    And the bits that undoing the last of them would cost, or one more colour for nothing.
+    The most superfluous pair goes first. And the bits that undoing the last merge would cost, or
+    one more colour for nothing.
 
     Args:
         places: in OKLab.
@@ -46,59 +47,80 @@ def merge_peaks(
         owner: every cell's peak, itself a cell.
         touching: only clouds with cells this near are ever merged.
     """
-    owner = owner.copy()
-    savings = {
+    owner, dearest = owner.copy(), PRICE_BITS
+    bits = {
         pair: saved_bits(places, weights, owner, *pair)
         for pair in _touching(places, owner, touching)
     }
-    last = PRICE_BITS
-    while savings:
-        pair = min(savings, key=lambda pair: (savings[pair], pair))
-        if savings[pair] >= 0:
-            break
-        last = -savings.pop(pair)
+    while bits and min(bits.values()) < 0:
+        pair = min(bits, key=lambda pair: (bits[pair], pair))
+        dearest = -bits[pair]
         kept, gone = sorted(pair, key=lambda peak: (-weights[owner == peak].sum(), peak))
         owner[owner == gone] = kept
-        met = {other for known in savings for other in known if {kept, gone} & set(known)}
-        savings = {known: bits for known, bits in savings.items() if not {kept, gone} & set(known)}
+        met = {other for known in bits if {kept, gone} & set(known) for other in known}
+        bits = {known: saved for known, saved in bits.items() if not {kept, gone} & set(known)}
         for other in met - {kept, gone}:
             new = (min(kept, other), max(kept, other))
-            savings[new] = saved_bits(places, weights, owner, *new)
-    return owner, last
+            bits[new] = saved_bits(places, weights, owner, *new)
+    return owner, dearest
 
 
 def evidence_for(places: Places, weights: Weights, owner: Owners, one_more: float) -> Evidence:
-    """Return what one paint less would cost: of all pairs of neighbours, the cheapest joined."""
+    """Return how many paints pay for themselves, and what one of them less would cost.
+
+    Paints apart from all others stay, however small; those that do not pay are not counted.
+    """
+    peaks, shares = np.unique(owner), np.bincount(owner, weights)
+    bits = _neighbours(places, weights, owner)
+    unpaid = {min(pair, key=lambda peak: shares[peak]) for pair, saved in bits.items() if saved < 0}
+    in_full = PIXELS * 24 - PRICE_BITS  # without any colour to name: every pixel's own
+    one_less = min((saved for saved in bits.values() if saved >= 0), default=in_full)
+    return Evidence(len(peaks) - len(unpaid), one_less, one_more)
+
+
+def _neighbours(places: Places, weights: Weights, owner: Owners) -> dict[tuple[int, int], float]:
+    """Return the bits that every peak saves against joining the nearest peak."""
     peaks = np.unique(owner)
-    if len(peaks) < 2:
-        return Evidence(1, PIXELS * 24 - PRICE_BITS, one_more)  # each pixel's colour in full
     away = np.linalg.norm(places[peaks][:, None] - places[peaks], axis=2)
     np.fill_diagonal(away, np.inf)
-    pairs = np.unique(np.sort([(peaks, peaks[away.argmin(axis=1)])], axis=1)[0], axis=1).T
-    one_less = min(saved_bits(places, weights, owner, int(a), int(b)) for a, b in pairs)
-    return Evidence(len(peaks), one_less, one_more)
+    nearest = peaks[away.argmin(axis=1)]
+    pairs = {
+        (int(min(p, n)), int(max(p, n))) for p, n in zip(peaks, nearest, strict=True) if p != n
+    }
+    return {pair: saved_bits(places, weights, owner, *pair) for pair in pairs}
 
 
 def saved_bits(places: Places, weights: Weights, owner: Owners, first: int, second: int) -> float:
     """Return the bits that two paints save against one for both peaks' cells."""
-    a, b = owner == first, owner == second
-    axis = places[second] - places[first]
-    axis = axis / max(float(np.linalg.norm(axis)), 1e-9)
-    along = (places[a | b] @ axis - places[first] @ axis) / BIN
-    at = np.rint(along).astype(int)
-    low, length = at.min() - 2, int(np.ptp(at)) + 5
-    counts = PIXELS * weights[a | b]
+    parts = [np.flatnonzero(owner == peak) for peak in (first, second)]
+    axis = _axis([places[part] for part in parts], [weights[part] for part in parts])
+    at = [np.rint(places[part] @ axis / BIN).astype(int) for part in parts]
+    low = min(int(one.min()) for one in at) - 2  # the smoothing reaches so far
+    length = max(int(one.max()) for one in at) - low + 3
     humps = [
-        np.convolve(
-            np.bincount(at[mask[a | b]] - low, counts[mask[a | b]], length), SMOOTHING, "same"
-        )
-        for mask in (a, b)
+        np.convolve(np.bincount(one - low, PIXELS * weights[part], length), SMOOTHING, "same")
+        for one, part in zip(at, parts, strict=True)
     ]
-    ends = [0 - low, round(float((places[second] - places[first]) @ axis / BIN)) - low]
-    apart = sum(_hump_bits(h, (end,)) for h, end in zip(humps, ends, strict=True))
-    total = [float(h.sum()) for h in humps]
-    which = sum(n * np.log2(sum(total) / n) for n in total)
-    return _hump_bits(humps[0] + humps[1], ends) - apart - float(which) - PRICE_BITS
+    tops = [round(float(places[peak] @ axis / BIN)) - low for peak in (first, second)]
+    apart = sum(_hump_bits(hump, (top,)) for hump, top in zip(humps, tops, strict=True))
+    amounts = [float(hump.sum()) for hump in humps]
+    which = sum(amount * np.log2(sum(amounts) / amount) for amount in amounts)
+    return _hump_bits(humps[0] + humps[1], tops) - apart - float(which) - PRICE_BITS
+
+
+def _axis(places: list[Places], weights: list[Weights]) -> Float[np.ndarray, " 3"]:
+    """Return the unit direction along which two clouds lie farthest apart for their widths.
+
+    Source: R. A. Fisher, "The use of multiple measurements in taxonomic problems" (1936).
+    """
+    spread = BIN**2 * np.eye(3)
+    middles = []
+    for own, weight in zip(places, weights, strict=True):
+        middle = np.average(own, axis=0, weights=weight)
+        spread += (own - middle).T @ ((own - middle) * weight[:, None]) / weight.sum()
+        middles.append(middle)
+    axis = np.linalg.solve(spread, middles[1] - middles[0])
+    return axis / max(float(np.linalg.norm(axis)), 1e-9)
 
 
 def _hump_bits(counts: Float[np.ndarray, " bins"], peaks: Iterable[int]) -> float:

@@ -83,7 +83,7 @@ class Evidence:
     Bits to describe 4,096 independent pixels of the character, with the colours themselves.
 
     Attributes:
-        colors: told apart, those under the rule included.
+        colors: that pay for themselves, those under the rule included.
         one_less: bits more with one colour less.
         one_more: bits more with one colour more.
     """
