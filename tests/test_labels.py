@@ -174,9 +174,9 @@ def test_the_indexed_png_holds_all_entries_and_one_transparent_one(tmp_path: Pat
     expected = np.dstack([PALETTE[labels % 255 % 3], np.full(labels.shape, 255)])
     expected[labels == UNLABELLED] = 0
     pillow = np.asarray(Image.open(io.BytesIO(data)).convert("RGBA")).copy()
-    opencv = cv2.cvtColor(
-        cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED), cv2.COLOR_BGRA2RGBA
-    )
+    decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert decoded is not None
+    opencv = cv2.cvtColor(decoded, cv2.COLOR_BGRA2RGBA)
     for seen in (pillow, opencv):
         assert np.array_equal(seen[labels != UNLABELLED], expected[labels != UNLABELLED])
         assert (seen[labels == UNLABELLED][:, 3] == 0).all()
