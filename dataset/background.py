@@ -24,7 +24,7 @@ HALO_WIDTH = 8  # levels: noise of the file falls off within about so many
 CLEAR_HALO = 4.0  # times as many pixels as a little farther from the background: noise at all
 HALO = 2.0  # times as many pixels as a little farther: still noise
 RARE = 3.0  # times the 80th percentile of noise: where its 99th may lie
-SLOPE_RIPPLE = 3  # levels of second difference: rounding of a smooth slope
+SLOPE_RIPPLE = 1  # levels from the mean of the surroundings: rounding of a smooth slope
 LEAST_SURE = 0.3  # of the border: less in one colour is no background
 WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
 WORTH_LEVELS = 2.0  # and less by so many levels
@@ -137,8 +137,7 @@ def halo_tolerance(away: UInt8[np.ndarray, "height width"]) -> int:
     (JPEG) adds small ones, the smaller the more. The level is where that decay ends. Slopes without
     ripples are shadows or shading, not noise.
     """
-    ripple = cv2.Laplacian(away, cv2.CV_16S, ksize=1)
-    rippled = cv2.inRange(ripple, -SLOPE_RIPPLE, SLOPE_RIPPLE) == 0
+    rippled = cv2.absdiff(away, cv2.blur(away, (5, 5))) > SLOPE_RIPPLE
     often = cv2.calcHist([away], [0], rippled.view(np.uint8), [256], [0, 256]).ravel()
     often = often.astype(np.float64)
     for level in range(1, MOST_TOLERANCE):

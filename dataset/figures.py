@@ -23,7 +23,7 @@ STRANGE = 0.6  # of what the views commonly share of their colours: less is anot
 RECTANGLE = 0.96  # of its box that a patch fills: a block of colour, no character
 WITHIN = 0.5  # of a patch that lies in a figure's box: its part
 NEAR = 0.02  # of the figure's height: a part this near to the figure is the figure's
-ABOVE = 0.08  # of the figure's height: so near something above or below it may be its part
+ABOVE = 0.08  # of the figure's height: so near something above may be its part
 BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
 FARTHEST = 0.3  # of the figure's height: a part that most views have is no farther
 SAME_LEVEL = 0.08  # of the figure's height
@@ -155,9 +155,8 @@ def group_blobs(
         for i, number in enumerate(small):
             if _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), bool(letters[i]), rgb):
                 figure[number] = nearest[i]
-        loose = np.flatnonzero((figure[small] < 0) & ~letters)
-        again = _come_again(blobs, small[loose], bodies[loose], gap[loose], len(mains), rgb)
-        figure[small[loose[again]]] = nearest[loose[again]]
+        again = ~letters & _come_again(blobs, small, bodies, gap, len(mains), rgb)
+        figure[small[again]] = nearest[again]
         for i, number in enumerate(small):
             if figure[number] >= 0:
                 continue
@@ -252,7 +251,7 @@ def _is_part(
         return False
     middle = own[0] + own[2] / 2
     if main[0] <= middle <= main[0] + main[2]:
-        return gap <= ABOVE * main[3]
+        return bool(gap <= ABOVE * main[3] and own[1] < main[1])
     return gap <= BESIDE * main[3] and _in_its_colors(blobs, number, body, rgb)
 
 

@@ -15,8 +15,8 @@ from jaxtyping import Bool
 
 LEAST_RUN = 0.04  # of the sheet's side along the line
 LEAST_RUN_PX = 24
-THICKEST = 0.008  # of the sheet's shorter side
-THICKEST_PX = 4  # whatever the sheet's size
+THICKEST = 0.015  # of the sheet's shorter side
+THICKEST_PX = 6  # whatever the sheet's size
 CROSSING = 0.6  # of the sheet: a line this long needs no others
 LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
 ALIKE = 0.8  # overlap of the runs of neighbouring rows

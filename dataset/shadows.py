@@ -27,6 +27,8 @@ FEET = 0.2  # of the shadow's height from its top: the figure reaches lower
 EDGE = 0.02  # of the figure's height: a shadow's own edge is no wider
 BLACK = 40  # levels: a shadow on transparency is no lighter
 OPAQUE = 230  # alpha: and less opaque
+FADED = 0.94  # of the paper's light, at the shadow's border
+MOSTLY = 0.7  # of the border
 GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, nothing is known
 TONE = 0.03  # of the paper's light: tones so near are one
 BESIDE = 0.2  # of a shadow's border that is paper
@@ -114,13 +116,29 @@ def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
     deep = np.concatenate([dim.light[own] for dim, own in zip(dims, pieces, strict=True)])
     if not len(deep):
         return None
+    darkest = float(np.percentile(deep, 10))
+    if _are_soft(bodies, dims, pieces):
+        return darkest
     toned = area = 0
     for body, dim in zip(bodies, dims, strict=True):
         upper = body[: int(TOP * len(body))]
         light, smooth = dim.light[: len(upper)], dim.smooth[: len(upper)]
         toned += int((upper & smooth & (np.abs(light - np.median(deep)) <= TONE)).sum())
         area += int(upper.sum())
-    return None if toned > GREY * area else float(np.percentile(deep, 10))
+    return None if toned > GREY * area else darkest
+
+
+def _are_soft(bodies: list[np.ndarray], dims: list[Dim], pieces: list[np.ndarray]) -> bool:
+    """Return whether most of the shadows' border with the paper fades into it, as no cloth does."""
+    square = np.ones((3, 3), np.uint8)
+    rims = []
+    for body, dim, own in zip(bodies, dims, pieces, strict=True):
+        paper = np.pad(~body, 1, constant_values=True).view(np.uint8)
+        beside = cv2.dilate(paper, square)[1:-1, 1:-1] > 0
+        shadow = _grown(own, EDGE * len(body), dim.mask & body)
+        rims.append(dim.light[shadow & beside])
+    rim = np.concatenate(rims)
+    return bool(len(rim) and np.mean(rim >= FADED) >= MOSTLY)
 
 
 def _pieces(
