@@ -62,7 +62,7 @@ def k_means(count: int | None, seed: int = 0) -> Method:
         tool = importlib.import_module("sklearn.cluster")  # untyped
         pixels = _pixels(images).astype(np.float32)
         fitted = tool.KMeans(count or true_count, random_state=seed).fit(pixels)
-        shares = np.bincount(fitted.labels_) / len(pixels)
+        shares = np.bincount(fitted.labels_, minlength=count or true_count) / len(pixels)
         centers = np.rint(fitted.cluster_centers_[shares >= LEAST_SHARE]).astype(int)
         return [(int(red), int(green), int(blue)) for red, green, blue in centers]
 

@@ -3,20 +3,21 @@
 import io
 
 import cv2
+import extcolors
 import numpy as np
 import pytest
 from PIL import Image
 
 from toonset.errors import PaletteError
 from toonset.palette.choice import PaletteOptions
-from toonset.palette.extract import (
-    extract_palette,
-    pick_palette,
-)
+from toonset.palette.extcolors_palette import extcolors_palette
+from toonset.palette.extract import extract_palette, pick_palette
 from toonset.palette.labels import label_image, nearest_colors
 from toonset.palette.names import NAMED, name_of
 from toonset.palette.oklab import oklab_from_rgb
-from toonset.palette.palette import Palette, PaletteColor
+from toonset.palette.palette import Palette, PaletteColor, Place
+from toonset.palette.patches import with_places
+from toonset.palette.pixels import count_pixels
 
 FINE = 8
 COLORS = np.array(
@@ -196,3 +197,142 @@ def test_names_name_themselves() -> None:
         assert name_of(rgb) == name
     assert name_of((12, 9, 11)) == "black"
     assert name_of((228, 30, 30)) == "red"
+
+
+def soft_stripes(*colors: tuple[int, int, int], width: int = 12, tall: int = 60) -> np.ndarray:
+    """Return stripes with one soft column of 45 : 55 between them: a blend that repeats exactly."""
+    parts: list[np.ndarray] = []
+    for index, color in enumerate(colors):
+        if index:
+            mean = np.rint(0.45 * np.array(colors[index - 1]) + 0.55 * np.array(color))
+            parts.append(np.tile(mean.astype(np.uint8), (tall, 1, 1)))
+        parts.append(np.tile(np.array(color, np.uint8), (tall, width, 1)))
+    rgb = np.concatenate(parts, axis=1)
+    return np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)])
+
+
+def test_counts_are_the_pixels() -> None:
+    rng = np.random.default_rng(2)
+    rgba = rng.integers(0, 4, (70, 90, 4), dtype=np.uint8) * 60
+    rgba[..., 3] = rng.choice([0, 200, 255], rgba.shape[:2])
+    histogram = count_pixels([rgba, rgba[::-1]])
+    colors, counts = np.unique(rgba[rgba[..., 3] == 255][:, :3], axis=0, return_counts=True)
+    found = {tuple(c): n for c, n in zip(histogram.colors.tolist(), histogram.counts, strict=True)}
+    assert found == {tuple(c): 2 * n for c, n in zip(colors.tolist(), counts, strict=True)}
+
+
+def test_large_and_small_pictures_are_counted_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    once = count_pixels([RGBA])
+    monkeypatch.setattr("toonset.palette.pixels.TABLE_RUNS", 1)
+    monkeypatch.setattr("toonset.palette.pixels.BAND_PIXELS", 500)
+    again = count_pixels([RGBA])
+    for name in ("colors", "counts", "flat", "thin"):
+        assert np.array_equal(getattr(once, name), getattr(again, name)), name
+
+
+def test_blends_are_no_colours_and_count_half_to_either_side() -> None:
+    colors = (200, 30, 40), (20, 60, 180), (30, 160, 60)
+    palette = extract_palette([soft_stripes(*colors, width=4)])
+    assert as_set(palette) == set(colors)
+    assert sum(color.share for color in palette.colors) == pytest.approx(1)
+
+
+def test_near_shades_merge_and_near_paints_do_not() -> None:
+    near, far = block(((150, 90, 60), 60), ((152, 91, 60), 40)), ((150, 90, 60), (160, 104, 72))
+    assert as_set(extract_palette([near])) == {(150, 90, 60)}
+    apart = oklab_from_rgb(np.array(far, dtype=np.uint8))
+    assert 0.04 < np.linalg.norm(apart[0] - apart[1]) < 0.06
+    assert as_set(extract_palette([block((far[0], 60), (far[1], 40))])) == set(far)
+
+
+@pytest.mark.parametrize("low", [0.8, 0.4])
+def test_long_gradients_are_one_colour(low: float) -> None:
+    for color in ((210, 60, 50), (90, 200, 120), (240, 220, 90)):
+        ramp = np.linspace(low, 1.0, 300)[None, :, None] * np.array(color) * np.ones((40, 1, 1))
+        rgba = np.dstack([np.rint(ramp), np.full((40, 300), 255)]).astype(np.uint8)
+        assert len(extract_palette([rgba]).colors) == 1, color
+
+
+def test_evidence_says_what_one_colour_less_would_cost() -> None:
+    palette = extract_palette([block(((200, 30, 40), 60), ((20, 60, 180), 40))])
+    assert palette.evidence is not None
+    assert palette.evidence.colors == 2
+    assert palette.evidence.one_less > 1000
+    assert palette.evidence.one_more > 0
+
+
+def test_small_colours_are_kept_on_request() -> None:
+    red, blue, green = (200, 30, 40), (20, 60, 180), (30, 160, 60)
+    picture = block((red, 95), (blue, 3), (green, 2))
+    assert as_set(extract_palette([picture])) == {red}
+    options = PaletteOptions(keep=((24, 64, 178),))  # near the blue that is there
+    assert as_set(extract_palette([picture], options)) == {red, blue}
+    with pytest.raises(
+        PaletteError, match="keep #ffff00: no such colour was found; the nearest is"
+    ):
+        extract_palette([picture], PaletteOptions(keep=((255, 255, 0),)))
+    all_three = PaletteOptions(min_share=0.0, max_colors=2, keep=(green,))
+    assert as_set(extract_palette([picture], all_three)) == {red, green}
+    with pytest.raises(PaletteError, match="raise --max-colors"):
+        PaletteOptions(max_colors=1, keep=(red, blue))
+
+
+def lined(black_cloth: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return a figure with black lines 2 px wide, some black cloth, and where the lines are."""
+    rgba = block(((200, 30, 40), 44), ((0, 0, 0), 2), ((20, 60, 180), 4), ((0, 0, 0), black_cloth))
+    line = np.zeros(rgba.shape[:2], dtype=bool)
+    line[:, 44:46] = True
+    return rgba, line
+
+
+def test_lines_count_to_their_ink_and_do_not_push_others_out() -> None:
+    rgba = block(((200, 30, 40), 60), ((0, 0, 0), 12), ((20, 60, 180), 3))
+    line = np.zeros(rgba.shape[:2], dtype=bool)
+    line[:, 60:72] = True
+    assert (20, 60, 180) not in as_set(extract_palette([rgba]))  # 4 %
+    rgba, line = rgba[:, 10:], line[:, 10:]  # 4.6 % of all, 5.7 % of what is no line
+    assert (20, 60, 180) not in as_set(extract_palette([rgba]))
+    palette = extract_palette([rgba], contours=[line])
+    assert as_set(palette) == {(200, 30, 40), (0, 0, 0), (20, 60, 180)}
+    assert palette.contour is not None
+    assert palette.contour.share == pytest.approx(12 / 65)
+    assert palette.contour.cloth == 0
+
+
+@pytest.mark.parametrize(("black_cloth", "stays"), [(0, False), (10, True)])
+def test_without_its_lines_black_stays_only_as_cloth(black_cloth: int, stays: bool) -> None:
+    rgba, line = lined(black_cloth)
+    palette = extract_palette([rgba], PaletteOptions(contour=False), [line])
+    assert ((0, 0, 0) in as_set(palette)) == stays
+    assert palette.contour is not None
+    assert palette.contour.cloth == pytest.approx(black_cloth / (50 + black_cloth))
+    if not stays:
+        kept = PaletteOptions(contour=False, keep=((0, 0, 0),))
+        assert (0, 0, 0) in as_set(extract_palette([rgba], kept, [line]))
+
+
+def test_thin_soft_lines_give_their_pure_ink() -> None:
+    rgb = np.full((80, 80, 3), (230, 180, 60), dtype=np.uint8)
+    for x in range(6, 78, 6):  # 1.5 px wide: a core, and half of it beside
+        rgb[:, x], rgb[:, x + 1] = (10, 10, 10), (120, 95, 35)
+    palette = extract_palette([np.dstack([rgb, np.full((80, 80), 255, np.uint8)])])
+    assert as_set(palette) == {(230, 180, 60), (10, 10, 10)}
+
+
+def test_extcolors_is_the_library() -> None:
+    palette = extcolors_palette([RGBA])
+    pixels = RGBA[RGBA[..., 3] > 0]
+    found, total = extcolors.extract_from_image(Image.fromarray(pixels[None]))
+    assert [(color.rgb, color.share) for color in palette.colors] == [
+        (rgb, count / total) for rgb, count in found if count >= 0.05 * total
+    ]
+    with pytest.raises(PaletteError, match="no pixel to count"):
+        extcolors_palette([np.zeros((4, 4, 4), np.uint8)])
+
+
+def test_left_out_colours_are_shown_where_they_are() -> None:
+    pictures = [block(((200, 30, 40), 90)), block(((200, 30, 40), 90))]
+    pictures[1][5:9, 20:26, :3] = (20, 60, 180)
+    pictures[0][30:32, 3:5, :3] = (20, 60, 180)
+    palette = with_places(extract_palette(pictures), pictures)
+    assert [color.place for color in palette.dropped] == [Place(1, (20, 5, 6, 4))]

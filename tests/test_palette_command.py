@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from toonset.camera import Camera
-from toonset.cli.palette import palette
+from toonset.cli.palette import Method, palette
+from toonset.cli.split import split
 from toonset.dataset.picture import encode_png, load_indexed_png
 from toonset.dataset.transforms import read_scene, transforms_dict
 from toonset.errors import ToonsetError
@@ -142,3 +144,63 @@ def test_mistakes_write_nothing(
     with pytest.raises(ToonsetError, match=fragment):
         palette([Path(argument) for argument in arguments], **options)  # type: ignore[arg-type]
     assert tree(tmp_path) == before
+
+
+def outlined() -> np.ndarray:
+    """Return a red and blue figure with a black outline of 3 px, 120 x 80."""
+    rgba = np.zeros((120, 80, 4), dtype=np.uint8)
+    rgba[10:110, 10:70] = (0, 0, 0, 255)
+    rgba[13:107, 13:67] = (*RED, 255)
+    rgba[70:107, 13:67] = (*BLUE, 255)
+    return rgba
+
+
+def test_lines_can_be_left_out_of_palette_and_labels(tmp_path: Path) -> None:
+    write_bytes(tmp_path / "a.png", encode_png(outlined()))
+    for contour in (True, False):
+        palette([tmp_path / "a.png"], contour=contour, out=tmp_path / "out", force=True)
+        content = json.loads((tmp_path / "out" / "palette.json").read_text())
+        assert ("#000000" in [color["hex"] for color in content["colors"]]) == contour
+        assert content["contour"]["hex"] == "#000000"
+        assert content["contour"]["cloth"] < 0.01
+        line = load_indexed_png(tmp_path / "out" / "labels" / "000.png")[11, 20:60]
+        assert ((line != 255) == contour).all()
+
+
+def test_folders_of_pictures_and_of_split_are_read(tmp_path: Path) -> None:
+    sheet = np.concatenate([outlined(), outlined()[:, ::-1]], axis=1)
+    write_bytes(tmp_path / "sheet.png", encode_png(sheet))
+    split([tmp_path / "sheet.png"], out=tmp_path / "views")
+    (tmp_path / "views" / "split.json").rename(tmp_path / "split.json")
+    palette([tmp_path / "views"], out=tmp_path / "plain")
+    (tmp_path / "split.json").rename(tmp_path / "views" / "split.json")
+    palette([tmp_path / "views"], out=tmp_path / "split")
+    for name in ("plain", "split"):
+        assert sorted(path.name for path in (tmp_path / name / "labels").iterdir()) == [
+            "000.png",
+            "001.png",
+        ]
+    read = [(tmp_path / name / "palette.json").read_bytes() for name in ("plain", "split")]
+    assert read[0] == read[1]
+
+
+def test_a_left_out_colour_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rgba = outlined()
+    rgba[20:24, 30:36, :3] = (250, 220, 50)
+    write_bytes(tmp_path / "a.png", encode_png(rgba))
+    palette([tmp_path / "a.png"], out=tmp_path / "without")
+    shown = capsys.readouterr().out
+    assert "picture 0 at (30, 20), 6 x 4 px" in shown
+    palette([tmp_path / "a.png"], keep="#fadc32", out=tmp_path / "with")
+    content = json.loads((tmp_path / "with" / "palette.json").read_text())
+    assert "#fadc32" in [color["hex"] for color in content["colors"]]
+
+
+def test_the_papers_tool_can_be_asked(tmp_path: Path) -> None:
+    write_bytes(tmp_path / "a.png", encode_png(figure()))
+    palette([tmp_path / "a.png"], method=Method.extcolors, out=tmp_path / "out")
+    content = json.loads((tmp_path / "out" / "palette.json").read_text())
+    assert content["rule"].startswith("extcolors, tolerance 32")
+    assert [color["hex"] for color in content["colors"]] == ["#c81e28", "#143cb4"]
+    with pytest.raises(typer.BadParameter, match="--keep belongs to --method toonset"):
+        palette([tmp_path / "a.png"], method=Method.extcolors, keep="#fff", out=tmp_path / "o")

@@ -1,0 +1,67 @@
+"""The palette bench: its truth, its scores, and that it runs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toonset.bench.palette import bench_palette, f1, score, sheet_of_size
+from toonset.bench.palette_cases import LEAST_APART, PaletteCase, palette_cases, random_paints
+from toonset.bench.palette_methods import METHODS
+from toonset.errors import BundleError
+from toonset.palette.oklab import oklab_from_rgb
+
+COLORS = np.array([(200, 30, 40), (20, 60, 180), (30, 160, 60)], dtype=np.uint8)
+
+
+def case() -> PaletteCase:
+    rgba = np.full((40, 100, 4), 255, dtype=np.uint8)
+    rgba[:, :90, :3], rgba[:, 90:98, :3], rgba[:, 98:, :3] = COLORS
+    return PaletteCase("three", "by hand", (rgba,), COLORS, np.array([0.9, 0.08, 0.02]))
+
+
+def test_scores() -> None:
+    red, blue, green = ((int(r), int(g), int(b)) for r, g, b in COLORS)
+    perfect, with_small = score([red, blue], case()), score([red, blue, green], case())
+    assert (perfect.found, perfect.missing, perfect.spurious) == (2, 0, 0)
+    assert (with_small.found, with_small.missing, with_small.spurious) == (2, 0, 0)
+    twice = score([red, (201, 30, 40), (255, 255, 255)], case())
+    assert (twice.found, twice.missing, twice.spurious) == (1, 1, 2)
+    assert f1([perfect]) == 1
+    assert f1([perfect, twice]) == pytest.approx(6 / 9)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_finds_plain_colours(name: str) -> None:
+    found = score(METHODS[name](case().images, 3), case())
+    assert (found.found, found.missing) == (2, 0)
+
+
+def test_random_paints_are_apart_and_repeat() -> None:
+    paints = random_paints(np.random.default_rng(4), 8)
+    places = oklab_from_rgb(np.array(paints, dtype=np.uint8))
+    away = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(8, 1)]
+    assert away.min() > LEAST_APART
+    assert random_paints(np.random.default_rng(4), 8) == paints
+
+
+def test_sheets_have_the_size_asked_for() -> None:
+    sheet = sheet_of_size(case(), 250, 90)
+    assert sheet.shape == (90, 250, 4)
+    assert np.array_equal(sheet[40:80, 100:200], case().images[0])
+
+
+def test_a_folder_without_characters_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BundleError, match="holds no character whose info"):
+        next(palette_cases(tmp_path, 0, quick=True))
+
+
+@pytest.mark.slow
+def test_the_bench_runs_and_ours_is_best() -> None:
+    records, text = bench_palette(None, 3, quick=True)
+    merit = {
+        name: np.mean([r.value for r in records if (r.method, r.metric) == (name, "F1 of colours")])
+        for name in METHODS
+    }
+    assert merit["default"] == max(merit.values())
+    assert "1200 x 600" in text
