@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.dataset.letters import find_letters
+from toonset.dataset.letters import find_letters, find_swatches
 
 LOWEST = 0.7  # of the views' median height: lower drawings are studies or props
 HIGHEST = 1.45  # of the same: higher ones, too
@@ -150,12 +150,15 @@ def group_blobs(
     if len(small):
         nearest, gap = _nearest_main(blobs, mains, small)
         letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[mains, 3])))
+        swatches = find_swatches(blobs.boxes[small], blobs.areas[small])
         typical = float(np.median(blobs.areas[mains]))
         bodies = mains[nearest]
         for i, number in enumerate(small):
-            if _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), bool(letters[i]), rgb):
+            within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
+            in_row = bool(letters[i] | swatches[i]) and not within
+            if not in_row and _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
                 figure[number] = nearest[i]
-        again = ~letters & _come_again(blobs, small, bodies, gap, len(mains), rgb)
+        again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(mains), rgb)
         figure[small[again]] = nearest[again]
         for i, number in enumerate(small):
             if figure[number] >= 0:
@@ -231,9 +234,7 @@ def _nearest_main(
     return np.array(nearest), np.array(gaps)
 
 
-def _is_part(
-    blobs: Blobs, number: int, body: int, gap: float, is_letter: bool, rgb: np.ndarray
-) -> bool:
+def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) -> bool:
     """Return whether a patch is a part of the figure whose body is nearest to it."""
     own, main = blobs.boxes[number], blobs.boxes[body]
     area = blobs.areas[number] / blobs.areas[body]
@@ -241,8 +242,6 @@ def _is_part(
         return False
     if _share_within(own, main) >= WITHIN:
         return True
-    if is_letter:
-        return False
     if gap <= NEAR * main[3]:
         return True
     if area < LEAST_PART or _is_stroke(blobs.mask(number)):

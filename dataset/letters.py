@@ -1,4 +1,4 @@
-"""Text on a sheet: small things of like height, side by side on a line."""
+"""Text and colour swatches on a sheet: small things alike, side by side on a line."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 LETTERS = 3  # small things in a row: a word
+DISC = 0.72  # of its box that a disc fills; a square fills more
+EQUAL = 0.2  # of a swatch's size: others differ by less
+LEAST_SWATCH = 6  # cells
 HIGHEST = 0.3  # of a figure's height, of letters; and their width
 TOO_MANY = 4000  # more is noise, and the table below would be large
 
@@ -25,6 +28,30 @@ def find_letters(boxes: Int[np.ndarray, "n 4"], figure_height: int) -> Bool[np.n
     return result
 
 
+def find_swatches(
+    boxes: Int[np.ndarray, "n 4"], areas: Int[np.ndarray, " n"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which patches are swatches: three or more equal squares or discs in a line."""
+    fill = areas / np.maximum(boxes[:, 2] * boxes[:, 3], 1)
+    able = np.flatnonzero(
+        (fill >= DISC) & (boxes[:, 2:].min(axis=1, initial=10**9) >= LEAST_SWATCH)
+    )
+    result = np.zeros(len(boxes), dtype=bool)
+    if len(able) < LETTERS or len(able) > TOO_MANY:
+        return result
+    middle = boxes[able, :2] + boxes[able, 2:] / 2
+    size = boxes[able, 2:].astype(float)
+    equal = (np.abs(size[:, None] - size) <= EQUAL * np.maximum(size[:, None], size)).all(axis=2)
+    apart = np.abs(middle[:, None] - middle)
+    near = np.zeros_like(equal)
+    for along, across in ((0, 1), (1, 0)):
+        level = apart[..., across] <= EQUAL * size[:, across]
+        near |= level & (apart[..., along] <= 2 * size[:, along])
+    groups = _components(near & equal & equal.T)
+    result[able] = np.bincount(groups)[groups] >= LETTERS
+    return result
+
+
 def words(letters: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, "words 4"]:
     """Return the boxes round the words that letters form."""
     if not len(letters) or len(letters) > TOO_MANY:
@@ -40,13 +67,16 @@ def words(letters: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, "words 4"]:
 
 def _groups(boxes: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, " n"]:
     """Return for every box the number of its group: boxes of like height on one level."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
     x, y, width, height = (boxes[:, i, None].astype(float) for i in range(4))
     taller = np.maximum(height, height.T)
     gap = np.maximum(x, x.T) - np.minimum(x + width, (x + width).T)
     level = np.abs((y + height / 2) - (y + height / 2).T) <= 0.6 * taller
     alike = taller <= 2.5 * np.minimum(height, height.T)
-    near = level & alike & (gap <= 1.5 * taller)
+    return _components(level & alike & (gap <= 1.5 * taller))
+
+
+def _components(near: Bool[np.ndarray, "n n"]) -> Int[np.ndarray, " n"]:
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
     return np.asarray(connected_components(csr_matrix(near), directed=False)[1], dtype=np.int64)

@@ -20,7 +20,8 @@ THICKEST_PX = 6  # whatever the sheet's size
 CROSSING = 0.6  # of the sheet: a line this long needs no others
 LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
 ALIKE = 0.8  # overlap of the runs of neighbouring rows
-OPEN = 0.5  # of the line's length with paper beside it, on the better side
+OPEN = 0.5  # of the line's length with paper on both sides
+OPEN_ACROSS = 0.2  # the same of a line that crosses the sheet, behind all figures
 DASHES = 6  # flat pieces in a row: a dashed line
 LONGEST_DASH = 0.1  # of the sheet's side
 JOINT = 0.02  # of the shorter side: corners may miss each other by so much
@@ -100,7 +101,21 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
     runs = zip(rows[long].tolist(), starts[long].tolist(), stops[long].tolist(), strict=True)
     bands = _stacked(list(runs))
     lines = [Line(*band, vertical) for band in bands if band[1] - band[0] < thickest]
+    lines += _broken(lines, paint.shape[1])
     return [line for line in lines if _is_open(paint, line)]
+
+
+def _broken(lines: list[Line], width: int) -> list[Line]:
+    """Return lines across the sheet whose pieces figures interrupt."""
+    found = []
+    for first in sorted({line.first for line in lines}):
+        own = [line for line in lines if line.first == first]
+        length = sum(line.stop - line.start for line in own)
+        if len(own) > 1 and length >= CROSSING * width:
+            start, stop = min(line.start for line in own), max(line.stop for line in own)
+            last = max(line.last for line in own)
+            found.append(Line(first, last, start, stop, own[0].vertical))
+    return found
 
 
 def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
@@ -145,7 +160,8 @@ def _is_open(paint: np.ndarray, line: Line) -> bool:
     below = paint[line.last + 2 : line.last + 2 + reach, columns]
     closed_above = above.all(axis=0) & bool(len(above))
     closed_below = below.all(axis=0) & bool(len(below))
-    return bool(np.mean(~closed_above & ~closed_below) >= OPEN)
+    crosses = line.stop - line.start >= CROSSING * paint.shape[1]
+    return bool(np.mean(~closed_above & ~closed_below) >= (OPEN_ACROSS if crosses else OPEN))
 
 
 def _beside(paint: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:

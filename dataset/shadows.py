@@ -23,7 +23,8 @@ LEAST_AREA = 0.01  # of the figure's area
 TOP = 0.4  # of the figure's height from its top: no shadow reaches higher
 WHOLE = 0.9  # of the figure without the shadow that is still one piece
 ENCLOSED = 0.5  # of the shadow that the figure surrounds: more is a patch of its clothes
-FEET = 0.2  # of the shadow's height from its top: the figure reaches lower
+FEET = 0.2  # of a soft shadow's height from its top: the figure reaches lower
+FEET_OF_HARD = 0.7  # the same of one with a hard edge, which shoes have, too
 EDGE = 0.02  # of the figure's height: a shadow's own edge is no wider
 BLACK = 40  # levels: a shadow on transparency is no lighter
 OPAQUE = 230  # alpha: and less opaque
@@ -171,12 +172,16 @@ def _shadow_of(
     shadow = _pieces(body, dim.mask & room, dim.smooth & room)
     if not shadow.any():
         return shadow
-    middle = float(np.median(dim.light[shadow]))
-    shadow |= _toned(dim.smooth & room, dim.light, middle, int(TOP * body.shape[0]))
+    soft = _are_soft([body], [dim], [shadow])
+    if not soft:  # its one tone shows between the legs, too
+        middle = float(np.median(dim.light[shadow]))
+        shadow |= _toned(dim.smooth & room, dim.light, middle, int(TOP * body.shape[0]))
     reach = EDGE * body.shape[0]
     shadow |= _mostly(dim.smooth & body, _grown(shadow, reach, dim.mask & room))
-    shadow = _grown(shadow, reach, dim.mask & body)
-    return shadow if _stands_in(body & ~shadow, shadow) else np.zeros_like(body)
+    darkest = float(np.percentile(dim.light[shadow], 2))
+    shadow = _grown(shadow, reach, dim.mask & body & (dim.light >= darkest - TONE))
+    fits = _stands_in(body & ~shadow, shadow, FEET if soft else FEET_OF_HARD)
+    return shadow if fits else np.zeros_like(body)
 
 
 def _mostly(
@@ -216,15 +221,15 @@ def _borders_paper(shadow: np.ndarray, body: np.ndarray) -> bool:
     return bool((rim & ~np.pad(body, 1)).sum() >= BESIDE * rim.sum())
 
 
-def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray) -> bool:
-    """Return whether what is left is whole and reaches down into the shadow."""
+def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray, depth: float) -> bool:
+    """Return whether what is left is whole and reaches so deep into the shadow."""
     _, _, stats, _ = cv2.connectedComponentsWithStats(rest.view(np.uint8), connectivity=8)
     if len(stats) < 2:
         return False
     largest = stats[1:][stats[1:, cv2.CC_STAT_AREA].argmax()]
     bottom = largest[cv2.CC_STAT_TOP] + largest[cv2.CC_STAT_HEIGHT]
     rows = np.flatnonzero(shadow.any(axis=1))
-    level = rows[0] + FEET * (rows[-1] - rows[0])
+    level = rows[0] + depth * (rows[-1] - rows[0])
     outlines, _ = cv2.findContours(
         np.ascontiguousarray(rest).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
     )
