@@ -17,7 +17,7 @@ from jaxtyping import UInt8
 
 from toonset.bench.palette_cases import PaletteCase, palette_cases
 from toonset.bench.palette_methods import LEAST_SHARE, METHODS, RGB
-from toonset.bench.record import Record, summarise
+from toonset.bench.record import Direction, Record, summarise
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
 
 SHEETS_WH = ((150, 150), (1200, 600), (4096, 2048))
@@ -139,7 +139,7 @@ def _all_seconds(
 
 def _records(scores: Sequence[Score], method: str, group: str, seed: int) -> list[Record]:
     def record(samples: Sequence[float], metric: str, unit: str, *, higher: bool = False) -> Record:
-        direction = "higher" if higher else "lower"
+        direction: Direction = "higher" if higher else "lower"
         return summarise(
             samples,
             method=method,

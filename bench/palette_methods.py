@@ -1,7 +1,8 @@
 """Ways to find a character's colours: ours, and tools that others use.
 
-All get the same pictures. extcolors and colorgram.py are given the figure's pixels; k-means is told
-the true number of colours, or takes 8, the usual guess. Their colours count from 5 % on, like ours.
+All get the same pictures. extcolors leaves transparent pixels out itself; colorgram.py and k-means,
+which cannot, are given the others only, and the true number of colours, or 8, the usual guess.
+Their colours count from 5 % of these pixels on, like ours.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from jaxtyping import UInt8
 
 from toonset.palette.choice import PaletteOptions
 from toonset.palette.contour import find_contour
-from toonset.palette.extcolors_palette import extcolors_palette
 from toonset.palette.extract import extract_palette
 
 LEAST_SHARE = PaletteOptions().min_share
@@ -39,7 +39,13 @@ def ours_with_lines(images: Images, _: int) -> list[RGB]:
 
 def extcolors(images: Images, _: int) -> list[RGB]:
     """Return what the paper's tool finds, tolerance 32."""
-    return [color.rgb for color in extcolors_palette(images).colors]
+    from PIL import Image
+
+    tool = importlib.import_module("extcolors")  # untyped
+    pixels = np.concatenate([image.reshape(-1, 4) for image in images])
+    found, _ = tool.extract_from_image(Image.fromarray(pixels[None]))
+    least = LEAST_SHARE * np.count_nonzero(pixels[:, 3])
+    return [rgb for rgb, count in found if count >= least]
 
 
 def colorgram(count: int | None) -> Method:

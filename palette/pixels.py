@@ -21,11 +21,12 @@ LEAST_NOISE = 2  # levels: a painted gradient's step from one pixel to the next
 MOST_NOISE = 12  # levels: more is an edge, in whatever file
 TYPICAL = 0.4  # of the steps between neighbours: less than half, for edges are steps, too
 NOISE_SPREAD = 1.5  # noise's typical step times this holds most of them
+NOISE_PIXELS = 2**16  # of a picture are looked at for its noise, twice: rows, and columns
 BAND_PIXELS = 2**18  # worked on at a time: stays in the processor's cache
 TABLE_RUNS = 2**17  # from so many on, a table of all colours beats sorting
 FLAT = np.uint32(1 << 24)  # a mark in the byte that held alpha
 OPAQUE_WORD, COVERED_WORD = np.uint32(OPAQUE << 24), np.uint32(COVERED << 24)
-NOTHING, RGB = np.uint32(0xFFFFFFFF), np.uint32(0xFFFFFF)
+RGB = np.uint32(0xFFFFFF)
 
 Words = UInt32[np.ndarray, "rows columns"]
 Places = Int[np.ndarray, " places"]
@@ -148,7 +149,7 @@ def _noise(pictures: Sequence[Words]) -> int:
     """Return the levels by which neighbours of one paint may differ in these pictures."""
     steps = np.zeros(256, dtype=np.int64)
     for words in [view for picture in pictures for view in (picture, picture.T)]:
-        rows = np.ascontiguousarray(words[:: max(1, words.size // BAND_PIXELS)])
+        rows = np.ascontiguousarray(words[:: max(1, words.size // NOISE_PIXELS)])
         both = (rows[:, 1:] >= OPAQUE_WORD) & (rows[:, :-1] >= OPAQUE_WORD)
         away = _difference(rows[:, 1:][both], rows[:, :-1][both])[:, :3].max(axis=1, initial=0)
         steps += np.bincount(away, minlength=256)
@@ -166,13 +167,14 @@ def _bands(words: Words, noise: int) -> Iterator[tuple[Runs, Places]]:
         above, end = max(top - 1, 0), min(top + height, len(words))
         window = np.ascontiguousarray(words[above : end + 1])  # with a row of the bands beside
         inner = slice(top - above, end - above)
-        own, flat = window[inner].ravel(), _flat(window, noise)[inner].ravel()
-        codes = np.where(own >= OPAQUE_WORD, (own & RGB) | flat * FLAT, NOTHING)
-        starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]]))
-        lengths = np.diff(starts, append=codes.size)
-        seen = codes[starts] != NOTHING
-        rough = (own >= COVERED_WORD) & ~(flat & (own >= OPAQUE_WORD))
-        yield (codes[starts][seen], lengths[seen]), np.flatnonzero(rough) + top * words.shape[1]
+        line, is_flat = window[inner].ravel(), _flat(window, noise)[inner].ravel()
+        places = np.flatnonzero(line >= COVERED_WORD)
+        own, flat = line[places], is_flat[places]
+        opaque = own >= OPAQUE_WORD
+        codes = (own & RGB | flat * FLAT)[opaque]
+        starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]])[: len(codes)])
+        lengths = np.diff(starts, append=len(codes))
+        yield (codes[starts], lengths), places[~(flat & opaque)] + top * window.shape[1]
 
 
 def _flat(words: Words, noise: int) -> Bool[np.ndarray, "rows columns"]:
