@@ -1,9 +1,9 @@
 """Palettes: exact on flat drawings, blind to order and orientation, open about what is dropped."""
 
+import importlib
 import io
 
 import cv2
-import extcolors
 import numpy as np
 import pytest
 from PIL import Image
@@ -321,6 +321,7 @@ def test_thin_soft_lines_give_their_pure_ink() -> None:
 
 def test_extcolors_is_the_library() -> None:
     palette = extcolors_palette([RGBA])
+    extcolors = importlib.import_module("extcolors")  # untyped
     pixels = RGBA[RGBA[..., 3] > 0]
     found, total = extcolors.extract_from_image(Image.fromarray(pixels[None]))
     assert [(color.rgb, color.share) for color in palette.colors] == [
