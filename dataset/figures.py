@@ -242,6 +242,8 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
         return False
     if _share_within(own, main) >= WITHIN:
         return True
+    if blobs.areas[number] >= RECTANGLE * own[2] * own[3]:
+        return False
     if gap <= NEAR * main[3]:
         return True
     if area < LEAST_PART or _is_stroke(blobs.mask(number)):
