@@ -7,6 +7,7 @@ from itertools import zip_longest
 from typing import Any
 
 from toonset.cli.info_folders import run_line
+from toonset.plain_text import printable
 
 NAME_WIDTH = 10  # of the left column below the table
 MOST_COLORS, MOST_VIEWS, MOST_FILES = 16, 40, 10
@@ -55,11 +56,6 @@ def table(rows: Sequence[Sequence[str]]) -> list[str]:
 def fact_lines(facts: Sequence[tuple[str, str]]) -> list[str]:
     """Return named facts as lines, those without text left out."""
     return [f"{name:{NAME_WIDTH}}{printable(text)}" for name, text in facts if text]
-
-
-def printable(text: str) -> str:
-    """Return foreign text without control characters."""
-    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def size_line(sizes: dict[str, int]) -> str:

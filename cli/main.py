@@ -18,6 +18,7 @@ import typer
 from toonset import __version__
 from toonset.cli.help import Verb, Verbs
 from toonset.errors import ToonsetError
+from toonset.plain_text import one_line
 
 VERBS = (  # in the order in which they are used
     *("split", "calibrate", "palette", "train", "render", "evaluate"),
@@ -106,9 +107,3 @@ def _refuse(text: str) -> NoReturn:
 def _say(text: str) -> None:
     over_progress = "\r\x1b[K" if sys.stderr.isatty() else ""
     print(f"{over_progress}toonset: {text}", file=sys.stderr)
-
-
-def one_line(error: object) -> str:
-    """Return the message on one line, without control characters (file names are foreign text)."""
-    text = " ".join(str(error).split())
-    return "".join(c if c.isprintable() else "?" for c in text)

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from toonset.errors import BundleError
+from toonset.plain_text import one_line
 from toonset.reading import read_whole
 from toonset.strict_json import parse_json
 
@@ -103,5 +104,4 @@ def _problems(error: ValidationError, most: int) -> list[str]:
 def _problem(path: tuple[object, ...], message: str) -> str:
     place = ".".join(str(part)[:60] for part in path)
     plain = re.sub(r" or instance of \w+| after validation", "", message).replace("tuple", "list")
-    text = f"field {place}: {plain}" if place else f"the whole: {plain}"
-    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+    return one_line(f"field {place}: {plain}" if place else f"the whole: {plain}")

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from toonset.dataset.json_file import SchemaProblems
 from toonset.errors import ToonsetError
+from toonset.plain_text import one_line
 
 Found = TypeVar("Found")
 
@@ -35,7 +36,7 @@ class ProblemLog:
 
     def add(self, where: str, what: str) -> None:
         """Note a problem; what a file says may hold anything and is made printable."""
-        self.problems.append(Problem(_plain(where), _plain(what)))
+        self.problems.append(Problem(one_line(where), one_line(what)))
 
     def attempt(
         self, where: str, read: Callable[..., Found], *args: Any, **options: Any
@@ -64,7 +65,3 @@ class ProblemLog:
         name, _, what = text.removeprefix(f"{self.root}/").partition(": ")
         inside = text.startswith(f"{self.root}/") and name.startswith(where)
         return (name, what) if inside else (where, text)
-
-
-def _plain(text: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))

@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 from toonset.errors import ToonsetError
+from toonset.plain_text import printable
 
 MAX_DEPTH = 64  # camera files nest eight deep
 LARGEST_INT = 2**63  # beyond, other programs' integers end
@@ -80,5 +81,4 @@ def _check(value: Any) -> None:
 
 
 def _place(path: tuple[object, ...]) -> str:
-    text = ".".join(str(part)[:40] for part in path[1:] or path)
-    return "".join(c if c.isprintable() else "?" for c in text)
+    return printable(".".join(str(part)[:40] for part in path[1:] or path))
