@@ -31,7 +31,7 @@ WORTH_LEVELS = 2.0  # and less by so many levels
 WORTH_SHARE = 0.05  # of the border: or explain so much more of it
 CLEARLY = 0.98  # of the border in one colour with less noise than that: nothing to gain
 RING = 0.02  # of the shorter side: the border that is looked at
-INSETS = (0.0, 0.02, 0.04)  # of the shorter side: where it is looked for
+INSETS = (0.0, 0.02, 0.04, 0.06, 0.08)  # of the shorter side: where it is looked for
 COMMON = 0.15  # of the sheet: a colour that covers less is no background but a frame
 MOST_SAMPLES = 200_000  # border pixels that are looked at
 
@@ -95,7 +95,7 @@ def find_background(
     if known_rgb is not None:
         known = _judged("plain", None, known_rgb, colors, np.array(known_rgb))
         return replace(known, inset=inset)
-    found = replace(_richest_worth_it(rgba, places, colors), inset=inset)
+    found = replace(_richest_worth_it(rgba, places, colors, inset), inset=inset)
     if found.sure < LEAST_SURE:
         raise SheetError(
             f"the background is not one colour (the commonest takes {found.sure:.0%} of the "
@@ -189,14 +189,14 @@ def _samples(ring: Bool[np.ndarray, "height width"]) -> tuple[np.ndarray, np.nda
 
 
 def _richest_worth_it(
-    rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray
+    rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray, inset: float
 ) -> Background:
     """Return the plain background, or a gradient or smooth field where the border asks for it."""
     dominant = _dominant(colors)
     best = _judged("plain", None, dominant, colors, np.array(dominant))
     if best.sure >= CLEARLY and best.tolerance <= 2 * WORTH_LEVELS:
         return best
-    gradient = fit_gradient(rgba)
+    gradient = fit_gradient(rgba, inset)
     for kind, field in (("gradient", gradient), ("uneven", fit_smooth(rgba, gradient))):
         expected = sampled(field, places)
         richer = _judged(kind, field, field.typical, colors, expected)

@@ -54,12 +54,17 @@ class Field:
         return np.rint(np.clip(wide, 0, 255)).astype(np.uint8)
 
 
-def fit_gradient(rgba: UInt8[np.ndarray, "height width 4"]) -> Field:
-    """Return the quadratic gradient that border and inside agree on."""
+def fit_gradient(rgba: UInt8[np.ndarray, "height width 4"], inset: float = 0.0) -> Field:
+    """Return the quadratic gradient that border and inside agree on.
+
+    Args:
+        rgba: the sheet.
+        inset: share of the shorter side at which the border begins, inside of a frame.
+    """
     small, size_wh = _small(rgba)
     basis = _quadratics(*small.shape[:2])
     flat = small.reshape(-1, 3)
-    trusted = _border(*small.shape[:2]).ravel()
+    trusted = _border(*small.shape[:2], inset).ravel()
     for width in np.geomspace(WIDEST_LEVELS, NARROWEST_LEVELS, ROUNDS):
         weight = np.sqrt(trusted)[:, None]
         coefficients = np.linalg.lstsq(basis * weight, flat * weight, rcond=None)[0]
@@ -115,9 +120,11 @@ def _small(rgba: np.ndarray) -> tuple[Float[np.ndarray, "rows columns 3"], tuple
     return picture.astype(np.float64), (width, height)
 
 
-def _border(rows: int, columns: int) -> Bool[np.ndarray, "rows columns"]:
-    border = np.ones((rows, columns), dtype=bool)
-    border[3:-3, 3:-3] = False
+def _border(rows: int, columns: int, inset: float) -> Bool[np.ndarray, "rows columns"]:
+    begin = round(inset * min(rows, columns))
+    border = np.zeros((rows, columns), dtype=bool)
+    border[begin : rows - begin, begin : columns - begin] = True
+    border[begin + 3 : rows - begin - 3, begin + 3 : columns - begin - 3] = False
     return border
 
 

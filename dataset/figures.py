@@ -35,7 +35,7 @@ LEAST_SPECK = 4  # cells: smaller things are noise
 LISTED_SPECK = 0.0005  # of the figure's area: smaller ones are counted, not listed
 FAMILIAR = 0.8  # of a part's pixels in colours that its figure has
 DARK = 170  # level: ink is no lighter
-LETTER_HEIGHT = 0.07  # of the figure's height
+LETTER_HEIGHT = 0.1  # of the figure's height
 OFF_INK = 24  # levels from the mixtures of ink and paper: noise
 ONE_INK = 0.95  # of a patch's pixels in its ink
 STROKE = 0.12  # of its box's squared diagonal: a thing that covers no more is a stroke
@@ -304,7 +304,9 @@ def _is_lettering(blobs: Blobs, number: int, body: int, rgb: np.ndarray) -> bool
     """Return whether a patch is of one ink, and low or thin: a word, a figure, an arrow."""
     mask = blobs.mask(number)
     low = mask.shape[0] <= LETTER_HEIGHT * blobs.boxes[body, 3]
-    return (low or _is_stroke(mask)) and _is_ink(rgb[blobs.window(number)][mask])
+    round_ = mask.mean() >= DISC[0] and max(mask.shape) <= 1.5 * min(mask.shape)  # a hand is
+    thin = (low and not round_) or _is_stroke(mask)
+    return thin and _is_ink(rgb[blobs.window(number)][mask])
 
 
 def _is_ink(colors: UInt8[np.ndarray, "n 3"]) -> bool:

@@ -23,12 +23,12 @@ LEAST_AREA = 0.01  # of the figure's area
 TOP = 0.4  # of the figure's height from its top: no shadow reaches higher
 WHOLE = 0.9  # of the figure without the shadow that is still one piece
 ENCLOSED = 0.5  # of the shadow that the figure surrounds: more is a patch of its clothes
-FEET = 0.2  # of a soft shadow's height from its top: the figure reaches lower
+FEET = 0.0  # of a soft shadow's height from its top: the figure reaches lower
 FEET_OF_HARD = 0.7  # the same of one with a hard edge, which shoes have, too
 EDGE = 0.02  # of the figure's height: a shadow's own edge is no wider
 BLACK = 40  # levels: a shadow on transparency is no lighter
 OPAQUE = 230  # alpha: and less opaque
-FADED = 0.94  # of the paper's light, at the shadow's border
+FADED = 0.95  # of the paper's light, at the shadow's border, besides noise
 MOSTLY = 0.7  # of the border
 GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, nothing is known
 TONE = 0.03  # of the paper's light: tones so near are one
@@ -61,13 +61,13 @@ def find_shadows(
         for window, _ in looks
     ]
     bodies = [body for _, body in looks]
-    tone = _tone(bodies, lights)
+    tone = _tone(bodies, lights, tolerance)
     found = np.zeros(blobs.labels.shape, dtype=bool)
     if tone is None:
         return found
     shaded = 0
     for (window, body), dim in zip(looks, lights, strict=True):
-        shadow = _shadow_of(body, dim, tone)
+        shadow = _shadow_of(body, dim, tone, tolerance)
         found[window] |= shadow
         shaded += bool(shadow.any())
     return found if shaded >= max(1.0, OFTEN * len(mains)) else np.zeros_like(found)
@@ -108,7 +108,7 @@ def _dimmed(
     return Dim(dim, _opened(dim & (slope <= STEEPEST + 2 * tolerance / 255)), light)
 
 
-def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
+def _tone(bodies: list[np.ndarray], dims: list[Dim], tolerance: int) -> float | None:
     """Return the light of the darkest shadow; None if the figures' own upper parts have it."""
     pieces = [
         _pieces(body, dim.mask & body, dim.smooth & body)
@@ -118,7 +118,7 @@ def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
     if not len(deep):
         return None
     darkest = float(np.percentile(deep, 10))
-    if _are_soft(bodies, dims, pieces):
+    if _are_soft(bodies, dims, pieces, tolerance):
         return darkest
     toned = area = 0
     for body, dim in zip(bodies, dims, strict=True):
@@ -129,7 +129,9 @@ def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
     return None if toned > GREY * area else darkest
 
 
-def _are_soft(bodies: list[np.ndarray], dims: list[Dim], pieces: list[np.ndarray]) -> bool:
+def _are_soft(
+    bodies: list[np.ndarray], dims: list[Dim], pieces: list[np.ndarray], tolerance: int
+) -> bool:
     """Return whether most of the shadows' border with the paper fades into it, as no cloth does."""
     square = np.ones((3, 3), np.uint8)
     rims = []
@@ -139,7 +141,7 @@ def _are_soft(bodies: list[np.ndarray], dims: list[Dim], pieces: list[np.ndarray
         shadow = _grown(own, EDGE * len(body), dim.mask & body)
         rims.append(dim.light[shadow & beside])
     rim = np.concatenate(rims)
-    return bool(len(rim) and np.mean(rim >= FADED) >= MOSTLY)
+    return bool(len(rim) and np.mean(rim >= FADED - tolerance / 255) >= MOSTLY)
 
 
 def _pieces(
@@ -165,14 +167,14 @@ def _opened(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height 
 
 
 def _shadow_of(
-    body: Bool[np.ndarray, "height width"], dim: Dim, tone: float
+    body: Bool[np.ndarray, "height width"], dim: Dim, tone: float, tolerance: int
 ) -> Bool[np.ndarray, "height width"]:
     """Return the smooth patches that lie as a shadow lies, with their own edges."""
     room = body & (dim.light >= tone - TONE)
     shadow = _pieces(body, dim.mask & room, dim.smooth & room)
     if not shadow.any():
         return shadow
-    soft = _are_soft([body], [dim], [shadow])
+    soft = _are_soft([body], [dim], [shadow], tolerance)
     if not soft:  # its one tone shows between the legs, too
         middle = float(np.median(dim.light[shadow]))
         shadow |= _toned(dim.smooth & room, dim.light, middle, int(TOP * body.shape[0]))

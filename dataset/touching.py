@@ -17,11 +17,12 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.figures import Blobs, find_mains, shared_colors
 
-DEAREST = 0.16  # of the patch's height in paint: the most that a cut may cost
+DEAREST = 0.12  # of the patch's height in paint: the most that a cut may cost
 AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
 AS_LARGE = 0.3  # of the patch's area: the same, for two figures of equal size less
 WIDER = 1.2  # times the narrowest figure's width: a patch that may be two figures
 WIDE_ALONE = 0.5  # times its own height: the same where there are no others
+LARGER = 1.4  # times the area of figures that stand alone: the same
 DETOUR = 0.02  # cost of a step aside, in pixels of paint
 ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
 LINE = 0.9  # of the cost of paint that a drawn line saves
@@ -62,7 +63,7 @@ def part_touching(
         rgb: the sheet.
     """
     mains, cuts = find_mains(blobs), list[Cut]()
-    widths = blobs.boxes[mains, 2]
+    widths, least = blobs.boxes[mains, 2], _least_area(blobs, mains)
     labels, top = blobs.labels, len(blobs.areas)
     queue = [(int(n) + 1, _as_box(blobs.boxes[n])) for n in mains]
     while queue:
@@ -72,6 +73,8 @@ def part_touching(
             continue
         mask = labels[y : y + height, x : x + width] == label
         paint = mask & painted[y : y + height, x : x + width]
+        if mask.sum() < least:
+            continue
         if paint.sum() < mask.sum() * (1 - MOST_ENCLOSED):
             paint = mask  # a line drawing: its inside is paper, too
         found = _best_cut(mask, paint, rgb[y : y + height, x : x + width])
@@ -115,6 +118,14 @@ def _boxes(labels: Int[np.ndarray, "height width"]) -> Int[np.ndarray, "blobs 4"
     return np.array(
         [(c.start, r.start, c.stop - c.start, r.stop - r.start) for r, c in places]
     ).reshape(-1, 4)
+
+
+def _least_area(blobs: Blobs, mains: Int[np.ndarray, " mains"]) -> float:
+    """Return from which area a patch may be two figures: more than those that stand alone have."""
+    widths, heights = blobs.boxes[mains, 2], blobs.boxes[mains, 3]
+    alone = (widths < WIDER * widths.min(initial=0)) & (widths < WIDE_ALONE * heights)
+    alone |= widths <= np.median(widths) if len(mains) >= 3 else alone
+    return LARGER * float(np.median(blobs.areas[mains[alone]])) if alone.any() else 0.0
 
 
 def _is_wide(box: tuple[int, int, int, int], widths: Int[np.ndarray, " mains"]) -> bool:
