@@ -9,6 +9,7 @@ from toonset.dataset.export_views import ExportView
 from toonset.dataset.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.dataset.picture import encode_png
 from toonset.mesh import Mesh
+from toonset.palette.srgb import linear_from_srgb
 
 GREY = [0.6, 0.6, 0.6, 1.0]  # linear, of a mannequin without colours
 PLANE_UV = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])  # glTF's v runs down the picture
@@ -65,10 +66,5 @@ def _vertex_colored(
     palette, color = np.unique(mesh.face_colors, axis=0, return_inverse=True)
     pairs = np.stack([mesh.faces.ravel(), np.repeat(color.ravel(), 3)], axis=1)
     unique, index = np.unique(pairs, axis=0, return_inverse=True)
-    linear = _linear(palette / 255.0)[unique[:, 1]]
+    linear = linear_from_srgb(palette / 255.0)[unique[:, 1]]
     return mesh.vertices[unique[:, 0]], index.reshape(-1, 3), linear
-
-
-def _linear(srgb: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Return linear light of sRGB in [0, 1]. Source: IEC 61966-2-1."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

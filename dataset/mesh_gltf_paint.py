@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Int, UInt8
 
 from toonset.dataset.mesh_color import face_colors_from_texture
 from toonset.dataset.mesh_gltf_file import GltfFile, data_of_uri
 from toonset.dataset.picture import decode_rgba
+from toonset.palette.srgb import linear_from_srgb, srgb_from_linear
 
 
 def primitive_colors(
@@ -34,18 +35,6 @@ def primitive_colors(
     if "COLOR_0" in attributes:
         linear = linear * file.array(attributes["COLOR_0"])[:, :3].astype(float)[faces].mean(axis=1)
     return np.rint(255 * srgb_from_linear(linear)).astype(np.uint8)
-
-
-def srgb_from_linear(linear: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Return sRGB in [0, 1] from linear light, clipped. Source: IEC 61966-2-1."""
-    value = np.clip(np.nan_to_num(linear), 0, 1)
-    return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
-
-
-def linear_from_srgb(srgb: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Return linear light from sRGB in [0, 1]. Source: IEC 61966-2-1."""
-    value = np.asarray(srgb, dtype=np.float64)
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
 def _texture_colors(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from toonset.palette.named import RGB
+from toonset.palette.srgb import srgb_from_linear
 
 WHITE_D50 = np.array([0.3457 / 0.3585, 1.0, (1 - 0.3457 - 0.3585) / 0.3585])
 D65_FROM_D50 = np.array(
@@ -39,7 +40,5 @@ def rgb_from_lab(lightness: float, a: float, b: float) -> RGB:
 
 def rgb_from_linear(linear: np.ndarray) -> RGB:
     """Return the 8-bit sRGB colour of three linear-light numbers, clipped to 0 to 1."""
-    held = np.clip(linear, 0, 1)
-    curved = np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1 / 2.4) - 0.055)
-    red, green, blue = np.rint(255 * curved).astype(int).tolist()
+    red, green, blue = np.rint(255 * srgb_from_linear(linear)).astype(int).tolist()
     return red, green, blue

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from toonset.palette.srgb import linear_from_srgb
+
 LMS_FROM_LINEAR = np.array(
     [
         [0.4122214708, 0.5363325363, 0.0514459929],
@@ -26,8 +28,7 @@ LAB_FROM_ROOTS = np.array(
 )
 JUST_NOTICEABLE = 0.02  # Source: CSS Color 4 (W3C), 13.2: "JND" of its gamut mapping in OKLab
 TOE = (0.206, 0.03)
-_LEVELS = np.arange(256) / 255
-LINEAR_OF_LEVEL = np.where(_LEVELS <= 0.04045, _LEVELS / 12.92, ((_LEVELS + 0.055) / 1.055) ** 2.4)
+LINEAR_OF_LEVEL = linear_from_srgb(np.arange(256) / 255)
 
 
 def oklab_from_rgb(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
