@@ -21,8 +21,7 @@ from toonset import __version__
 from toonset import frames as conventions
 from toonset.dataset.blender_script import SCRIPT
 from toonset.dataset.export_planes import clip_range, plane_corners, scene_views, stand, window_wh
-from toonset.dataset.export_views import ExportView, write_beside
-from toonset.dataset.picture import encode_png
+from toonset.dataset.export_views import ExportView, write_views
 from toonset.files import new_folder, write_bytes
 from toonset.mesh import Mesh
 
@@ -51,10 +50,8 @@ def write_blender_script(
     text = text.replace("@WINDOW@", repr(window_wh(written)))
     text = text.replace("@VIEWS@", json.dumps(records, indent=1, allow_nan=False))
     with new_folder(folder, force=force) as temporary:
-        for view, picture in zip(written, pictures, strict=True):
-            write_bytes(temporary / picture, encode_png(view.rgba))
         write_bytes(temporary / SCRIPT_NAME, text.encode())
-        write_beside(temporary, "blender", written, pictures, mesh)
+        write_views(temporary, "blender", written, pictures, mesh)
     return written
 
 

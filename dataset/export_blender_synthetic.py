@@ -21,8 +21,7 @@ from toonset.dataset.colmap_points import TrackedPoints
 from toonset.dataset.export_lens import common_lens
 from toonset.dataset.export_points import encode_ply
 from toonset.dataset.export_transforms import transform_matrix
-from toonset.dataset.export_views import ExportView, write_beside
-from toonset.dataset.picture import encode_png
+from toonset.dataset.export_views import ExportView, write_views
 from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
 
@@ -55,12 +54,10 @@ def write_blender_synthetic(
     ]
     angle = 2 * math.atan(pinhole.size_wh[0] / 2 / float(pinhole.K[0, 0]))
     with new_folder(folder, force=force) as temporary:
-        for view, picture in zip(written, pictures, strict=True):
-            write_bytes(temporary / picture, encode_png(view.rgba))
         for split in SPLITS:
             content = {"camera_angle_x": angle, "frames": frames}
             write_json(temporary / f"transforms_{split}.json", content)
         if points is not None:
             write_bytes(temporary / "points3d.ply", encode_ply(points))
-        write_beside(temporary, "blender-synthetic", written, pictures, mesh)
+        write_views(temporary, "blender-synthetic", written, pictures, mesh)
     return written

@@ -29,10 +29,9 @@ from toonset.dataset.export_planes import (
     scene_views,
     stand,
 )
-from toonset.dataset.export_views import ExportView, write_beside
+from toonset.dataset.export_views import ExportView, write_views
 from toonset.dataset.gltf_mesh import add_mannequin, add_plane
 from toonset.dataset.gltf_write import Gltf
-from toonset.dataset.picture import encode_png
 from toonset.dataset.transforms import NativeCamera
 from toonset.files import new_folder, write_bytes
 from toonset.mesh import Mesh
@@ -59,10 +58,8 @@ def write_gltf(
     pictures = [f"images/{view.name}" for view in written]
     data = _scene(written, mesh)
     with new_folder(folder, force=force) as temporary:
-        for view, picture in zip(written, pictures, strict=True):
-            write_bytes(temporary / picture, encode_png(view.rgba))
         write_bytes(temporary / SCENE, data)
-        write_beside(temporary, "gltf", written, pictures, mesh)
+        write_views(temporary, "gltf", written, pictures, mesh)
     return written
 
 

@@ -19,8 +19,7 @@ import cv2
 import numpy as np
 
 from toonset import frames as conventions
-from toonset.dataset.export_views import ExportView, write_beside
-from toonset.dataset.picture import encode_png
+from toonset.dataset.export_views import ExportView, write_views
 from toonset.files import new_folder, write_bytes
 from toonset.mesh import Mesh
 
@@ -44,10 +43,8 @@ def write_opencv(
     pictures = [f"images/{view.name}" for view in views]
     text = _text(suffix, list(zip(views, pictures, strict=True)))
     with new_folder(folder, force=force) as temporary:
-        for view, picture in zip(views, pictures, strict=True):
-            write_bytes(temporary / picture, encode_png(view.rgba))
         write_bytes(temporary / f"cameras.{suffix}", text.encode())
-        write_beside(temporary, "opencv-xml" if xml else "opencv", views, pictures, mesh)
+        write_views(temporary, "opencv-xml" if xml else "opencv", views, pictures, mesh)
 
 
 def _text(suffix: str, views: Sequence[tuple[ExportView, str]]) -> str:

@@ -24,8 +24,7 @@ from jaxtyping import Float
 from toonset import frames as conventions
 from toonset.dataset.colmap_points import TrackedPoints
 from toonset.dataset.export_points import encode_ply
-from toonset.dataset.export_views import ExportView, write_beside
-from toonset.dataset.picture import encode_png
+from toonset.dataset.export_views import ExportView, write_views
 from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
 
@@ -63,13 +62,11 @@ def write_transforms(
     pictures = [f"images/{view.name}" for view in views]
     content["frames"] = [_frame(v, p) for v, p in zip(views, pictures, strict=True)]
     with new_folder(folder, force=force) as temporary:
-        for view, picture in zip(views, pictures, strict=True):
-            write_bytes(temporary / picture, encode_png(view.rgba))
         if "ply_file_path" in content and points is not None:
             write_bytes(temporary / POINTS, encode_ply(points))
         write_json(temporary / "transforms.json", content)
         kind = "instant-ngp" if instant_ngp else "nerfstudio"
-        write_beside(temporary, kind, views, pictures, mesh)
+        write_views(temporary, kind, views, pictures, mesh)
 
 
 def transform_matrix(view: ExportView) -> list[list[float]]:

@@ -24,6 +24,7 @@ from toonset import frames as conventions
 from toonset.camera import Camera
 from toonset.dataset.bundle import MANNEQUIN
 from toonset.dataset.mesh_file import save_obj
+from toonset.dataset.picture import encode_png
 from toonset.dataset.scene import Frame
 from toonset.dataset.transforms import NativeCamera, read_json, read_scene, transforms_file
 from toonset.errors import BundleError
@@ -89,6 +90,19 @@ def read_views(bundle: Path) -> tuple[ExportView, ...]:
 def largest_error_px(views: Sequence[ExportView]) -> float:
     """Return the bound that holds for every view's pinhole."""
     return max(view.error_px for view in views)
+
+
+def write_views(
+    folder: Path,
+    kind: str,
+    views: Sequence[ExportView],
+    pictures: Sequence[str],
+    mesh: Mesh | None,
+) -> None:
+    """Write every view's RGBA picture, and what stands beside all exports (see `write_beside`)."""
+    for view, picture in zip(views, pictures, strict=True):
+        write_bytes(folder / picture, encode_png(view.rgba))
+    write_beside(folder, kind, views, pictures, mesh)
 
 
 def write_beside(

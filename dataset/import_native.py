@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from toonset.camera import Camera
 from toonset.dataset.export_views import NATIVE
 from toonset.dataset.import_place import ImportView, find_picture
 from toonset.dataset.json_file import read_json, schema_version, validated
 from toonset.dataset.native_camera import NativeCamera
-from toonset.dataset.transforms_camera import SAME_VIEW_PX
+from toonset.dataset.transforms_camera import shows_same_view
 from toonset.dataset.transforms_schema import MAX_FRAMES
 from toonset.errors import BundleError, CameraError
 
@@ -59,7 +57,9 @@ class NativeExport:
         own = next((own for own in self.views if own.name == view.name), None)
         if own is None:
             return view
-        if not _agree(own.camera, view.camera, self.error_px[own.name]):
+        same_size = own.camera.size_wh == view.camera.size_wh
+        error_px = self.error_px[own.name]
+        if not (same_size and shows_same_view(own.camera, view.camera, error_px)):
             raise BundleError(
                 f"{path}: {view.name}: its camera and that of {NATIVE} beside it disagree; remove "
                 f"{NATIVE} if the cameras were changed"
@@ -93,12 +93,3 @@ def _view(root: Path, record: _ViewRecord, file: Path) -> ImportView:
     except (CameraError, BundleError) as error:
         raise BundleError(f"{where}: {error}; export it again") from error
     return ImportView(record.name, camera, find_picture([root], record.picture, where), None)
-
-
-def _agree(exact: Camera, pinhole: Camera, error_px: float) -> bool:
-    """Return whether a pinhole shows what the exact camera does, around its target."""
-    reach = 0.1 * max(exact.size_wh) / exact.scale
-    points = exact.target + reach * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    off = np.abs(exact.project(points)[0] - pinhole.project(points)[0])
-    near = np.nan_to_num(off, nan=np.inf).max() <= error_px + SAME_VIEW_PX
-    return bool(near) and exact.size_wh == pinhole.size_wh

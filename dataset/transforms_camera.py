@@ -41,7 +41,7 @@ def camera_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) ->
             f"w and h are {camera.size_wh}, the `toonset` camera's are {native.size_wh}; make "
             "them equal"
         )
-    if not _same_view(native, camera, frame.toonset.pinhole_error_px):
+    if not shows_same_view(native, camera, frame.toonset.pinhole_error_px):
         raise BundleError(
             "transform_matrix and its `toonset` camera disagree; remove the `toonset` key of a "
             "frame whose matrix you changed"
@@ -49,8 +49,14 @@ def camera_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) ->
     return native
 
 
-def _same_view(native: Camera, pinhole: Camera, error_px: float) -> bool:
-    """Return whether a far pinhole shows what the native camera does, around the target."""
+def shows_same_view(native: Camera, pinhole: Camera, error_px: float) -> bool:
+    """Return whether a far pinhole shows what the native camera does, around the target.
+
+    Args:
+        native: the exact camera.
+        pinhole: what stands for it.
+        error_px: by how much it may miss the exact one, beside rounding.
+    """
     reach = 0.1 * max(native.size_wh) / native.scale
     points = native.target + reach * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     off = np.abs(native.project(points)[0] - pinhole.project(points)[0])
