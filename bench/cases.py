@@ -16,13 +16,14 @@ from jaxtyping import Float
 
 from toonset import frames
 from toonset.dataset.bodies import random_body
+from toonset.dataset.json_file import read_json
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.picture import load_rgba
 from toonset.dataset.scene import Frame, Scene
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
-from toonset.dataset.transforms import read_json, read_scene
+from toonset.dataset.transforms import read_scene
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.view import View

@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.bench.sprites import SHADOW_BELOW
+from toonset.dataset.json_file import read_json
 from toonset.dataset.messy import make_messy_sheet
 from toonset.dataset.messy_figure import tight_window
 from toonset.dataset.messy_options import DIFFICULTIES
 from toonset.dataset.picture import load_rgba
-from toonset.dataset.transforms import read_json
 from toonset.errors import BundleError
 
 Box = tuple[int, int, int, int]  # x, y, width, height

@@ -63,7 +63,7 @@ def sweep_into(
 def _finished_steps(folder: Path, key: RunKey, *, force: bool) -> list[StepResult]:
     """Return the steps of an earlier run in `folder`; none if it is new or to be replaced."""
     from toonset.bench.stability_files import from_plain
-    from toonset.dataset.transforms import read_json
+    from toonset.dataset.json_file import read_json
 
     kept = folder / STEPS
     if kept.is_file() and not force:

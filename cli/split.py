@@ -163,8 +163,10 @@ def _say(
 
 
 def _source_line(source: Source) -> str:
+    from toonset.palette.names import hex_of
+
     width, height = source.size_wh
     ground = "transparent"
     if source.background is not None:
-        ground = "background #{:02x}{:02x}{:02x}".format(*source.background)
+        ground = f"background {hex_of(source.background)}"
     return f"{source.name}: {width} x {height} px, {ground}"

@@ -83,13 +83,14 @@ def train(
 
 def _with_palette(scene: Scene, no_palette: bool, printer: Printer) -> Scene:
     from toonset.nerf.labelling import labelled, without_palette
+    from toonset.palette.names import hex_of
 
     if no_palette:
         return without_palette(scene)
     if scene.palette is not None and any(frame.labels is not None for frame in scene.frames):
         return scene
     scene, palette = labelled(scene)
-    colors = " ".join("#{:02x}{:02x}{:02x}".format(*rgb) for rgb in palette.rgb.tolist())
+    colors = " ".join(hex_of(color.rgb) for color in palette.colors)
     printer.say(f"palette, extracted: {colors}")
     return scene
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from toonset.dataset.calibration_schema import SCHEMA, VERSION, CalibrationFile
 from toonset.dataset.calibration_upgrade import upgraded
-from toonset.dataset.json_file import read_json, schema_version, validated
+from toonset.dataset.json_file import read_json, validated
 from toonset.errors import BundleError, CameraError
+from toonset.schema_name import schema_version
 from toonset.view import View
 
 RUN_ONLY = ("seconds",)  # of this run, not of the result: the same input gives the same bytes
@@ -39,7 +40,7 @@ def read_calibration(file: Path) -> CalibrationFile:
             holds a camera that cannot exist.
     """
     content = read_json(file)
-    version = schema_version(content, SCHEMA, VERSION, str(file))
+    version = schema_version(content, SCHEMA, VERSION, str(file), BundleError)
     if version is None:
         raise BundleError(
             f"{file}: states no schema, '{SCHEMA}/{VERSION}' is needed; calibrate again"

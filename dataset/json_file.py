@@ -1,8 +1,8 @@
 """JSON files of a bundle: read strictly, named by a schema, checked against it.
 
-A file says what it is in `schema`: "NAME/MAJOR", or "NAME/MAJOR.MINOR". Within a major version keys
-may be added, never changed or taken away, so readers ignore keys that they do not know. A camera
-is the exception: a number more could change where it looks, so its keys must all be known.
+A file says what it is in `schema` (see `toonset.schema_name`): readers ignore keys that they do not
+know, for later versions may add some. A camera is the exception: a number more could change where
+it looks, so its keys must all be known.
 """
 
 from __future__ import annotations
@@ -48,35 +48,6 @@ def read_json(file: Path) -> Any:
     """
     data = read_whole(file, "JSON", BundleError, MAX_JSON_BYTES)
     return parse_json(data, str(file), BundleError)
-
-
-def schema_version(content: Any, name: str, newest: int, where: str) -> int | None:
-    """Return the major version that a file's `schema` states, None where it states none.
-
-    Args:
-        content: of the file.
-        name: of the schema that is meant, e.g. "toonset-calibration".
-        newest: the highest major version that is understood.
-        where: the file, for messages.
-
-    Raises:
-        BundleError: another schema, or one of a newer toonset.
-    """
-    stated = content.get("schema") if isinstance(content, dict) else None
-    if stated is None:
-        return None
-    match = re.fullmatch(rf"{name}/([1-9]\d{{0,3}})(\.\d{{1,4}})?", str(stated), re.ASCII)
-    if match is None:
-        raise BundleError(
-            f"{where}: schema {str(stated)[:60]!r}, '{name}/{newest}' is needed; write it again"
-        )
-    major = int(match[1])
-    if major > newest:
-        raise BundleError(
-            f"{where}: schema '{name}/{major}' is newer than this toonset, which reads up to "
-            f"'{name}/{newest}'; update toonset"
-        )
-    return major
 
 
 def validated(schema: type[Record], content: Any, file: Path) -> Record:

@@ -11,23 +11,26 @@ from __future__ import annotations
 
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import UInt8
 from pydantic import BaseModel, Field, ValidationError
 
 from toonset import __version__
+from toonset.dataset.json_file import validation_reason
 from toonset.dataset.picture import encode_png
 from toonset.dataset.sheet import LeftOut
 from toonset.dataset.split import Source, Split
-from toonset.dataset.transforms import validation_reason
 from toonset.errors import SheetError
 from toonset.files import new_folder, write_bytes, write_json
+from toonset.palette.format_hex import rgb_of_hex
+from toonset.palette.names import hex_of
 from toonset.reading import read_whole
+from toonset.schema_name import schema_version
 from toonset.strict_json import parse_json
 
-SCHEMA = "toonset-split/1"
+NAME, VERSION = "toonset-split", 1
 SPLIT_FILE, IMAGES, OVERLAY = "split.json", "images", "overlay.png"
 MAX_JSON_BYTES = 8 * 2**20
 
@@ -74,7 +77,6 @@ class ViewRecord(BaseModel):
 
 
 class _SplitFile(BaseModel):
-    schema_: Literal["toonset-split/1"] = Field(alias="schema")
     sheets: list[_SourceRecord]
     views: list[ViewRecord]
 
@@ -82,7 +84,7 @@ class _SplitFile(BaseModel):
 def split_dict(split: Split, options: dict[str, Any]) -> dict[str, Any]:
     """Return the content of split.json but for the hashes of the views' files."""
     return {
-        "schema": SCHEMA,
+        "schema": f"{NAME}/{VERSION}",
         "toonset": __version__,
         "sheets": [_source_dict(source) for source in split.sources],
         "views": [
@@ -136,7 +138,7 @@ def _source_dict(source: Source) -> dict[str, Any]:
         "name": source.name,
         "sha256": source.sha256,
         "size_wh": list(source.size_wh),
-        "background": None if background is None else "#{:02x}{:02x}{:02x}".format(*background),
+        "background": None if background is None else hex_of(background),
         "warnings": list(source.warnings),
         "remarks": list(source.remarks),
         "left_out": [{"kind": left.kind, "box": list(left.box)} for left in source.left_out],
@@ -152,8 +154,13 @@ def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ..
     """
     file = folder / SPLIT_FILE
     data = read_whole(file, "split", SheetError, MAX_JSON_BYTES)
+    content = parse_json(data, str(file), SheetError)
+    if schema_version(content, NAME, VERSION, str(file), SheetError) is None:
+        raise SheetError(
+            f"{file}: states no schema, '{NAME}/{VERSION}' is needed; split the sheet again"
+        )
     try:
-        found = _SplitFile.model_validate(parse_json(data, str(file), SheetError))
+        found = _SplitFile.model_validate(content)
     except ValidationError as error:
         raise SheetError(f"{file}: {validation_reason(error)}") from error
     for view in found.views:
@@ -168,8 +175,7 @@ def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ..
 def _source(record: _SourceRecord) -> Source:
     background = None
     if record.background is not None:
-        red, green, blue = bytes.fromhex(record.background[1:])
-        background = (red, green, blue)
+        background = rgb_of_hex(record.background, "background")
     left_out = tuple(LeftOut(left.box, left.kind) for left in record.left_out)
     return Source(
         record.name,

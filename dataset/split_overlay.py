@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from toonset.dataset.split_panel import LEFT_OUT, MARGIN, WIDEST, Panel, draw_panel
 from toonset.dataset.split_tags import Line, Rgb, text_width
+from toonset.palette.names import hex_of
 
 GREY: Rgb = (40, 40, 40)
 
@@ -40,7 +41,7 @@ def _title(panel: Panel) -> str:
     height, width = panel.rgba.shape[:2]
     ground = "transparent"
     if panel.background is not None:
-        ground = "background #{:02x}{:02x}{:02x}".format(*panel.background)
+        ground = f"background {hex_of(panel.background)}"
     text = f"{panel.title}: {width} x {height} px, {ground}"
     kinds = Counter(thing.kind for thing in panel.left_out)
     left = ", ".join(f"{count} {kind}" for kind, count in kinds.items())

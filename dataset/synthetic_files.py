@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 
 from toonset.dataset.mesh_file import save_obj
+from toonset.dataset.native_camera import NativeCamera
 from toonset.dataset.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.dataset.synthetic import Turnaround
-from toonset.dataset.transforms import NativeCamera, transforms_dict
+from toonset.dataset.transforms import transforms_dict
 from toonset.files import new_folder, write_bytes, write_json
+from toonset.palette.names import hex_of
 
 TRUTH_VERSION = 1
 
@@ -80,7 +82,7 @@ def truth_dict(turnaround: Turnaround) -> dict[str, Any]:
         "version": TRUTH_VERSION,
         "mesh": turnaround.mesh.name,
         "body_height": turnaround.mesh.height,
-        "palette": [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in turnaround.palette.tolist()],
+        "palette": [hex_of((r, g, b)) for r, g, b in turnaround.palette.tolist()],
         "seed": turnaround.seed,
         "options": asdict(turnaround.options),
         "views": views,

@@ -13,7 +13,6 @@ from typing import Any
 
 from toonset import frames as conventions
 from toonset.camera import Camera
-from toonset.dataset.json_file import read_json, validation_reason
 from toonset.dataset.native_camera import NativeCamera
 from toonset.dataset.scene_read import read_scene
 from toonset.dataset.transforms_read import picture_paths, read_cameras, transforms_file
@@ -21,14 +20,11 @@ from toonset.dataset.transforms_schema import SCHEMA, VERSION
 
 __all__ = [
     "FAR_HEIGHTS",
-    "NativeCamera",
     "picture_paths",
     "read_cameras",
-    "read_json",
     "read_scene",
     "transforms_dict",
     "transforms_file",
-    "validation_reason",
 ]
 
 FAR_HEIGHTS = 100.0  # body heights to the far pinhole that stands for an orthographic view

@@ -10,8 +10,10 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from toonset.dataset.json_file import read_json, schema_version, validated
+from toonset.dataset.json_file import read_json, validated
 from toonset.dataset.native_camera import NativeCamera
+from toonset.errors import BundleError
+from toonset.schema_name import schema_version
 
 SCHEMA, VERSION = "toonset-transforms", 1
 MAX_FRAMES = 10_000
@@ -53,5 +55,5 @@ def read_records(file: Path) -> TransformsFile:
     """
     content = read_json(file)
     if isinstance(content, dict) and str(content.get("schema", "")).startswith("toonset-"):
-        schema_version(content, SCHEMA, VERSION, str(file))
+        schema_version(content, SCHEMA, VERSION, str(file), BundleError)
     return validated(TransformsFile, content, file)

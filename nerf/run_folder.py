@@ -21,7 +21,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from toonset.dataset.transforms import read_json, validation_reason
+from toonset.dataset.json_file import read_json, validation_reason
 from toonset.errors import BundleError
 from toonset.files import write_bytes
 from toonset.nerf.classifier import PaletteClassifier

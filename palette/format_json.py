@@ -13,7 +13,7 @@ from toonset.palette.palette import Palette
 from toonset.reading import read_whole
 from toonset.strict_json import parse_json
 
-SCHEMA = "toonset-palette/1"  # see toonset.palette.palette_schema for what may change within it
+NAME, VERSION = "toonset-palette", 1  # toonset.palette.palette_schema says what may change
 MAX_BYTES = 2**20
 
 
@@ -36,7 +36,7 @@ def to_json(palette: Palette) -> dict[str, Any]:
     """Return the content of palette.json."""
     contour, evidence = palette.contour, palette.evidence
     return {
-        "schema": SCHEMA,
+        "schema": f"{NAME}/{VERSION}",
         "colors": [_record(color.rgb, color.share, color.name) for color in palette.colors],
         "rule": palette.rule,
         "dropped": [

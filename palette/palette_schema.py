@@ -1,20 +1,19 @@
 """The content of palette.json, as pydantic checks it.
 
-`schema` is "toonset-palette/MAJOR" or "toonset-palette/MAJOR.MINOR". Within a major version keys
-may be added, never changed or taken away: readers ignore keys that they do not know. To add one,
-give it a default here, write it in `format_json.to_json`, and leave SCHEMA as it is. Whatever would
-make an older reader draw a wrong conclusion needs the next major version.
+Within a version keys may be added (see `toonset.schema_name`): readers ignore keys that they do not
+know. To add one, give it a default here, write it in `format_json.to_json`, and leave the version
+as it is. Whatever would make an older reader draw a wrong conclusion needs the next one.
 """
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from toonset.errors import PaletteError
 from toonset.palette.format_hex import rgb_of_hex
+from toonset.palette.format_json import NAME, VERSION
 from toonset.palette.named import RGB, clean_name, one_line
 from toonset.palette.palette import (
     MAX_COLORS,
@@ -25,10 +24,7 @@ from toonset.palette.palette import (
     PaletteColor,
     Place,
 )
-
-NAME, MAJOR = "toonset-palette", 1
-SCHEMA = f"{NAME}/{MAJOR}"
-VERSION = re.compile(rf"{NAME}/([1-9]\d{{0,3}})(\.\d{{1,4}})?", re.ASCII)
+from toonset.schema_name import schema_version
 
 Name = Annotated[str, AfterValidator(clean_name)]
 Line = Annotated[str, AfterValidator(one_line)]
@@ -133,17 +129,10 @@ def _dropped(color: DroppedRecord) -> DroppedColor:
 
 
 def _check_version(content: Any, where: str) -> None:
-    stated = content.get("schema") if isinstance(content, dict) else type(content).__name__
-    match = VERSION.fullmatch(str(stated))
-    if match is None:
+    if schema_version(content, NAME, VERSION, where, PaletteError) is None:
         raise PaletteError(
-            f"{where}: schema {str(stated)[:60]!r}, {SCHEMA!r} is needed; write it again with "
+            f"{where}: states no schema, '{NAME}/{VERSION}' is needed; write it again with "
             "`toonset palette`"
-        )
-    if int(match[1]) > MAJOR:
-        raise PaletteError(
-            f"{where}: schema {match[0]!r} is newer than this toonset, which reads {SCHEMA!r}; "
-            "update toonset"
         )
 
 

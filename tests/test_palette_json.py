@@ -82,8 +82,8 @@ def test_foreign_text_prints_as_one_line() -> None:
 @pytest.mark.parametrize(
     ("content", "fragment"),
     [
-        ([], "schema 'list', 'toonset-palette/1' is needed"),
-        ({}, "schema 'None', 'toonset-palette/1' is needed"),
+        ([], "states no schema, 'toonset-palette/1' is needed"),
+        ({}, "states no schema, 'toonset-palette/1' is needed"),
         (GOOD | {"schema": "toonset-palette/1x"}, "schema 'toonset-palette/1x', "),
         (GOOD | {"schema": "toonset-palette/9"}, "'toonset-palette/9' is newer than this toonset"),
         (

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image, ImageDraw
 
 from toonset.dataset.sheet import SheetOptions, split_sheet
-from toonset.dataset.split_files import SCHEMA
+from toonset.dataset.split_files import NAME, VERSION
 from toonset.dataset.split_read import read_split
 
 COLORS = ((200, 60, 40), (40, 120, 200), (60, 160, 70), (220, 180, 40))
@@ -92,7 +92,7 @@ def test_split_json_says_where_everything_is_from(sheet: Path, toonset):
     done = toonset("split", sheet, "-o", "o", "--views", "front,3q,?,90", "--json", "--quiet")
     assert (done.code, done.err) == (0, "")
     content = json.loads(Path("o/split.json").read_text())
-    assert content["schema"] == SCHEMA == done.json["schema"]
+    assert content["schema"] == f"{NAME}/{VERSION}" == done.json["schema"]
     assert done.json["folder"] == "o"
     (source,) = content["sheets"]
     assert source["name"] == "sheet.png"

@@ -18,12 +18,13 @@ from toonset.dataset import gl_render
 from toonset.dataset.drawing_error import displace, displacement_field
 from toonset.dataset.gl_render import render_labels
 from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.native_camera import NativeCamera
 from toonset.dataset.picture import load_indexed_png, load_rgba
 from toonset.dataset.scene import UNLABELLED
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
 from toonset.dataset.synthetic_files import write_turnaround
-from toonset.dataset.transforms import NativeCamera, read_cameras
+from toonset.dataset.transforms import read_cameras
 from toonset.errors import CameraError, MeshError, SetupError, SheetError
 from toonset.mesh import Mesh
 
