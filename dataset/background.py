@@ -32,7 +32,7 @@ WORTH_SHARE = 0.05  # of the border: or explain so much more of it
 CLEARLY = 0.98  # of the border in one colour with less noise than that: nothing to gain
 RING = 0.02  # of the shorter side: the border that is looked at
 INSETS = (0.0, 0.02, 0.04, 0.06, 0.08)  # of the shorter side: where it is looked for
-COMMON = 0.15  # of the sheet: a colour that covers less is no background but a frame
+COMMON = 0.3  # of the sheet: a colour that covers less is no background but a frame
 MOST_SAMPLES = 200_000  # border pixels that are looked at
 
 

@@ -26,6 +26,7 @@ NEAR = 0.02  # of the figure's height: a part this near to the figure is the fig
 ABOVE = 0.08  # of the figure's height: so near something above may be its part
 BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
 FARTHEST = 0.3  # of the figure's height: a part that most views have is no farther
+FEET = 0.95  # of the figure's height from its top: no part's middle lies lower
 SAME_LEVEL = 0.08  # of the figure's height
 SAME_SIZE = 2.5  # times, of shares of the figure's area
 OFTEN = 0.45  # times the views: in some a hand lies before the body, in some there are two
@@ -108,12 +109,20 @@ def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
 
 
 def without_strangers(
-    blobs: Blobs, mains: Int[np.ndarray, " mains"], rgb: UInt8[np.ndarray, "height width 3"]
+    blobs: Blobs,
+    mains: Int[np.ndarray, " mains"],
+    painted: Bool[np.ndarray, "height width"],
+    rgb: UInt8[np.ndarray, "height width 3"],
 ) -> Int[np.ndarray, " mains"]:
     """Return the bodies without smaller ones in other colours: a sword as high as its bearer."""
     if len(mains) < 3:
         return mains
-    looks = np.array([_look(rgb[blobs.window(int(n))][blobs.mask(int(n))]) for n in mains])
+    looks = np.array(
+        [
+            _look(rgb[blobs.window(int(n))][blobs.mask(int(n)) & painted[blobs.window(int(n))]])
+            for n in mains
+        ]
+    )
     others = (looks.sum(axis=0) - looks) / (len(mains) - 1)
     shared = np.minimum(looks, others).sum(axis=1)
     heights, areas = blobs.boxes[mains, 3], blobs.areas[mains]
@@ -275,6 +284,7 @@ def _come_again(
     size = blobs.areas[numbers] / blobs.areas[bodies]
     above = (middle[:, 0] >= 0) & (middle[:, 0] <= main[:, 2])
     able = (gaps <= FARTHEST * main[:, 3]) & (size >= LEAST_PART) & (size <= PART_AREA)
+    able &= level <= FEET  # captions stand below
     for i in np.flatnonzero(able):
         number, body = int(numbers[i]), int(bodies[i])
         drawn = not _is_lettering(blobs, number, body, rgb) and not _is_stroke(blobs.mask(number))

@@ -6,6 +6,7 @@ between arm and body) if all of this holds:
 - it is larger than a small share of the figure,
 - it does not lie in the figure's top: a white patch there is hair, a face or a hat,
 - nothing lies inside it (an eye has a pupil),
+- a line or another colour runs all round it: it does not fade into a shade of its own colour,
 - its border looks like the figure's outline: as inked as that, and without soft shades beside it
   (a white shirt has folds and borders on skin without the contour line),
 - most of the figure is in other colours (else it is a line drawing, whose paper is its body).
@@ -27,6 +28,8 @@ LINE_ART = 0.5  # of the figure: more of it in the background's colour is a line
 INK_LUMA = 64  # of 255: darker is ink
 HEAD = 0.25  # of the figure's height from its top: no holes there
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
+CLEAR = 40  # levels from the background: a line or another colour
+MOST_FADING = 0.1  # of the border
 AS_INKED = 0.5  # of the outline's share of ink
 SLACK = 0.05  # of the border: the shares of a short border are rough
 SQUARE = np.ones((3, 3), np.uint8)
@@ -118,10 +121,20 @@ def open_holes(
         window = _window(stats[number], labels.shape)
         patch = labels[window] == number
         look = _look(patch, (mask & ~enclosed)[window], contrast[window], luma[window])
-        if look.could_belong_to(outline) and not _has_islands(patch):
+        fades = _fading(patch, contrast[window]) > MOST_FADING
+        if look.could_belong_to(outline) and not fades and not _has_islands(patch):
             result[window] &= ~patch
             opened += 1
     return result, opened
+
+
+def _fading(
+    patch: Bool[np.ndarray, "height width"], contrast: UInt8[np.ndarray, "height width"]
+) -> float:
+    """Return the share of a patch's border beside which nothing differs from the background."""
+    rim = (cv2.dilate(patch.view(np.uint8), SQUARE) > 0) & ~patch
+    around = cv2.dilate(contrast, np.ones((7, 7), np.uint8))
+    return float((around[rim] < CLEAR).mean()) if rim.any() else 0.0
 
 
 def _look(

@@ -17,12 +17,15 @@ LEAST_RUN = 0.04  # of the sheet's side along the line
 LEAST_RUN_PX = 24
 THICKEST = 0.015  # of the sheet's shorter side
 THICKEST_PX = 6  # whatever the sheet's size
-CROSSING = 0.6  # of the sheet: a line this long needs no others
+CROSSING = 0.6  # of the sheet's width: a line this long needs no others
+UPRIGHT = 0.9  # of its height: the same; staffs and poles are shorter
 LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
 ALIKE = 0.8  # overlap of the runs of neighbouring rows
 OPEN = 0.5  # of the line's length with paper on both sides
 OPEN_ACROSS = 0.2  # the same of a line that crosses the sheet, behind all figures
 DASHES = 6  # flat pieces in a row: a dashed line
+EQUAL = 0.25  # of their length: dashes differ by less
+MOSTLY = 0.6  # of the dashes; figures cut some short
 LONGEST_DASH = 0.1  # of the sheet's side
 JOINT = 0.02  # of the shorter side: corners may miss each other by so much
 BROKEN_PX = 5  # gaps in a run that noise may leave
@@ -122,13 +125,17 @@ def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
     """Return rows of dashes: many thin flat pieces on one level that span most of the sheet."""
     stats = cv2.connectedComponentsWithStats(paint.view(np.uint8), connectivity=8)[2][1:]
     left, top, width, height = stats[:, :4].T
-    flat = (height <= thickest) & (width >= 1.5 * height) & (width <= LONGEST_DASH * paint.shape[1])
+    thin = (height <= max(3, thickest // 2)) & (width >= 2 * height)
+    flat = thin & (width <= LONGEST_DASH * paint.shape[1])
     lines = []
     for level in np.unique(top[flat]):
         own = flat & (np.abs(top - level) <= 1)
         start, stop = int(left[own].min()), int((left + width)[own].max())
         if own.sum() < DASHES or stop - start < CROSSING * paint.shape[1]:
             continue
+        usual = np.median(width[own])
+        if np.mean(np.abs(width[own] - usual) <= EQUAL * usual) < MOSTLY:
+            continue  # a line of small print
         last = int((top + height)[own].max()) - 1
         if not lines or lines[-1].last < level - 1:
             lines.append(Line(int(level), last, 0, paint.shape[1], vertical))
@@ -174,7 +181,8 @@ def _beside(paint: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _crosses(line: Line, shape: tuple[int, ...]) -> bool:
-    return line.stop - line.start >= CROSSING * shape[0 if line.vertical else 1]
+    length = line.stop - line.start
+    return length >= (UPRIGHT * shape[0] if line.vertical else CROSSING * shape[1])
 
 
 def _closed(lines: list[Line], free: list[Line], slack: float) -> list[Line]:

@@ -94,7 +94,7 @@ def survey(
         paper = joined(~painted | ruled | shadow, ring)
         blobs = find_blobs(~paper)
     blobs, cuts = part_touching(blobs, painted & ~ruled & ~shadow, small[..., :3])
-    mains = without_strangers(blobs, find_mains(blobs), small[..., :3])
+    mains = without_strangers(blobs, find_mains(blobs), painted, small[..., :3])
     grouping = group_blobs(blobs, mains, small[..., :3])
     return Survey(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
 

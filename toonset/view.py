@@ -9,6 +9,10 @@ from jaxtyping import Bool, UInt8
 
 from toonset.errors import SheetError
 
+VISIBLE = 16  # alpha: fainter is a file's noise
+
+Box = tuple[int, int, int, int]  # x, y, width, height
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -37,9 +41,9 @@ class View:
 
     @property
     def figure_box(self) -> tuple[int, int, int, int]:
-        """Return (x, y, width, height) in the sheet of what the figure covers at all."""
-        rows = np.flatnonzero(self.rgba[..., 3].any(axis=1))
-        columns = np.flatnonzero(self.rgba[..., 3].any(axis=0))
+        """Return (x, y, width, height) in the sheet of what the figure visibly covers."""
+        covered = self.rgba[..., 3] >= VISIBLE
+        rows, columns = (np.flatnonzero(covered.any(axis=axis)) for axis in (1, 0))
         x, y = self.box[0] + int(columns[0]), self.box[1] + int(rows[0])
         return x, y, int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
 
