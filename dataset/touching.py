@@ -22,6 +22,7 @@ AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
 AS_LARGE = 0.3  # of the patch's area: the same, for two figures of equal size less
 WIDER = 1.2  # times the narrowest figure's width: a patch that may be two figures
 WIDE_ALONE = 0.5  # times its own height: the same where there are no others
+LEAST_HEIGHT = 24  # cells: in a lower patch no two figures can be told
 LARGER = 1.4  # times the area of figures that stand alone: the same
 DETOUR = 0.02  # cost of a step aside, in pixels of paint
 ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
@@ -131,7 +132,7 @@ def _least_area(blobs: Blobs, mains: Int[np.ndarray, " mains"]) -> float:
 def _is_wide(box: tuple[int, int, int, int], widths: Int[np.ndarray, " mains"]) -> bool:
     if len(widths) >= 3 and box[2] < WIDER * float(widths.min()):
         return False
-    return box[2] >= WIDE_ALONE * box[3]
+    return box[3] >= LEAST_HEIGHT and box[2] >= WIDE_ALONE * box[3]
 
 
 def _outlines(
