@@ -59,7 +59,8 @@ def _match(folder: Path, request: dict[str, Any]) -> None:
         reader.camera_params = f"{focal},{width / 2},{height / 2}"
     features = pycolmap.FeatureExtractionOptions()
     matching = pycolmap.FeatureMatchingOptions()
-    matching.num_threads = 1  # the order in which pairs are done decides what is mapped first
+    # the order in which pictures and pairs are done decides what is mapped first
+    features.num_threads = matching.num_threads = 1
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = request["seed"]
     if request["permissive"]:
