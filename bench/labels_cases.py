@@ -17,10 +17,10 @@ from PIL import Image
 
 from toonset.bench.palette_cases import characters
 from toonset.dataset.flat_colors import flat_palette
-from toonset.dataset.scene import UNLABELLED
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
 from toonset.mesh import Mesh
+from toonset.palette.labels import UNLABELLED
 
 SIZES_PX = (150, 300, 600)
 OUTLINE = 0.01  # of the cell

@@ -21,11 +21,11 @@ from toonset.dataset.bodies import random_body
 from toonset.dataset.flat_colors import flat_palette
 from toonset.dataset.gl_render import render_labels
 from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.scene import UNLABELLED
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
+from toonset.palette.labels import UNLABELLED
 from toonset.palette.oklab import oklab_from_rgb
 
 SIZES_PX = (150, 600)

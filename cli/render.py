@@ -139,9 +139,9 @@ def _layer(trained: TrainedField, camera: Camera, layer: str) -> tuple[bytes, Pi
     import numpy as np
 
     from toonset.dataset.picture import encode_indexed_png, encode_png
-    from toonset.dataset.scene import UNLABELLED
     from toonset.nerf import layers
     from toonset.nerf.views import render as render_view
+    from toonset.palette.labels import UNLABELLED
 
     view = render_view(trained, camera)
     if layer == "labels":

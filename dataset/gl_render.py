@@ -22,9 +22,9 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from toonset.camera import MIN_RELATIVE_DEPTH, Camera
-from toonset.dataset.scene import UNLABELLED
 from toonset.errors import CameraError, SetupError
 from toonset.mesh import Mesh
+from toonset.palette.labels import UNLABELLED
 
 MAX_SIDE_PX = 4096  # the 4-fold multisampled buffers of a larger picture need over half a GiB
 DEPTH_MARGIN = 0.01  # of the depth range, in front of and behind the mesh

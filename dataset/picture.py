@@ -20,12 +20,12 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 
 from toonset.dataset.pixel_modes import rgba_of
 from toonset.errors import PictureError
+from toonset.palette.labels import UNLABELLED
 from toonset.reading import describe, read_whole
 
 FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF")
 MAX_PIXELS = 80_000_000  # 16,384 x 4,096 and a margin; beyond 89 million Pillow suspects a bomb
 ORIENTATION_TAG = 0x0112  # EXIF; values 5 to 8 swap width and height
-UNLABELLED = 255
 COMPRESSION = 4  # of 0 to 9: as small as 6 on noisy pictures and a quarter faster
 PNG_END = b"IEND\xaeB`\x82"
 

@@ -9,8 +9,6 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 
-UNLABELLED = 255  # label of background and of mixed edge pixels
-
 
 @dataclass(frozen=True, eq=False)
 class Frame:

@@ -10,10 +10,11 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.dataset.picture import load_indexed_png, load_rgba
-from toonset.dataset.scene import UNLABELLED, Frame, Scene
+from toonset.dataset.scene import Frame, Scene
 from toonset.dataset.transforms_read import PosedPicture, is_inside, read_frames, transforms_file
 from toonset.errors import BundleError
 from toonset.palette.files import read_palette_json
+from toonset.palette.labels import UNLABELLED
 
 Labels = UInt8[np.ndarray, "height width"]
 

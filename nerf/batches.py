@@ -11,11 +11,12 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from toonset.dataset.scene import UNLABELLED, Scene
+from toonset.dataset.scene import Scene
 from toonset.nerf.field import TriplaneField
 from toonset.nerf.hull import Hull, occupancy
 from toonset.nerf.interpolation import Operator
 from toonset.nerf.march import Rays, Samples, march, rays_of
+from toonset.palette.labels import UNLABELLED
 
 RAYS_PER_BATCH = 2048  # activations of a batch stay in a core's cache
 MOST_RAYS = 100_000  # drawn by lot from larger scenes; bounds memory at about 1 GB

@@ -14,12 +14,12 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.dataset.scene import UNLABELLED
 from toonset.nerf.hull import occupancy
 from toonset.nerf.losses import straight
 from toonset.nerf.march import Rays, Samples, march, pixels_near, rays_of
 from toonset.nerf.rendering import compositing_weights, padded
 from toonset.nerf.trained import TrainedField
+from toonset.palette.labels import UNLABELLED
 
 RAYS_PER_SIDE = 2  # of a pixel; 3 gains 0.04 dB and doubles the time
 FIRST_SAMPLES = 8  # of every ray; most rays are opaque by then

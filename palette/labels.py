@@ -18,7 +18,7 @@ from toonset.palette.oklab import oklab_from_rgb
 
 Space = Literal["rgb", "oklab"]
 
-UNLABELLED = 255
+UNLABELLED = 255  # background, soft edges, blends
 BAND_PX = 1 << 21  # pixels looked up at once: bounds the memory
 BATCH = 1 << 18  # colours compared with the palette at once
 

@@ -20,13 +20,13 @@ from toonset.dataset.gl_render import render_labels
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.native_camera import NativeCamera
 from toonset.dataset.picture import load_indexed_png, load_rgba
-from toonset.dataset.scene import UNLABELLED
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
 from toonset.dataset.synthetic_files import write_turnaround
 from toonset.dataset.transforms import read_cameras
 from toonset.errors import CameraError, MeshError, SetupError, SheetError
 from toonset.mesh import Mesh
+from toonset.palette.labels import UNLABELLED
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 SIDES = np.array(
