@@ -18,8 +18,8 @@ from toonset.dataset.messy_figure import tight_window
 from toonset.dataset.messy_options import DIFFICULTIES
 from toonset.dataset.picture import load_rgba
 from toonset.errors import BundleError
+from toonset.view import Box
 
-Box = tuple[int, int, int, int]  # x, y, width, height
 MIXED = "mixed"
 MIXED_FOR_ONE = 15  # mixtures for every sheet of a difficulty alone: 60 at the default count of 4
 

@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from toonset.bench.split_cases import Box, Drawn, drawn_at
+from toonset.bench.split_cases import Drawn, drawn_at
 from toonset.dataset.sheet import split_sheet
 from toonset.errors import ToonsetError
+from toonset.view import Box
 
 CORNER_PX = 5  # side of the patch in the upper left corner whose colour is taken as the ground's
 DIFFERENT = 30  # in some channel: no ground

@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from toonset.bench.split_cases import Box, SplitCase
+from toonset.bench.split_cases import SplitCase
 from toonset.bench.split_methods import Found
+from toonset.view import Box
 
 TILE_WH = (620, 340)
 TITLE_PX = 20

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toonset.bench.split_cases import Box, Drawn, SplitCase, drawn_at
+from toonset.bench.split_cases import Drawn, SplitCase, drawn_at
 from toonset.bench.split_methods import Found
+from toonset.view import Box
 
 NEAR_PX = 2
 NEAR_IOU = 0.97

@@ -23,8 +23,7 @@ from typing import Any
 from toonset.errors import SheetError
 from toonset.reading import describe, read_whole
 from toonset.strict_json import BOM, parse_json
-
-Box = tuple[int, int, int, int]
+from toonset.view import Box
 
 COLUMNS = ("x", "y", "width", "height")
 SHORT = {"w": "width", "h": "height"}

@@ -30,8 +30,8 @@ from toonset.dataset.messy_margins import Margins, furnish, plan_margins
 from toonset.dataset.messy_options import GROUNDS, MessyOptions, checked, in_order, mixture
 from toonset.dataset.messy_rows import compose_rows
 from toonset.dataset.messy_rules import rule_lines
+from toonset.view import Box
 
-Box = tuple[int, int, int, int]
 JPEG_QUALITY = (60, 95)
 
 

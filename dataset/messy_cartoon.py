@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from toonset.dataset.messy_figure import Cast, Figure, Rgb, cut_figure
+from toonset.dataset.messy_figure import Cast, Figure, Rgb, cut_figure, straight
 
 SAMPLES = 4  # per pixel and axis
 FLOAT_GAPS = (0.04, 0.08)  # over the head, to a hat in the air
@@ -208,9 +208,7 @@ def _shrunk(color: np.ndarray, covered: np.ndarray, ink: np.ndarray) -> Figure:
     painted = color[window] * (alpha * (1 - lines))[..., None]
     size = alpha.shape[1] // SAMPLES, alpha.shape[0] // SAMPLES
     small = cv2.resize(np.dstack([painted, 255 * alpha]), size, interpolation=cv2.INTER_AREA)
-    small[..., :3] *= 255 / np.maximum(small[..., 3:], 1e-3)
-    rgba = np.rint(np.clip(small, 0, 255)).astype(np.uint8)
-    return cut_figure(rgba, cv2.resize(ink[window], size, interpolation=cv2.INTER_AREA))
+    return cut_figure(straight(small), cv2.resize(ink[window], size, interpolation=cv2.INTER_AREA))
 
 
 def _whole_pixels(start: int, length: int) -> slice:

@@ -15,9 +15,7 @@ from toonset.dataset.messy_figure import Rgb
 from toonset.dataset.picture import decode_rgba
 
 WHITE: Rgb = (255, 255, 255)
-CONTRAST = (
-    45  # in some channel: what a painter leaves between a figure without lines and its ground
-)
+CONTRAST = 45  # in some channel: what a painter leaves between a figure and its ground
 DARK = 110  # luma: on darker grounds black ink is hardly seen
 LIGHT = 170  # luma: on darker grounds pencil and coloured lines are hardly seen
 

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import UInt8
 
-from toonset.dataset.messy_figure import Figure
-
-Stamp = UInt8[np.ndarray, "height width 4"]
-Rectangle = tuple[int, int, int, int]  # x, y, width, height
+from toonset.dataset.messy_figure import Figure, Stamp
+from toonset.view import Box
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +97,7 @@ class Row:
     items: tuple[Placed, ...]
     top: int
     ground: int
-    cell_boxes: tuple[Rectangle, ...]
+    cell_boxes: tuple[Box, ...]
     texts: tuple[tuple[Stamp, int, int], ...]
 
 

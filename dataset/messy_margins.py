@@ -9,9 +9,9 @@ import numpy as np
 
 from toonset.dataset.messy_canvas import Canvas
 from toonset.dataset.messy_cast import Brief
-from toonset.dataset.messy_figure import Cast, Rgb
+from toonset.dataset.messy_figure import Cast, Rgb, Stamp
 from toonset.dataset.messy_layout import Layout, Placed, Spacing
-from toonset.dataset.messy_props import Stamp, arrow, swatches
+from toonset.dataset.messy_props import arrow, swatches
 from toonset.dataset.messy_rules import frame_px
 from toonset.dataset.messy_text import faded, signature, title_block
 

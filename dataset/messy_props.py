@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
 
-from toonset.dataset.messy_figure import Rgb, tight_window
+from toonset.dataset.messy_figure import Rgb, Stamp, tight_window
 
-Stamp = UInt8[np.ndarray, "height width 4"]
 SAMPLES = 4
 BLACK: Rgb = (20, 20, 24)
 STEEL, GOLD, LEATHER, STRAP = (176, 186, 196), (214, 170, 60), (142, 92, 58), (96, 60, 40)

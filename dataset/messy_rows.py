@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from toonset.dataset.messy_cast import Brief
-from toonset.dataset.messy_figure import Cast, Figure, Rgb, resized
+from toonset.dataset.messy_figure import Cast, Figure, Rgb, Stamp, resized
 from toonset.dataset.messy_layout import Item
-from toonset.dataset.messy_props import Stamp, bag, sword
+from toonset.dataset.messy_props import bag, sword
 from toonset.dataset.messy_text import caption
 
 OVERLAP_PX = (2, 8)

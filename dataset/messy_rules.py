@@ -6,7 +6,8 @@ import numpy as np
 
 from toonset.dataset.messy_canvas import Canvas
 from toonset.dataset.messy_figure import Rgb
-from toonset.dataset.messy_layout import Layout, Rectangle
+from toonset.dataset.messy_layout import Layout
+from toonset.view import Box
 
 INSETS = (0, 3, 8)  # px from the sheet's edge to its frame
 WIDEST_PEN, BETWEEN = 5, 3  # px; of a frame's lines
@@ -40,7 +41,7 @@ def rule_lines(
                 _dashed(canvas, y, width, pen, dash, color)
 
 
-def rectangle(canvas: Canvas, box: Rectangle, pen: int, rgb: Rgb) -> None:
+def rectangle(canvas: Canvas, box: Box, pen: int, rgb: Rgb) -> None:
     """Draw the rim of a box, inwards."""
     x, y, width, height = box
     canvas.rule(x, y, width, pen, rgb, 1.0)

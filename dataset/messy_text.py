@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from toonset.dataset.messy_figure import Rgb, tight_window
+from toonset.dataset.messy_figure import Rgb, Stamp, tight_window
 
-Stamp = UInt8[np.ndarray, "height width 4"]
 FACES = ("pillow", "plain", "heavy", "slanted")
 VIEW_NAMES = ("front", "3/4 front", "side", "3/4 back", "back", "3/4 back", "side", "3/4 front")
 TITLES = ("Character sheet", "MODEL SHEET", "Turnaround v2", "Hero - final", "Ref. sheet #3")

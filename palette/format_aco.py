@@ -75,9 +75,7 @@ def _cut_off(number: int, where: str) -> PaletteError:
 
 def _rgb(words: tuple[int, ...], where: str) -> RGB:
     space, first, second, third, _ = words
-    if (
-        space == 0
-    ):  # the high byte, as in Apple's RGBColor: right for writers of v * 256 and v * 257
+    if space == 0:  # the high byte, as Apple does: right for writers of v * 256 and v * 257
         return first >> 8, second >> 8, third >> 8
     if space == 1:
         hue, saturation, brightness = (part / FULL for part in (first, second, third))
