@@ -79,32 +79,23 @@ def export(
     """
     if to != Format.colmap and (text or centre or layout != Layout.new):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
+    from toonset.dataset.bundle import mannequin_of
     from toonset.dataset.export_lens import centred
     from toonset.dataset.export_views import read_views
+    from toonset.dataset.transforms import transforms_file
 
     printer, target = Printer(as_json, quiet), TARGETS[to]
     check_output(out, [bundle, mesh], target.written, force=force)
     views = read_views(bundle)
     if centre:
         views = tuple(centred(view) for view in views)
-    body = _mannequin(bundle, mesh)
+    body = mannequin_of(transforms_file(bundle).parent, mesh)
     points = None
     if body is not None and target.wants_points:
         printer.progress("colouring points")
         points = _points(body, views, seed, is_given=mesh is not None)
     job = Job(out, views, points, body, text, layout == Layout.old, force)
     _report(printer, to, job, target.write(job))
-
-
-def _mannequin(bundle: Path, mesh: Path | None) -> Mesh | None:
-    """Return the mesh that was named, else the bundle's own, else None."""
-    from toonset.dataset.bundle import MANNEQUIN
-    from toonset.dataset.mesh_file import load_mesh
-    from toonset.dataset.transforms import transforms_file
-
-    own = transforms_file(bundle).parent / MANNEQUIN
-    body = mesh or (own if own.is_file() else None)
-    return None if body is None else load_mesh(body)
 
 
 def _points(

@@ -20,7 +20,6 @@ from toonset.cli.output import (
 if TYPE_CHECKING:
     from toonset.dataset.import_bundle import ImportReport
     from toonset.dataset.import_views import Imported
-    from toonset.mesh import Mesh
 
 WRITTEN = ("transforms.json", "images", "mannequin.obj")
 
@@ -67,27 +66,18 @@ def import_(
     Pictures become RGBA: a mask becomes their alpha. Lens distortion is refused: undistort first.
     Of toonset's own exports the exact cameras beside them are taken.
     """
+    from toonset.dataset.bundle import mannequin_of
     from toonset.dataset.import_bundle import write_imported
     from toonset.dataset.import_views import read_import
 
     printer = Printer(as_json, quiet)
     check_output(out, [path, images, masks, mesh], WRITTEN, force=force)
     imported = read_import(path, images, masks)
-    body = _mannequin(path, mesh)
+    body = mannequin_of(path.parent if path.is_file() else path, mesh)
     report = write_imported(out, imported, body, z_up=up == Up.z, force=force)
     printer.say(_summary(imported, report, has_mannequin=body is not None))
     values = {"bundle": out, "format": imported.program, "views": list(report.views)}
     printer.result({**values, "opaque": list(report.opaque), "masked": report.masked}, str(out))
-
-
-def _mannequin(path: Path, mesh: Path | None) -> Mesh | None:
-    """Return the mesh that was named, else the one beside the cameras, else None."""
-    from toonset.dataset.bundle import MANNEQUIN
-    from toonset.dataset.mesh_file import load_mesh
-
-    own = (path.parent if path.is_file() else path) / MANNEQUIN
-    body = mesh or (own if own.is_file() else None)
-    return None if body is None else load_mesh(body)
 
 
 def _summary(imported: Imported, report: ImportReport, *, has_mannequin: bool) -> str:

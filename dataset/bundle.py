@@ -26,7 +26,7 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.dataset.calibration_file import calibration_content
-from toonset.dataset.mesh_file import save_obj
+from toonset.dataset.mesh_file import load_mesh, save_obj
 from toonset.dataset.picture import encode_png
 from toonset.dataset.transforms import transforms_dict
 from toonset.errors import BundleError
@@ -36,6 +36,17 @@ from toonset.view import View
 
 MANNEQUIN, OVERLAY, CALIBRATION = "mannequin.obj", "overlay.png", "calibration.json"
 LABELS, CONTOURS, IMAGES = "labels", "contours", "images"
+
+
+def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:
+    """Return the mesh of a file that was given, else the folder's own, else None.
+
+    Raises:
+        MeshError: the file is no mesh.
+    """
+    own = folder / MANNEQUIN
+    file = given or (own if own.is_file() else None)
+    return None if file is None else load_mesh(file)
 
 
 def write_bundle(

@@ -18,6 +18,7 @@ from toonset.dataset.bundle import CALIBRATION, CONTOURS, IMAGES, LABELS, MANNEQ
 from toonset.dataset.calibration_file import read_calibration
 from toonset.dataset.calibration_schema import CalibrationFile
 from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.palette_files import COPIES, PALETTE_JSON, SWATCHES
 from toonset.dataset.picture import load_rgba
 from toonset.dataset.problem_log import Problem, ProblemLog
 from toonset.dataset.scene_read import (
@@ -33,8 +34,6 @@ from toonset.dataset.transforms_read import PosedPicture, check_total, frame_of,
 from toonset.dataset.transforms_schema import read_records
 from toonset.palette.files import parse_colors
 
-PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
-PALETTE_COPIES = ("palette.gpl", "palette.ase", "palette.hex")
 SAME_CAMERA = 1e-6  # relative: both files are written from the same numbers
 
 Colors = UInt8[np.ndarray, "colors 3"]
@@ -126,7 +125,7 @@ def _check_maps(
 
 def _check_copies(log: ProblemLog, palette: Colors) -> None:
     """Compare the palette's copies for other programs with palette.json."""
-    for name in PALETTE_COPIES:
+    for name in (f"palette{end}" for end in COPIES):
         found = log.attempt(name, member, log.root, name)
         colors = log.attempt(name, parse_colors, str(found)) if found else None
         if colors is not None and set(map(tuple, colors)) != set(map(tuple, palette)):

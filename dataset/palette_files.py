@@ -1,13 +1,13 @@
 """A palette, its label maps and contours on disk, in a bundle or in a folder of their own.
 
-palette.json, .gpl   the colours
+palette.json         the colours
+palette.gpl, .ase, .hex, .png   the same for other programs, and as a picture for people
 labels/000.png ..    per picture: indexed PNG with all 256 entries, 255 transparent and unlabelled
 contours/000.png ..  per picture: grey PNG, how far drawn lines cover each pixel
 """
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,18 +15,20 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.picture import encode_grey_png, encode_indexed_png
+from toonset.dataset.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.files import new_folder, write_bytes
-from toonset.palette.files import to_gpl, to_json
+from toonset.palette.files import encode_palette
 from toonset.palette.palette import Palette
+from toonset.palette.swatch import draw_swatches
 
-PALETTE_GPL, PALETTE_JSON = "palette.gpl", "palette.json"
+PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
+COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs
 
 Maps = Sequence[tuple[str, UInt8[np.ndarray, "_ _"]]]
 
 
 def write_palette(folder: Path, palette: Palette, labels: Maps, contours: Maps = ()) -> None:
-    """Write palette.json, palette.gpl, labels/ and contours/ into an existing folder.
+    """Write palette.json and its copies, labels/ and contours/ into an existing folder.
 
     They replace older ones; without contours, older ones stay: they depend on the pictures alone.
 
@@ -42,10 +44,9 @@ def write_palette(folder: Path, palette: Palette, labels: Maps, contours: Maps =
     Raises:
         OutputError: the folder cannot be written.
     """
-    files = {
-        PALETTE_GPL: to_gpl(palette).encode(),
-        PALETTE_JSON: (json.dumps(to_json(palette), indent=2, allow_nan=False) + "\n").encode(),
-    }
+    files = {f"palette{end}": encode_palette(palette, end) for end in COPIES}
+    files[SWATCHES] = encode_png(draw_swatches(palette))
+    files[PALETTE_JSON] = encode_palette(palette, ".json")
     if contours:
         with new_folder(folder / "contours", force=True) as temporary:
             for name, values in contours:

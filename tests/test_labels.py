@@ -207,6 +207,5 @@ def test_labels_and_contours_lie_beside_the_palette(tmp_path: Path) -> None:
     assert sorted(place.name for place in tmp_path.iterdir()) == [
         "contours",
         "labels",
-        "palette.gpl",
-        "palette.json",
+        *(f"palette.{end}" for end in ("ase", "gpl", "hex", "json", "png")),
     ]
