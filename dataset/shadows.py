@@ -32,7 +32,7 @@ FADED = 0.95  # of the paper's light, at the shadow's border, besides noise
 MOSTLY = 0.7  # of the border
 GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, nothing is known
 TONE = 0.03  # of the paper's light: tones so near are one
-BESIDE = 0.2  # of a shadow's border that is paper
+BESIDE = 0.12  # of a shadow's border that is paper
 OFTEN = 0.75  # of the views that show a shadow, if one does
 
 
