@@ -49,11 +49,9 @@ def _problems(path: Path) -> list[Problem]:
         _check_run(log, path)
         return log.problems
     if kind == SPLIT:
-        from toonset.dataset.split_read import read_split
+        from toonset.dataset.split_check import split_problems
 
-        log = ProblemLog(path)
-        log.attempt("split.json", read_split, path)
-        return log.problems
+        return split_problems(path)
     from toonset.dataset.bundle_check import bundle_problems
     from toonset.dataset.bundle_summary import runs_of
 

@@ -16,10 +16,15 @@ def kind_of(path: Path) -> str:
     Raises:
         BundleError: it is none of them.
     """
+    from toonset.dataset.picture_folder import ENDINGS
     from toonset.dataset.transforms_read import NAMES
 
     if not path.exists():
         raise BundleError(f"{path}: does not exist; name a bundle, a run or a split folder")
+    if path.suffix.lower() in ENDINGS:
+        raise BundleError(
+            f"{path}: is a picture; name a folder that `toonset split` or `calibrate` has written"
+        )
     if not path.is_dir():
         return CAMERAS
     if any((path / name).is_file() for name in NAMES):

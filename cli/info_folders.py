@@ -58,15 +58,21 @@ def run_text(found: dict[str, Any]) -> str:
 
 
 def summarise_split(folder: Path) -> dict[str, Any]:
-    """Return what split.json says; the pictures are not looked into.
+    """Return what split.json says, and which pictures came and went since.
+
+    The pictures are not looked into.
 
     Raises:
         SheetError: split.json cannot be read.
     """
     from toonset.dataset.bundle_summary import sizes
-    from toonset.dataset.split_files import read_records
+    from toonset.dataset.picture_folder import picture_files
+    from toonset.dataset.split_files import IMAGES, read_records
 
     sheets, views = read_records(folder)
+    place = folder / IMAGES
+    there = [path.name for path in picture_files(place)[0]] if place.is_dir() else []
+    known = [view.name for view in views]
     return {
         "kind": "split",
         "path": str(folder),
@@ -80,6 +86,8 @@ def summarise_split(folder: Path) -> dict[str, Any]:
             for sheet in sheets
         ],
         "views": [view.model_dump(mode="json") for view in views],
+        "gone": [name for name in known if name not in there],
+        "new": [name for name in there if name not in known],
         "bytes": sizes(folder),
     }
 
@@ -92,7 +100,7 @@ def split_text(found: dict[str, Any]) -> str:
     for view in found["views"]:
         x, y, width, height = view["box"]
         sheet = found["sheets"][view["sheet"]]["name"]
-        line = f"{view['line_width_px']:.1f} px"
+        line = f"{view['line_width_px']:.1f} px" if view["line_width_px"] else "none"
         shows = view["label"] or ""
         rows.append((view["name"], f"{width} x {height}", f"{x}, {y}", line, sheet, shows))
     facts = []
@@ -102,6 +110,8 @@ def split_text(found: dict[str, Any]) -> str:
         counts = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
         facts.append(("left out", ", ".join(counts)))
         facts += [("warning", text) for text in sheet["warnings"]]
+    facts.append(("gone", ", ".join(found["gone"])))
+    facts.append(("new", ", ".join(found["new"]) + " (or renamed)" * bool(found["new"])))
     facts.append(("on disk", size_line(found["bytes"])))
     title = f"{found['path']}: a split of {len(found['views'])} views"
     return "\n".join([title, "", *table(rows), "", *fact_lines(facts)])

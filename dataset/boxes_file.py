@@ -39,7 +39,7 @@ def read_boxes(path: Path) -> tuple[tuple[Box, ...], ...]:
     Raises:
         SheetError: the file is missing, broken or without boxes, or a box is none.
     """
-    data = read_whole(path, "box", SheetError, MAX_BYTES)
+    data = read_whole(path, "boxes", SheetError, MAX_BYTES)
     if data.removeprefix(BOM).lstrip()[:1] in (b"[", b"{"):
         sheets = _from_json(path, parse_json(data, str(path), SheetError))
     else:

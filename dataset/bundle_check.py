@@ -19,7 +19,8 @@ from toonset.dataset.calibration_file import read_calibration
 from toonset.dataset.calibration_schema import CalibrationFile
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.palette_files import COPIES, PALETTE_JSON, SWATCHES
-from toonset.dataset.picture import load_rgba
+from toonset.dataset.picture import load_indexed_png, load_rgba
+from toonset.dataset.picture_folder import picture_files
 from toonset.dataset.problem_log import Problem, ProblemLog
 from toonset.dataset.scene_read import (
     check_label_names,
@@ -34,6 +35,7 @@ from toonset.dataset.transforms_read import PosedPicture, check_total, frame_of,
 from toonset.dataset.transforms_schema import read_records
 from toonset.palette.files import parse_colors
 
+PICTURES = {IMAGES: load_rgba, LABELS: load_indexed_png, CONTOURS: load_rgba}
 SAME_CAMERA = 1e-6  # relative: both files are written from the same numbers
 
 Colors = UInt8[np.ndarray, "colors 3"]
@@ -80,6 +82,8 @@ def bundle_problems(path: Path) -> list[Problem]:
 def _check_frames(log: ProblemLog, file: Path) -> _Frames:
     content = log.attempt(file.name, read_records, file)
     if content is None:
+        for folder, read in PICTURES.items():
+            _check_folder(log, folder, read)
         return _Frames(None, [])
     found = [
         log.attempt(file.name, frame_of, file, content, number, need_picture=True)
@@ -188,6 +192,13 @@ def _check_strays(log: ProblemLog, folder: str, names: Iterable[str] | None) -> 
         twin = seen.setdefault(name.casefold(), name)
         if twin != name:
             log.add(f"{folder}/{name}", f"differs from {twin} in case only; rename one")
+
+
+def _check_folder(log: ProblemLog, folder: str, read: Callable[[Path], object]) -> None:
+    """Check pictures alone, where it is not known which frames they belong to."""
+    place = log.root / folder
+    for path in picture_files(place)[0] if place.is_dir() else ():
+        _check_alone(log, f"{folder}/{path.name}", read)
 
 
 def _check_alone(log: ProblemLog, name: str, read: Callable[[Path], object]) -> None:

@@ -64,7 +64,9 @@ def validated(schema: type[Record], content: Any, file: Path) -> Record:
 
 def validation_reason(error: ValidationError) -> str:
     """Return where and what the first problem of a schema check is."""
-    return f"{_problems(error, 1)[0]} ({error.error_count()} problem(s)); correct the file"
+    more = error.error_count() - 1
+    also = f" (and {more} more problem{'s' * (more > 1)})" if more else ""
+    return f"{_problems(error, 1)[0]}{also}; correct the file"
 
 
 def _problems(error: ValidationError, most: int) -> list[str]:

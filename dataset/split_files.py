@@ -18,7 +18,7 @@ from jaxtyping import UInt8
 from pydantic import BaseModel, Field, ValidationError
 
 from toonset import __version__
-from toonset.dataset.json_file import validation_reason
+from toonset.dataset.json_file import SchemaProblems
 from toonset.dataset.picture import encode_png
 from toonset.dataset.sheet import LeftOut
 from toonset.dataset.split import Source, Split
@@ -37,6 +37,10 @@ MAX_JSON_BYTES = 8 * 2**20
 _Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]
 _Place = Annotated[int, Field(strict=True, ge=0, le=10**6)]
 _Box = tuple[_Place, _Place, _Length, _Length]
+
+
+class SplitProblems(SchemaProblems, SheetError):
+    """A split.json that does not fit its schema; all that is wrong is in `problems`."""
 
 
 class _LeftOutRecord(BaseModel):
@@ -162,7 +166,7 @@ def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ..
     try:
         found = _SplitFile.model_validate(content)
     except ValidationError as error:
-        raise SheetError(f"{file}: {validation_reason(error)}") from error
+        raise SplitProblems(file, error) from error
     for view in found.views:
         if view.sheet >= len(found.sheets):
             raise SheetError(

@@ -112,3 +112,57 @@ def test_what_is_no_bundle_is_refused(verb, tmp_path: Path, toonset):
     (tmp_path / "x.txt").write_text("hello")
     if verb == "info":
         assert "is no valid JSON" in toonset(verb, tmp_path / "x.txt").reason
+
+
+def test_check_goes_on_where_the_cameras_cannot_be_read(place: Path, toonset):
+    content = json.loads((place / "transforms.json").read_text())
+    content["frames"][0]["fl_x"] = content["frames"][1]["fl_x"] = "long"
+    (place / "transforms.json").write_text(json.dumps(content))
+    (place / "images" / "001.png").write_bytes(b"x")
+    (place / "labels" / "002.png").write_bytes(b"x")
+    done = toonset("check", place)
+    assert [line.split()[0] for line in done.out.splitlines()[:-1]] == [
+        "transforms.json",
+        "transforms.json",
+        "images/001.png",
+        "labels/002.png",
+    ]
+    assert "(and 1 more problem); correct the file" in toonset("info", place).reason
+
+
+@pytest.fixture
+def views(drawn: Path, tmp_path: Path, toonset) -> Path:
+    folder = tmp_path / "views"
+    assert toonset("split", drawn / "sheet.png", "-o", folder).code == 0
+    return folder
+
+
+def test_info_of_a_split_tells_what_came_and_went(views: Path, toonset):
+    assert "gone" not in toonset("info", views).out
+    (views / "images" / "001.png").rename(views / "images" / "side.png")
+    done = toonset("info", views)
+    assert "gone      001.png\n" in done.out
+    assert "new       side.png (or renamed)\n" in done.out
+    assert toonset("check", views).code == 0
+
+
+def test_check_of_a_split_lists_every_problem(views: Path, toonset):
+    content = json.loads((views / "split.json").read_text())
+    content["views"][0]["crop"][0] = -4
+    content["views"][1]["label"] = 5
+    (views / "split.json").write_text(json.dumps(content))
+    (views / "images" / "002.png").write_bytes(b"x")
+    (views / "overlay.png").write_bytes(b"x")
+    done = toonset("check", views)
+    assert done.code == 2
+    assert [line.split()[0] for line in done.out.splitlines()[:-1]] == [
+        "split.json",
+        "split.json",
+        "images/002.png",
+        "overlay.png",
+    ]
+
+
+@pytest.mark.parametrize("verb", ["info", "check"])
+def test_a_picture_is_no_bundle(verb, drawn: Path, toonset):
+    assert "is a picture; name a folder" in toonset(verb, drawn / "sheet.png").reason
