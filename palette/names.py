@@ -7,8 +7,9 @@ import numpy as np
 from toonset.palette.oklab import oklab_from_rgb
 
 NAMED = {
-    "black": (0, 0, 0),
+    "black": (14, 14, 14),
     "charcoal": (54, 57, 63),
+    "dark charcoal": (42, 43, 45),
     "dark grey": (90, 90, 90),
     "grey": (136, 136, 136),
     "light grey": (195, 195, 195),
@@ -19,6 +20,9 @@ NAMED = {
     "skin": (236, 188, 155),
     "brown": (125, 78, 45),
     "dark brown": (66, 42, 28),
+    "dark purple": (44, 28, 56),
+    "dark teal": (22, 62, 66),
+    "dark blue": (24, 28, 58),
     "rust": (170, 75, 35),
     "orange": (245, 135, 30),
     "peach": (255, 200, 165),

@@ -196,6 +196,9 @@ def test_names_name_themselves() -> None:
     for name, rgb in NAMED.items():
         assert name_of(rgb) == name
     assert name_of((12, 9, 11)) == "black"
+    assert name_of((36, 28, 48)) == "dark purple"
+    assert name_of((27, 25, 43)) == "dark blue"
+    assert name_of((42, 42, 42)) == "dark charcoal"
     assert name_of((228, 30, 30)) == "red"
 
 
