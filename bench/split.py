@@ -33,6 +33,7 @@ GOOD_MASK = 0.95  # IoU: a mask without a missing shirt
 LEGEND = (
     "right: all figures found, in order, every box within 2 px or IoU >= 0.97",
     "masks: share of figures whose mask has IoU >= 0.95",
+    "wrong.png: true boxes green, found ones red, what was left out blue",
     "silent: wrong, without a warning, and what was missed is not shown as left out",
     "false alarms: right, but with a warning; seconds are of processor time",
 )

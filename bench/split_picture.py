@@ -1,4 +1,7 @@
-"""Wrongly split sheets in one picture: true boxes green, found ones red, what was left out blue."""
+"""Wrongly split sheets in one picture: true boxes green, found ones red, what was left out blue.
+
+Found boxes are numbered from 0, as in the overlay of `toonset split`.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ def tile(case: SplitCase, found: Found, title: str) -> Rgb:
         _box(pen, figure.box, factor, TRUE, 2)
     for number, figure in enumerate(found.figures):
         corner = _box(pen, figure.box, factor, FOUND, 0)
-        pen.text(corner, str(number + 1), FOUND, font=ImageFont.load_default(16))
+        pen.text(corner, str(number), FOUND, font=ImageFont.load_default(16))
     return np.asarray(whole)
 
 
