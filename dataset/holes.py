@@ -6,6 +6,8 @@ between arm and body) if all of this holds:
 - it is larger than a small share of the figure,
 - it does not lie in the figure's top: a white patch there is hair, a face or a hat,
 - nothing lies inside it (an eye has a pupil),
+- a limb divides it from the outside: neither only a line (white clothes reach up to the outline)
+  nor half of the body (a white bag, a button),
 - a line or another colour runs all round it: it does not fade into a shade of its own colour,
 - its border looks like the figure's outline: as inked as that, and without soft shades beside it
   (a white shirt has folds and borders on skin without the contour line),
@@ -18,7 +20,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.background import difference
 
@@ -28,6 +30,10 @@ LINE_ART = 0.5  # of the figure: more of it in the background's colour is a line
 INK_LUMA = 64  # of 255: darker is ink
 HEAD = 0.25  # of the figure's height from its top: no holes there
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
+LEAST_WALL_PX = 4.0
+THIN_WALL = 0.025  # of the figure's height: no limb but a line
+MOST_THIN = 0.15  # of the border behind so thin a wall
+THICK_WALL = 0.2  # of the figure's height: no limb but the body
 CLEAR = 40  # levels from the background: a line or another colour
 MOST_FADING = 0.1  # of the border
 AS_INKED = 0.5  # of the outline's share of ink
@@ -107,6 +113,9 @@ def open_holes(
         difference(rgb, background),
         cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY),
     )
+    depth = cv2.distanceTransform(
+        np.pad(mask, 1).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+    )[1:-1, 1:-1]
     _, labels, stats, _ = cv2.connectedComponentsWithStats(
         enclosed.astype(np.uint8), connectivity=4
     )
@@ -121,11 +130,23 @@ def open_holes(
         window = _window(stats[number], labels.shape)
         patch = labels[window] == number
         look = _look(patch, (mask & ~enclosed)[window], contrast[window], luma[window])
+        if not _is_behind_a_limb(patch, depth[window], height):
+            continue
         fades = _fading(patch, contrast[window]) > MOST_FADING
         if look.could_belong_to(outline) and not fades and not _has_islands(patch):
             result[window] &= ~patch
             opened += 1
     return result, opened
+
+
+def _is_behind_a_limb(
+    patch: Bool[np.ndarray, "height width"], depth: Float[np.ndarray, "height width"], tall: int
+) -> bool:
+    """Return whether a patch is as far from the outside as a limb is thick."""
+    rim = patch & (cv2.erode(np.pad(patch, 1).view(np.uint8), SQUARE)[1:-1, 1:-1] == 0)
+    walls = depth[rim]
+    thin = float((walls <= max(LEAST_WALL_PX, THIN_WALL * tall)).mean())
+    return thin <= MOST_THIN and float(walls.min()) <= THICK_WALL * tall
 
 
 def _fading(
