@@ -101,9 +101,16 @@ def table(records: Sequence[Record]) -> str:
         (r.group, r.method, r.metric, f"{r.median:.3g}", f"{r.p95:.3g}", r.unit, str(r.n))
         for r in records
     ]
-    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
-    lines = [
-        "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
-        for row in (head, *rows)
+    return "\n".join(aligned((head, *rows), words=len(head)))
+
+
+def aligned(rows: Sequence[Sequence[str]], words: int) -> list[str]:
+    """Return rows as lines: so many columns of words from the left, then columns of numbers."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            cell.ljust(width) if number < words else cell.rjust(width)
+            for number, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
     ]
-    return "\n".join(lines)

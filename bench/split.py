@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.bench.calib_figures import Recorder
-from toonset.bench.record import Record
+from toonset.bench.record import Record, aligned
 from toonset.bench.split_cases import SplitCase
 from toonset.bench.split_methods import METHODS
 from toonset.bench.split_picture import tile
@@ -107,15 +107,7 @@ def _table(scores: dict[tuple[str, str], list[Score]]) -> str:
         for (_, name), results in scores.items():
             whole.setdefault(("all", name), []).extend(results)
     rows = [TABLE_HEAD, *(_row(group, name, results) for (group, name), results in whole.items())]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(TABLE_HEAD))]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if i < 2 else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
-    ]
-    return "\n".join([*lines, "", *LEGEND])
+    return "\n".join([*aligned(rows, words=2), "", *LEGEND])
 
 
 def _row(group: str, name: str, results: Sequence[Score]) -> tuple[str, ...]:

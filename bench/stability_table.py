@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
-from toonset.bench.record import Record, summarise
+from toonset.bench.record import Record, aligned, summarise
 from toonset.bench.stability import NO_VERDICT, StepResult
 
 SOLVED_DEG = 5.0
@@ -118,11 +118,7 @@ def as_text(rows: Sequence[Row]) -> str:
         errors = (f"{item.median_deg:.2f}", f"{item.p95_deg:.2f}")
         counts = (str(getattr(item, name)) for name in COUNTS)
         lines.append([item.sweep, item.step, str(item.views), *shares, *errors, *counts])
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    )
+    return "\n".join(aligned(lines, words=len(lines[0])))
 
 
 def as_records(results: Sequence[StepResult], seed: int) -> list[Record]:
