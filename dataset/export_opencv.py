@@ -62,7 +62,7 @@ def _text(suffix: str, views: Sequence[tuple[ExportView, str]]) -> str:
 def _write_view(storage: cv2.FileStorage, view: ExportView, picture: str) -> None:
     camera = view.pinhole
     K = camera.K
-    K[:2, 2] -= conventions.OPENCV_PIXEL_OFFSET
+    K[:2, 2] = conventions.opencv_from_pixels(K[:2, 2])
     pose = camera.camera_from_world
     rotation = np.ascontiguousarray(pose[:3, :3])
     storage.write("name", view.name)

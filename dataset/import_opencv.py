@@ -76,7 +76,7 @@ def _camera(node: Any, root: Any, picture: Path) -> Camera:
     if not np.allclose(K[[1, 2, 2], [0, 0, 1]], 0) or K[2, 2] != 1 or min(K[0, 0], K[1, 1]) <= 0:
         raise BundleError("camera_matrix is not [fx 0 cx; 0 fy cy; 0 0 1]")
     _refuse_distortion(node, root)
-    K[:2, 2] += conventions.OPENCV_PIXEL_OFFSET
+    K[:2, 2] = conventions.pixels_from_opencv(K[:2, 2])
     pose = np.eye(4)
     pose[:3, :3] = _rotation(node, root).T
     pose[:3, 3] = -pose[:3, :3] @ _matrix(node, root, "tvec", 3)

@@ -122,16 +122,16 @@ def _rgb(value: ElementTree.Element, version: str, where: str) -> RGB:
     if kind == "CMYK":
         raise no_cmyk(where)
     if kind == "sRGB" or (kind == "RGB" and SRGB.fullmatch(space)):
-        red, green, blue = (level(part, where) for part in _numbers(value, "rgb", where))
+        red, green, blue = (level(part, where) for part in _numbers(value, "rgb"))
         return red, green, blue
     if kind == "RGB" and LINEAR.fullmatch(space):
-        parts = [within(part, 0, 1, where) for part in _numbers(value, "rgb", where)]
+        parts = [within(part, 0, 1, where) for part in _numbers(value, "rgb")]
         return rgb_from_linear(np.array(parts))
     if kind == "Gray" and GRAY.fullmatch(space):
-        gray = level(next(_numbers(value, "g", where)), where)
+        gray = level(next(_numbers(value, "g")), where)
         return gray, gray, gray
     if kind == "Lab" and version != "1.0":  # Krita 4 wrote Lab in another range
-        lightness, a, b = _numbers(value, "Lab", where)
+        lightness, a, b = _numbers(value, "Lab")
         return rgb_from_lab(
             within(lightness, 0, 100, where),
             within(a, -128, 128, where),
@@ -143,7 +143,7 @@ def _rgb(value: ElementTree.Element, version: str, where: str) -> RGB:
     )
 
 
-def _numbers(value: ElementTree.Element, keys: str, where: str) -> Iterator[float]:
+def _numbers(value: ElementTree.Element, keys: str) -> Iterator[float]:
     for key in keys:
         try:
             yield float(value.get(key, "nan"))
