@@ -13,6 +13,7 @@ Lines lighter than both sides are not found.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 
 import cv2
@@ -27,10 +28,12 @@ LEAST_FILLED = 10  # levels: less covers nothing
 INK = 20  # percentile of the lightness in lines: thin lines' cores are not pure
 DARK = 0.25  # of the way from ink to white: as dark as ink
 OUTLINED = 0.7  # of the rim that must be dark for an outline all round
+SURE = 0.9  # of a layer of the rim that must be dark for its line to be measured there first
 SEEN = 0.3  # of the rim that must be a line by itself, for the rest to go on
 ROUND = 0.5  # of the rim that must be a line for its width to be told
 DARKEST = 100  # lightness of 255: a lighter rim is no ink
 WIDEST = 0.04  # of the figure's height: wider is a limb
+SOFT = 0.004  # of the figure's height: so far inside a blurred rim its line may be dark only
 MEASURED_PX = 800  # height of a figure on which its line's width is measured
 BAND_PX = 1 << 21
 SQUARE = np.ones((3, 3), dtype=np.uint8)
@@ -74,7 +77,8 @@ def rim_line_px(
     """Return the width of the dark line round the figure: 0 where less than half of it has one.
 
     The line is as wide as the disc that just fails to fill it. Large figures are measured on a
-    smaller copy: time grows with the square of the height up to there only.
+    smaller copy: time grows with the square of the height up to there only. What was scanned or
+    enlarged has a soft rim: its line is dark a little further in.
 
     Args:
         light: lightness over white paper.
@@ -87,18 +91,31 @@ def rim_line_px(
         small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
         covered = cv2.resize(mask.view(np.uint8), size, interpolation=cv2.INTER_AREA) > 0
         return shrink * rim_line_px(small, covered)
-    rim = mask & ~_eroded(mask, 1)
-    if not rim.any():
-        return 0.0
+    rims = _dark_rims(light, mask, int(SOFT * tall))
+    widths = (_width_at(light, rim, int(WIDEST * tall / 2) + 1) for rim in rims)
+    return next((width for width in widths if width > 0), 0.0)
+
+
+def _width_at(light: np.ndarray, rim: np.ndarray, widest: int) -> float:
+    """Return the width of the line under a layer of pixels; 0 where less than half has one."""
     dark = light[rim] <= DARKEST
     before = 0.0
-    for reach in range(1, int(WIDEST * tall / 2) + 2):
+    for reach in range(1, widest + 1):
         filled = _closed(light, reach)[rim] - light[rim]
         share = float((dark & (filled >= LEAST_DEPTH)).mean())
         if share >= ROUND:  # between the last disc, 2 reach - 1 px wide, and this one
             return 2 * reach - 2 + 2 * (ROUND - before) / (share - before)
         before = share
     return 0.0
+
+
+def _dark_rims(light: np.ndarray, mask: np.ndarray, deepest: int) -> list[np.ndarray]:
+    """Return the mask's outermost layers that are dark enough for a line, sure ones first."""
+    inside = [_eroded(mask, reach) for reach in range(deepest + 2)]
+    layers = [outer & ~inner for outer, inner in itertools.pairwise(inside)]
+    shares = [(light[layer] <= DARKEST).sum() / max(int(layer.sum()), 1) for layer in layers]
+    dark = [i for i, share in enumerate(shares) if share >= ROUND]
+    return [layers[i] for i in sorted(dark, key=lambda i: shares[i] < SURE)]
 
 
 def _lightness(rgba: np.ndarray) -> UInt8[np.ndarray, "height width"]:

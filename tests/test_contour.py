@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -61,11 +62,13 @@ def test_a_drawing_without_lines_has_none(seed: int) -> None:
         assert not find_contour(view.rgba, 0.0).any()
 
 
-def ring(ink: tuple[int, int, int], *, radius: float = 40, width: float = 4) -> np.ndarray:
+def ring(
+    ink: tuple[int, int, int], *, side: int = 120, radius: float = 40, width: float = 4
+) -> np.ndarray:
     """Return a light disc with a round line along its border and a pupil inside."""
-    down, right = np.mgrid[:120, :120] - 59.5
+    down, right = np.mgrid[:side, :side] - (side - 1) / 2
     away = np.hypot(down, right)
-    rgba = np.zeros((120, 120, 4), dtype=np.uint8)
+    rgba = np.zeros((side, side, 4), dtype=np.uint8)
     rgba[away < radius + width / 2] = (240, 200, 160, 255)
     rgba[np.abs(away - radius) < width / 2, :3] = ink
     rgba[np.hypot(down + 8, right) < 2.2 * width, :3] = ink
@@ -110,3 +113,16 @@ def test_wholly_black_figures_have_no_lines() -> None:
     picture[..., :3] = 0
     assert not find_contour(picture).any()
     assert not find_contour(picture, 3.0).any()
+
+
+@pytest.mark.parametrize("sigma", [1.0, 2.0])
+def test_lines_of_large_blurred_drawings_are_found(sigma: float) -> None:
+    sharp = ring((0, 0, 0), side=1000, radius=440, width=14)
+    on_paper = np.where(sharp[..., 3:] > 0, sharp[..., :3], 255).astype(np.uint8)
+    soft = cv2.GaussianBlur(on_paper, (0, 0), sigma)
+    grown = cv2.dilate(sharp[..., 3], np.ones((3, 3), np.uint8), iterations=round(sigma))
+    found = find_contour(np.dstack([soft, grown])) >= 128
+    line = (sharp[..., :3] == 0).all(axis=-1) & (sharp[..., 3] > 0)
+    line &= np.hypot(*(np.mgrid[:1000, :1000] - 499.5)) > 400
+    assert found[line].mean() > 0.9
+    assert (found & ~line).sum() < 0.15 * line.sum()
