@@ -51,7 +51,6 @@ LABELS_HELP = (
 )
 
 MOST_CELLS = 1000  # a sheet of letters or a tile map is no character sheet
-HEX = re.compile(r"#?(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 NAMED = {"white": (255, 255, 255), "black": (0, 0, 0)}
 
 
@@ -90,21 +89,20 @@ class Cutting:
     @property
     def background_rgb(self) -> tuple[int, int, int] | None:
         """Return the colour of --background; None to find it."""
-        from toonset.errors import SheetError
+        from toonset.errors import PaletteError, SheetError
+        from toonset.palette.format_hex import rgb_of_hex
 
         word = self.background.strip().lower()
         if not word:
             return None
         if word in NAMED:
             return NAMED[word]
-        if not HEX.fullmatch(word):
+        try:
+            return rgb_of_hex(word, "--background")
+        except PaletteError as error:
             raise SheetError(
                 f"--background: {self.background!r} is no colour; write '#rrggbb' or white"
-            )
-        digits = word.removeprefix("#")
-        digits = digits if len(digits) == 6 else "".join(2 * digit for digit in digits)
-        red, green, blue = bytes.fromhex(digits)
-        return red, green, blue
+            ) from error
 
     @property
     def cells(self) -> tuple[int, int] | None:
