@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.letters import find_letters, find_swatches
 
-LOWEST = 0.7  # of the views' median height: lower drawings are studies or props
+LOWEST = 0.75  # of the views' median height: lower drawings are studies or props
 HIGHEST = 1.45  # of the same: higher ones, too
 LEAST_AREA = 0.25  # of the views' median area: a side view is rarely below a third of a front view
 SMALLER = 0.85  # of the views' median height or area
@@ -251,13 +251,15 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
         return False
     if _share_within(own, main) >= WITHIN:
         return True
-    if blobs.areas[number] >= RECTANGLE * own[2] * own[3]:
+    if blobs.areas[number] >= SWATCH * own[2] * own[3]:
         return False
+    lettering = _is_lettering(blobs, number, body, rgb)
+    below = own[1] >= main[1] + main[3]
     if gap <= NEAR * main[3]:
-        return True
+        return not (lettering and below)
     if area < LEAST_PART or _is_stroke(blobs.mask(number)):
         return False
-    if _is_lettering(blobs, number, body, rgb):
+    if lettering:
         return False
     middle = own[0] + own[2] / 2
     if main[0] <= middle <= main[0] + main[2]:
