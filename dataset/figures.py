@@ -172,7 +172,9 @@ def group_blobs(
         for i, number in enumerate(small):
             if figure[number] >= 0:
                 continue
-            if letters[i]:
+            if swatches[i]:
+                kinds[number] = "swatch"
+            elif letters[i]:
                 kinds[number] = "text"
             elif blobs.areas[number] >= LISTED_SPECK * typical:
                 kinds[number] = _kind(blobs, int(number), typical)

@@ -105,7 +105,7 @@ def _dimmed(
     dim = (light > DARKEST) & (light < LIGHTEST) & (off <= OFF_PAPER + tolerance)
     slopes = [cv2.Sobel(light, cv2.CV_32F, *axis, scale=0.125) for axis in ((1, 0), (0, 1))]
     slope = np.abs(slopes).max(axis=0)
-    return Dim(dim, _opened(dim & (slope <= STEEPEST + 2 * tolerance / 255)), light)
+    return Dim(dim, _opened(dim & (slope <= max(STEEPEST, 1.5 * tolerance / 255))), light)
 
 
 def _tone(bodies: list[np.ndarray], dims: list[Dim], tolerance: int) -> float | None:

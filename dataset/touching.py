@@ -27,8 +27,7 @@ LARGER = 1.4  # times the area of figures that stand alone: the same
 DETOUR = 0.02  # cost of a step aside, in pixels of paint
 ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
 LINE = 0.9  # of the cost of paint that a drawn line saves
-EDGE = 0.5  # of the same, that a border of two colours saves
-STRONG = 60.0  # levels: a line that much darker, colours so different
+STRONG = 60.0  # levels that a line is darker than what it divides
 WIDEST_LINE = 0.03  # of the height
 GAP = 0.1  # of the cost of paint: paper that is enclosed
 THROUGH = 0.7  # of an enclosed patch's height that a cut runs through: a gap between two figures
@@ -145,14 +144,6 @@ def _outlines(
     return np.clip(lines.astype(np.float32) / STRONG, 0, 1)
 
 
-def _upright_edges(
-    rgb: UInt8[np.ndarray, "height width 3"],
-) -> Float[np.ndarray, "height width"]:
-    """Return how strongly colours change sideways, 0 to 1."""
-    slope = np.abs(cv2.Sobel(rgb, cv2.CV_32F, 1, 0, ksize=3, scale=0.25)).max(axis=2)
-    return np.clip(slope / STRONG, 0, 1)
-
-
 def _best_cut(
     mask: Bool[np.ndarray, "height width"],
     paint: Bool[np.ndarray, "height width"],
@@ -162,7 +153,7 @@ def _best_cut(
     height, width = mask.shape
     shrink = min(1.0, MOST_ROWS / height)
     size = max(8, round(width * shrink)), max(8, round(height * shrink))
-    savings = np.maximum(LINE * _outlines(rgb), EDGE * _upright_edges(rgb))
+    savings = LINE * _outlines(rgb)
     solid, drawn, saved = (
         cv2.resize(picture.astype(np.float32), size, interpolation=cv2.INTER_AREA)
         for picture in (mask, paint, savings)
