@@ -18,7 +18,10 @@ BAD = 2  # exit code, as of any other bad input
 
 def check(
     bundle: Annotated[
-        Path, typer.Argument(help="A bundle, a run, a split folder, or any transforms.json.")
+        Path,
+        typer.Argument(
+            metavar="FOLDER", help="A bundle, a run, a split folder, or any transforms.json."
+        ),
     ] = Path("bundle"),
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,

@@ -37,7 +37,10 @@ class Layout(StrEnum):
 
 
 def export(
-    bundle: Annotated[Path, typer.Argument(help="A bundle, or a folder with transforms.json.")],
+    bundle: Annotated[
+        Path,
+        typer.Argument(metavar="BUNDLE", help="A bundle, or a folder with transforms.json."),
+    ],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],

@@ -35,8 +35,9 @@ def import_(
     path: Annotated[
         Path,
         typer.Argument(
+            metavar="FOLDER",
             help="A nerfstudio, instant-ngp, Blender-synthetic or COLMAP folder, an OpenCV "
-            "cameras.yml or .xml, or any folder of `toonset export`."
+            "cameras.yml or .xml, or any folder of `toonset export`.",
         ),
     ],
     out: Annotated[

@@ -13,7 +13,10 @@ from toonset.cli.output import JsonFlag, Printer, QuietFlag
 
 def info(
     bundle: Annotated[
-        Path, typer.Argument(help="A bundle, a run, a split folder, or any transforms.json.")
+        Path,
+        typer.Argument(
+            metavar="FOLDER", help="A bundle, a run, a split folder, or any transforms.json."
+        ),
     ] = Path("bundle"),
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
