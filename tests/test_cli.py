@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -274,12 +275,14 @@ def test_no_verb_of_a_user_needs_opengl(drawn: Path, tmp_path):
 def test_ctrl_c_leaves_nothing_behind(verb, sign, drawn: Path, bundle: Path, tmp_path, snapshot):
     arguments: dict[str, list[Any]] = {
         "calibrate": [drawn / "sheet.png", "--mesh", drawn / "mannequin.obj", "-o", "new"],
-        "train": [bundle, "--steps", 100_000, "--threads", 1, "--device", "cpu"],
+        "train": [bundle, *FAST],
     }
     before = snapshot(tmp_path)
     command = [sys.executable, "-m", "toonset", verb, *map(str, arguments[verb])]
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, cwd=tmp_path, **pipes) as process:
+    # a shell's background jobs, these tests perhaps, ignore Ctrl-C and hand that down
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, cwd=tmp_path, preexec_fn=heard, **pipes) as process:
         assert process.stderr is not None
         assert any(sign in line for line in process.stderr)
         process.send_signal(signal.SIGINT)
