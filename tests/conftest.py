@@ -16,6 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from threadpoolctl import threadpool_limits
+
+# Sums depend in their last digits on how many threads share them. A process of its own has one
+# (`main` sees to it); here plugins have imported numpy before anything could be set.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of libraries that are loaded from now on, as scipy's
+threadpool_limits(1, user_api="blas")  # of those that are loaded already
 
 VIEWS, CELL, SEED = 5, 120, 11
 
