@@ -12,7 +12,7 @@ from pathlib import Path
 
 from toonset.cli.output import Printer
 
-SPLIT_FILE = "split.json"
+SPLIT_FILE, OVERLAY, IMAGES = "split.json", "overlay.png", "images"
 NOT_SHEETS = {"transforms.json": "images", "config.json": None}  # a bundle, a trained run
 MOST_NAMES = 3  # of files that are left out; more are counted
 
@@ -58,6 +58,11 @@ def _check_no_result(folder: Path) -> None:
         if (folder / name).is_file():
             advice = f"give {folder / images}" if images else "give the drawings"
             raise SheetError(f"{folder}: holds {name}, so it is no folder of sheets; {advice}")
+    if (folder / OVERLAY).is_file() and (folder / IMAGES).is_dir():
+        raise SheetError(
+            f"{folder}: holds {OVERLAY} and {IMAGES}/ as a split folder does, but no {SPLIT_FILE}; "
+            f"give {folder / IMAGES}, or split the sheet again"
+        )
 
 
 def _check_once(places: Sequence[Path]) -> None:

@@ -275,6 +275,8 @@ def prepared(toonset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (here / "far.csv").write_text("x,y,w,h\n0,0,60,160\n400,0,60,160\n")
     (here / "flat.csv").write_text("10,10,60,0\n")
     assert toonset("split", here / "sheet.png", "-o", here / "done", "-q").code == 0
+    shutil.copytree(here / "done", here / "torn")
+    (here / "torn" / "split.json").unlink()
     return here
 
 
@@ -305,6 +307,7 @@ def prepared(toonset, tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["sheet.png", "none.png"], "none.png: no such file"),
         (["empty"], "empty: is a folder without pictures; name a sheet, or its folder"),
         (["bundle"], "bundle: holds transforms.json, so it is no folder of sheets; give bundle/im"),
+        (["torn"], "torn: holds overlay.png and images/ as a split folder does, but no split.json"),
         (["done", "--grid", "4x1"], "--grid: done is cut already; give the sheet that it was cut"),
         (["broken"], "broken/split.json: is no valid JSON"),
         (["sheet.png", "-o", "sheet.png"], "sheet.png: is a file, a folder is needed"),
