@@ -55,7 +55,7 @@ def _is_meant_as_bundle(place: Path) -> bool:
 
     if place.is_dir():
         marks = (*NAMES, "calibration.json")  # a bundle that has lost its cameras is broken
-        return any((place / name).is_file() for name in marks) or not any(place.iterdir())
+        return any((place / name).is_file() for name in marks)
     if place.suffix.lower() == ".json":
         return place.name != "split.json"
     return not place.suffix and not place.exists()  # the bundle's reader says so

@@ -33,7 +33,7 @@ BackgroundOption = Annotated[
     typer.Option(
         "--background",
         metavar="COLOUR",
-        help="The paper's colour, '#rrggbb' or white.",
+        help="The paper's colour: '#rrggbb', white or black.",
         rich_help_panel=CORRECTIONS_PANEL,
     ),
 ]
@@ -51,7 +51,6 @@ LABELS_HELP = (
 )
 
 MOST_CELLS = 1000  # a sheet of letters or a tile map is no character sheet
-NAMED = {"white": (255, 255, 255), "black": (0, 0, 0)}
 
 
 @dataclass(frozen=True)
@@ -90,18 +89,16 @@ class Cutting:
     def background_rgb(self) -> tuple[int, int, int] | None:
         """Return the colour of --background; None to find it."""
         from toonset.errors import PaletteError, SheetError
-        from toonset.palette.format_hex import rgb_of_hex
+        from toonset.palette.typed import rgb_of_typed
 
         word = self.background.strip().lower()
         if not word:
             return None
-        if word in NAMED:
-            return NAMED[word]
         try:
-            return rgb_of_hex(word, "--background")
+            return rgb_of_typed(word, "--background")
         except PaletteError as error:
             raise SheetError(
-                f"--background: {self.background!r} is no colour; write '#rrggbb' or white"
+                f"--background: {self.background!r} is no colour; write '#rrggbb', white or black"
             ) from error
 
     @property

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from toonset.errors import PaletteError
 from toonset.palette.areas import Areas
@@ -46,12 +47,17 @@ class PaletteOptions:
             PaletteError: out of range.
         """
         if not 0 <= self.min_share <= 1:
-            raise PaletteError(f"min share {self.min_share:g}; it is a share from 0 to 1")
+            raise PaletteError(
+                f"--min-share: {self.min_share:g} is no share; give 0 to 1, as 0.05 for 5 %"
+            )
         if not 1 <= self.max_colors <= MAX_COLORS:
-            raise PaletteError(f"max colours {self.max_colors}; 1 to {MAX_COLORS} are possible")
+            raise PaletteError(
+                f"--max-colors: {self.max_colors} colours; 1 to {MAX_COLORS} are possible, as many "
+                "as a label can name"
+            )
         if len(self.keep) > self.max_colors:
             raise PaletteError(
-                f"keep: {len(self.keep)} colours, but at most {self.max_colors} are wanted; "
+                f"--keep: {len(self.keep)} colours, but at most {self.max_colors} are wanted; "
                 "raise --max-colors"
             )
 
@@ -108,6 +114,7 @@ def choose(
         PaletteError: nothing found near a colour to keep.
     """
     wanted = [_nearest(amounts, rgb) for rgb in options.keep]
+    notes = _keep_notes(wanted, options)
     by_share = sorted(amounts, key=lambda amount: (-amount.share, amount.paint.rgb))
     rule = [a for a in by_share if a.weight >= options.min_share and a not in wanted]
     room = options.max_colors - len(set(map(id, wanted)))
@@ -115,7 +122,7 @@ def choose(
     kept = [amount for amount in by_share if id(amount) in stay]
     left = [amount for amount in by_share if id(amount) not in stay]
     if wanted or rule:
-        return kept, left, ()
+        return kept, left, notes
     warning = (
         f"no colour reaches {options.min_share:.1%} of the pixels; the largest, with "
         f"{kept[0].share:.1%}, was kept alone: lower --min-share"
@@ -123,15 +130,28 @@ def choose(
     return kept, left, (warning,)
 
 
-def _nearest(amounts: Sequence[Amount], rgb: RGB) -> Amount:
-    found = np.array([amount.paint.rgb for amount in amounts], dtype=np.uint8)
-    away = np.linalg.norm(
-        oklab_from_rgb(found) - oklab_from_rgb(np.array(rgb, dtype=np.uint8)), axis=1
+def _keep_notes(wanted: Sequence[Amount], options: PaletteOptions) -> tuple[str, ...]:
+    """Return what was kept for colours that are not in the pictures as typed."""
+    return tuple(
+        f"--keep: {hex_of(rgb)} itself was not found; kept the nearest, {hex_of(one.paint.rgb)}"
+        f"{', which the rule keeps anyway' if one.weight >= options.min_share else ''}"
+        for rgb, one in zip(options.keep, wanted, strict=True)
+        if _away([one], rgb)[0] > JUST_NOTICEABLE
     )
+
+
+def _away(amounts: Sequence[Amount], rgb: RGB) -> Float[np.ndarray, " amounts"]:
+    """Return how far the paints are from a colour in OKLab."""
+    found = oklab_from_rgb(np.array([amount.paint.rgb for amount in amounts], dtype=np.uint8))
+    return np.linalg.norm(found - oklab_from_rgb(np.array(rgb, dtype=np.uint8)), axis=1)
+
+
+def _nearest(amounts: Sequence[Amount], rgb: RGB) -> Amount:
+    away = _away(amounts, rgb)
     nearest = amounts[int(away.argmin())]
     if away.min() > KEEP_REACH:
         raise PaletteError(
-            f"keep {hex_of(rgb)}: no such colour was found; the nearest is "
+            f"--keep: {hex_of(rgb)}: no such colour was found; the nearest is "
             f"{hex_of(nearest.paint.rgb)}: name that one, or give the whole palette with --colors"
         )
     return nearest

@@ -15,7 +15,7 @@ from toonset.errors import PaletteError
 from toonset.palette.format_aco import read_aco
 from toonset.palette.format_ase import read_ase, to_ase
 from toonset.palette.format_gpl import read_gpl, to_gpl
-from toonset.palette.format_hex import HEX, read_hex, rgb_of_hex, to_hex
+from toonset.palette.format_hex import read_hex, to_hex
 from toonset.palette.format_json import read_json, read_palette_json, to_json
 from toonset.palette.format_kpl import MAX_BYTES as MAX_KPL_BYTES
 from toonset.palette.format_kpl import read_kpl
@@ -23,6 +23,7 @@ from toonset.palette.format_pal import read_pal
 from toonset.palette.named import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.palette.text import without_mark
+from toonset.palette.typed import is_color, rgb_of_typed
 from toonset.reading import describe, read_whole
 
 __all__ = [
@@ -82,7 +83,7 @@ def parse_colors(text_or_path: str) -> UInt8[np.ndarray, "colors 3"]:
     """Return the sRGB colours of a typed list or of a palette file; repeated ones count once.
 
     Args:
-        text_or_path: "#aabbcc,#123" (commas or spaces, # may be left out), or the path of a
+        text_or_path: "#aabbcc,#123,white" (commas or spaces, # may be left out), or the path of a
             palette file (see FORMATS), which is recognised by its content.
 
     Raises:
@@ -101,14 +102,14 @@ def parse_named_colors(text_or_path: str) -> tuple[NamedColor, ...]:
     words = re.split(r"[,;\s]+", text_or_path.strip().strip(",;"))
     if not any(words):
         raise PaletteError("colours: none given; write them as '#aabbcc,#123' or name a file")
-    typed = "#" in text_or_path or all(HEX.fullmatch(word) for word in words)
+    typed = "#" in text_or_path or all(map(is_color, words))
     path = Path(text_or_path)
     if path.suffix.lower() not in EXTENSIONS and typed:
-        return _checked([NamedColor(rgb_of_hex(word, "colours")) for word in words], "colours")
+        return _checked([NamedColor(rgb_of_typed(word, "colours")) for word in words], "colours")
     if "\0" in text_or_path or not (path.suffix.lower() in EXTENSIONS or _exists(path)):
         shown = text_or_path if text_or_path.isprintable() else repr(text_or_path)
         raise PaletteError(
-            f"{shown[:SHOWN]}: neither colours such as '#aabbcc,#123' nor a palette file "
+            f"{shown[:SHOWN]}: neither colours such as '#aabbcc,#123,white' nor a palette file "
             f"({', '.join(EXTENSIONS)})"
         )
     return _checked(_read(path), str(path))

@@ -132,12 +132,17 @@ def test_an_unwritten_format_is_named() -> None:
         encode_palette(PALETTE, ".aco")
 
 
+def test_two_plain_words_are_colours() -> None:
+    assert parse_colors("white").tolist() == [[255] * 3]
+    assert parse_colors("#123 Black").tolist() == [[0x11, 0x22, 0x33], [0] * 3]
+
+
 @pytest.mark.parametrize(
     ("text", "fragment"),
     [
         ("", "colours: none given"),
         (" , ", "colours: none given"),
-        ("red", "red: neither colours such as '#aabbcc,#123' nor a palette file"),
+        ("red", "red: neither colours such as '#aabbcc,#123,white' nor a palette file"),
         ("red\0", r"'red\\x00': neither colours"),
         ("r" * 5000, "^r{80}: neither colours"),
         ("#12", "colours: '#12' is no colour; write it as #rrggbb or #rgb"),
