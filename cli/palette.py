@@ -55,7 +55,7 @@ def palette(
         str | None,
         typer.Option(
             "--colors",
-            help="Your own: '#aabbcc,#123', or a palette file.",
+            help="Your own: '#aabbcc,#123,white', or a palette file.",
             rich_help_panel=CHOICE_PANEL,
         ),
     ] = None,
@@ -143,10 +143,20 @@ def palette(
 
 def _options(min_share: float, max_colors: int, keep: str, contour: bool) -> PaletteOptions:
     from toonset.palette.choice import PaletteOptions
+
+    kept = _typed("--keep", keep).tolist() if keep else []
+    return PaletteOptions(min_share, max_colors, tuple((r, g, b) for r, g, b in kept), contour)
+
+
+def _typed(option: str, text: str) -> UInt8[np.ndarray, "colors 3"]:
+    """Return the colours of an option, which messages name."""
+    from toonset.errors import PaletteError
     from toonset.palette.files import parse_colors
 
-    kept = parse_colors(keep).tolist() if keep else []
-    return PaletteOptions(min_share, max_colors, tuple((r, g, b) for r, g, b in kept), contour)
+    try:
+        return parse_colors(text)
+    except PaletteError as error:
+        raise PaletteError(f"{option}: {error}") from error
 
 
 def _contours(drawn: Drawn) -> list[Map]:
@@ -160,18 +170,17 @@ def _choose(
 ) -> Palette:
     from toonset.palette.extcolors_palette import extcolors_palette
     from toonset.palette.extract import extract_palette, pick_palette
-    from toonset.palette.files import parse_colors
     from toonset.palette.patches import with_places
 
     if colors is not None and (options.keep or method is not Method.toonset):
         raise typer.BadParameter("--colors is the whole palette; leave --keep and --method away")
     if options.keep and method is not Method.toonset:
         raise typer.BadParameter("--keep belongs to --method toonset")
+    lines = [contour >= LINE for contour in contours]
     if colors is not None:
-        return pick_palette(drawn.pictures, parse_colors(colors))
+        return pick_palette(drawn.pictures, _typed("--colors", colors), lines)
     if method is Method.extcolors:
         return with_places(extcolors_palette(drawn.pictures, options), drawn.pictures)
-    lines = [contour >= LINE for contour in contours]
     return with_places(extract_palette(drawn.pictures, options, lines), drawn.pictures)
 
 

@@ -5,25 +5,43 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from toonset.palette.palette import DroppedColor, Palette
+    from toonset.palette.palette import DroppedColor, Evidence, Palette
 
 HUNDRED = 100.0
+PIXELS = 4096  # for which the evidence counts bits
+LEAST_BITS = 1.0  # less decides nothing
 
 
 def palette_lines(found: Palette) -> list[str]:
-    """Return a line per colour, then what is known of lines, left-out colours and their number."""
+    """Return a line per colour, then the rule, lines, left-out colours and why so many."""
     lines = [_line(color.rgb, color.share, color.name) for color in found.colors]
+    lines.append(f"shares are of all the character's pixels; rule: {found.rule}")
     lines += _contour_lines(found)
     if found.dropped:
         lines.append("left out (with the mean OKLab error that this costs, and the largest patch):")
         lines += [_dropped_line(color) for color in found.dropped]
-    evidence = found.evidence
-    if evidence is not None:
-        lines.append(
-            f"told apart: {evidence.colors}; one less costs {evidence.one_less:+.0f} bits, one "
-            f"more {evidence.one_more:+.0f}, per 4,096 pixels"
-        )
+    if found.evidence is not None:
+        lines.append(_evidence_line(found.evidence))
     return lines
+
+
+def _evidence_line(evidence: Evidence) -> str:
+    """Return why so many colours: with them the drawing is described most briefly."""
+    number = evidence.colors
+    others = [_other_number(number + 1, evidence.one_more)]
+    if number > 1:
+        others.insert(0, _other_number(number - 1, evidence.one_less))
+    colors = "1 colour describes" if number == 1 else f"{number} colours describe"
+    return (
+        f"{colors} the drawing most briefly, those left out included; {', '.join(others)} "
+        f"(bits per {PIXELS:,} pixels)"
+    )
+
+
+def _other_number(number: int, more_bits: float) -> str:
+    if more_bits < LEAST_BITS:
+        return f"{number} would do as well"
+    return f"{number} would take {more_bits:.0f} bits more"
 
 
 def _contour_lines(found: Palette) -> list[str]:

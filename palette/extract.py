@@ -19,10 +19,17 @@ from toonset.palette.choice import Amount, PaletteOptions, choose, measure
 from toonset.palette.labels import nearest_colors
 from toonset.palette.names import hex_of, name_of
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
-from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
+from toonset.palette.palette import (
+    MAX_COLORS,
+    ContourColor,
+    DroppedColor,
+    Palette,
+    PaletteColor,
+)
 from toonset.palette.pixels import Histogram, count_pixels
-from toonset.palette.shades import find_paints
+from toonset.palette.shades import Paint, find_paints
 
+PICKED = "picked by hand; what is not among these colours counts for the nearest"
 LEAST_LISTED = 0.002  # of the pixels: what is rarer is not worth a line among the dropped
 
 Images = Sequence[UInt8[np.ndarray, "_ _ 4"]]
@@ -54,26 +61,66 @@ def extract_palette(
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)
     contour = None if ink is None else _contour(amounts[ink])
     dropped = _dropped(left, histogram, colors)
-    return Palette(colors, _rule(options, ink is not None), dropped, warnings, contour, evidence)
+    return Palette(colors, _rule(options, contour), dropped, warnings, contour, evidence)
 
 
-def pick_palette(images: Images, rgb: UInt8[np.ndarray, "colors 3"]) -> Palette:
+def pick_palette(
+    images: Images, rgb: UInt8[np.ndarray, "colors 3"], contours: Masks | None = None
+) -> Palette:
     """Return hand-picked colours with their shares in the pictures, in the order given.
+
+    Areas are counted as for a palette that is found, but nothing is left out: what is not among
+    these colours counts for the nearest in RGB.
+
+    Args:
+        images: the character on transparent ground.
+        rgb: the colours.
+        contours: the drawn lines of every picture, if known.
 
     Raises:
         PaletteError: no picture, or no opaque pixel in them.
     """
     histogram = _histogram(images)
-    label = nearest_colors(histogram.colors, rgb)
-    shares = np.bincount(label, histogram.counts, len(rgb)) / histogram.counts.sum()
-    triples = [(int(red), int(green), int(blue)) for red, green, blue in rgb]
-    unused = [hex_of(triple) for triple, share in zip(triples, shares, strict=True) if not share]
+    paints = _picked_paints(histogram, rgb)
+    amounts, ink = measure(paints, paint_areas(histogram, paints, contours), PaletteOptions())
+    colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in amounts)
+    unused = [hex_of(color.rgb) for color in colors if not color.share]
     warnings = (f"no pixel is nearest to {', '.join(unused)}",) if unused else ()
-    colors = tuple(
-        PaletteColor(triple, float(share), name_of(triple))
-        for triple, share in zip(triples, shares, strict=True)
-    )
-    return Palette(colors, "picked by hand", (), warnings)
+    contour = None if ink is None else _contour(amounts[ink])
+    return Palette(colors, PICKED, (), warnings, contour)
+
+
+def _picked_paints(histogram: Histogram, rgb: UInt8[np.ndarray, "colors 3"]) -> list[Paint]:
+    """Return the colours as paints of all pixels."""
+    label = nearest_colors(histogram.colors, rgb)
+    found = find_paints(histogram)[0]
+    for paint, own in zip(found, _only_picks(found, histogram, rgb), strict=True):
+        if own is not None:
+            label[paint.members] = own
+    inks = [nearest_colors(np.array([p.rgb], np.uint8), rgb)[0] for p in found if p.is_ink]
+    return [
+        Paint((int(red), int(green), int(blue)), np.flatnonzero(label == number), number in inks)
+        for number, (red, green, blue) in enumerate(rgb)
+    ]
+
+
+def _only_picks(
+    found: Sequence[Paint], histogram: Histogram, rgb: UInt8[np.ndarray, "colors 3"]
+) -> list[int | None]:
+    """Return per paint the one picked colour that is meant by it, and so has all its shades.
+
+    None where no colour is that of the paint, or where several part its shades among them.
+    """
+    from scipy.spatial import KDTree
+
+    paint_of = np.empty(len(histogram.colors), dtype=np.int64)
+    for number, paint in enumerate(found):
+        paint_of[paint.members] = number
+    home = paint_of[KDTree(histogram.colors).query(rgb)[1]]
+    own = oklab_from_rgb(np.array([paint.rgb for paint in found], dtype=np.uint8))[home]
+    meant = np.linalg.norm(oklab_from_rgb(rgb) - own, axis=1) <= JUST_NOTICEABLE
+    picks = [np.flatnonzero(home == number) for number in range(len(found))]
+    return [int(of[0]) if len(of) == 1 and meant[of[0]] else None for of in picks]
 
 
 def _histogram(images: Images) -> Histogram:
@@ -88,13 +135,19 @@ def _histogram(images: Images) -> Histogram:
     return histogram
 
 
-def _rule(options: PaletteOptions, lines: bool) -> str:
-    words = [f"at least {options.min_share:g} of the figure's pixels"]
-    if lines:
-        words = [f"at least {options.min_share:g} of the figure's pixels that are no drawn lines"]
-        words.append(
-            "the lines' colour by all pixels" if options.contour else "the lines' colour alike"
-        )
+def _rule(options: PaletteOptions, contour: ContourColor | None) -> str:
+    """Return the rule in words; shares that it names are of the same pixels as the colours'."""
+    least = 100 * options.min_share
+    words = [f"at least {least:g} % of the character's pixels"]
+    if contour is not None:
+        of_all = least * (1 - contour.share)
+        words = [
+            f"at least {least:g} % of the character without its drawn lines, here {of_all:.1f} % "
+            "of all its pixels (a colour with soft edges may have a little less)",
+            f"the lines' colour {least:g} % of all" if options.contour else "the lines' colour too",
+        ]
+    if options.max_colors < MAX_COLORS:
+        words.append(f"at most {options.max_colors} colours")
     words.append(f"shades within {JUST_NOTICEABLE:g} in OKLab are one colour")
     if options.keep:
         words.append(f"kept by hand: {', '.join(map(hex_of, options.keep))}")

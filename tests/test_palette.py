@@ -167,9 +167,9 @@ def test_nothing_to_see_is_an_error() -> None:
         extract_palette([])
     with pytest.raises(PaletteError, match="no opaque pixel"):
         extract_palette([np.zeros((9, 9, 4), dtype=np.uint8)])
-    with pytest.raises(PaletteError, match="min share 5; it is a share from 0 to 1"):
+    with pytest.raises(PaletteError, match="--min-share: 5 is no share; give 0 to 1"):
         PaletteOptions(min_share=5.0)
-    with pytest.raises(PaletteError, match="max colours 0; 1 to 255 are possible"):
+    with pytest.raises(PaletteError, match="--max-colors: 0 colours; 1 to 255 are possible"):
         PaletteOptions(max_colors=0)
     with pytest.raises(PaletteError, match="0 colours; 1 to 255 are needed"):
         Palette((), "none")
@@ -271,13 +271,61 @@ def test_small_colours_are_kept_on_request() -> None:
     options = PaletteOptions(keep=((24, 64, 178),))  # near the blue that is there
     assert as_set(extract_palette([picture], options)) == {red, blue}
     with pytest.raises(
-        PaletteError, match="keep #ffff00: no such colour was found; the nearest is"
+        PaletteError, match="--keep: #ffff00: no such colour was found; the nearest is"
     ):
         extract_palette([picture], PaletteOptions(keep=((255, 255, 0),)))
     all_three = PaletteOptions(min_share=0.0, max_colors=2, keep=(green,))
     assert as_set(extract_palette([picture], all_three)) == {red, green}
     with pytest.raises(PaletteError, match="raise --max-colors"):
         PaletteOptions(max_colors=1, keep=(red, blue))
+
+
+def test_a_colour_kept_in_the_place_of_another_is_said() -> None:
+    red, blue = (200, 30, 40), (20, 60, 180)
+    small = block((red, 97), (blue, 3))
+    near = ((40, 85, 190),)  # 0.07 away in OKLab
+    (note,) = extract_palette([small], PaletteOptions(keep=near)).warnings
+    assert note == "--keep: #2855be itself was not found; kept the nearest, #143cb4"
+    (note,) = extract_palette([block((red, 60), (blue, 40))], PaletteOptions(keep=near)).warnings
+    assert note.endswith("#143cb4, which the rule keeps anyway")
+    assert extract_palette([small], PaletteOptions(keep=(blue,))).warnings == ()
+
+
+def test_a_found_palette_picked_by_hand_has_the_same_shares() -> None:
+    rgba = soft_stripes((200, 30, 40), (20, 60, 180), (30, 160, 60), width=6)
+    line = np.zeros(rgba.shape[:2], dtype=bool)
+    line[:, 8:12] = True
+    rgba[:, 8:12, :3] = (0, 0, 0)
+    rgba[:, [7, 12], :3] = rgba[:, [7, 12], :3] // 2  # the line's soft edges
+    line[:, [7, 12]] = True
+    found = extract_palette([rgba], contours=[line])
+    assert found.dropped == ()
+    picked = pick_palette([rgba], found.rgb, [line])
+    assert [color.share for color in picked.colors] == [color.share for color in found.colors]
+    assert picked.contour == found.contour
+
+
+def test_shades_stay_with_their_paint_and_what_is_left_out_goes_to_the_nearest() -> None:
+    ramp = np.linspace(0.55, 1.0, 200)[None, :, None] * [210, 60, 50] * np.ones((40, 1, 1))
+    shaded = np.dstack([np.rint(ramp), np.full((40, 200), 255)]).astype(np.uint8)
+    dark, blue = (100, 20, 50), (20, 60, 180)  # the dark one is nearest to some shades
+    rgba = np.concatenate([shaded, block((dark, 60), (blue, 5))], axis=1)
+    found = extract_palette([rgba])
+    assert [color.rgb for color in found.dropped] == [blue]
+    picked = pick_palette([rgba], found.rgb)
+    more = [p.share - f.share for p, f in zip(picked.colors, found.colors, strict=True)]
+    assert sorted(more) == pytest.approx([0, 5 / 265])
+    two = np.array([found.rgb[0], shaded[0, 0, :3]], dtype=np.uint8)  # both of the gradient
+    assert min(color.share for color in pick_palette([shaded], two).colors) > 0.1
+
+
+def test_the_rule_names_the_least_share_of_all_pixels() -> None:
+    rgba, line = lined(0)
+    palette = extract_palette([rgba], contours=[line])
+    assert "here 4.8 % of all its pixels" in palette.rule  # 96 % are no lines
+    assert min(color.share for color in palette.colors) >= 0.048
+    assert "of the character's pixels" in extract_palette([rgba]).rule
+    assert "at most 2 colours" in extract_palette([rgba], PaletteOptions(max_colors=2)).rule
 
 
 def lined(black_cloth: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,11 +9,13 @@ import typer
 
 from toonset.camera import Camera
 from toonset.cli.palette import Method, palette
+from toonset.cli.palette_report import palette_lines
 from toonset.cli.split import split
 from toonset.dataset.picture import encode_png, load_indexed_png
 from toonset.dataset.transforms import read_scene, transforms_dict
 from toonset.errors import ToonsetError
 from toonset.files import write_bytes, write_json
+from toonset.palette.palette import Evidence, Palette, PaletteColor
 
 RED, BLUE = (200, 30, 40), (20, 60, 180)
 
@@ -50,8 +52,9 @@ def test_a_bundle_gets_its_palette_and_labels(
     palette()
     shown = capsys.readouterr().out.splitlines()
     assert shown[:2] == ["#c81e28   70.0 %  red", "#143cb4   30.0 %  royal blue"]
-    assert shown[2].startswith("told apart: 2; one less costs +")
-    assert shown[3:] == ["bundle"]
+    assert shown[2].startswith("shares are of all the character's pixels; rule: at least 5 % of")
+    assert shown[3].startswith("2 colours describe the drawing most briefly")
+    assert shown[4:] == ["bundle"]
     scene = read_scene(tmp_path / "bundle")
     assert scene.palette is not None
     assert scene.palette.tolist() == [list(RED), list(BLUE)]
@@ -107,19 +110,36 @@ def test_what_is_dropped_is_printed(tmp_path: Path, capsys: pytest.CaptureFixtur
     bundle = make_bundle(tmp_path / "b")
     palette([bundle], min_share=0.5)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1].startswith("left out")
-    assert lines[2].startswith("#143cb4   30.0 %  royal blue  0.")
+    assert "rule: at least 50 % of the character's pixels" in lines[1]
+    assert lines[2].startswith("left out")
+    assert lines[3].startswith("#143cb4   30.0 %  royal blue  0.")
+
+
+def test_the_number_of_colours_is_explained_without_empty_figures() -> None:
+    red = PaletteColor(RED, 1.0, "red")
+    said = [
+        palette_lines(Palette((red,), "r", evidence=Evidence(*evidence)))[-1]
+        for evidence in [(8, 233.4, 14.2), (8, 0.3, 14.2), (1, 98274.0, 87.0)]
+    ]
+    for number, colors in zip(("8", "8", "1"), said, strict=True):
+        assert colors.startswith(f"{number} colour")
+    assert "7 would take 233 bits more, 9 would take 14 bits more" in said[0]
+    assert "7 would do as well, 9 would take 14 bits more" in said[1]
+    assert "0 would" not in said[2]
 
 
 @pytest.mark.parametrize(
     ("arguments", "options", "fragment"),
     [
         (["none.png"], {}, "none.png: no such file; check the name of the picture"),
-        (["empty"], {}, "empty: holds no transforms.json; run `toonset calibrate` first"),
+        (["empty"], {}, "empty: is a folder without pictures; name a sheet, or its"),
         (["bundle", "front.png"], {}, "a bundle stands alone"),
         (["text.png"], {}, "is text, no picture that can be read"),
-        (["bundle"], {"colors": "blurple"}, "blurple: neither colours such as"),
-        (["bundle"], {"min_share": 7.0}, "min share 7"),
+        (["bundle"], {"colors": "red"}, "^--colors: red: neither colours such as '#aabbcc"),
+        (["bundle"], {"keep": "xx"}, "^--keep: xx: neither colours such as"),
+        (["bundle"], {"keep": "#"}, "^--keep: colours: '#' is no colour"),
+        (["bundle"], {"keep": "#ffff00"}, "^--keep: #ffff00: no such colour was found"),
+        (["bundle"], {"min_share": 7.0}, "^--min-share: 7 is no share"),
         (["bundle"], {"out": Path("/proc/nowhere/x")}, "not writable|cannot be written"),
         (["outside"], {}, "lies outside of the folder"),
     ],
