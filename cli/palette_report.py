@@ -40,7 +40,7 @@ def _evidence_line(evidence: Evidence) -> str:
 
 def _other_number(number: int, more_bits: float) -> str:
     if more_bits < LEAST_BITS:
-        return f"{number} would do as well"
+        return f"{number} would do nearly as well, a close call"
     return f"{number} would take {more_bits:.0f} bits more"
 
 

@@ -28,6 +28,7 @@ from toonset.palette.palette import (
 )
 from toonset.palette.pixels import Histogram, count_pixels
 from toonset.palette.shades import Paint, find_paints
+from toonset.palette.wide_paints import wide_paint_notes
 
 PICKED = "picked by hand; what is not among these colours counts for the nearest"
 LEAST_LISTED = 0.002  # of the pixels: what is rarer is not worth a line among the dropped
@@ -59,6 +60,7 @@ def extract_palette(
     amounts, ink = measure(paints, areas, options)
     kept, left, warnings = choose(amounts, options)
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)
+    warnings += wide_paint_notes(histogram, [a.paint for a in kept], options.min_share)
     contour = None if ink is None else _contour(amounts[ink])
     dropped = _dropped(left, histogram, colors)
     return Palette(colors, _rule(options, contour), dropped, warnings, contour, evidence)

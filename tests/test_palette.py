@@ -319,6 +319,16 @@ def test_shades_stay_with_their_paint_and_what_is_left_out_goes_to_the_nearest()
     assert min(color.share for color in pick_palette([shaded], two).colors) > 0.1
 
 
+def test_a_paint_of_very_different_shades_is_said() -> None:
+    for low, count in ((0.7, 0), (0.0, 1)):
+        ramp = np.linspace(low, 1.0, 300)[None, :, None] * [240, 225, 190] * np.ones((40, 1, 1))
+        shaded = np.dstack([np.rint(ramp), np.full((40, 300), 255)]).astype(np.uint8)
+        palette = extract_palette([shaded])
+        assert len(palette.colors) == 1
+        assert len(palette.warnings) == count, low
+    assert "stands for very different shades" in palette.warnings[0]
+
+
 def test_the_rule_names_the_least_share_of_all_pixels() -> None:
     rgba, line = lined(0)
     palette = extract_palette([rgba], contours=[line])
