@@ -90,7 +90,8 @@ def find_background(
     if is_transparent(rgba) and known_rgb is None:
         return Background(None, None, "transparent", _sure_of_alpha(rgba), 0)
     inset = _inset(rgba)
-    places = _samples(ring_of(*rgba.shape[:2], inset))
+    height, width = rgba.shape[:2]
+    places = _samples(ring_of(height, width, inset))
     colors = rgba[places][:, :3]
     if known_rgb is not None:
         known = _judged("plain", None, known_rgb, colors, np.array(known_rgb))
@@ -166,15 +167,16 @@ def ring_of(height: int, width: int, inset: float = 0.0) -> Bool[np.ndarray, "he
 
 
 def _sure_of_alpha(rgba: np.ndarray) -> float:
-    return float((rgba[..., 3][ring_of(*rgba.shape[:2])] < 128).mean())
+    return float((rgba[..., 3][ring_of(rgba.shape[0], rgba.shape[1])] < 128).mean())
 
 
 def _inset(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
     """Return where the background begins: inside of frames, whose colour is on the rim alone."""
-    step = max(1, round((rgba.shape[0] * rgba.shape[1] / MOST_SAMPLES) ** 0.5))
+    height, width = rgba.shape[:2]
+    step = max(1, round((height * width / MOST_SAMPLES) ** 0.5))
     everywhere = rgba[::step, ::step, :3].reshape(-1, 3)
     for inset in INSETS:
-        rim = _dominant(rgba[_samples(ring_of(*rgba.shape[:2], inset))][:, :3])
+        rim = _dominant(rgba[_samples(ring_of(height, width, inset))][:, :3])
         near = np.abs(everywhere - np.array(rim, dtype=np.int16)).max(axis=1) <= CLUSTER_RADIUS
         if near.mean() >= COMMON:
             return inset

@@ -64,7 +64,8 @@ def fit_gradient(rgba: UInt8[np.ndarray, "height width 4"], inset: float = 0.0) 
     small, size_wh = _small(rgba)
     basis = _quadratics(*small.shape[:2])
     flat = small.reshape(-1, 3)
-    trusted = _border(*small.shape[:2], inset).ravel()
+    trusted = _border(small.shape[0], small.shape[1], inset).ravel().astype(np.float64)
+    coefficients = np.zeros((basis.shape[1], 3))
     for width in np.geomspace(WIDEST_LEVELS, NARROWEST_LEVELS, ROUNDS):
         weight = np.sqrt(trusted)[:, None]
         coefficients = np.linalg.lstsq(basis * weight, flat * weight, rcond=None)[0]
@@ -129,8 +130,8 @@ def _border(rows: int, columns: int, inset: float) -> Bool[np.ndarray, "rows col
 
 
 def _quadratics(rows: int, columns: int) -> Float[np.ndarray, "cells 6"]:
-    y, x = np.meshgrid(np.linspace(-1, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
-    x, y = x.ravel(), y.ravel()
+    grids = np.meshgrid(np.linspace(-1, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
+    y, x = (grid.ravel() for grid in grids)
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
 

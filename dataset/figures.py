@@ -229,9 +229,10 @@ def _nearest_main(
     position = np.zeros(len(blobs.areas) + 1, dtype=np.int64)
     position[mains + 1] = np.arange(len(mains))
     zero_at_main = (~is_main[blobs.labels]).view(np.uint8)
-    away, zones = cv2.distanceTransformWithLabels(
+    away, found = cv2.distanceTransformWithLabels(
         zero_at_main, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
+    zones = np.asarray(found, dtype=np.int32)
     main_of_zone = np.zeros(int(zones.max()) + 1, dtype=np.int64)
     at_main = zero_at_main == 0
     main_of_zone[zones[at_main]] = position[blobs.labels[at_main]]
@@ -277,7 +278,7 @@ def _come_again(
     views: int,
     rgb: np.ndarray,
 ) -> Bool[np.ndarray, " n"]:
-    """Return which patches are parts because most views have the like at the same level.
+    """Return which patches are parts: most views have the like at the level, or one has a pair.
 
     So hands without arms and hats in the air are found, farther away than a single thing may be.
     """
@@ -296,8 +297,10 @@ def _come_again(
     for i in np.flatnonzero(able):
         alike = able & (np.abs(level - level[i]) <= SAME_LEVEL) & (above == above[i])
         alike &= (size <= SAME_SIZE * size[i]) & (size >= size[i] / SAME_SIZE)
-        if len(np.unique(bodies[alike])) >= 2 and alike.sum() >= OFTEN * views:
-            result[i] = True
+        often = len(np.unique(bodies[alike])) >= 2 and alike.sum() >= OFTEN * views
+        left = middle[:, 0] < main[:, 2] / 2
+        pair = alike & (bodies == bodies[i]) & (left != left[i]) & ~above
+        result[i] = often or pair.any()
     return result
 
 

@@ -15,6 +15,7 @@ from jaxtyping import Bool
 
 LEAST_RUN = 0.04  # of the sheet's side along the line
 LEAST_RUN_PX = 24
+LEAST_SHEET = 100  # cells on the shorter side: on a smaller picture a line is part of a drawing
 THICKEST = 0.015  # of the sheet's shorter side
 THICKEST_PX = 6  # whatever the sheet's size
 CROSSING = 0.6  # of the sheet's width: a line this long needs no others
@@ -22,12 +23,14 @@ UPRIGHT = 0.9  # of its height: the same; staffs and poles are shorter
 LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
 ALIKE = 0.8  # overlap of the runs of neighbouring rows
 OPEN = 0.5  # of the line's length with paper on both sides
+OPEN_UPRIGHT = 0.7  # the same of upright lines, which no figure stands behind
 OPEN_ACROSS = 0.2  # the same of a line that crosses the sheet, behind all figures
 DASHES = 6  # flat pieces in a row: a dashed line
 EQUAL = 0.25  # of their length: dashes differ by less
 MOSTLY = 0.6  # of the dashes; figures cut some short
 LONGEST_DASH = 0.1  # of the sheet's side
 JOINT = 0.02  # of the shorter side: corners may miss each other by so much
+THROUGHOUT = 0.75  # of the columns with paper above and below that a broken line crosses
 BROKEN_PX = 5  # gaps in a run that noise may leave
 
 
@@ -64,6 +67,8 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
         paint: pixels that are not background-coloured.
     """
     height, width = paint.shape
+    if min(height, width) < LEAST_SHEET:
+        return []
     thickest = max(THICKEST_PX, round(THICKEST * min(height, width)))
     lines = []
     for vertical in (False, True):
@@ -104,20 +109,27 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
     runs = zip(rows[long].tolist(), starts[long].tolist(), stops[long].tolist(), strict=True)
     bands = _stacked(list(runs))
     lines = [Line(*band, vertical) for band in bands if band[1] - band[0] < thickest]
-    lines += _broken(lines, paint.shape[1])
+    lines += _broken(paint, lines)
     return [line for line in lines if _is_open(paint, line)]
 
 
-def _broken(lines: list[Line], width: int) -> list[Line]:
+def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
     """Return lines across the sheet whose pieces figures interrupt."""
     found = []
     for first in sorted({line.first for line in lines}):
         own = [line for line in lines if line.first == first]
         length = sum(line.stop - line.start for line in own)
-        if len(own) > 1 and length >= CROSSING * width:
+        least = UPRIGHT if own[0].vertical else CROSSING
+        if len(own) > 1 and length >= least * paint.shape[1]:
             start, stop = min(line.start for line in own), max(line.stop for line in own)
             last = max(line.last for line in own)
-            found.append(Line(first, last, start, stop, own[0].vertical))
+            line = Line(first, last, start, stop, own[0].vertical)
+            above, below = _beside(paint, line)
+            open_ = np.asarray(~above & ~below)
+            drawn = np.all(paint[first : last + 1, start:stop], axis=0)
+            crossed = np.count_nonzero(drawn & open_)
+            if crossed and crossed >= THROUGHOUT * np.count_nonzero(open_):  # hems end earlier
+                found.append(line)
     return found
 
 
@@ -127,7 +139,7 @@ def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
     left, top, width, height = stats[:, :4].T
     thin = (height <= max(3, thickest // 2)) & (width >= 2 * height)
     flat = thin & (width <= LONGEST_DASH * paint.shape[1])
-    lines = []
+    lines: list[Line] = []
     for level in np.unique(top[flat]):
         own = flat & (np.abs(top - level) <= 1)
         start, stop = int(left[own].min()), int((left + width)[own].max())
@@ -167,8 +179,9 @@ def _is_open(paint: np.ndarray, line: Line) -> bool:
     below = paint[line.last + 2 : line.last + 2 + reach, columns]
     closed_above = above.all(axis=0) & bool(len(above))
     closed_below = below.all(axis=0) & bool(len(below))
-    crosses = line.stop - line.start >= CROSSING * paint.shape[1]
-    return bool(np.mean(~closed_above & ~closed_below) >= (OPEN_ACROSS if crosses else OPEN))
+    across = not line.vertical and line.stop - line.start >= CROSSING * paint.shape[1]
+    least = OPEN_ACROSS if across else OPEN_UPRIGHT if line.vertical else OPEN
+    return bool(np.mean(~closed_above & ~closed_below) >= least)
 
 
 def _beside(paint: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:

@@ -150,7 +150,8 @@ def _pieces(
     smooth: Bool[np.ndarray, "height width"],
 ) -> Bool[np.ndarray, "height width"]:
     """Return the smooth patches that are large, low and open enough for shadows."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(smooth.view(np.uint8), connectivity=8)
+    _, found, stats, _ = cv2.connectedComponentsWithStats(smooth.view(np.uint8), connectivity=8)
+    labels = np.asarray(found, dtype=np.int32)
     large = stats[:, cv2.CC_STAT_AREA] >= LEAST_AREA * body.sum()
     able = np.flatnonzero(large & (stats[:, cv2.CC_STAT_TOP] >= TOP * body.shape[0]))
     pieces = [labels == number for number in able[able > 0]]
@@ -190,7 +191,8 @@ def _mostly(
     smooth: Bool[np.ndarray, "height width"], shadow: Bool[np.ndarray, "height width"]
 ) -> Bool[np.ndarray, "height width"]:
     """Return the smooth patches of which most is shadow already: with its darker core."""
-    count, labels = cv2.connectedComponents(smooth.view(np.uint8), connectivity=8)
+    count, found = cv2.connectedComponents(smooth.view(np.uint8), connectivity=8)
+    labels = np.asarray(found, dtype=np.int32)
     sizes = np.bincount(labels.ravel(), minlength=count)
     inside = np.bincount(labels[shadow], minlength=count) > 0.5 * sizes
     inside[0] = False

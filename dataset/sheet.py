@@ -23,6 +23,7 @@ from toonset.view import View
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
 SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that a person should look at
+BROAD = 1.15  # times its own height: wider than arms reach
 WIDE = 1.8  # times the median width: two figures that touch
 
 NAMES = {
@@ -120,7 +121,7 @@ def split_sheet(
         tuple(views),
         ground.rgb,
         ground.sure,
-        _doubts(ground, views) + (() if by_hand else _doubts_of_figures(found, views)),
+        _doubts(ground, found) + (() if by_hand else _doubts_of_figures(found, views)),
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes),
     )
@@ -224,11 +225,10 @@ def _as_box(box: Int[np.ndarray, " 4"]) -> Box:
     return x, y, width, height
 
 
-def _doubts(ground: Background, views: list[View]) -> tuple[str, ...]:
-    said = []
-    if ground.rgb is not None and ground.sure < SURE_ENOUGH:
-        said.append(f"only {ground.sure:.0%} of the sheet's border is background")
-    return tuple(said)
+def _doubts(ground: Background, found: Survey) -> tuple[str, ...]:
+    if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:  # a frame explains it
+        return ()
+    return (f"only {100 * ground.sure:.0f} % of the sheet's border is background",)
 
 
 def _doubts_of_figures(found: Survey, views: list[View]) -> tuple[str, ...]:
@@ -237,19 +237,20 @@ def _doubts_of_figures(found: Survey, views: list[View]) -> tuple[str, ...]:
         x, y, width, height = (value * found.cell_px for value in cut.box)
         said.append(
             f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "
-            f"through {cut.crossed:.1%} of their height: look whether the cut is right"
+            f"through {100 * cut.crossed:.1f} % of their height: look whether the cut is right"
         )
     widths = [view.figure_box[2] for view in views]
     for view, width in zip(views, widths, strict=True):
-        if len(views) >= 3 and width > WIDE * float(np.median(widths)):
+        among_others = len(views) >= 3 and width > WIDE * float(np.median(widths))
+        if among_others or width > BROAD * view.figure_box[3]:
             said.append(f"view {view.name} is unusually wide: do two figures touch?")
-    height = float(np.median([view.figure_box[3] for view in views]))
+    usual = float(np.median([view.figure_box[3] for view in views]))
     for thing in _left_out(found):
-        if thing.kind == "study" and thing.box[3] >= NEARLY_A_VIEW * height:
+        if thing.kind == "study" and thing.box[3] >= NEARLY_A_VIEW * usual:
             x, y = thing.box[:2]
             said.append(
-                f"a drawing at {x}, {y} of {thing.box[3] / height:.0%} of the views' height was "
-                "left out: if it is a view, give all views with --boxes"
+                f"a drawing at {x}, {y} of {100 * thing.box[3] / usual:.0f} % of the views' height "
+                "was left out: if it is a view, give all views with --boxes"
             )
     return tuple(said)
 

@@ -82,7 +82,7 @@ def survey(
     lines = find_lines(painted)
     ruled = line_pixels(painted, lines)
     shadow = np.zeros_like(painted)
-    ring = ring_of(*painted.shape, ground.inset)
+    ring = ring_of(painted.shape[0], painted.shape[1], ground.inset)
     paper = joined(~painted | ruled, ring)
     blobs = find_blobs(~paper)
     small = np.ascontiguousarray(rgba[::cell, ::cell])
@@ -103,7 +103,8 @@ def joined(
     free: Bool[np.ndarray, "height width"], seeds: Bool[np.ndarray, "height width"]
 ) -> Bool[np.ndarray, "height width"]:
     """Return the free pixels that are connected to a seed through free pixels."""
-    _, labels = cv2.connectedComponents(free.view(np.uint8), connectivity=4)
+    _, found = cv2.connectedComponents(free.view(np.uint8), connectivity=4)
+    labels = np.asarray(found, dtype=np.int32)
     touched = np.zeros(int(labels.max()) + 1, dtype=bool)
     touched[labels[seeds]] = True
     touched[0] = False

@@ -95,9 +95,10 @@ def _crossed(
     enclosed: Bool[np.ndarray, "height width"], cut: Int[np.ndarray, " height"]
 ) -> Bool[np.ndarray, "height width"]:
     """Return the enclosed patches that a cut runs through from top to bottom."""
-    count, patches, stats, _ = cv2.connectedComponentsWithStats(
+    count, found, stats, _ = cv2.connectedComponentsWithStats(
         enclosed.view(np.uint8), connectivity=4
     )
+    patches = np.asarray(found, dtype=np.int32)
     rows, columns = np.arange(len(cut)), np.clip(cut, 1, enclosed.shape[1] - 1)
     met = np.maximum(patches[rows, columns], patches[rows, columns - 1])
     between = np.bincount(met, minlength=count) >= THROUGH * stats[:, cv2.CC_STAT_HEIGHT]

@@ -8,9 +8,12 @@ import pytest
 
 from toonset.dataset import survey
 from toonset.dataset.background import find_background
+from toonset.dataset.bodies import random_body
 from toonset.dataset.messy import make_messy_sheet
 from toonset.dataset.messy_options import DIFFICULTIES
 from toonset.dataset.sheet import Sheet, SheetOptions, split_sheet
+from toonset.dataset.synth_options import SynthOptions
+from toonset.dataset.synthetic import make_turnaround
 from toonset.errors import SheetError
 
 WHITE, RED, BLUE, SKIN = (255, 255, 255), (200, 30, 40), (20, 60, 180), (236, 188, 155)
@@ -88,7 +91,7 @@ def test_hand_in_hand_is_cut_and_said() -> None:
 
 def test_a_figure_with_wide_arms_stays_whole() -> None:
     picture = paper(300, 200)
-    person(picture, 150, arm=100)
+    person(picture, 150, arm=90)
     sheet = split_sheet(opaque(picture))
     assert len(sheet.views) == 1
     assert sheet.warnings == ()
@@ -178,3 +181,10 @@ def test_surveying_in_cells_finds_the_same_figures(monkeypatch: pytest.MonkeyPat
     assert figure_boxes(in_cells) == figure_boxes(whole)
     for a, b in zip(whole.views, in_cells.views, strict=True):
         assert np.count_nonzero(a.mask) == np.count_nonzero(b.mask)
+
+
+def test_limbs_of_small_figures_are_no_ruled_lines() -> None:
+    drawn = make_turnaround(random_body(11), SynthOptions(views=5, cell_px=120, outline_px=0), 11)
+    sheet = split_sheet(drawn.sheet)
+    for found, true in zip(sheet.views, drawn.views, strict=True):
+        assert abs(int(found.mask.sum()) - int(true.mask.sum())) <= 0.01 * true.mask.sum()
