@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 
     Map = UInt8[np.ndarray, "_ _"]
 
-FORMATS = (".ase", ".hex")  # beside .json and .gpl
-SWATCHES = "palette.png"
-WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", SWATCHES)
+WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette.png")
 FOLDERS = ("labels", "contours")
 BUNDLE, OUT = Path("bundle"), Path("palette")
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
@@ -200,14 +198,7 @@ def _write(
     folder: Path, drawn: Drawn, found: Palette, labels: list[Map], contours: list[Map]
 ) -> None:
     from toonset.dataset.palette_files import write_palette
-    from toonset.dataset.picture import encode_png
-    from toonset.files import write_bytes
-    from toonset.palette.files import encode_palette
-    from toonset.palette.swatch import draw_swatches
 
-    for extension in FORMATS:
-        write_bytes(folder / f"palette{extension}", encode_palette(found, extension))
-    write_bytes(folder / SWATCHES, encode_png(draw_swatches(found)))
     named = list(zip(drawn.names, labels, strict=True))
     write_palette(folder, found, named, list(zip(drawn.names, contours, strict=True)))
 
