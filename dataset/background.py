@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.dataset.background_field import Box, Field, fit_gradient, fit_smooth, sampled
+from toonset.dataset.background_field import Field, fit_gradient, fit_smooth, sampled
 from toonset.errors import SheetError
+from toonset.view import Box
 
 BINS = 16  # levels per bin of the coarse histogram that finds the dominant colour
 CLUSTER_RADIUS = 32  # levels: border pixels this near to the background are background + noise

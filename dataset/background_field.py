@@ -13,13 +13,13 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.view import Box
+
 SMALL_PX = 192  # longest side of the copy that the field is fitted on
 ROUNDS = 8  # of fitting and choosing what agrees
 WIDEST_LEVELS = 40.0  # pixels that agree in the first round
 NARROWEST_LEVELS = 8.0  # and in the last
 SMOOTHNESS = 0.06  # of the longest side: width of the smooth field's kernel
-
-Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,9 @@ from jaxtyping import Bool, Int
 
 from toonset.dataset.survey import Survey, figure_cells, in_pixels, joined
 from toonset.errors import SheetError
+from toonset.view import Box
 
 LEAST_CELL_PX = 16  # pixels of paint in a cell of a grid: less is an empty cell
-
-Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)

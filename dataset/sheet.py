@@ -8,17 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int, UInt8
+from jaxtyping import Bool, UInt8
 
 from toonset.dataset.background import Background, find_background, flattened, is_transparent
 from toonset.dataset.crops import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.cutout import cut_out, edge_softness_px
+from toonset.dataset.figures import as_box
 from toonset.dataset.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.letters import words
 from toonset.dataset.line_width import contour_width_px
 from toonset.dataset.survey import Survey, find_paint, survey
 from toonset.errors import SheetError
-from toonset.view import View
+from toonset.view import Box, View
 
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
 SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
@@ -33,8 +34,6 @@ NAMES = {
     "study": "smaller drawings were",
     "speck": "small patches that belong to no figure were",
 }
-
-Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
@@ -212,17 +211,12 @@ def _left_out(found: Survey) -> tuple[LeftOut, ...]:
     kinds = np.array(found.grouping.kinds, dtype=object)
     for kind in NAMES:
         own = found.blobs.boxes[kinds == kind]
-        boxes += [(_as_box(box), kind) for box in (words(own) if kind == "text" else own)]
+        boxes += [(as_box(box), kind) for box in (words(own) if kind == "text" else own)]
     cell = found.cell_px
     return tuple(
         LeftOut((x * cell, y * cell, width * cell, height * cell), kind)
         for (x, y, width, height), kind in boxes
     )
-
-
-def _as_box(box: Int[np.ndarray, " 4"]) -> Box:
-    x, y, width, height = (int(value) for value in box)
-    return x, y, width, height
 
 
 def _doubts(ground: Background, found: Survey) -> tuple[str, ...]:

@@ -13,17 +13,12 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.background import Background, difference, halo_tolerance, ring_of
-from toonset.dataset.figures import (
-    Blobs,
-    Grouping,
-    find_blobs,
-    find_mains,
-    group_blobs,
-    without_strangers,
-)
+from toonset.dataset.figures import Blobs, find_blobs, find_mains, without_strangers
 from toonset.dataset.lines import Line, find_lines, line_pixels
+from toonset.dataset.parts import Grouping, group_blobs
 from toonset.dataset.shadows import find_shadows
 from toonset.dataset.touching import Cut, part_touching
+from toonset.view import Box
 
 LARGEST_SIDE = 4096  # pixels: a larger sheet is surveyed on cells
 BAND = 2**22  # pixels that are compared with the background at a time
@@ -126,7 +121,7 @@ def in_cells(
     return cv2.resize(padded, size, interpolation=cv2.INTER_AREA) > 255 * PAINTED
 
 
-def in_pixels(cells: np.ndarray, cell_px: int, box: tuple[int, int, int, int]) -> np.ndarray:
+def in_pixels(cells: np.ndarray, cell_px: int, box: Box) -> np.ndarray:
     """Return the cells' values for every pixel of a window (x, y, width, height) of the sheet."""
     x, y, width, height = box
     rows = np.arange(y, y + height) // cell_px

@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.dataset.figures import Blobs, find_mains, shared_colors
+from toonset.dataset.figures import Blobs, as_box, find_mains, shared_colors
+from toonset.view import Box
 
 DEAREST = 0.12  # of the patch's height in paint: the most that a cut may cost
 AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
@@ -44,7 +45,7 @@ class Cut:
         crossed: paint that the cut goes through, as a share of the height.
     """
 
-    box: tuple[int, int, int, int]
+    box: Box
     crossed: float
 
 
@@ -65,7 +66,7 @@ def part_touching(
     mains, cuts = find_mains(blobs), list[Cut]()
     widths, least = blobs.boxes[mains, 2], _least_area(blobs, mains)
     labels, top = blobs.labels, len(blobs.areas)
-    queue = [(int(n) + 1, _as_box(blobs.boxes[n])) for n in mains]
+    queue = [(int(n) + 1, as_box(blobs.boxes[n])) for n in mains]
     while queue:
         label, box = queue.pop()
         x, y, width, height = box
@@ -87,7 +88,7 @@ def part_touching(
         window[_crossed(mask & ~paint, found[0])] = 0
         cuts.append(Cut(box, found[1]))
         parts = _boxes(labels)
-        queue += [(n, _as_box(parts[n - 1])) for n in (label, top)]
+        queue += [(n, as_box(parts[n - 1])) for n in (label, top)]
     return (_measured(labels, top) if cuts else blobs), cuts
 
 
@@ -104,11 +105,6 @@ def _crossed(
     between = np.bincount(met, minlength=count) >= THROUGH * stats[:, cv2.CC_STAT_HEIGHT]
     between[0] = False
     return between[patches]
-
-
-def _as_box(box: np.ndarray) -> tuple[int, int, int, int]:
-    x, y, width, height = (int(value) for value in box)
-    return x, y, width, height
 
 
 def _boxes(labels: Int[np.ndarray, "height width"]) -> Int[np.ndarray, "blobs 4"]:
@@ -129,7 +125,7 @@ def _least_area(blobs: Blobs, mains: Int[np.ndarray, " mains"]) -> float:
     return LARGER * float(np.median(blobs.areas[mains[alone]])) if alone.any() else 0.0
 
 
-def _is_wide(box: tuple[int, int, int, int], widths: Int[np.ndarray, " mains"]) -> bool:
+def _is_wide(box: Box, widths: Int[np.ndarray, " mains"]) -> bool:
     if len(widths) >= 3 and box[2] < WIDER * float(widths.min()):
         return False
     return box[3] >= LEAST_HEIGHT and box[2] >= WIDE_ALONE * box[3]
