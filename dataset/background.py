@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.background_field import Field, fit_gradient, fit_smooth, sampled
+from toonset.dataset.ripples import halo_levels, has_jpeg_grid
 from toonset.errors import SheetError
 from toonset.view import Box
 
@@ -21,11 +22,10 @@ CLUSTER_RADIUS = 32  # levels: border pixels this near to the background are bac
 LEAST_TOLERANCE = 2  # levels: a picture without noise still holds rounding
 MOST_TOLERANCE = 48  # levels: beyond it figures would be eaten, whatever the noise
 TRANSPARENT = 0.01  # of the sheet: less see-through area is an accident, not a background
-HALO_WIDTH = 8  # levels: noise of the file falls off within about so many
-CLEAR_HALO = 4.0  # times as many pixels as a little farther from the background: noise at all
-HALO = 1.4  # times as many pixels as a little farther: still noise
+STEADY = 1.5  # times the 99th percentile of noise: the 99.99th of a normal distribution
+RIPPLED = 2.0  # the same in JPEG, whose ripples are stronger near figures than in the border
+GRAIN = 2.0  # levels: paper with more has grain all over, beside which no ripples are seen
 RARE = 3.0  # times the 80th percentile of noise: where its 99th may lie
-SLOPE_RIPPLE = 1  # levels from the mean of the surroundings: rounding of a smooth slope
 LEAST_SURE = 0.3  # of the border: less in one colour is no background
 WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
 WORTH_LEVELS = 2.0  # and less by so many levels
@@ -46,6 +46,8 @@ class Background:
         field: how the colour changes over the sheet; None where it does not.
         kind: "transparent", "plain", "gradient" or "uneven".
         sure: share of the border that is background, 0 to 1.
+        noise: of 99 % of the border, in levels.
+        grain: of 80 % of the border, in levels: what is all over the sheet.
         tolerance: largest difference of a channel, in levels, that is still background.
         evidence: why this kind and not a simpler one, for people; "" for the simplest.
         inset: share of the shorter side at which it begins: more than 0 inside of a thick frame.
@@ -55,6 +57,8 @@ class Background:
     field: Field | None
     kind: str
     sure: float
+    noise: float
+    grain: float
     tolerance: int
     evidence: str = ""
     inset: float = 0.0
@@ -89,7 +93,7 @@ def find_background(
         SheetError: the border has no dominant colour.
     """
     if is_transparent(rgba) and known_rgb is None:
-        return Background(None, None, "transparent", _sure_of_alpha(rgba), 0)
+        return Background(None, None, "transparent", _sure_of_alpha(rgba), 0.0, 0.0, 0)
     inset = _inset(rgba)
     height, width = rgba.shape[:2]
     places = _samples(ring_of(height, width, inset))
@@ -132,23 +136,20 @@ def difference(
     return np.asarray(result, dtype=np.uint8)
 
 
-def halo_tolerance(away: UInt8[np.ndarray, "height width"]) -> int:
-    """Return how far, in levels, compression has spread the background's colour near figures.
+def with_final_tolerance(ground: Background, away: UInt8[np.ndarray, "height width"]) -> Background:
+    """Return the background with the tolerance that the whole sheet asks for.
 
-    A soft edge passes all differences from the background equally often; ringing around edges
-    (JPEG) adds small ones, the smaller the more. The level is where that decay ends. Slopes without
-    ripples are shadows or shading, not noise.
+    Args:
+        ground: what the border shows.
+        away: difference of every pixel from the background, in levels.
     """
-    rippled = cv2.absdiff(away, cv2.blur(away, (5, 5))) > SLOPE_RIPPLE
-    often = cv2.calcHist([away], [0], rippled.view(np.uint8), [256], [0, 256]).ravel()
-    often = often.astype(np.float64)
-    for level in range(1, MOST_TOLERANCE):
-        here = often[level : level + 3].mean()
-        beyond = np.median(often[level + HALO_WIDTH : level + 3 * HALO_WIDTH])
-        surplus = CLEAR_HALO if level == 1 else HALO  # chance makes small surpluses
-        if here <= surplus * beyond + 3 * np.sqrt(beyond) + 1:
-            return level
-    return MOST_TOLERANCE
+    if has_jpeg_grid(away, ground.grain):
+        levels = max(RIPPLED * ground.noise, halo_levels(away, MOST_TOLERANCE, ripples=True))
+        return replace(ground, tolerance=_clipped(levels))
+    if ground.grain > GRAIN:
+        return ground
+    halo = halo_levels(away, MOST_TOLERANCE)
+    return replace(ground, tolerance=max(ground.tolerance, halo))
 
 
 def ring_of(height: int, width: int, inset: float = 0.0) -> Bool[np.ndarray, "height width"]:
@@ -197,7 +198,7 @@ def _richest_worth_it(
     """Return the plain background, or a gradient or smooth field where the border asks for it."""
     dominant = _dominant(colors)
     best = _judged("plain", None, dominant, colors, np.array(dominant))
-    if best.sure >= CLEARLY and best.tolerance <= 2 * WORTH_LEVELS:
+    if best.sure >= CLEARLY and best.noise <= WORTH_LEVELS:
         return best
     gradient = fit_gradient(rgba, inset)
     for kind, field in (("gradient", gradient), ("uneven", fit_smooth(rgba, gradient))):
@@ -206,19 +207,19 @@ def _richest_worth_it(
         if not _is_worth_it(richer, best):
             continue
         evidence = (
-            f"noise {richer.tolerance / 2:g} levels, {best.tolerance / 2:g} if it were "
+            f"noise {richer.noise:g} levels, {best.noise:g} if it were "
             f"{best.kind}; {richer.sure:.0%} of the border, {best.sure:.0%} if it were"
         )
-        best = Background(field.typical, field, kind, richer.sure, richer.tolerance, evidence)
+        best = replace(richer, evidence=evidence)
     return best
 
 
 def _is_worth_it(richer: Background, simpler: Background) -> bool:
-    quieter = richer.tolerance <= WORTH * simpler.tolerance
-    quieter &= richer.tolerance / 2 <= simpler.tolerance / 2 - WORTH_LEVELS
+    quieter = richer.noise <= WORTH * simpler.noise
+    quieter &= richer.noise <= simpler.noise - WORTH_LEVELS
     if quieter:
         return richer.sure >= simpler.sure - WORTH_SHARE
-    no_noisier = richer.tolerance <= simpler.tolerance / WORTH
+    no_noisier = richer.noise <= simpler.noise / WORTH
     return no_noisier and richer.sure >= simpler.sure + WORTH_SHARE
 
 
@@ -232,12 +233,17 @@ def _judged(
     """Return a background with its share of the border and the tolerance that its noise asks."""
     away = np.abs(colors - expected.astype(np.float32)).max(axis=1)
     near = away <= CLUSTER_RADIUS
-    # 99 % of the border's noise, doubled: noise near figures (JPEG) is stronger than far away;
-    # but no more than the common noise explains, lest a shadow in the border counts as noise
+    # no more than the common noise explains, lest a shadow in the border counts as noise
     common, rare = np.percentile(away[near], [80, 99]) if near.any() else (0.0, 0.0)
     noise = min(float(rare), RARE * float(common) + LEAST_TOLERANCE)
-    tolerance = int(np.clip(np.ceil(2 * noise), LEAST_TOLERANCE, MOST_TOLERANCE))
-    return Background(rgb, field, kind, float(near.mean()), tolerance)
+    noise = max(noise, LEAST_TOLERANCE / 2)
+    return Background(
+        rgb, field, kind, float(near.mean()), noise, float(common), _clipped(STEADY * noise)
+    )
+
+
+def _clipped(levels: float) -> int:
+    return int(np.clip(np.ceil(levels), LEAST_TOLERANCE, MOST_TOLERANCE))
 
 
 def _dominant(colors: UInt8[np.ndarray, "n 3"]) -> tuple[int, int, int]:

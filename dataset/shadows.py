@@ -7,18 +7,14 @@ with the figure standing in it (feet reach below its top) and whole without it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Int, UInt8
 
+from toonset.dataset.dimmed import OFF_PAPER, Dim, dimmed, opened, see_through
 from toonset.dataset.figures import Blobs
 
-DARKEST = 0.25  # of the paper's light
-LIGHTEST = 0.998
-OFF_PAPER = 2.0  # levels, beyond the noise: a channel dimmed otherwise is paint
-STEEPEST = 0.06  # of the light per cell: a shadow's inside is smooth
+OFF_MEAN = 0.2  # of the noise: so far a whole patch may be off
 LEAST_AREA = 0.01  # of the figure's area
 TOP = 0.4  # of the figure's height from its top: no shadow reaches higher
 WHOLE = 0.9  # of the figure without the shadow that is still one piece
@@ -26,8 +22,6 @@ ENCLOSED = 0.5  # of the shadow that the figure surrounds: more is a patch of it
 FEET = 0.0  # of a soft shadow's height from its top: the figure reaches lower
 FEET_OF_HARD = 0.7  # the same of one with a hard edge, which shoes have, too
 EDGE = 0.02  # of the figure's height: a shadow's own edge is no wider
-BLACK = 40  # levels: a shadow on transparency is no lighter
-OPAQUE = 230  # alpha: and less opaque
 FADED = 0.95  # of the paper's light, at the shadow's border, besides noise
 MOSTLY = 0.7  # of the border
 GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, nothing is known
@@ -55,130 +49,96 @@ def find_shadows(
     """
     looks = [(blobs.window(int(n)), blobs.mask(int(n))) for n in mains]
     lights = [
-        _see_through(rgba[window])
+        see_through(rgba[window])
         if ground is None
-        else _dimmed(rgba[window][..., :3], ground[window], tolerance)
+        else dimmed(rgba[window][..., :3], ground[window], tolerance)
         for window, _ in looks
     ]
     bodies = [body for _, body in looks]
-    tone = _tone(bodies, lights, tolerance)
+    tone = _tone(bodies, lights)
     found = np.zeros(blobs.labels.shape, dtype=bool)
-    if tone is None:
-        return found
     shaded = 0
     for (window, body), dim in zip(looks, lights, strict=True):
-        shadow = _shadow_of(body, dim, tone, tolerance)
+        shadow = _shadow_of(body, dim, tone)
         found[window] |= shadow
         shaded += bool(shadow.any())
     return found if shaded >= max(1.0, OFTEN * len(mains)) else np.zeros_like(found)
 
 
-@dataclass(frozen=True, eq=False)
-class Dim:
-    """Where a picture is the paper with less light.
-
-    Attributes:
-        mask: there.
-        smooth: there, away from edges.
-        light: share of the paper's light, 0 to 1.
-    """
-
-    mask: Bool[np.ndarray, "height width"]
-    smooth: Bool[np.ndarray, "height width"]
-    light: Float[np.ndarray, "height width"]
-
-
-def _see_through(rgba: UInt8[np.ndarray, "height width 4"]) -> Dim:
-    dim = (rgba[..., :3].max(axis=2) <= BLACK) & (rgba[..., 3] < OPAQUE)
-    return Dim(dim, _opened(dim), 1 - rgba[..., 3].astype(np.float32) / 255)
-
-
-def _dimmed(
-    rgb: UInt8[np.ndarray, "height width 3"],
-    ground: UInt8[np.ndarray, "height width 3"],
-    tolerance: int,
-) -> Dim:
-    paper = np.maximum(ground.astype(np.float32), 1)
-    seen = rgb.astype(np.float32)
-    light = (seen * paper).sum(axis=2) / (paper * paper).sum(axis=2)
-    off = np.abs(seen - light[..., None] * paper).max(axis=2)
-    dim = (light > DARKEST) & (light < LIGHTEST) & (off <= OFF_PAPER + tolerance)
-    slopes = [cv2.Sobel(light, cv2.CV_32F, *axis, scale=0.125) for axis in ((1, 0), (0, 1))]
-    slope = np.abs(slopes).max(axis=0)
-    return Dim(dim, _opened(dim & (slope <= max(STEEPEST, 1.5 * tolerance / 255))), light)
-
-
-def _tone(bodies: list[np.ndarray], dims: list[Dim], tolerance: int) -> float | None:
-    """Return the light of the darkest shadow; None if the figures' own upper parts have it."""
-    pieces = [
-        _pieces(body, dim.mask & body, dim.smooth & body)
-        for body, dim in zip(bodies, dims, strict=True)
-    ]
-    deep = np.concatenate([dim.light[own] for dim, own in zip(dims, pieces, strict=True)])
+def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
+    """Return the light of the darkest hard shadow; None if the figures' own upper parts have it."""
+    deep = np.concatenate(
+        [
+            np.concatenate([[], *(dim.light[piece] for piece in _pieces(body, dim, body))])
+            for body, dim in zip(bodies, dims, strict=True)
+        ]
+    )
     if not len(deep):
         return None
-    darkest = float(np.percentile(deep, 10))
-    if _are_soft(bodies, dims, pieces, tolerance):
-        return darkest
     toned = area = 0
     for body, dim in zip(bodies, dims, strict=True):
         upper = body[: int(TOP * len(body))]
         light, smooth = dim.light[: len(upper)], dim.smooth[: len(upper)]
         toned += int((upper & smooth & (np.abs(light - np.median(deep)) <= TONE)).sum())
         area += int(upper.sum())
-    return None if toned > GREY * area else darkest
+    return None if toned > GREY * area else float(np.percentile(deep, 10))
 
 
-def _are_soft(
-    bodies: list[np.ndarray], dims: list[Dim], pieces: list[np.ndarray], tolerance: int
-) -> bool:
-    """Return whether most of the shadows' border with the paper fades into it, as no cloth does."""
-    square = np.ones((3, 3), np.uint8)
-    rims = []
-    for body, dim, own in zip(bodies, dims, pieces, strict=True):
-        paper = np.pad(~body, 1, constant_values=True).view(np.uint8)
-        beside = cv2.dilate(paper, square)[1:-1, 1:-1] > 0
-        shadow = _grown(own, EDGE * len(body), dim.mask & body)
-        rims.append(dim.light[shadow & beside])
-    rim = np.concatenate(rims)
-    return bool(len(rim) and np.mean(rim >= FADED - tolerance / 255) >= MOSTLY)
+def _is_soft(body: np.ndarray, dim: Dim, piece: np.ndarray) -> bool:
+    """Return whether most of a patch's border with the paper fades into it, as no cloth does."""
+    paper = np.pad(~body, 1, constant_values=True).view(np.uint8)
+    beside = cv2.dilate(paper, np.ones((3, 3), np.uint8))[1:-1, 1:-1] > 0
+    rim = dim.light[_grown(piece, EDGE * len(body), dim.mask & body) & beside]
+    return bool(len(rim) and np.mean(rim >= FADED - dim.noise / 255) >= MOSTLY)
 
 
 def _pieces(
-    body: Bool[np.ndarray, "height width"],
-    dim: Bool[np.ndarray, "height width"],
-    smooth: Bool[np.ndarray, "height width"],
-) -> Bool[np.ndarray, "height width"]:
-    """Return the smooth patches that are large, low and open enough for shadows."""
-    _, found, stats, _ = cv2.connectedComponentsWithStats(smooth.view(np.uint8), connectivity=8)
+    body: Bool[np.ndarray, "height width"], dim: Dim, room: Bool[np.ndarray, "height width"]
+) -> list[Bool[np.ndarray, "height width"]]:
+    """Return the smooth patches in the room that are large, low and open enough for shadows."""
+    _, found, stats, _ = cv2.connectedComponentsWithStats(
+        (dim.smooth & room).view(np.uint8), connectivity=8
+    )
     labels = np.asarray(found, dtype=np.int32)
     large = stats[:, cv2.CC_STAT_AREA] >= LEAST_AREA * body.sum()
     able = np.flatnonzero(large & (stats[:, cv2.CC_STAT_TOP] >= TOP * body.shape[0]))
     pieces = [labels == number for number in able[able > 0]]
-    reach = EDGE * body.shape[0]
-    return np.any(
-        [np.zeros_like(body), *(p for p in pieces if _borders_paper(_grown(p, reach, dim), body))],
-        axis=0,
-    )
+    return [piece for piece in pieces if _is_open_shade(piece, dim, body, room)]
 
 
-def _opened(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
-    """Return the mask without what is as thin as a soft edge."""
-    return cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+def _is_open_shade(piece: np.ndarray, dim: Dim, body: np.ndarray, room: np.ndarray) -> bool:
+    """Return whether a patch is of the paper's tint and nothing darker divides it from the paper.
+
+    An outline does: it shows a shoe.
+    """
+    if np.abs(dim.tint[piece].mean(axis=0)).max() > OFF_PAPER + OFF_MEAN * dim.noise:
+        return False
+    lighter = dim.light >= float(np.median(dim.light[piece])) - TONE - dim.noise / 255
+    grown = _grown(piece & lighter, EDGE * body.shape[0], dim.mask & room & lighter)
+    return _borders_paper(grown, body)
 
 
 def _shadow_of(
-    body: Bool[np.ndarray, "height width"], dim: Dim, tone: float, tolerance: int
+    body: Bool[np.ndarray, "height width"], dim: Dim, tone: float | None
 ) -> Bool[np.ndarray, "height width"]:
-    """Return the smooth patches that lie as a shadow lies, with their own edges."""
-    room = body & (dim.light >= tone - TONE)
-    shadow = _pieces(body, dim.mask & room, dim.smooth & room)
+    """Return the smooth patches that lie as a shadow lies, with their own edges.
+
+    Args:
+        body: a patch of paint.
+        dim: where it is the paper with less light.
+        tone: light of the darkest shadow with a hard edge; None if there are none.
+    """
+    pieces = [piece for piece in _pieces(body, dim, body) if _is_soft(body, dim, piece)]
+    shadow, soft = np.any([np.zeros_like(body), *pieces], axis=0), bool(pieces)
+    room = body
+    if not soft and tone is not None:
+        room = body & (dim.light >= tone - TONE)
+        shadow = np.any([shadow, *_pieces(body, dim, room)], axis=0)
+        if shadow.any():  # its one tone shows between the legs, too
+            middle = float(np.median(dim.light[shadow]))
+            shadow |= _toned(dim.smooth & room, dim.light, middle, int(TOP * body.shape[0]))
     if not shadow.any():
         return shadow
-    soft = _are_soft([body], [dim], [shadow], tolerance)
-    if not soft:  # its one tone shows between the legs, too
-        middle = float(np.median(dim.light[shadow]))
-        shadow |= _toned(dim.smooth & room, dim.light, middle, int(TOP * body.shape[0]))
     reach = EDGE * body.shape[0]
     shadow |= _mostly(dim.smooth & body, _grown(shadow, reach, dim.mask & room))
     darkest = float(np.percentile(dim.light[shadow], 2))
@@ -205,7 +165,7 @@ def _toned(
     """Return the low smooth patches of the shadow's tone: those between the legs."""
     same = smooth & (np.abs(light - tone) <= TONE)
     same[:top] = False
-    return _opened(same)
+    return opened(same)
 
 
 def _grown(
@@ -232,6 +192,8 @@ def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray, depth
         return False
     largest = stats[1:][stats[1:, cv2.CC_STAT_AREA].argmax()]
     bottom = largest[cv2.CC_STAT_TOP] + largest[cv2.CC_STAT_HEIGHT]
+    below = stats[1:, cv2.CC_STAT_TOP] >= bottom  # a caption that the shadow reaches
+    own = stats[1:][~below, cv2.CC_STAT_AREA].sum()
     rows = np.flatnonzero(shadow.any(axis=1))
     level = rows[0] + depth * (rows[-1] - rows[0])
     outlines, _ = cv2.findContours(
@@ -240,6 +202,6 @@ def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray, depth
     filled = cv2.drawContours(np.zeros(rest.shape, np.uint8), outlines, -1, 1, cv2.FILLED) > 0
     return bool(
         bottom >= level
-        and largest[cv2.CC_STAT_AREA] >= WHOLE * rest.sum()
+        and largest[cv2.CC_STAT_AREA] >= WHOLE * own
         and (shadow & filled).sum() <= ENCLOSED * shadow.sum()
     )

@@ -6,13 +6,13 @@ every pixel again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.background import Background, difference, halo_tolerance, ring_of
+from toonset.dataset.background import Background, difference, ring_of, with_final_tolerance
 from toonset.dataset.figures import Blobs, find_blobs, find_mains, without_strangers
 from toonset.dataset.lines import Line, find_lines, line_pixels
 from toonset.dataset.parts import Grouping, group_blobs
@@ -62,7 +62,7 @@ def find_paint(
     for top in range(0, height, rows):
         part = rgba[top : top + rows, :, :3]
         away[top : top + rows] = difference(part, ground.colors((0, top, width, len(part))))
-    ground = replace(ground, tolerance=max(ground.tolerance, halo_tolerance(away)))
+    ground = with_final_tolerance(ground, away)
     return away > ground.tolerance, ground
 
 

@@ -1,0 +1,32 @@
+"""Shadows are left out, grey shoes stay, and neither grain nor JPEG changes that."""
+
+import pytest
+
+from toonset.bench.split_cases import Drawn, SplitCase
+from toonset.bench.split_methods import by_toonset
+from toonset.bench.split_score import score
+from toonset.dataset.messy import make_messy_sheet
+from toonset.dataset.sheet import split_sheet
+
+
+def fault(seed: int, *what: str) -> str:
+    sheet = make_messy_sheet(seed, what)
+    figures = tuple(Drawn(box, alpha) for box, alpha in zip(sheet.boxes, sheet.alphas, strict=True))
+    return score(SplitCase("case", "group", sheet.rgba, figures), by_toonset(sheet.rgba)).fault
+
+
+@pytest.mark.parametrize("seed", [5001, 5016])
+def test_soft_shadows_of_any_strength_are_left_out(seed: int) -> None:
+    assert fault(seed, "shadows") == ""
+    remarks = split_sheet(make_messy_sheet(seed, ("shadows",)).rgba).remarks
+    assert "shadows on the ground were left out" in remarks
+
+
+@pytest.mark.parametrize("kind", ["paper", "jpeg"])
+@pytest.mark.parametrize("seed", [5000, 5011])
+def test_grey_shoes_within_an_outline_and_brown_trousers_are_none(seed: int, kind: str) -> None:
+    assert fault(seed, kind) == ""
+
+
+def test_a_caption_that_a_shadow_reaches_is_no_part() -> None:
+    assert fault(5008, "one", "swatches", "shadows") == ""
