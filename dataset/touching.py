@@ -1,10 +1,8 @@
-"""Figures that touch or overlap a little: cut apart along the thinnest place.
+"""Figures that touch or overlap a little: cut apart where the evidence says that two meet.
 
-The cut is a path from the top to the bottom of the patch that crosses as little paint as it can,
-found by dynamic programming as in seam carving; to run along an outline costs little. It counts if
-both sides are then as high as a figure, of its colours, and no mere limb: a hand in a hand is
-crossed in a few per cent of the height, a body never.
-Source: S. Avidan, A. Shamir, "Seam carving for content-aware image resizing" (2007).
+Cuts are cheap ways from the top to the bottom (`touching_paths`) through what is seen of a patch
+(`touching_sight`); which one is right, and whether a person should look at it, is decided in
+`touching_choice`.
 """
 
 from __future__ import annotations
@@ -13,27 +11,19 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.figures import Blobs, as_box, find_mains, shared_colors
+from toonset.dataset.figures import Blobs, find_mains
+from toonset.dataset.touching_choice import WIDE_ALONE, Option, best_option, find_options
+from toonset.dataset.touching_flanks import flanks, largest_piece
+from toonset.dataset.touching_sight import look_at
 from toonset.view import Box
 
-DEAREST = 0.12  # of the patch's height in paint: the most that a cut may cost
-AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
-AS_LARGE = 0.3  # of the patch's area: the same, for two figures of equal size less
-WIDER = 1.2  # times the narrowest figure's width: a patch that may be two figures
-WIDE_ALONE = 0.5  # times its own height: the same where there are no others
+WORST = 25.0  # of a cut's badness: what is worse goes through a single figure
 LEAST_HEIGHT = 24  # cells: in a lower patch no two figures can be told
-LARGER = 1.4  # times the area of figures that stand alone: the same
-DETOUR = 0.02  # cost of a step aside, in pixels of paint
-ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
-LINE = 0.9  # of the cost of paint that a drawn line saves
-STRONG = 60.0  # levels that a line is darker than what it divides
-WIDEST_LINE = 0.03  # of the height
-GAP = 0.1  # of the cost of paint: paper that is enclosed
 THROUGH = 0.7  # of an enclosed patch's height that a cut runs through: a gap between two figures
 MOST_ENCLOSED = 0.25  # of a patch in the background's colour: more is a line drawing
-MOST_ROWS = 600  # of the picture on which cuts are sought
+SURE = 0.9  # chance of being right: a cut that has less is worth a look
 
 
 @dataclass(frozen=True)
@@ -43,10 +33,43 @@ class Cut:
     Attributes:
         box: (x, y, width, height) of the two together, in the cells of the labels.
         crossed: paint that the cut goes through, as a share of the height.
+        sure: chance that it is right, among the cuts that were found between the two.
     """
 
     box: Box
     crossed: float
+    sure: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Patches:
+    """Numbered patches while they are cut: `labels`, `boxes` and `sides` change.
+
+    Attributes:
+        labels: number of every cell's patch, 0 = none.
+        painted: cells that are not of the background's colour.
+        rgb: their colours.
+        boxes: of the patches that are figures, or several, by number.
+        sides: of the same, right and left.
+    """
+
+    labels: Int[np.ndarray, "height width"]
+    painted: Bool[np.ndarray, "height width"]
+    rgb: UInt8[np.ndarray, "height width 3"]
+    boxes: dict[int, Box]
+    sides: dict[int, tuple[np.ndarray, np.ndarray]]
+
+    def window(self, label: int) -> tuple[slice, slice]:
+        """Return rows and columns of a patch."""
+        x, y, width, height = self.boxes[label]
+        return slice(y, y + height), slice(x, x + width)
+
+    def measure(self, label: int, window: tuple[slice, slice]) -> None:
+        """Take the box and the sides of a patch that lies in a window anew."""
+        mask = self.labels[window] == label
+        x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+        self.boxes[label] = (window[1].start + x, window[0].start + y, width, height)
+        self.sides[label] = flanks(largest_piece(mask))
 
 
 def part_touching(
@@ -54,7 +77,7 @@ def part_touching(
     painted: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
 ) -> tuple[Blobs, list[Cut]]:
-    """Return the patches of a sheet with touching figures apart, and the cuts.
+    """Return the patches of a sheet with touching figures apart, and the cuts in doubt.
 
     Paper that two touching figures enclose between them becomes nobody's.
 
@@ -64,32 +87,55 @@ def part_touching(
         rgb: the sheet.
     """
     mains, cuts = find_mains(blobs), list[Cut]()
-    widths, least = blobs.boxes[mains, 2], _least_area(blobs, mains)
-    labels, top = blobs.labels, len(blobs.areas)
-    queue = [(int(n) + 1, as_box(blobs.boxes[n])) for n in mains]
+    patches = _Patches(blobs.labels.copy(), painted, rgb, {}, {})
+    for number in mains:
+        patches.measure(int(number) + 1, blobs.window(int(number)))
+    queue, top = list(patches.boxes), len(blobs.areas)
     while queue:
-        label, box = queue.pop()
-        x, y, width, height = box
-        if not _is_wide(box, widths):
+        label = queue.pop()
+        box = patches.boxes[label]
+        if box[2] < WIDE_ALONE * box[3] or box[3] < LEAST_HEIGHT:
             continue
-        mask = labels[y : y + height, x : x + width] == label
-        paint = mask & painted[y : y + height, x : x + width]
-        if mask.sum() < least:
-            continue
-        if paint.sum() < mask.sum() * (1 - MOST_ENCLOSED):
-            paint = mask  # a line drawing: its inside is paper, too
-        found = _best_cut(mask, paint, rgb[y : y + height, x : x + width])
-        if found is None:
-            continue
-        labels = labels.copy() if not cuts else labels
-        top += 1
-        window = labels[y : y + height, x : x + width]
-        window[mask & (np.arange(width) >= found[0][:, None])] = top
-        window[_crossed(mask & ~paint, found[0])] = 0
-        cuts.append(Cut(box, found[1]))
-        parts = _boxes(labels)
-        queue += [(n, as_box(parts[n - 1])) for n in (label, top)]
-    return (_measured(labels, top) if cuts else blobs), cuts
+        sure = _part(patches, label, top + 1)
+        if sure is not None:
+            top += 1
+            queue += [label, top]
+            cuts.append(sure)
+    doubtful = [cut for cut in cuts if cut.sure < SURE]
+    return (_measured(patches.labels, top) if cuts else blobs), doubtful
+
+
+def _part(patches: _Patches, label: int, new: int) -> Cut | None:
+    """Cut a patch in two, the right part with a new number; return the cut, or None for none."""
+    window = patches.window(label)
+    mask = patches.labels[window] == label
+    paint = mask & patches.painted[window]
+    if paint.sum() < mask.sum() * (1 - MOST_ENCLOSED):
+        paint = mask  # a line drawing: its inside is paper, too
+    rgb = patches.rgb[window]
+    sight = look_at(mask, paint, rgb)
+    small = cv2.resize(rgb, sight.drawn.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    options = find_options(sight, small, [side for two in patches.sides.values() for side in two])
+    if not options:
+        return None
+    best, sure = best_option(options, sight.drawn > 0.5)
+    if best.badness > WORST:
+        return None
+    box = patches.boxes[label]
+    columns = _enlarged(best, mask.shape)
+    labels = patches.labels[window]
+    labels[mask & (np.arange(mask.shape[1]) >= columns[:, None])] = new
+    labels[_crossed(mask & ~paint, columns)] = 0
+    patches.measure(label, window)
+    patches.measure(new, window)
+    return Cut(box, best.crossed, sure)
+
+
+def _enlarged(option: Option, shape: tuple[int, ...]) -> Int[np.ndarray, " height"]:
+    """Return the column right of a cut for every row of the sheet."""
+    rows, columns = option.is_right.shape
+    each = np.minimum(np.arange(shape[0]) * rows // shape[0], rows - 1)
+    return np.rint(option.way.columns[each] * shape[1] / columns).astype(int)
 
 
 def _crossed(
@@ -107,6 +153,15 @@ def _crossed(
     return between[patches]
 
 
+def _measured(labels: Int[np.ndarray, "height width"], count: int) -> Blobs:
+    """Return boxes, areas and centres of numbered patches."""
+    rows, columns = np.nonzero(labels)
+    number = labels[rows, columns] - 1
+    areas = np.bincount(number, minlength=count)
+    sums = [np.bincount(number, places, count) for places in (columns, rows)]
+    return Blobs(labels, _boxes(labels), areas, np.stack(sums, axis=1) / areas[:, None])
+
+
 def _boxes(labels: Int[np.ndarray, "height width"]) -> Int[np.ndarray, "blobs 4"]:
     """Return x, y, width, height of every number in use."""
     from scipy.ndimage import find_objects
@@ -115,123 +170,3 @@ def _boxes(labels: Int[np.ndarray, "height width"]) -> Int[np.ndarray, "blobs 4"
     return np.array(
         [(c.start, r.start, c.stop - c.start, r.stop - r.start) for r, c in places]
     ).reshape(-1, 4)
-
-
-def _least_area(blobs: Blobs, mains: Int[np.ndarray, " mains"]) -> float:
-    """Return from which area a patch may be two figures: more than those that stand alone have."""
-    widths, heights = blobs.boxes[mains, 2], blobs.boxes[mains, 3]
-    alone = (widths < WIDER * widths.min(initial=0)) & (widths < WIDE_ALONE * heights)
-    alone |= widths <= np.median(widths) if len(mains) >= 3 else alone
-    return LARGER * float(np.median(blobs.areas[mains[alone]])) if alone.any() else 0.0
-
-
-def _is_wide(box: Box, widths: Int[np.ndarray, " mains"]) -> bool:
-    if len(widths) >= 3 and box[2] < WIDER * float(widths.min()):
-        return False
-    return box[3] >= LEAST_HEIGHT and box[2] >= WIDE_ALONE * box[3]
-
-
-def _outlines(
-    rgb: UInt8[np.ndarray, "height width 3"],
-) -> Float[np.ndarray, "height width"]:
-    """Return where thin dark lines are, 0 to 1: what closing the dark away takes away."""
-    luma = cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY)
-    width = max(5, round(WIDEST_LINE * len(rgb))) | 1
-    lines = cv2.morphologyEx(luma, cv2.MORPH_BLACKHAT, np.ones((width, width), np.uint8))
-    return np.clip(lines.astype(np.float32) / STRONG, 0, 1)
-
-
-def _best_cut(
-    mask: Bool[np.ndarray, "height width"],
-    paint: Bool[np.ndarray, "height width"],
-    rgb: UInt8[np.ndarray, "height width 3"],
-) -> tuple[Int[np.ndarray, " height"], float] | None:
-    """Return the column right of the cut for every row, and what it crosses; None for no cut."""
-    height, width = mask.shape
-    shrink = min(1.0, MOST_ROWS / height)
-    size = max(8, round(width * shrink)), max(8, round(height * shrink))
-    savings = LINE * _outlines(rgb)
-    solid, drawn, saved = (
-        cv2.resize(picture.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-        for picture in (mask, paint, savings)
-    )
-    price = drawn * (1 - saved) + GAP * (solid - drawn)
-    down, up = _costs(price), _costs(price[::-1])[::-1]
-    rows = np.minimum((np.arange(height) * shrink).astype(int), size[1] - 1)
-    for column in _valleys((down + up - price)[size[1] // 2]):
-        path = _path(down, up, column)
-        crossed = float(drawn[np.arange(size[1]), path].sum()) / size[1]
-        cost = float(price[np.arange(size[1]), path].sum()) / size[1]
-        if cost <= DEAREST and _are_figures(drawn, path):
-            cut = np.rint(path[rows] / shrink).astype(int)
-            right = np.arange(width) >= cut[:, None]
-            if shared_colors(rgb[mask & right], rgb[mask & ~right]) >= ALIKE:
-                return cut, crossed
-    return None
-
-
-def _costs(paint: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    """Return the least paint on a path from the top to every cell, itself included."""
-    total = paint.copy()
-    for row in range(1, len(paint)):
-        above = total[row - 1]
-        aside = np.minimum(np.append(np.inf, above[:-1]), np.append(above[1:], np.inf))
-        total[row] += np.minimum(above, aside + DETOUR)
-    return total
-
-
-def _valleys(cost: Float[np.ndarray, " width"]) -> list[int]:
-    """Return the columns at which a cut is cheapest among its neighbours, the cheapest first."""
-    padded = np.pad(cost, 1, constant_values=np.inf)
-    low = (cost <= padded[:-2]) & (cost <= padded[2:])
-    starts = np.flatnonzero(low & ~np.append(False, low[:-1]))
-    stops = np.flatnonzero(low & ~np.append(low[1:], False))
-    middles = (starts + stops) // 2
-    return [int(c) for c in middles[np.argsort(cost[middles], kind="stable")]]
-
-
-def _path(down: np.ndarray, up: np.ndarray, column: int) -> Int[np.ndarray, " height"]:
-    """Return the columns of the cheapest path through a column of the middle row."""
-    middle = len(down) // 2
-    path = np.full(len(down), column)
-    for row in range(middle - 1, -1, -1):
-        path[row] = _cheapest_beside(down[row], path[row + 1])
-    for row in range(middle + 1, len(down)):
-        path[row] = _cheapest_beside(up[row], path[row - 1])
-    return path
-
-
-def _cheapest_beside(cost: np.ndarray, column: int) -> int:
-    places = [c for c in (column, column - 1, column + 1) if 0 <= c < len(cost)]
-    return min(places, key=lambda c: cost[c] + (DETOUR if c != column else 0.0))
-
-
-def _are_figures(paint: np.ndarray, path: np.ndarray) -> bool:
-    """Return whether the largest piece on each side of a path could be a figure."""
-    right = np.arange(paint.shape[1]) >= path[:, None]
-    least = AS_LARGE * float(paint.sum()) * 2 / _figures_across(paint)
-    for side in (right, ~right):
-        piece = ((paint > 0.5) & side).view(np.uint8)
-        stats = cv2.connectedComponentsWithStats(piece, connectivity=8)[2][1:]
-        if not len(stats):
-            return False
-        largest = stats[stats[:, cv2.CC_STAT_AREA].argmax()]
-        if largest[cv2.CC_STAT_HEIGHT] < AS_HIGH * len(paint):
-            return False
-        if largest[cv2.CC_STAT_AREA] < least:
-            return False
-    return True
-
-
-def _figures_across(paint: np.ndarray) -> float:
-    """Return about how many figures stand side by side: a figure is rarely over half as wide."""
-    return max(2.0, paint.shape[1] / (WIDE_ALONE * paint.shape[0]))
-
-
-def _measured(labels: Int[np.ndarray, "height width"], count: int) -> Blobs:
-    """Return boxes, areas and centres of numbered patches."""
-    rows, columns = np.nonzero(labels)
-    number = labels[rows, columns] - 1
-    areas = np.bincount(number, minlength=count)
-    sums = [np.bincount(number, places, count) for places in (columns, rows)]
-    return Blobs(labels, _boxes(labels), areas, np.stack(sums, axis=1) / areas[:, None])
