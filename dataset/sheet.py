@@ -13,6 +13,7 @@ from jaxtyping import Bool, UInt8
 from toonset.dataset.background import Background, find_background, flattened, is_transparent
 from toonset.dataset.crops import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.cutout import cut_out, edge_softness_px
+from toonset.dataset.doubts import border_doubts, figure_doubts
 from toonset.dataset.figures import as_box
 from toonset.dataset.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.letters import words
@@ -22,10 +23,6 @@ from toonset.errors import SheetError
 from toonset.view import Box, View
 
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
-SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
-NEARLY_A_VIEW = 0.5  # of the views' height: something left out that a person should look at
-BROAD = 1.15  # times its own height: wider than arms reach
-WIDE = 1.8  # times the median width: two figures that touch
 
 NAMES = {
     "text": "text beside the figures was",
@@ -120,7 +117,7 @@ def split_sheet(
         tuple(views),
         ground.rgb,
         ground.sure,
-        _doubts(ground, found) + (() if by_hand else _doubts_of_figures(found, views)),
+        border_doubts(ground, found) + (() if by_hand else figure_doubts(found, views, rgba)),
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes),
     )
@@ -217,36 +214,6 @@ def _left_out(found: Survey) -> tuple[LeftOut, ...]:
         LeftOut((x * cell, y * cell, width * cell, height * cell), kind)
         for (x, y, width, height), kind in boxes
     )
-
-
-def _doubts(ground: Background, found: Survey) -> tuple[str, ...]:
-    if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:  # a frame explains it
-        return ()
-    return (f"only {100 * ground.sure:.0f} % of the sheet's border is background",)
-
-
-def _doubts_of_figures(found: Survey, views: list[View]) -> tuple[str, ...]:
-    said = []
-    for cut in found.cuts:
-        x, y, width, height = (value * found.cell_px for value in cut.box)
-        said.append(
-            f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "
-            f"through {100 * cut.crossed:.1f} % of their height: look whether the cut is right"
-        )
-    widths = [view.figure_box[2] for view in views]
-    for view, width in zip(views, widths, strict=True):
-        among_others = len(views) >= 3 and width > WIDE * float(np.median(widths))
-        if among_others or width > BROAD * view.figure_box[3]:
-            said.append(f"view {view.name} is unusually wide: do two figures touch?")
-    usual = float(np.median([view.figure_box[3] for view in views]))
-    for thing in _left_out(found):
-        if thing.kind == "study" and thing.box[3] >= NEARLY_A_VIEW * usual:
-            x, y = thing.box[:2]
-            said.append(
-                f"a drawing at {x}, {y} of {100 * thing.box[3] / usual:.0f} % of the views' height "
-                "was left out: if it is a view, give all views with --boxes"
-            )
-    return tuple(said)
 
 
 def _remarks(ground: Background, found: Survey, holes: int) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from toonset.dataset.figures import Blobs, find_blobs, find_mains, without_stran
 from toonset.dataset.lines import Line, find_lines, line_pixels
 from toonset.dataset.parts import Grouping, group_blobs
 from toonset.dataset.shadows import find_shadows
+from toonset.dataset.swatch_strips import strip_seams
 from toonset.dataset.touching import Cut, part_touching
 from toonset.view import Box
 
@@ -81,6 +82,11 @@ def survey(
     paper = joined(~painted | ruled, ring)
     blobs = find_blobs(~paper)
     small = np.ascontiguousarray(rgba[::cell, ::cell])
+    seams = strip_seams(blobs, small[..., :3])
+    if seams.any():
+        ruled = ruled | seams
+        paper = joined(~painted | ruled, ring)
+        blobs = find_blobs(~paper)
     if len(blobs.areas):
         box = (0, 0, paint.shape[1], paint.shape[0])
         colors = None if ground.rgb is None else ground.colors(box)[::cell, ::cell]

@@ -1,0 +1,53 @@
+"""What is left out is doubted if it may be a view, and not if it is a head or a sword."""
+
+import numpy as np
+import pytest
+
+from toonset.dataset.messy import make_messy_sheet
+from toonset.dataset.sheet import split_sheet
+
+
+def figure(height: int, shirt: tuple[int, int, int]) -> np.ndarray:
+    """Return a block person on white, without paper around."""
+    width = height * 2 // 5
+    rgb = np.full((height, width, 3), 255, np.uint8)
+    rgb[: height // 4, width // 4 : -width // 4] = (230, 190, 160)
+    rgb[height // 4 : height * 3 // 5] = shirt
+    rgb[height * 3 // 5 :, width // 5 : width * 2 // 5] = (60, 60, 120)
+    rgb[height * 3 // 5 :, -width * 2 // 5 : -width // 5] = (60, 60, 120)
+    return rgb
+
+
+def sheet_of(*figures: np.ndarray) -> np.ndarray:
+    rgba = np.full((340, 20 + sum(f.shape[1] + 60 for f in figures), 4), 255, np.uint8)
+    x = 40
+    for drawn in figures:
+        height, width = drawn.shape[:2]
+        rgba[320 - height : 320, x : x + width, :3] = drawn
+        x += width + 60
+    return rgba
+
+
+@pytest.mark.parametrize("height", [165, 200])
+def test_a_small_figure_of_the_same_kind_is_doubted(height: int) -> None:
+    red = (200, 40, 40)
+    views = [figure(280, red) for _ in range(4)]
+    sheet = split_sheet(sheet_of(*views, figure(height, red)))
+    assert len(sheet.views) == 4
+    assert any("left out: if it is a view" in line for line in sheet.warnings)
+
+
+def test_a_small_figure_in_other_colours_is_not() -> None:
+    views = [figure(280, (200, 40, 40)) for _ in range(4)]
+    other = np.where(figure(165, (40, 160, 60)) < 255, np.uint8((90, 200, 40)), np.uint8(255))
+    sheet = split_sheet(sheet_of(*views, other))
+    assert len(sheet.views) == 4
+    assert sheet.warnings == ()
+
+
+@pytest.mark.parametrize("kind", ["heads", "props"])
+def test_few_heads_and_swords_are_doubted(kind: str) -> None:
+    doubted = [
+        bool(split_sheet(make_messy_sheet(s, (kind,)).rgba).warnings) for s in range(7300, 7306)
+    ]
+    assert sum(doubted) <= 1
