@@ -1,0 +1,53 @@
+"""The shape that the drawings' silhouettes ask for, from a scene to its hull."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from toonset.dataset.scene import Frame, Scene
+from toonset.errors import BundleError
+from toonset.nerf.evidence import HullEvidence, choose_missing
+from toonset.nerf.hull import Hull, carve
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.rounding import rounded
+
+OPAQUE = 128  # alpha from which a pixel belongs to the figure
+VOXELS_PER_PX, VOXELS = 1.25, (64, 208)
+
+
+def hull_of(scene: Scene, options: TrainOptions) -> tuple[Hull, HullEvidence]:
+    """Return the rounded hull of a scene's masks and the evidence for its tolerance.
+
+    Raises:
+        BundleError: fewer than two views show a figure, or the views share no volume.
+    """
+    frames = [frame for frame in scene.frames if _figure_px(frame)]
+    if len(frames) < 2:
+        raise BundleError(
+            f"{scene.name}: {len(frames)} picture(s) with an opaque figure; at least two views "
+            "with transparent background are needed"
+        )
+    cameras = [frame.camera for frame in frames]
+    alphas = [torch.as_tensor(frame.rgba[..., 3] / np.float32(255)) for frame in frames]
+    missing = options.missing_views
+    evidence = HullEvidence(missing, ()) if missing is not None else choose_missing(cameras, alphas)
+    voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
+    hull = rounded(carve(cameras, alphas, voxels, evidence.missing), cameras, alphas)
+    # Run folders hold bytes: train on exactly what will be loaded.
+    return replace(hull, support=(hull.support * 255).round() / 255), evidence
+
+
+def per_px(scene: Scene, factor: float, limits: tuple[int, int]) -> int:
+    """Return `factor` times the size of the largest figure in pixels, within limits."""
+    size = max(_figure_px(frame) for frame in scene.frames)
+    return int(np.clip(round(factor * size), *limits))
+
+
+def _figure_px(frame: Frame) -> int:
+    """Return the longer side of a figure's box, 0 where there is none."""
+    mask = frame.rgba[..., 3] >= OPAQUE
+    sides = [np.flatnonzero(mask.any(axis=axis)) for axis in (0, 1)]
+    return max((int(side[-1] - side[0] + 1) if len(side) else 0) for side in sides)
