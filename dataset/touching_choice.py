@@ -72,32 +72,41 @@ def find_options(
         others: sides of the sheet's figures that are known, those of this patch included.
     """
     found: list[Option] = []
-    height, width = sight.drawn.shape
-    inside = sight.drawn > 0.5
-    for way in distinct_ways(sight.prices(), sight.drawn, DEAREST * height):
-        right = way.is_right(width)
-        crossed = float(way.along(sight.drawn).sum()) / height
-        if crossed > MOST_CROSSED:
-            continue
-        if any((right != o.is_right)[inside].sum() < SAME * inside.sum() for o in found):
-            continue
-        left_piece, right_piece = (_piece(inside & side) for side in (~right, right))
-        if left_piece is None or right_piece is None:
-            continue
-        if not _are_figures(inside, left_piece, right_piece):
-            continue
-        if shared_colors(colors[left_piece], colors[right_piece]) < ALIKE:
-            continue
-        unlike = (
-            unlikeness(right_flank(left_piece), others),
-            unlikeness(right_flank(right_piece[:, ::-1]), others),
-        )
-        ends = (
-            int(np.flatnonzero(left_piece.any(axis=0))[-1]) / height,
-            int(np.flatnonzero(right_piece.any(axis=0))[0]) / height,
-        )
-        found.append(Option(way, right, (*_crossing(sight, way), *unlike), crossed, ends))
+    height = len(sight.drawn)
+    for ways in distinct_ways(sight.prices(), sight.drawn, DEAREST * height):
+        for way in ways:
+            option = _option(sight, colors, others, way)
+            if option is not None and not any(_are_same(option, o, sight) for o in found):
+                found.append(option)
+        if not found:  # where the cheapest ways part no two figures, dearer ones do not either
+            break
     return found
+
+
+def _option(
+    sight: Sight, colors: np.ndarray, others: Sequence[np.ndarray], way: Way
+) -> Option | None:
+    """Return a way as a cut, None if it does not leave two figures."""
+    height, width = sight.drawn.shape
+    crossed = float(way.along(sight.drawn).sum()) / height
+    if crossed > MOST_CROSSED:
+        return None
+    inside, right = sight.drawn > 0.5, way.is_right(width)
+    if not (inside & right).any() or not (inside & ~right).any():
+        return None
+    one, two = largest_piece(inside & ~right), largest_piece(inside & right)
+    if not _are_figures(inside, one, two) or shared_colors(colors[one], colors[two]) < ALIKE:
+        return None
+    sides = right_flank(one), right_flank(two[:, ::-1])
+    unlike = unlikeness(sides[0], [*others, sides[1]]), unlikeness(sides[1], [*others, sides[0]])
+    ends = np.flatnonzero(one.any(axis=0))[-1], np.flatnonzero(two.any(axis=0))[0]
+    evidence = (*_crossing(sight, way), *unlike)
+    return Option(way, right, evidence, crossed, (ends[0] / height, ends[1] / height))
+
+
+def _are_same(a: Option, b: Option, sight: Sight) -> bool:
+    inside = sight.drawn > 0.5
+    return bool((a.is_right != b.is_right)[inside].sum() < SAME * inside.sum())
 
 
 def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> tuple[Option, float]:
@@ -109,10 +118,6 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
     ends = np.array([option.ends for option in rivals])
     alike = (np.abs(ends - best.ends) <= AS_GOOD).all(axis=1)
     return best, float(chances[alike].sum() / chances.sum())
-
-
-def _piece(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"] | None:
-    return largest_piece(mask) if mask.any() else None
 
 
 def _crossing(sight: Sight, way: Way) -> tuple[float, float, float]:

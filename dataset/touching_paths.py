@@ -51,8 +51,8 @@ def distinct_ways(
     prices: Float[np.ndarray, "kinds height width"],
     drawn: Float[np.ndarray, "height width"],
     dearest: float,
-) -> Iterator[Way]:
-    """Yield ways that part the paint, cheap ones first within each round; the same may come twice.
+) -> Iterator[list[Way]]:
+    """Yield ways that part the paint, round by round; the same may come twice.
 
     After every round the paint that was crossed is dearer, so that the next goes elsewhere.
 
@@ -67,6 +67,7 @@ def distinct_ways(
     inner = (share > AT_THE_SIDES) & (share < 1 - AT_THE_SIDES)
     for _ in range(ROUNDS):
         down, up = least_costs(prices), least_costs(prices[:, ::-1])[:, ::-1]
+        ways = []
         for kind, price in enumerate(prices):
             through = down[kind, middle] + up[kind, middle] - price[middle]
             for column in _valleys(np.where(inner, through, np.inf))[:MOST_WAYS]:
@@ -74,7 +75,8 @@ def distinct_ways(
                     break
                 way = _way(down[kind], up[kind], column)
                 _make_dearer(price, drawn, way)
-                yield way
+                ways.append(way)
+        yield ways
 
 
 def least_costs(
