@@ -59,7 +59,9 @@ def _like_views(found: Survey, views: list[View], rgba: np.ndarray) -> list[str]
     shapes = [view.figure_box[2] / view.figure_box[3] for view in views]
     colors = [view.rgba[view.mask][:, :3] for view in views]
     said, cell = [], found.cell_px
-    for number in np.flatnonzero(np.array(found.grouping.kinds, dtype=object) == "study"):
+    for number, kind in enumerate(found.grouping.kinds):
+        if kind != "study":
+            continue
         x, y, width, height = (int(value) * cell for value in found.blobs.boxes[number])
         if height < NEARLY_A_VIEW * usual:
             continue

@@ -15,14 +15,16 @@ from toonset.dataset.dimmed import OFF_PAPER, Dim, dimmed, opened, see_through
 from toonset.dataset.figures import Blobs
 
 OFF_MEAN = 0.2  # of the noise: so far a whole patch may be off
-LEAST_AREA = 0.01  # of the figure's area
+LEAST_AREA = 0.01  # of the figure's area, with its edge
+LEAST_CORE = 0.003  # of the figure's area: the smooth inside of a shadow
+LEAST_CELLS = 8
 TOP = 0.4  # of the figure's height from its top: no shadow reaches higher
 WHOLE = 0.9  # of the figure without the shadow that is still one piece
 ENCLOSED = 0.5  # of the shadow that the figure surrounds: more is a patch of its clothes
 FEET = 0.0  # of a soft shadow's height from its top: the figure reaches lower
 FEET_OF_HARD = 0.7  # the same of one with a hard edge, which shoes have, too
 EDGE = 0.02  # of the figure's height: a shadow's own edge is no wider
-FADED = 0.95  # of the paper's light, at the shadow's border, besides noise
+FADED = 0.93  # of the paper's light, at the shadow's border, besides noise
 MOSTLY = 0.7  # of the border
 GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, nothing is known
 TONE = 0.03  # of the paper's light: tones so near are one
@@ -88,7 +90,7 @@ def _is_soft(body: np.ndarray, dim: Dim, piece: np.ndarray) -> bool:
     """Return whether most of a patch's border with the paper fades into it, as no cloth does."""
     paper = np.pad(~body, 1, constant_values=True).view(np.uint8)
     beside = cv2.dilate(paper, np.ones((3, 3), np.uint8))[1:-1, 1:-1] > 0
-    rim = dim.light[_grown(piece, EDGE * len(body), dim.mask & body) & beside]
+    rim = dim.light[_lit(piece, dim, body) & beside]
     return bool(len(rim) and np.mean(rim >= FADED - dim.noise / 255) >= MOSTLY)
 
 
@@ -100,7 +102,7 @@ def _pieces(
         (dim.smooth & room).view(np.uint8), connectivity=8
     )
     labels = np.asarray(found, dtype=np.int32)
-    large = stats[:, cv2.CC_STAT_AREA] >= LEAST_AREA * body.sum()
+    large = stats[:, cv2.CC_STAT_AREA] >= max(LEAST_CELLS, LEAST_CORE * body.sum())
     able = np.flatnonzero(large & (stats[:, cv2.CC_STAT_TOP] >= TOP * body.shape[0]))
     pieces = [labels == number for number in able[able > 0]]
     return [piece for piece in pieces if _is_open_shade(piece, dim, body, room)]
@@ -113,9 +115,15 @@ def _is_open_shade(piece: np.ndarray, dim: Dim, body: np.ndarray, room: np.ndarr
     """
     if np.abs(dim.tint[piece].mean(axis=0)).max() > OFF_PAPER + OFF_MEAN * dim.noise:
         return False
-    lighter = dim.light >= float(np.median(dim.light[piece])) - TONE - dim.noise / 255
-    grown = _grown(piece & lighter, EDGE * body.shape[0], dim.mask & room & lighter)
-    return _borders_paper(grown, body)
+    grown = _lit(piece, dim, body & room)
+    return bool(grown.sum() >= LEAST_AREA * body.sum()) and _borders_paper(grown, body)
+
+
+def _lit(piece: np.ndarray, dim: Dim, room: np.ndarray) -> Bool[np.ndarray, "height width"]:
+    """Return a patch, with what is as light or lighter around it, without its darker parts."""
+    darker = float(np.percentile(dim.light[piece], 25))
+    lighter = dim.light >= darker - TONE - dim.noise / 255
+    return _grown(piece & lighter, EDGE * room.shape[0], dim.mask & room & lighter)
 
 
 def _shadow_of(

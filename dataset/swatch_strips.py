@@ -25,11 +25,11 @@ def strip_seams(
     seams = np.zeros(blobs.labels.shape, dtype=bool)
     sides = np.sort(blobs.boxes[:, 2:], axis=1)
     cells = np.rint(sides[:, 1] / np.maximum(sides[:, 0], 1)).astype(int)
-    fits = np.abs(sides[:, 1] - cells * sides[:, 0]) <= EQUAL * sides[:, 0] * cells
-    full = blobs.areas >= DISC * sides.prod(axis=1)
-    able = fits & full & (sides[:, 0] >= LEAST_SWATCH) & (cells >= LETTERS) & (cells <= LONGEST)
-    for number in np.flatnonzero(able):
-        window = blobs.window(int(number))
+    able = np.abs(sides[:, 1] - cells * sides[:, 0]) <= EQUAL * sides[:, 0] * cells
+    able &= blobs.areas >= DISC * sides.prod(axis=1)
+    able &= (sides[:, 0] >= LEAST_SWATCH) & (cells >= LETTERS) & (cells <= LONGEST)
+    for number in np.flatnonzero(able).tolist():
+        window = blobs.window(number)
         own = seams[window]
         tall = own if own.shape[0] > own.shape[1] else own.T
         picture = rgb[window] if own.shape[0] > own.shape[1] else rgb[window].swapaxes(0, 1)
@@ -40,7 +40,7 @@ def strip_seams(
 
 
 def _are_swatches(cells: list[UInt8[np.ndarray, "side side 3"]]) -> bool:
-    """Return whether every cell is of one colour, another than the cells beside it."""
+    """Return whether every cell is of one colour, mostly another than the cell before it."""
     colors = []
     for cell in cells:
         rim = [round(MIDDLE * side) for side in cell.shape[:2]]
@@ -50,4 +50,4 @@ def _are_swatches(cells: list[UInt8[np.ndarray, "side side 3"]]) -> bool:
             return False
         colors.append(color)
     steps = np.abs(np.diff(colors, axis=0)).max(axis=1)
-    return bool((steps >= OTHER).all())
+    return bool(np.mean(steps >= OTHER) > 0.5)

@@ -39,7 +39,8 @@ def test_a_small_figure_of_the_same_kind_is_doubted(height: int) -> None:
 
 def test_a_small_figure_in_other_colours_is_not() -> None:
     views = [figure(280, (200, 40, 40)) for _ in range(4)]
-    other = np.where(figure(165, (40, 160, 60)) < 255, np.uint8((90, 200, 40)), np.uint8(255))
+    other = figure(165, (40, 160, 60))
+    other[(other < 255).any(axis=2)] = (90, 200, 40)
     sheet = split_sheet(sheet_of(*views, other))
     assert len(sheet.views) == 4
     assert sheet.warnings == ()
