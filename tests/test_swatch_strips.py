@@ -19,7 +19,7 @@ def strip(colors: list[tuple[int, int, int]], side: int = 20) -> np.ndarray:
 
 
 def pieces(picture: np.ndarray) -> int:
-    painted = (picture < 255).any(axis=2)
+    painted = np.asarray((picture < 255).any(axis=2))
     seams = strip_seams(find_blobs(painted), picture)
     return len(find_blobs(painted & ~seams).areas)
 
