@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -12,7 +12,7 @@ from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.errors import BundleError
-from toonset.nerf.hull import LEVEL, Hull, carve
+from toonset.nerf.hull import LEVEL, Hull, alpha_at, carve
 from toonset.nerf.march import march, pixels_near, rays_of
 
 RESOLUTION = 64  # voxels: coarse, since only the ranking matters
@@ -42,30 +42,40 @@ def choose_missing(
         return HullEvidence(0, ())
     left_out = [round(i * views / MOST_LEFT_OUT) for i in range(MOST_LEFT_OUT)]
     left_out = list(range(views)) if views <= MOST_LEFT_OUT else left_out
+    try:  # whatever the hull of all views but one holds, with one view against it
+        grid = carve(cameras, alphas, RESOLUTION, 2)
+    except BundleError:  # these views share nothing: nothing can be predicted
+        return HullEvidence(0, ())
+    values = torch.stack(
+        [alpha_at(grid.centres(), *view) for view in zip(cameras, alphas, strict=True)]
+    )
+    ranked = values.sort(dim=0).values[:3]
     scores = []
     for missing in (0, 1):
-        each = [_left_out_iou(cameras, alphas, view, missing) for view in left_out]
+        lower, upper = ranked[missing], ranked[missing + 1]
+        each = []
+        for view in left_out:  # a view among the lowest moves the others up by one rank
+            support = torch.where(values[view] <= lower, upper, lower).view(grid.support.shape)
+            each.append(mask_iou(replace(grid, support=support), cameras[view], alphas[view], 2))
         scores.append(sum(each) / len(each))
     return HullEvidence(int(scores[1] > scores[0]), tuple(scores))
 
 
-def mask_iou(hull: Hull, camera: Camera, alpha: Float[Tensor, "height width"]) -> float:
-    """Return the intersection over union of the hull's outline and a mask in one view."""
-    near = pixels_near(camera, hull).reshape(-1)
-    pixels = camera.pixel_grid().reshape(-1, 2)[near]
+def mask_iou(
+    hull: Hull, camera: Camera, alpha: Float[Tensor, "height width"], every: int = 1
+) -> float:
+    """Return the intersection over union of the hull's outline and a mask in one view.
+
+    Args:
+        hull: what is seen.
+        camera: from where.
+        alpha: what should be seen.
+        every: only each `every`-th row and column of pixels counts.
+    """
+    near = pixels_near(camera, hull)[::every, ::every].reshape(-1)
+    pixels = camera.pixel_grid()[::every, ::every].reshape(-1, 2)[near]
     samples = march(rays_of(camera, pixels, hull), hull, hull.voxel, 1, LEVEL)
     seen = torch.zeros(len(near), dtype=torch.bool)
     seen[torch.as_tensor(np.flatnonzero(near))[samples.ray]] = True
-    drawn = (alpha >= LEVEL).reshape(-1)
+    drawn = (alpha[::every, ::every] >= LEVEL).reshape(-1)
     return float((seen & drawn).sum() / (seen | drawn).sum())
-
-
-def _left_out_iou(
-    cameras: Sequence[Camera], alphas: Sequence[Tensor], view: int, missing: int
-) -> float:
-    others = [i for i in range(len(cameras)) if i != view]
-    try:
-        hull = carve([cameras[i] for i in others], [alphas[i] for i in others], RESOLUTION, missing)
-    except BundleError:  # these views share nothing: the choice predicts nothing
-        return 0.0
-    return mask_iou(hull, cameras[view], alphas[view])

@@ -58,6 +58,14 @@ class Hull:
         """Return which voxels are inside."""
         return self.support >= LEVEL
 
+    def centres(self) -> Float[Tensor, "n 3"]:
+        """Return the voxels' centres in the world, in the order of `support`."""
+        axes = [
+            torch.as_tensor(low + self.voxel * (np.arange(n) + 0.5), dtype=torch.float32)
+            for low, n in zip(self.low, self.support.shape, strict=True)
+        ]
+        return torch.cartesian_prod(*axes)
+
     @cached_property
     def near(self) -> Bool[Tensor, "x y z"]:
         """Return the voxels in which the trilinear support can reach EDGE."""

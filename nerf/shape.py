@@ -10,16 +10,16 @@ import torch
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
 from toonset.nerf.evidence import HullEvidence, choose_missing
+from toonset.nerf.fairing import faired
 from toonset.nerf.hull import Hull, carve
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.rounding import rounded
 
 OPAQUE = 128  # alpha from which a pixel belongs to the figure
 VOXELS_PER_PX, VOXELS = 1.25, (64, 208)
 
 
 def hull_of(scene: Scene, options: TrainOptions) -> tuple[Hull, HullEvidence]:
-    """Return the rounded hull of a scene's masks and the evidence for its tolerance.
+    """Return the faired hull of a scene's masks and the evidence for its tolerance.
 
     Raises:
         BundleError: fewer than two views show a figure, or the views share no volume.
@@ -35,7 +35,7 @@ def hull_of(scene: Scene, options: TrainOptions) -> tuple[Hull, HullEvidence]:
     missing = options.missing_views
     evidence = HullEvidence(missing, ()) if missing is not None else choose_missing(cameras, alphas)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
-    hull = rounded(carve(cameras, alphas, voxels, evidence.missing), cameras, alphas)
+    hull = faired(carve(cameras, alphas, voxels, evidence.missing), cameras, alphas)
     # Run folders hold bytes: train on exactly what will be loaded.
     return replace(hull, support=(hull.support * 255).round() / 255), evidence
 

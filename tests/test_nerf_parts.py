@@ -15,13 +15,13 @@ from toonset.errors import BundleError
 from toonset.nerf import losses
 from toonset.nerf.bounds import Box, box_of_masks
 from toonset.nerf.evidence import choose_missing, mask_iou
+from toonset.nerf.fairing import faired
 from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.hull import EDGE, LEVEL, Hull, carve, project
 from toonset.nerf.interpolation import Operator
 from toonset.nerf.march import march, pixels_near, rays_of
 from toonset.nerf.metrics import BEST_PSNR, compare, ssim
 from toonset.nerf.rendering import composite, compositing_weights, padded
-from toonset.nerf.rounding import rounded
 
 BOX = Box(np.array([-3.0, 10.0, 0.5]), np.array([1.0, 18.0, 2.5]))
 
@@ -170,7 +170,7 @@ def test_hull_of_a_box_is_the_box() -> None:
     np.testing.assert_allclose(hull.low + hull.voxel * high, half, atol=0.05)
 
 
-def test_rounding_removes_corners_but_no_outline() -> None:
+def test_fairing_removes_corners_but_no_outline() -> None:
     cameras = [
         Camera.looking_at(np.zeros(3), yaw, 0.0, 20.0, (64, 64)) for yaw in np.arange(8) * np.pi / 4
     ]
@@ -178,7 +178,7 @@ def test_rounding_removes_corners_but_no_outline() -> None:
     alpha = np.clip(0.5 + 20 * np.minimum(1 - np.abs(u), 1.2 - np.abs(v)), 0, 1)  # upright cylinder
     alphas = [torch.as_tensor(alpha, dtype=torch.float32)] * 8
     hull = carve(cameras, alphas, 96, 0)
-    smooth = rounded(hull, cameras, alphas)
+    smooth = faired(hull, cameras, alphas)
     between = Camera.looking_at(np.zeros(3), np.pi / 8, 0.0, 20.0, (64, 64))
     assert mask_iou(smooth, cameras[1], alphas[1]) > 0.98
     assert mask_iou(smooth, between, alphas[0]) > mask_iou(hull, between, alphas[0]) + 0.02

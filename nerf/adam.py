@@ -1,0 +1,67 @@
+"""Adam in plain torch.
+
+`torch.optim` imports `torch._dynamo` as soon as an optimiser is made: 4 s of CPU, a third of a
+whole training here. The update itself is a few lines, and its state is plain tensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+EPSILON = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Parameters with a learning rate of their own.
+
+    Attributes:
+        parameters: what is fitted, in place.
+        rate: learning rate at the start.
+    """
+
+    parameters: Sequence[Tensor]
+    rate: float
+
+
+class Adam:
+    """Adam with bias correction; the learning rates are multiplied by a common factor per step.
+
+    Source: Kingma and Ba, "Adam: a method for stochastic optimization", 2015, algorithm 1.
+    """
+
+    def __init__(self, groups: Sequence[Group], betas: tuple[float, float] = (0.9, 0.99)) -> None:
+        """Begin with zero moments."""
+        self.groups = tuple(groups)
+        self.betas = betas
+        self.count = 0
+        parameters = [p for group in self.groups for p in group.parameters]
+        self.first = [torch.zeros_like(p) for p in parameters]
+        self.second = [torch.zeros_like(p) for p in parameters]
+
+    @torch.no_grad()
+    def step(self, factor: float = 1.0) -> None:
+        """Move every parameter that has a gradient, and forget the gradients.
+
+        Args:
+            factor: of all learning rates.
+        """
+        self.count += 1
+        slow, fast = self.betas
+        root = (1 - fast**self.count) ** 0.5
+        moments = iter(zip(self.first, self.second, strict=True))
+        for group in self.groups:
+            size = factor * group.rate / (1 - slow**self.count)
+            for parameter in group.parameters:
+                first, second = next(moments)
+                if parameter.grad is None:
+                    continue
+                first.lerp_(parameter.grad, 1 - slow)
+                second.mul_(fast).addcmul_(parameter.grad, parameter.grad, value=1 - fast)
+                scale = second.sqrt().div_(root).add_(EPSILON)
+                parameter.addcdiv_(first, scale, value=-size)
+                parameter.grad = None
