@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from toonset.dataset.scene import Scene
-from toonset.nerf.field import TriplaneField
+from toonset.nerf.fields import Constants, Field
 from toonset.nerf.hull import Hull, occupancy
-from toonset.nerf.interpolation import Operator
 from toonset.nerf.march import Rays, Samples, march, rays_of
 from toonset.palette.labels import UNLABELLED
 
@@ -27,31 +26,38 @@ class Batch:
     """Some rays with their samples.
 
     Attributes:
-        operator: from the planes' table to the samples' features.
-        slots: (samples,) place of each sample in the flat (rays, most) table.
-        occupancy: (samples,) how much of each sample's density counts.
+        constants: what the field knows of the samples' places.
+        ray: (samples,) which ray a sample belongs to, ascending; every ray has one at least.
+        length: (samples,) world units that a sample stands for, less where the hull is soft.
         rgb: (rays, 3) the drawing's straight colour in [0, 1].
         alpha: (rays,) the drawing's coverage in [0, 1].
         labels: (rays,) the drawing's palette label, 255 = none.
     """
 
-    operator: Operator
-    slots: Int[Tensor, " samples"]
-    occupancy: Float[Tensor, " samples"]
+    constants: Constants
+    ray: Int[Tensor, " samples"]
+    length: Float[Tensor, " samples"]
     rgb: Float[Tensor, "rays 3"]
     alpha: Float[Tensor, " rays"]
     labels: Int[Tensor, " rays"]
 
     def to(self, device: torch.device) -> Batch:
         """Return the batch on a device."""
-        tensors = (self.slots, self.occupancy, self.rgb, self.alpha, self.labels)
-        return Batch(self.operator.to(device), *(t.to(device) for t in tensors))
+        tensors = (self.ray, self.length, self.rgb, self.alpha, self.labels)
+        return Batch(self.constants.to(device), *(t.to(device) for t in tensors))
+
+    def kept(self, samples: Bool[Tensor, " samples"]) -> Batch:
+        """Return the batch with some of its samples; every ray must keep one."""
+        constants = self.constants.kept(samples)
+        return replace(
+            self, constants=constants, ray=self.ray[samples], length=self.length[samples]
+        )
 
 
 def make_batches(
     scene: Scene,
     hull: Hull,
-    field: TriplaneField,
+    field: Field,
     step: float,
     most: int,
     generator: torch.Generator,
@@ -67,7 +73,7 @@ def make_batches(
         part = slice(first, last)
         samples = march(rays.at(part), hull, step, most)
         if len(samples.ray):
-            batches.append(_batch(samples, field, most, drawn.at(part)))
+            batches.append(_batch(samples, field, step, drawn.at(part)))
     return batches
 
 
@@ -98,9 +104,8 @@ def _near_figure(scene: Scene, hull: Hull) -> tuple[Rays, _Drawn]:
     return Rays(*map(torch.cat, parts)), _Drawn(*map(torch.cat, (rgb, alpha, labels)))
 
 
-def _batch(samples: Samples, field: TriplaneField, most: int, drawn: _Drawn) -> Batch:
+def _batch(samples: Samples, field: Field, step: float, drawn: _Drawn) -> Batch:
     hit, ray = torch.unique_consecutive(samples.ray, return_inverse=True)
-    rows, weights = field.taps(samples.points)
-    operator = Operator.of(rows, weights, len(field.planes))
-    seen, slots = drawn.at(hit), ray * most + samples.order
-    return Batch(operator, slots, occupancy(samples.support), seen.rgb, seen.alpha, seen.labels)
+    constants, length = field.constants(samples.points), occupancy(samples.support) * step
+    seen = drawn.at(hit)
+    return Batch(constants, ray, length, seen.rgb, seen.alpha, seen.labels)

@@ -19,13 +19,16 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from toonset.nerf import losses
 from toonset.nerf.bounds import Box
+from toonset.nerf.fields import Constants, Field
+from toonset.nerf.interpolation import Operator
 
 PLANES = ((0, 1), (0, 2), (1, 2))  # axes of each plane: xy, xz, yz
 OPAQUE_AT_START = 0.1  # optical depth of one cell before training: the hull starts as a mist
 
 
-class TriplaneField(nn.Module):
+class TriplaneField(Field):
     """Density and colour anywhere in a box; see the module docstring."""
 
     low: Tensor
@@ -60,13 +63,32 @@ class TriplaneField(nn.Module):
         )
         return self.decode(features)
 
+    def constants(self, points_world: Float[Tensor, "n 3"]) -> Operator:
+        """Return the interpolation as a sparse matrix."""
+        return Operator.of(*self.taps(points_world), len(self.planes))
+
+    def shade(self, constants: Constants) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:
+        """Return density and colour, differentiable in the parameters."""
+        assert isinstance(constants, Operator)
+        return self.decode(constants(self.planes))
+
+    def tables(self) -> list[nn.Parameter]:
+        """Return the planes."""
+        return [self.planes]
+
+    def roughness(self) -> Float[Tensor, ""]:
+        """Return the planes' total variation."""
+        return losses.total_variation(self.plane_images())
+
     def decode(
         self, features: Float[Tensor, "n channels"]
     ) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:
         """Return density per world unit and RGB in [0, 1] of summed features."""
-        raw = self.out(F.relu(self.hidden(features)))
+        hidden = F.relu(self.hidden(features))
+        # outputs by rows: each is contiguous, which the functions below like better than columns
+        raw = torch.addmm(self.out.bias[:, None], self.out.weight, hidden.T)
         shift = float(np.log(np.expm1(OPAQUE_AT_START)))
-        return F.softplus(raw[:, 0] + shift) / self.cell, torch.sigmoid(raw[:, 1:])
+        return F.softplus(raw[0] + shift) / self.cell, torch.sigmoid(raw[1:]).T
 
     def taps(
         self, points_world: Float[Tensor, "n 3"]

@@ -15,7 +15,7 @@ from typing import Any
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 
@@ -55,6 +55,19 @@ class Operator:
     def to(self, device: torch.device) -> Operator:
         """Return the operator on a device."""
         return Operator(*(getattr(self, field.name).to(device) for field in fields(self)))
+
+    def kept(self, samples: Bool[Tensor, " samples"]) -> Operator:
+        """Return the operator of some of its samples; nothing is sorted again."""
+        number = samples.cumsum(0, dtype=torch.int32) - 1
+        by_row = samples[self.samples_by_row]
+        before = torch.cat([by_row.new_zeros(1, dtype=torch.int32), by_row.cumsum(0)])
+        return Operator(
+            self.rows[samples],
+            self.weights[samples],
+            number[self.samples_by_row[by_row]],
+            self.weights_by_row[by_row],
+            before[self.offsets].int(),
+        )
 
     def __call__(
         self, table: Float[Tensor, "entries channels"]

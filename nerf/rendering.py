@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
+import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor
 
@@ -48,3 +51,68 @@ def padded(
     """
     table = packed.new_zeros(rays * most, packed.shape[1])
     return table.index_copy(0, ray * most + order, packed).view(rays, most, -1)
+
+
+MOST_OPTICAL_DEPTH = 30.0  # of one sample: exp(-30) is nothing, and sums stay exact
+
+
+def composite_packed(
+    optical_depth: Float[Tensor, " n"],
+    color: Float[Tensor, "n colors"],
+    ray: Int[Tensor, " n"],
+    rays: int,
+) -> tuple[Float[Tensor, "rays colors"], Float[Tensor, " rays"]]:
+    """Composite packed samples front to back; return premultiplied colour and opacity.
+
+    The same as `composite`, without a padded table and with the gradient written down: a tenth of
+    the passes over memory. Sums run over all rays at once, in double precision, and a ray's part is
+    a difference of two of them.
+
+    Args:
+        optical_depth: density times length of every sample, >= 0.
+        color: of every sample.
+        ray: which ray a sample belongs to, ascending; every ray has at least one.
+        rays: how many there are.
+    """
+    return _CompositePacked.apply(optical_depth, color, ray, rays)
+
+
+def transmittance_packed(
+    optical_depth: Float[Tensor, " n"], ray: Int[Tensor, " n"]
+) -> Float[Tensor, " n"]:
+    """Return the light that reaches each packed sample; arguments as of `composite_packed`."""
+    counts = torch.bincount(ray)
+    depth = optical_depth.clamp(max=MOST_OPTICAL_DEPTH)
+    return _transmittance(depth, ray, counts.cumsum(0) - counts)
+
+
+def _transmittance(depth: Tensor, ray: Tensor, first: Tensor) -> Tensor:
+    total = depth.cumsum(0, dtype=torch.float64) - depth
+    return torch.exp((total[first][ray] - total).to(depth.dtype))
+
+
+class _CompositePacked(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any, optical_depth: Tensor, color: Tensor, ray: Tensor, rays: int
+    ) -> tuple[Tensor, Tensor]:
+        depth = optical_depth.clamp(max=MOST_OPTICAL_DEPTH)
+        ends = torch.bincount(ray, minlength=rays).cumsum(0)
+        first = torch.cat([ends.new_zeros(1), ends[:-1]])
+        left = _transmittance(depth, ray, first)
+        weights = left * -torch.expm1(-depth)
+        table = torch.cat([color, torch.ones_like(depth)[:, None]], dim=1)
+        number = torch.arange(len(ray), device=ray.device)
+        seen = F.embedding_bag(number, table, first, per_sample_weights=weights, mode="sum")
+        ctx.save_for_backward(color, ray, ends, weights, left)
+        return seen[:, :-1].contiguous(), seen[:, -1].contiguous()
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None, None]:
+        color, ray, ends, weights, left = ctx.saved_tensors
+        upstream = gradients[0].index_select(0, ray)
+        by_weight = (upstream * color).sum(dim=1) + gradients[1].index_select(0, ray)
+        weighted = weights * by_weight
+        total = weighted.cumsum(0, dtype=torch.float64)
+        behind = (total[ends - 1][ray] - total).to(weights.dtype)
+        return (left - weights) * by_weight - behind, weights[:, None] * upstream, None, None

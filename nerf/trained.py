@@ -9,7 +9,7 @@ from jaxtyping import UInt8
 
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.evidence import HullEvidence
-from toonset.nerf.field import TriplaneField
+from toonset.nerf.fields import Field
 from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 
@@ -29,7 +29,7 @@ class TrainedField:
         size_px: longest side of the training pictures, for turntables.
     """
 
-    field: TriplaneField
+    field: Field
     hull: Hull
     step: float
     samples: int

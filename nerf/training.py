@@ -19,7 +19,9 @@ from toonset.nerf import losses
 from toonset.nerf.batches import make_batches
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.field import TriplaneField
-from toonset.nerf.fitting import Model, Progress, Weights, fit
+from toonset.nerf.field_loss import Model, Weights
+from toonset.nerf.field_rays import FixedRays
+from toonset.nerf.fitting import Progress, Watch, fit
 from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.shape import hull_of, per_px
@@ -31,7 +33,12 @@ STEPS_ALONG = 160  # samples that the longest side of the hull would take
 MOST_SAMPLES = 24  # per ray, from its first inside the hull
 
 
-def train(scene: Scene, options: TrainOptions, progress: Progress | None = None) -> Training:
+def train(
+    scene: Scene,
+    options: TrainOptions,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+) -> Training:
     """Return the field that explains the drawings, and how it came about.
 
     On a CPU the same scene, options and number of threads give the same bits, unless `budget_s`
@@ -40,7 +47,8 @@ def train(scene: Scene, options: TrainOptions, progress: Progress | None = None)
     Args:
         scene: posed pictures; labels are used where the scene has them.
         options: see there.
-        progress: called with a line that says where the work stands.
+        progress: called with a line that says what is prepared.
+        watch: looks on while the field is fitted.
 
     Raises:
         BundleError: fewer than two usable views, or cameras that do not belong to the pictures.
@@ -61,18 +69,19 @@ def train(scene: Scene, options: TrainOptions, progress: Progress | None = None)
         raise BundleError(f"{scene.name}: no drawn pixel meets the hull; the cameras are wrong")
     clock.append(time.perf_counter())
     smoothness = losses.smoothness_weight(options.smoothness, len(scene.frames))
-    weights = Weights(options.palette_weight, smoothness, start.step, start.samples)
+    weights = Weights(options.palette_weight, smoothness)
     model = Model(start.field, start.classifier).to(device)
     moved = [batch.to(device) for batch in batches]
-    history, stopped = fit(model, moved, weights, options, generator, tell)
+    begin = watch.begin(start) if watch else None
+    history, stopped = fit(model, FixedRays(moved), weights, options, generator, watch, begin)
     model.to("cpu")
-    clock.append(time.perf_counter())
-    hull_s, rays_s, steps_s = np.diff(clock).tolist()
+    hull_s, rays_s = np.diff(clock).tolist()
+    steps_s = history[-1].seconds if history else 0.0  # without what the watch has taken
     seconds = {"hull": hull_s, "rays": rays_s, "steps": steps_s}
     counts = {
         "views": len(scene.frames),
         "rays": sum(len(batch.rgb) for batch in batches),
-        "samples": sum(len(batch.slots) for batch in batches),
+        "samples": sum(len(batch.ray) for batch in batches),
         "parameters": sum(p.numel() for p in model.parameters()),
     }
     return Training(start, options, tuple(history), stopped, evidence, seconds, counts)
