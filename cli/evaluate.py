@@ -1,13 +1,39 @@
-"""`toonset evaluate`: how near a run's renderings come to pictures it has not seen."""
+"""`toonset evaluate`: how near a run's renderings come to pictures, seen and unseen."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.output import JsonFlag, Printer, QuietFlag
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    check_output,
+)
+
+if TYPE_CHECKING:
+    from toonset.dataset.scene import Scene
+    from toonset.nerf.evaluation import ScoredView
+
+WRITTEN = ("evaluation.json", "evaluation.png")
+COLUMNS = {  # of the table: heading, number format
+    "psnr": ("PSNR dB", "{:.2f}"),
+    "psnr_mask": ("in mask", "{:.2f}"),
+    "psnr_shift": ("+-2 px", "{:.2f}"),
+    "ssim": ("SSIM", "{:.4f}"),
+    "flip": ("FLIP", "{:.4f}"),
+    "haarpsi": ("HaarPSI", "{:.4f}"),
+    "lpips": ("LPIPS", "{:.4f}"),
+    "silhouette_iou": ("outline", "{:.1%}"),
+    "label_accuracy": ("labels", "{:.1%}"),
+    "label_miou": ("mIoU", "{:.1%}"),
+    "ink_f1": ("lines", "{:.2f}"),
+}
 
 
 def evaluate(
@@ -15,30 +41,127 @@ def evaluate(
     test: Annotated[
         Path, typer.Option("--test", help="A transforms.json with RGBA pictures, or its folder.")
     ],
+    bundle: Annotated[
+        Path | None,
+        typer.Option(
+            "--bundle", help="The bundle it was trained on (default: the run's parent folder)."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Write evaluation.json and evaluation.png into this folder.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
+    ] = None,
+    force: ForceFlag = False,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Print PSNR and SSIM over white, and PSNR inside the masks, raw and in palette colours."""
+    """Compare renderings with held-out pictures, and apart from them with the training drawings.
+
+    Everything over white; "in mask" counts the pixels that the drawing covers. "+-2 px" is the best
+    PSNR over shifts of the whole picture by up to 2 px, "outline" the overlap of the silhouettes,
+    "labels" the share of unmixed pixels with the right palette colour, "lines" the F1 of dark lines
+    within 2 px. "-": the run or the picture has no such thing, or a package is missing; the JSON
+    says why.
+    """
     from toonset.dataset.transforms import read_scene
-    from toonset.nerf.evaluation import evaluate as evaluate_run
+    from toonset.nerf.evaluation import report, score_views
+    from toonset.nerf.metrics_view import load_judges
     from toonset.nerf.run_folder import read_field
 
     printer = Printer(as_json, quiet)
-    trained = read_field(run)
-    result = evaluate_run(trained, read_scene(test))
-    printer.result(result, _table(result))
+    if out is not None:
+        check_output(out, [run, test, bundle], WRITTEN, force=force)
+    trained, held_out = read_field(run), read_scene(test)
+    seen, why_unseen = _training_scene(run, bundle)
+    if seen is not None and _same_pictures(held_out, seen):
+        printer.say(f"{test}: holds pictures that the run was trained on; they are not held out")
+    judges = load_judges()
+    scored = score_views(trained, held_out, judges, printer.progress)
+    own = () if seen is None else score_views(trained, seen, judges, printer.progress)
+    absent = judges.absent | ({} if why_unseen is None else {"training": why_unseen})
+    result = report(scored, own, absent)
+    if out is not None:
+        sections = (("held-out views", scored), ("training views", own))
+        _write(out, result, sections, force=force)
+    printer.result(result, _text(result))
 
 
-def _table(result: dict[str, Any]) -> str:
-    layers = [name for name in ("rgb", "palette") if result[name] is not None]
-    lines = [f"{'view':<20}{'layer':<9}{'PSNR dB':>9}{'in mask':>9}{'SSIM':>8}"]
-    for view in result["views"]:
-        lines += [_row(view["name"], layer, view[layer]) for layer in layers]
-    return "\n".join([*lines, *(_row("mean", layer, result[layer]) for layer in layers)])
+def _write(
+    out: Path,
+    result: dict[str, Any],
+    sections: tuple[tuple[str, tuple[ScoredView, ...]], ...],
+    *,
+    force: bool,
+) -> None:
+    from toonset.dataset.picture import encode_png
+    from toonset.files import new_folder, write_bytes, write_json
+    from toonset.nerf.evaluation_picture import contact_sheet
+
+    errors_are = "mean difference" if "flip" in result["absent"] else "FLIP"
+    with new_folder(out, force=force) as folder:
+        write_json(folder / "evaluation.json", result)
+        write_bytes(folder / "evaluation.png", encode_png(contact_sheet(sections, errors_are)))
 
 
-def _row(name: str, layer: str, values: dict[str, float | None]) -> str:
-    psnr, inside, ssim = (values[key] for key in ("psnr", "psnr_mask", "ssim"))
-    inside_text = "-" if inside is None else f"{inside:.2f}"
-    ssim_text = "-" if ssim is None else f"{ssim:.4f}"
-    return f"{name[:19]:<20}{layer:<9}{psnr:>9.2f}{inside_text:>9}{ssim_text:>8}"
+def _training_scene(run: Path, bundle: Path | None) -> tuple[Scene | None, str | None]:
+    """Return the frames that the run was trained on, or why they are not known."""
+    from toonset.dataset.json_file import read_json
+    from toonset.dataset.transforms import read_scene
+    from toonset.errors import BundleError, ToonsetError
+    from toonset.nerf.evaluation import chosen_frames
+
+    place = bundle or run.resolve().parent
+    if bundle is None and not (place / "transforms.json").is_file():
+        return None, f"{place} holds no transforms.json; pass --bundle"
+    config = read_json(run / "config.json")
+    try:
+        scene = chosen_frames(read_scene(place), config)
+        if not scene.frames:
+            raise BundleError(f"{place}: has none of the run's views; pass its --bundle")
+    except ToonsetError as error:
+        if bundle is not None:
+            raise
+        return None, str(error)
+    return scene, None
+
+
+def _same_pictures(held_out: Scene, seen: Scene) -> bool:
+    known = {frame.rgba.tobytes() for frame in seen.frames}
+    return any(frame.rgba.tobytes() in known for frame in held_out.frames)
+
+
+def _text(result: dict[str, Any]) -> str:
+    lines = ["held-out views", *_table(result)]
+    if result["training"] is not None:
+        lines += ["", "training views", *_table(result["training"])]
+    reasons = [f"{name}: {reason}" for name, reason in result["absent"].items()]
+    return "\n".join([*lines, *([""] if reasons else []), *reasons])
+
+
+def _table(section: dict[str, Any]) -> list[str]:
+    layers = [name for name in ("rgb", "palette") if section[name] is not None]
+    shown = {
+        key: column
+        for key, column in COLUMNS.items()
+        if any(section[layer][key] is not None for layer in layers)
+    }
+    head = "".join(f"{title:>9}" for title, _ in shown.values())
+    lines = [f"{'view':<20}{'layer':<9}{head}"]
+    for view in section["views"]:
+        lines += [_row(view["name"], layer, view[layer], shown) for layer in layers]
+    return [*lines, *(_row("mean", layer, section[layer], shown) for layer in layers)]
+
+
+def _row(
+    name: str, layer: str, values: dict[str, float | None], shown: dict[str, tuple[str, str]]
+) -> str:
+    cells = [
+        "-" if (value := values[key]) is None else form.format(value)
+        for key, (_, form) in shown.items()
+    ]
+    return f"{name[:19]:<20}{layer:<9}" + "".join(f"{cell:>9}" for cell in cells)

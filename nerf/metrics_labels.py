@@ -1,0 +1,44 @@
+"""How many pixels a rendering gives the right palette label."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.palette.labels import UNLABELLED
+
+
+@dataclass(frozen=True)
+class LabelScore:
+    """Labels of one view against the truth's, where both have one.
+
+    Attributes:
+        accuracy: share of these pixels with the right label.
+        miou: mean intersection over union of the labels that the truth has there.
+        pixels: how many these are.
+    """
+
+    accuracy: float
+    miou: float
+    pixels: int
+
+
+def score_labels(
+    rendered: UInt8[np.ndarray, "height width"], true: UInt8[np.ndarray, "height width"]
+) -> LabelScore | None:
+    """Return the score over pixels that are labelled in both; None where there is none.
+
+    In the truth these are the pixels that are no blends, in the rendering those of the figure.
+    """
+    both = (rendered != UNLABELLED) & (true != UNLABELLED)
+    found, wanted = rendered[both], true[both]
+    if not len(wanted):
+        return None
+    hits = np.bincount(wanted[found == wanted], minlength=UNLABELLED)
+    sizes = np.bincount(wanted, minlength=UNLABELLED)
+    union = sizes + np.bincount(found, minlength=UNLABELLED) - hits
+    present = sizes > 0
+    miou = float((hits[present] / union[present]).mean())
+    return LabelScore(float((found == wanted).mean()), miou, len(wanted))

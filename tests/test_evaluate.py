@@ -1,0 +1,170 @@
+"""`toonset evaluate`: sections, reasons, files and the picture."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.transforms import read_scene
+from toonset.nerf.evaluation import ScoredView, chosen_frames, report
+from toonset.nerf.evaluation_picture import (
+    CAPTION_PX,
+    HEADING_PX,
+    TILE_PX,
+    contact_sheet,
+    worst_first,
+)
+from toonset.nerf.metrics_view import Judges, figures_of
+
+JUDGES = Judges("no flip here", "no lpips here")
+RED, BLUE = (200, 30, 20, 255), (20, 60, 200, 255)
+LABEL_FIGURES: dict[str, float | None] = {"label_accuracy": 0.5, "label_miou": None}
+
+
+def scored(name: str, wrong_px: int, *, palette: bool = True) -> ScoredView:
+    """Return a view of a red square of which so many rows are rendered blue."""
+    drawn = np.zeros((40, 40, 4), dtype=np.uint8)
+    drawn[10:30, 10:30] = RED
+    rendered = drawn.copy()
+    rendered[10 : 10 + wrong_px, 10:30] = BLUE
+    figures, error = figures_of(rendered, drawn, JUDGES)
+    layers = ["rgb", "palette"] if palette else ["rgb"]
+    return ScoredView(
+        name,
+        drawn,
+        dict.fromkeys(layers, rendered),
+        dict.fromkeys(layers, figures | LABEL_FIGURES),
+        dict.fromkeys(layers, error),
+    )
+
+
+def test_held_out_and_training_views_apart(
+    bundle: Path, trained, toonset, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(trained[0], bundle / "run")
+    done = toonset("evaluate", "bundle/run", "--test", "bundle", "--json", "-o", "judged")
+    assert done.code == 0
+    assert "bundle: holds pictures that the run was trained on; they are not held out" in done.err
+    found = done.json
+    assert {path.name for path in (tmp_path / "judged").iterdir()} == {
+        "evaluation.json",
+        "evaluation.png",
+    }
+    assert json.loads((tmp_path / "judged" / "evaluation.json").read_text()) == found
+    # both are the same pictures here, but the test's labels are made anew
+    assert found["training"]["rgb"] == found["rgb"]
+    assert found["training"]["views"] == found["views"]
+    assert found["absent"].keys() <= {"flip", "lpips"}
+    assert 0 < found["palette"]["label_accuracy"] <= 1
+    for layer in ("rgb", "palette"):
+        each = [view[layer]["psnr"] for view in found["views"]]
+        assert found[layer]["psnr"] == pytest.approx(np.mean(each))
+    with Image.open(tmp_path / "judged" / "evaluation.png") as picture:
+        rows = -(-len(found["views"]) // 2)  # two views side by side, two sections
+        assert picture.height == 2 * (HEADING_PX + rows * (TILE_PX + CAPTION_PX))
+
+
+def test_a_run_apart_from_its_bundle(bundle: Path, run: Path, toonset, snapshot, tmp_path) -> None:
+    before = snapshot(tmp_path)
+    alone = toonset("evaluate", run, "--test", bundle, "--json")
+    assert alone.json["training"] is None
+    assert alone.json["absent"]["training"] == (
+        f"{tmp_path} holds no transforms.json; pass --bundle"
+    )
+    told = toonset("evaluate", run, "--test", bundle, "--bundle", bundle, "--json")
+    assert told.json["training"]["views"] == alone.json["views"]
+    assert "training" not in told.json["absent"]
+    assert snapshot(tmp_path) == before  # nothing is written without -o
+    (tmp_path / "transforms.json").write_text("{")
+    broken = toonset("evaluate", run, "--test", bundle, "--json")
+    assert broken.code == 0
+    assert "transforms.json" in broken.json["absent"]["training"]
+    missing = toonset("evaluate", run, "--test", bundle, "--bundle", tmp_path / "none")
+    assert str(tmp_path / "none") in missing.reason
+
+
+def test_the_table(bundle: Path, run: Path, toonset) -> None:
+    done = toonset("evaluate", run, "--test", bundle, "--bundle", bundle, "--quiet")
+    lines = done.out.splitlines()
+    views = len(read_scene(bundle).frames)
+    assert lines[0] == "held-out views"
+    assert lines[1].split()[:6] == ["view", "layer", "PSNR", "dB", "in", "mask"]
+    assert [line.split()[0] for line in lines[2 + 2 * views : 4 + 2 * views]] == ["mean", "mean"]
+    assert lines[4 + 2 * views : 6 + 2 * views] == ["", "training views"]
+    assert lines[2].split()[1:3] != lines[3].split()[1:3]  # rgb and palette differ
+    widths = {len(line) for line in lines[1 : 4 + 2 * views]}
+    assert len(widths) == 1
+    assert "LPIPS" not in lines[1] or "lpips: " not in done.out
+
+
+def test_an_output_is_not_replaced_unasked(
+    bundle: Path, run: Path, toonset, snapshot, tmp_path
+) -> None:
+    out = tmp_path / "judged"
+    out.mkdir()
+    (out / "drawing.png").write_bytes(b"mine")
+    before = snapshot(tmp_path)
+    arguments = ("evaluate", run, "--test", bundle, "-o", out)
+    assert "exists already; pass --force" in toonset(*arguments).reason
+    assert "holds 'drawing.png'" in toonset(*arguments, "--force").reason
+    assert snapshot(tmp_path) == before
+
+
+def test_the_views_of_a_run_among_those_of_its_bundle() -> None:
+    camera = read_camera()
+    blank = np.zeros((4, 4, 4), dtype=np.uint8)
+    scene = Scene(tuple(Frame(n, camera, blank) for n in ("a.png", "b.png", "c.png")), None, "s")
+
+    def names(config: object) -> list[str]:
+        return [frame.name for frame in chosen_frames(scene, config).frames]
+
+    assert names({"scene": {"views": ["c.png", "a.png"]}}) == ["a.png", "c.png"]
+    assert names({"scene": {"views": ["d.png"]}}) == []
+    assert names({}) == names({"scene": {"views": 3}}) == names([]) == ["a.png", "b.png", "c.png"]
+
+
+def read_camera():
+    from toonset.camera import Camera
+
+    return Camera.looking_at(np.zeros(3), 0.0, 0.0, 1.0, (4, 4))
+
+
+def test_a_run_without_palette_has_no_palette_figures() -> None:
+    found = report([scored("a", 1, palette=False)], [], {"flip": "why"})
+    assert found["palette"] is None
+    assert found["views"][0]["palette"] is None
+    assert found["training"] is None
+    assert found["absent"] == {"flip": "why"}
+    json.dumps(found, allow_nan=False)
+
+
+def test_the_worst_views_come_first_and_wrong_pixels_glow() -> None:
+    views = [scored("good", 1), scored("bad", 9), scored("right", 0), scored("worse", 12)]
+    assert [view.name for view in worst_first(views)] == ["worse", "bad", "good", "right"]
+    sheet = contact_sheet([("held-out views", views), ("training views", [])], "mean difference")
+    block = TILE_PX + CAPTION_PX
+    assert sheet.shape[0] == HEADING_PX + 2 * block
+    # the last column of tiles of each block: the heat map, black where nothing is wrong
+    heat = sheet[HEADING_PX : HEADING_PX + TILE_PX, :, :].astype(int)
+    first, second = np.split(heat, 2, axis=1)
+    share = [
+        float((part[:, -TILE_PX - 8 : -8].sum(axis=-1) > 60).mean()) for part in (first, second)
+    ]
+    assert share[0] > share[1] > 0.3
+    right = sheet[HEADING_PX + block : HEADING_PX + block + TILE_PX, -TILE_PX - 8 : -8]
+    assert right.max() < 10
+
+
+def test_a_picture_shows_the_worst_of_many_views() -> None:
+    views = [scored(f"{i}", i % 9) for i in range(30)]
+    sheet = contact_sheet([("held-out views", views)], "FLIP")
+    assert sheet.shape[0] == HEADING_PX + 12 * (TILE_PX + CAPTION_PX)
+    odd = contact_sheet([("a", views[:3]), ("b", views[:1])], "FLIP")
+    assert odd.shape == (2 * HEADING_PX + 3 * (TILE_PX + CAPTION_PX), sheet.shape[1], 3)
