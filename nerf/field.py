@@ -13,7 +13,6 @@ Source: Chan et al., "Efficient geometry-aware 3D generative adversarial network
 
 from __future__ import annotations
 
-import numpy as np
 import torch
 import torch.nn.functional as F
 from jaxtyping import Float, Int
@@ -21,11 +20,10 @@ from torch import Tensor, nn
 
 from toonset.nerf import losses
 from toonset.nerf.bounds import Box
-from toonset.nerf.fields import Constants, Field
+from toonset.nerf.fields import DENSITY_SHIFT, Constants, Field, FieldSpec, Places, shape_of
 from toonset.nerf.interpolation import Operator
 
 PLANES = ((0, 1), (0, 2), (1, 2))  # axes of each plane: xy, xz, yz
-OPAQUE_AT_START = 0.1  # optical depth of one cell before training: the hull starts as a mist
 
 
 class TriplaneField(Field):
@@ -42,11 +40,9 @@ class TriplaneField(Field):
             channels: features per plane.
             hidden: width of the decoder's hidden layer.
         """
-        super().__init__()
+        super().__init__(FieldSpec("triplane", resolution, channels, hidden))
         self.resolution = resolution
-        self.cell = float(box.size.max()) / resolution
-        # Values sit on the cells' corners, hence one more than cells.
-        self.shape = tuple(int(n) + 1 for n in np.ceil(box.size / self.cell - 1e-6))
+        self.cell, self.shape = shape_of(box, resolution)
         self.register_buffer("low", torch.as_tensor(box.low, dtype=torch.float32))
         rows = sum(self.shape[a] * self.shape[b] for a, b in PLANES)
         self.planes = nn.Parameter(0.1 * torch.randn(rows, channels))
@@ -69,6 +65,8 @@ class TriplaneField(Field):
 
     def shade(self, constants: Constants) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:
         """Return density and colour, differentiable in the parameters."""
+        if isinstance(constants, Places):
+            return self.decode(self._features(constants.points))
         assert isinstance(constants, Operator)
         return self.decode(constants(self.planes))
 
@@ -87,8 +85,21 @@ class TriplaneField(Field):
         hidden = F.relu(self.hidden(features))
         # outputs by rows: each is contiguous, which the functions below like better than columns
         raw = torch.addmm(self.out.bias[:, None], self.out.weight, hidden.T)
-        shift = float(np.log(np.expm1(OPAQUE_AT_START)))
-        return F.softplus(raw[0] + shift) / self.cell, torch.sigmoid(raw[1:]).T
+        return F.softplus(raw[0] + DENSITY_SHIFT) / self.cell, torch.sigmoid(raw[1:]).T
+
+    def _features(self, points_world: Float[Tensor, "n 3"]) -> Float[Tensor, "n channels"]:
+        """Return summed features at points that come but once: cheaper to differentiate."""
+        at, total = (points_world - self.low) / self.cell, None
+        for image, (a, b) in zip(self.plane_images(), PLANES, strict=True):
+            most = at.new_tensor([self.shape[b] - 1, self.shape[a] - 1])
+            places = at[:, [b, a]] * (2 / most) - 1  # grid_sample names the last axis first
+            plane = image.permute(2, 0, 1)[None].contiguous()
+            found = F.grid_sample(
+                plane, places[None, None], padding_mode="border", align_corners=True
+            )[0, :, 0].T
+            total = found if total is None else total + found
+        assert total is not None
+        return total
 
     def taps(
         self, points_world: Float[Tensor, "n 3"]

@@ -31,10 +31,14 @@ class Weights:
     Attributes:
         palette: of the cross-entropy.
         smoothness: of the tables' total variation.
+        backdrop: grey behind drawings and renderings.
+        opacity: of the error of opacity; 0: silhouettes count through the backdrop alone.
     """
 
     palette: float
     smoothness: float
+    backdrop: float = losses.BACKDROP
+    opacity: float = losses.OPACITY_WEIGHT
 
 
 def loss_terms(
@@ -42,12 +46,16 @@ def loss_terms(
 ) -> tuple[Float[Tensor, ""], Float[Tensor, ""], Float[Tensor, ""]]:
     """Return the weighted photometric, cross-entropy and smoothness terms of a batch."""
     color, opacity = render_batch(model.field, batch)
-    photometric = losses.photometric(color, opacity, batch.rgb, batch.alpha)
+    photometric = losses.photometric(
+        color, opacity, batch.rgb, batch.alpha, weights.backdrop, weights.opacity
+    )
     entropy = photometric.new_zeros(())
     if model.classifier is not None:
         logits = model.classifier(losses.straight(color, opacity))
         entropy = weights.palette * losses.cross_entropy(logits, batch.labels)
-    smooth = weights.smoothness * model.field.roughness()
+    smooth = photometric.new_zeros(())
+    if weights.smoothness:
+        smooth = weights.smoothness * model.field.roughness()
     return photometric, entropy, smooth
 
 

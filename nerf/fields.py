@@ -7,12 +7,38 @@ field splits the work: `constants` is what depends on the points alone and is co
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from typing import Protocol, Self
+from dataclasses import dataclass
+from typing import Literal, Protocol, Self
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
+
+from toonset.nerf.bounds import Box
+
+Kind = Literal["triplane", "mlp", "voxel"]
+OPAQUE_AT_START = 0.1  # optical depth of one cell before training: space starts as a mist
+DENSITY_SHIFT = math.log(math.expm1(OPAQUE_AT_START))  # softplus of it is the above
+
+
+@dataclass(frozen=True)
+class FieldSpec:
+    """What builds a field, beside its box.
+
+    Attributes:
+        kind: name of the kind.
+        resolution: cells along the longest side of the box.
+        channels: features per plane; layers of an mlp.
+        hidden: width of the decoder's hidden layers; 0: no decoder.
+    """
+
+    kind: Kind
+    resolution: int
+    channels: int
+    hidden: int
 
 
 class Constants(Protocol):
@@ -25,8 +51,33 @@ class Constants(Protocol):
         """Return those of some of the points."""
 
 
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Points as they are: for fields that precompute nothing, and for points that come once."""
+
+    points: Float[Tensor, "n 3"]
+
+    def to(self, device: torch.device) -> Places:
+        """Return them on a device."""
+        return Places(self.points.to(device))
+
+    def kept(self, samples: Bool[Tensor, " n"]) -> Places:
+        """Return some of them."""
+        return Places(self.points[samples])
+
+
 class Field(nn.Module, ABC):
-    """Density per world unit and RGB in [0, 1] anywhere in a box; colour has no highlights."""
+    """Density per world unit and RGB in [0, 1] anywhere in a box.
+
+    Colour does not depend on the viewing direction: a drawing has no highlights that move.
+    """
+
+    decoder_rate = 0.02  # Adam's, for everything that is no table
+
+    def __init__(self, spec: FieldSpec) -> None:
+        """Remember what the field is built from."""
+        super().__init__()
+        self.spec = spec
 
     @abstractmethod
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Constants:
@@ -34,7 +85,7 @@ class Field(nn.Module, ABC):
 
     @abstractmethod
     def shade(self, constants: Constants) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:
-        """Return density and colour, differentiable in the parameters."""
+        """Return density and colour, differentiable in the parameters; any field takes `Places`."""
 
     @abstractmethod
     def forward(
@@ -49,3 +100,10 @@ class Field(nn.Module, ABC):
     def roughness(self) -> Float[Tensor, ""]:
         """Return the mean absolute step between neighbours in the tables, 0 without tables."""
         return torch.zeros(())
+
+
+def shape_of(box: Box, resolution: int) -> tuple[float, tuple[int, ...]]:
+    """Return the edge of a cell and how many corners there are along x, y, z."""
+    cell = float(box.size.max()) / resolution
+    # Values sit on the cells' corners, hence one more than cells.
+    return cell, tuple(int(n) + 1 for n in np.ceil(box.size / cell - 1e-6))

@@ -22,18 +22,22 @@ def photometric(
     opacity: Float[Tensor, " rays"],
     drawn: Float[Tensor, "rays 3"],
     alpha: Float[Tensor, " rays"],
+    backdrop: float = BACKDROP,
+    opacity_weight: float = OPACITY_WEIGHT,
 ) -> Float[Tensor, ""]:
-    """Return the squared error of colours over grey, plus that of opacity.
+    """Return the squared error of colours over a grey, plus that of opacity.
 
     Args:
         color: rendered, premultiplied.
         opacity: rendered.
         drawn: straight colour of the drawing.
         alpha: coverage of the drawing.
+        backdrop: the grey, 0 to 1.
+        opacity_weight: of the error of opacity; 0: pictures alone.
     """
     missing = alpha - opacity
-    error = color - alpha[:, None] * drawn + missing[:, None] * BACKDROP
-    return error.square().sum(dim=-1).mean() + OPACITY_WEIGHT * missing.square().mean()
+    error = color - alpha[:, None] * drawn + missing[:, None] * backdrop
+    return error.square().sum(dim=-1).mean() + opacity_weight * missing.square().mean()
 
 
 def straight(

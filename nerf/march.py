@@ -133,7 +133,7 @@ def _march_chunk(
     rays: Rays, part: slice, hull: Hull, step: float, level: float
 ) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"], Float[Tensor, "n 3"], Float[Tensor, " n"]]:
     rays = rays.at(part)
-    near, far = _clip(rays, hull)
+    near, far = clip(rays, hull)
     stride = max(1, int(BLOCK * hull.voxel / step + 1e-6))  # steps that stay next to one block
     strides = ((far - near) / (stride * step)).ceil().clamp_min(0).long()
     ray = torch.repeat_interleave(torch.arange(len(near)), strides)
@@ -160,7 +160,7 @@ def _points(
     return origins.addcmul_(directions, distance[:, None])
 
 
-def _clip(rays: Rays, hull: Hull) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"]]:
+def clip(rays: Rays, hull: Hull) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"]]:
     """Return where the rays enter and leave the hull's box (far < near: they miss it)."""
     low, high = (torch.as_tensor(c, dtype=torch.float32) for c in (hull.box.low, hull.box.high))
     parallel = rays.directions.abs() < 1e-9

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+FieldName = Literal["triplane", "mlp", "voxel", "hull"]
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,10 @@ class TrainOptions:
         smoothness: weight of the planes' total variation at eight views; fewer views get more.
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
+        field: what is fitted: planes with a small decoder; or, to compare with, a network alone, a
+            grid of voxels, or the hull with the drawings' colours (nothing is fitted then).
+        carve: sample inside the drawings' visual hull; False: along the whole rays through the
+            figure's box, at new places in every step, against pictures over white.
     """
 
     steps: int = 300
@@ -30,3 +37,5 @@ class TrainOptions:
     smoothness: float = 1e-3
     palette_weight: float = 0.01
     missing_views: int | None = None
+    field: FieldName = "triplane"
+    carve: bool = True

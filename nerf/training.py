@@ -9,6 +9,7 @@ ray and their interpolation weights. A step is two sparse products, a small deco
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -18,9 +19,14 @@ from toonset.errors import BundleError, SetupError
 from toonset.nerf import losses
 from toonset.nerf.batches import make_batches
 from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.field import TriplaneField
+from toonset.nerf.evidence import HullEvidence
+from toonset.nerf.field_box import BINS, BoxRays, open_box, without_empty_space
+from toonset.nerf.field_hull import paint
+from toonset.nerf.field_kinds import build_field
 from toonset.nerf.field_loss import Model, Weights
-from toonset.nerf.field_rays import FixedRays
+from toonset.nerf.field_rays import FixedRays, TrainingRays
+from toonset.nerf.field_voxel import VoxelField
+from toonset.nerf.fields import FieldSpec
 from toonset.nerf.fitting import Progress, Watch, fit
 from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
@@ -31,6 +37,8 @@ CHANNELS, HIDDEN = 16, 32
 CELLS_PER_PX, CELLS = 0.75, (48, 160)
 STEPS_ALONG = 160  # samples that the longest side of the hull would take
 MOST_SAMPLES = 24  # per ray, from its first inside the hull
+MLP_LAYERS, MLP_WIDTH = 4, 64
+NO_EVIDENCE = HullEvidence(0, ())
 
 
 def train(
@@ -59,42 +67,79 @@ def train(
     device = device_of(options.device)
     torch.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
-    tell("carving the hull")
-    hull, evidence = hull_of(scene, options)
+    tell("carving the hull" if options.carve else "placing the box")
+    hull, evidence = hull_of(scene, options) if options.carve else (open_box(scene), NO_EVIDENCE)
     clock.append(time.perf_counter())
     tell("laying out the rays")
     start = _untrained(scene, hull, options)
-    batches = make_batches(scene, hull, start.field, start.step, start.samples, generator)
-    if not batches:
-        raise BundleError(f"{scene.name}: no drawn pixel meets the hull; the cameras are wrong")
+    if options.field == "hull":
+        assert isinstance(start.field, VoxelField)
+        paint(start.field, hull, scene)
+        options = replace(options, steps=0)
+    rays, counts = _rays(scene, start, options, generator, device)
     clock.append(time.perf_counter())
-    smoothness = losses.smoothness_weight(options.smoothness, len(scene.frames))
-    weights = Weights(options.palette_weight, smoothness)
     model = Model(start.field, start.classifier).to(device)
-    moved = [batch.to(device) for batch in batches]
     begin = watch.begin(start) if watch else None
-    history, stopped = fit(model, FixedRays(moved), weights, options, generator, watch, begin)
+    weights = _weights(options, len(scene.frames))
+    history, stopped = fit(model, rays, weights, options, generator, watch, begin)
     model.to("cpu")
+    if not options.carve:
+        start = replace(start, hull=without_empty_space(hull, start.field))
     hull_s, rays_s = np.diff(clock).tolist()
     steps_s = history[-1].seconds if history else 0.0  # without what the watch has taken
     seconds = {"hull": hull_s, "rays": rays_s, "steps": steps_s}
-    counts = {
+    counts |= {
         "views": len(scene.frames),
-        "rays": sum(len(batch.rgb) for batch in batches),
-        "samples": sum(len(batch.ray) for batch in batches),
         "parameters": sum(p.numel() for p in model.parameters()),
     }
     return Training(start, options, tuple(history), stopped, evidence, seconds, counts)
 
 
+def _rays(
+    scene: Scene,
+    start: TrainedField,
+    options: TrainOptions,
+    generator: torch.Generator,
+    device: torch.device,
+) -> tuple[TrainingRays, dict[str, int]]:
+    """Return where the steps' batches come from, and how many rays and samples there are."""
+    if not options.carve:
+        box_rays = BoxRays(scene, start.hull, options.seed, generator)
+        return box_rays.to(device), {"rays": box_rays.rays, "samples": box_rays.rays * BINS}
+    batches = make_batches(scene, start.hull, start.field, start.step, start.samples, generator)
+    if not batches:
+        raise BundleError(f"{scene.name}: no drawn pixel meets the hull; the cameras are wrong")
+    counts = {
+        "rays": sum(len(batch.rgb) for batch in batches),
+        "samples": sum(len(batch.ray) for batch in batches),
+    }
+    return FixedRays([batch.to(device) for batch in batches]), counts
+
+
+def _weights(options: TrainOptions, views: int) -> Weights:
+    smoothness = losses.smoothness_weight(options.smoothness, views)
+    if options.carve:
+        return Weights(options.palette_weight, smoothness)
+    return Weights(options.palette_weight, smoothness, backdrop=1.0, opacity=0.0)
+
+
 def _untrained(scene: Scene, hull: Hull, options: TrainOptions) -> TrainedField:
-    cells = options.resolution or per_px(scene, CELLS_PER_PX, CELLS)
-    field = TriplaneField(hull.box, cells, CHANNELS, HIDDEN)
     colors = scene.palette
     classifier = None if colors is None else PaletteClassifier(len(colors))
-    step = float(hull.box.size.max()) / STEPS_ALONG
+    field = build_field(_spec(scene, options), hull.box)
+    along, most = (STEPS_ALONG, MOST_SAMPLES) if options.carve else (BINS, 2 * BINS)
+    step = float(hull.box.size.max()) / along
     k, size_px = _typical_camera(scene, hull)
-    return TrainedField(field, hull, step, MOST_SAMPLES, classifier, colors, k, size_px)
+    return TrainedField(field, hull, step, most, classifier, colors, k, size_px)
+
+
+def _spec(scene: Scene, options: TrainOptions) -> FieldSpec:
+    cells = options.resolution or per_px(scene, CELLS_PER_PX, CELLS)
+    if options.field == "mlp":
+        return FieldSpec("mlp", 1, MLP_LAYERS, MLP_WIDTH)
+    if options.field == "triplane":
+        return FieldSpec("triplane", cells, CHANNELS, HIDDEN)
+    return FieldSpec("voxel", cells, 4, 0)
 
 
 def _typical_camera(scene: Scene, hull: Hull) -> tuple[float, int]:

@@ -1,0 +1,133 @@
+"""Classic volume rendering without a hull: stratified samples along the rays through a box.
+
+Every step draws its samples anew, one per bin of equal length, so nothing can be computed before.
+Source: Mildenhall et al., "NeRF", 2020, equations 2 and 3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from toonset.dataset.scene import Scene
+from toonset.nerf.batches import Batch
+from toonset.nerf.bounds import Box, box_of_masks
+from toonset.nerf.field_loss import Model
+from toonset.nerf.fields import Field, Places
+from toonset.nerf.hull import Hull
+from toonset.nerf.march import Rays, clip, rays_of
+from toonset.palette.labels import UNLABELLED
+
+OPAQUE = 128  # alpha from which a pixel belongs to the figure
+VOXELS = 96  # of the box, in the map of empty space that rendering skips
+BINS = 96  # along a ray through the box
+RAYS_PER_STEP = 1024
+EMPTY_BELOW = 0.01  # opacity of a voxel that rendering skips
+POINTS_PER_CHUNK = 1 << 16
+
+
+class BoxRays:
+    """The rays of all pixels that meet the box, background too."""
+
+    def __init__(self, scene: Scene, hull: Hull, seed: int, generator: torch.Generator) -> None:
+        """Lay out the rays in an order drawn by `generator`; `seed` draws the samples."""
+        rays, rgb, alpha, labels = _pixels(scene, hull)
+        near, far = clip(rays, hull)
+        meets = (far > near).nonzero()[:, 0]
+        order = meets[torch.randperm(len(meets), generator=generator)]
+        self._rays, self._near, self._far = rays.at(order), near[order], far[order]
+        self._rgb, self._alpha, self._labels = rgb[order], alpha[order], labels[order]
+        self._seed = seed
+        self._device = torch.device("cpu")
+
+    def __len__(self) -> int:
+        """Return how many batches go through all rays once."""
+        return max(1, len(self._near) // RAYS_PER_STEP)
+
+    @property
+    def rays(self) -> int:
+        """Return how many rays there are."""
+        return len(self._near)
+
+    def to(self, device: torch.device) -> BoxRays:
+        """Let batches come on a device."""
+        self._device = device
+        return self
+
+    def batch(self, index: int, step: int) -> Batch:
+        """Return a batch with this step's samples."""
+        part = torch.arange(index, self.rays, len(self))
+        generator = torch.Generator().manual_seed((self._seed << 32) + step)
+        shift = torch.rand(len(part), BINS, generator=generator)
+        near, far = self._near[part, None], self._far[part, None]
+        distance = near + (far - near) / BINS * (torch.arange(BINS) + shift)
+        rays = self._rays.at(part)
+        points = rays.origins[:, None] + rays.directions[:, None] * distance[..., None]
+        length = torch.cat([distance, far], dim=1).diff(dim=1)
+        return Batch(
+            Places(points.reshape(-1, 3)),
+            torch.arange(len(part)).repeat_interleave(BINS),
+            length.reshape(-1),
+            self._rgb[part],
+            self._alpha[part],
+            self._labels[part],
+        ).to(self._device)
+
+    def after(self, step: int, model: Model) -> None:
+        """Take note of nothing: samples are drawn anew for every step."""
+
+    def state(self) -> dict[str, Tensor]:
+        """Return nothing: a step's samples depend on its number alone."""
+        return {}
+
+    def restore(self, state: dict[str, Tensor]) -> None:
+        """Take back nothing."""
+
+
+def open_box(scene: Scene) -> Hull:
+    """Return the box round the figure, full everywhere: no silhouette is carved."""
+    frames = [f for f in scene.frames if (f.rgba[..., 3] >= OPAQUE).any()]
+    masks = [frame.rgba[..., 3] >= OPAQUE for frame in frames]
+    return full_hull(box_of_masks([frame.camera for frame in frames], masks))
+
+
+def full_hull(box: Box) -> Hull:
+    """Return a hull that fills a cube."""
+    return Hull(box.low, float(box.size.max()) / VOXELS, torch.ones(VOXELS, VOXELS, VOXELS))
+
+
+@torch.no_grad()
+def without_empty_space(hull: Hull, field: Field) -> Hull:
+    """Return the hull with the voxels emptied in and round which the field shows nothing."""
+    counts = hull.support.shape
+    centres = [(torch.arange(n) + 0.5) * hull.voxel for n in counts]
+    points = torch.cartesian_prod(*centres) + torch.as_tensor(hull.low, dtype=torch.float32)
+    density = torch.cat([field(part)[0] for part in points.split(POINTS_PER_CHUNK)])
+    filled = (1 - torch.exp(-density * hull.voxel) >= EMPTY_BELOW).view(1, 1, *counts).float()
+    grown = F.max_pool3d(filled, 3, stride=1, padding=1)[0, 0]
+    return Hull(hull.low, hull.voxel, grown)
+
+
+def _pixels(
+    scene: Scene, hull: Hull
+) -> tuple[Rays, Float[Tensor, "n 3"], Float[Tensor, " n"], Int[Tensor, " n"]]:
+    rays, rgba, labels = [], [], []
+    for frame in scene.frames:
+        rays.append(rays_of(frame.camera, frame.camera.pixel_grid().reshape(-1, 2), hull))
+        rgba.append(torch.as_tensor(frame.rgba.reshape(-1, 4) / np.float32(255)))
+        labels.append(torch.as_tensor(nearest_labels(frame.rgba, scene.palette)))
+    parts = ([getattr(r, name) for r in rays] for name in ("origins", "directions", "start"))
+    colors = torch.cat(rgba)
+    return Rays(*map(torch.cat, parts)), colors[:, :3], colors[:, 3], torch.cat(labels)
+
+
+def nearest_labels(rgba: np.ndarray, palette: np.ndarray | None) -> Int[np.ndarray, " pixels"]:
+    """Return the nearest palette colour by L2 in RGB of every pixel of the figure, row by row."""
+    pixels = rgba.reshape(-1, 4).astype(np.int64)
+    if palette is None:
+        return np.full(len(pixels), UNLABELLED)
+    distances = [np.square(pixels[:, :3] - color).sum(axis=1) for color in palette.astype(np.int64)]
+    return np.where(pixels[:, 3] >= OPAQUE, np.argmin(distances, axis=0), UNLABELLED)

@@ -1,0 +1,19 @@
+"""Named sets of training options."""
+
+from __future__ import annotations
+
+from toonset.nerf.options import TrainOptions
+
+PAPER_STEPS = 2000
+
+
+def paper(steps: int = PAPER_STEPS) -> TrainOptions:
+    """Return the plain method: triplane, small decoder, classic volume rendering, classifier.
+
+    Three planes with summed bilinear features; a decoder to density and colour; stratified samples
+    along the whole rays through the figure's box, drawn anew in every step; pictures over white; a
+    classifier of one hidden layer on the rendered colour, whose labels are the nearest palette
+    colours. No silhouette is used but to place the box, and nothing is smoothed. A step takes 1,024
+    rays of 96 samples, so that 2,000 steps end within six minutes on two cores.
+    """
+    return TrainOptions(steps=steps, carve=False, smoothness=0.0)
