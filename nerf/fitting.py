@@ -1,146 +1,212 @@
-"""The training loop: Adam over precomputed batches."""
+"""The training loop: Adam over batches of rays."""
 
 from __future__ import annotations
 
-import copy
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Protocol
 
 import torch
-from jaxtyping import Float
-from torch import Tensor, nn
+from torch import Tensor
 
-from toonset.nerf import losses
-from toonset.nerf.batches import Batch
-from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.field import TriplaneField
+from toonset.nerf.adam import Adam, Group
+from toonset.nerf.checkpoint_good import LastGood
+from toonset.nerf.checkpoint_state import FitState
+from toonset.nerf.field_loss import Model, Weights, loss_terms
+from toonset.nerf.field_rays import TrainingRays
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.rendering import compositing_weights
-from toonset.nerf.trained import Step
+from toonset.nerf.trained import Step, TrainedField
 
-PLANES_RATE, DECODER_RATE = 0.2, 0.02  # Adam
+TABLES_RATE = 0.2
 BETAS = (0.9, 0.99)  # a few hundred steps are too few for a memory of a thousand
 LAST_RATE = 0.1  # of the first: exponential decay over the training
-SNAPSHOT_EVERY = 20  # steps between kept good states
+HALF_FROM = 4096  # values: tables of this size and more are stored in half precision
 
 Progress = Callable[[str], None]
 
 
-class Model(nn.Module):
-    """The parameters of a training: field and, with a palette, classifier."""
-
-    def __init__(self, field: TriplaneField, classifier: PaletteClassifier | None) -> None:
-        """Hold both."""
-        super().__init__()
-        self.field = field
-        self.classifier = classifier
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Weights of the loss's terms, and what a step needs to know about sampling.
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A training just after a step.
 
     Attributes:
-        palette: of the cross-entropy.
-        smoothness: of the planes' total variation.
-        step: distance of samples, world units.
-        most: samples per ray.
+        history: every step so far.
+        progress: how much of the training is over, 0 to 1.
+        state: returns a copy of everything that the rest depends on.
     """
 
-    palette: float
-    smoothness: float
-    step: float
-    most: int
+    history: list[Step]
+    progress: float
+    state: Callable[[], FitState]
+
+
+class Watch(Protocol):
+    """What looks on while a field is fitted; the seconds it takes are not the training's."""
+
+    def begin(self, trained: TrainedField) -> FitState | None:
+        """Take the field that will be fitted; return the state to go on from, if any."""
+
+    def look(self, moment: Moment) -> str:
+        """Look at a training after each step; return why it should end, or nothing."""
 
 
 def fit(
     model: Model,
-    batches: list[Batch],
+    rays: TrainingRays,
     weights: Weights,
     options: TrainOptions,
     generator: torch.Generator,
-    tell: Progress,
+    watch: Watch | None = None,
+    start: FitState | None = None,
 ) -> tuple[list[Step], str]:
     """Fit `model` in place; return the history and why it ended.
 
-    A loss that is not finite ends the training with the last state known to be good.
+    A training that goes wrong ends with the last state known to be good (see `LastGood`). The model
+    ends as run folders store it: large tables in half precision.
+
+    Args:
+        model: parameters to fit.
+        rays: where batches come from.
+        weights: of the loss's terms.
+        options: steps and budget.
+        generator: shuffles the batches.
+        watch: looks on after every step, and may end the training.
+        start: go on from here; None: from the model as it is.
     """
-    optimizer = _optimizer(model)
-    good, good_step = copy.deepcopy(model.state_dict()), 0
-    history: list[Step] = []
-    queue: list[int] = []
-    began = time.perf_counter()
-    for number in range(options.steps):
-        spent = time.perf_counter() - began
-        if options.budget_s is not None and spent >= options.budget_s and number:
-            return history, "budget"
-        _set_rates(optimizer, _progress(number, spent, options))
-        queue = queue or torch.randperm(len(batches), generator=generator).tolist()
-        terms = loss_terms(model, batches[queue.pop()], weights)
+    loop = _Loop(model, rays, weights, options, generator)
+    if start is not None:
+        loop.restore(start)
+    good = LastGood(model, [step.loss for step in loop.history])
+    stopped = "steps"
+    while len(loop.history) < options.steps:
+        if loop.out_of_time():
+            stopped = "budget"
+            break
+        if wrong := loop.step(good):
+            return loop.history, wrong
+        if watch is not None:
+            with loop.clock.stopped():
+                stopped = watch.look(Moment(loop.history, loop.progress(), loop.state))
+            if stopped:
+                break
+            stopped = "steps"
+    wrong = good.wrong_at_end(len(loop.history))
+    store_in_half(model)
+    return loop.history, wrong or stopped
+
+
+@torch.no_grad()
+def store_in_half(model: Model) -> None:
+    """Round large tables to half precision: run folders hold them so."""
+    most = torch.finfo(torch.float16).max
+    for values in model.parameters():
+        if values.numel() >= HALF_FROM:
+            values.copy_(values.clamp(-most, most).half())
+
+
+class _Clock:
+    """Seconds that run on, except while stopped."""
+
+    def __init__(self) -> None:
+        self.began = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        return time.perf_counter() - self.began
+
+    @contextmanager
+    def stopped(self) -> Iterator[None]:
+        paused = time.perf_counter()
+        yield
+        self.began += time.perf_counter() - paused
+
+
+class _Loop:
+    """The state of a training, and its one step."""
+
+    def __init__(
+        self,
+        model: Model,
+        rays: TrainingRays,
+        weights: Weights,
+        options: TrainOptions,
+        generator: torch.Generator,
+    ) -> None:
+        self._model, self._rays, self._weights = model, rays, weights
+        self._options, self._generator = options, generator
+        tables = {id(values) for values in model.field.tables()}
+        named = sorted(model.named_parameters(), key=lambda pair: id(pair[1]) not in tables)
+        self._parameters = dict(named)  # tables first, as in the groups
+        values = list(self._parameters.values())
+        fast = Group(values[: len(tables)], TABLES_RATE)
+        slow = Group(values[len(tables) :], model.field.decoder_rate)
+        self._adam = Adam([fast, slow], BETAS)
+        self._queue: list[int] = []
+        self.history: list[Step] = []
+        self.clock = _Clock()
+
+    def out_of_time(self) -> bool:
+        """Return whether the budget is spent; one step is always taken."""
+        budget = self._options.budget_s
+        return budget is not None and bool(self.history) and self.clock.seconds >= budget
+
+    def progress(self) -> float:
+        """Return how much of the training is over, by steps or by the clock if that is further."""
+        budget = self._options.budget_s
+        by_clock = 0.0 if budget is None else self.clock.seconds / budget
+        return max(len(self.history) / self._options.steps, min(by_clock, 1.0))
+
+    def step(self, good: LastGood) -> str:
+        """Take a step, unless something is wrong: then return what."""
+        number, rate = len(self.history), LAST_RATE ** self.progress()
+        if not self._queue:
+            order = torch.randperm(len(self._rays), generator=self._generator)
+            self._queue = order.tolist()
+        batch = self._rays.batch(self._queue.pop(), number)
+        terms = loss_terms(self._model, batch, self._weights)
         loss = torch.stack(terms).sum()
-        if not losses.is_finite(loss):
-            model.load_state_dict(good)
-            return history, f"loss not finite at step {number}, kept the state of step {good_step}"
-        # The loss before this update was finite, so the state that gave it is good.
-        if number % SNAPSHOT_EVERY == 0:
-            good, good_step = copy.deepcopy(model.state_dict()), number
-        optimizer.zero_grad(set_to_none=True)
+        # one transfer from the device for all of them
+        value, photometric, entropy = torch.stack([loss, *terms[:2]]).detach().tolist()
+        if wrong := good.wrong(loss, value, number):
+            return wrong
         loss.backward()
-        optimizer.step()
-        photometric, cross_entropy = float(terms[0].detach()), float(terms[1].detach())
-        history.append(Step(number, float(loss.detach()), photometric, cross_entropy, spent))
-        tell(f"training: step {number + 1} of {options.steps}, loss {history[-1].loss:.4f}")
-    if not all(bool(torch.isfinite(p).all()) for p in model.parameters()):
-        model.load_state_dict(good)
-        return history, f"parameters not finite at the end, kept the state of step {good_step}"
-    return history, "steps"
+        self._adam.step(rate)
+        self._rays.after(number, self._model)
+        self.history.append(Step(number, value, photometric, entropy, self.clock.seconds))
+        return ""
+
+    def state(self) -> FitState:
+        """Return a copy of everything that the rest of the training depends on."""
+        return FitState(
+            tuple(self.history),
+            *(_copied(group) for group in self._groups()),
+            tuple(self._queue),
+            self._generator.get_state(),
+            torch.get_rng_state(),
+            _copied(self._rays.state()),
+        )
+
+    @torch.no_grad()
+    def restore(self, start: FitState) -> None:
+        """Become what `state` was taken from."""
+        given = (start.parameters, start.means, start.squares)
+        for group, values in zip(self._groups(), given, strict=True):
+            for name, tensor in group.items():
+                tensor.copy_(values[name])
+        self.history, self._queue = list(start.history), list(start.queue)
+        self._adam.count = start.steps
+        self._generator.set_state(start.generator)
+        torch.set_rng_state(start.torch_generator)
+        self._rays.restore(start.rays)
+        self.clock.began -= start.seconds
+
+    def _groups(self) -> tuple[dict[str, Tensor], dict[str, Tensor], dict[str, Tensor]]:
+        names, adam = list(self._parameters), self._adam
+        moments = (dict(zip(names, some, strict=True)) for some in (adam.first, adam.second))
+        return self._parameters, *moments
 
 
-def loss_terms(
-    model: Model, batch: Batch, weights: Weights
-) -> tuple[Float[Tensor, ""], Float[Tensor, ""], Float[Tensor, ""]]:
-    """Return the weighted photometric, cross-entropy and smoothness terms of a batch."""
-    color, opacity = render_batch(model.field, batch, weights.step, weights.most)
-    photometric = losses.photometric(color, opacity, batch.rgb, batch.alpha)
-    entropy = photometric.new_zeros(())
-    if model.classifier is not None:
-        logits = model.classifier(losses.straight(color, opacity))
-        entropy = weights.palette * losses.cross_entropy(logits, batch.labels)
-    smooth = weights.smoothness * losses.total_variation(model.field.plane_images())
-    return photometric, entropy, smooth
-
-
-def render_batch(
-    field: TriplaneField, batch: Batch, step: float, most: int
-) -> tuple[Float[Tensor, "rays 3"], Float[Tensor, " rays"]]:
-    """Return premultiplied colour and opacity of a batch's rays."""
-    density, rgb = field.decode(batch.operator(field.planes))
-    rays = len(batch.rgb)
-    optical = density * batch.occupancy * step
-    depth = density.new_zeros(rays * most).index_copy(0, batch.slots, optical)
-    weights = compositing_weights(depth.view(rays, most))
-    weighted = weights.reshape(-1)[batch.slots, None] * rgb
-    color = rgb.new_zeros(rays * most, 3).index_copy(0, batch.slots, weighted)
-    return color.view(rays, most, 3).sum(dim=1), weights.sum(dim=1)
-
-
-def _optimizer(model: Model) -> torch.optim.Adam:
-    planes = model.field.planes
-    rest = [p for p in model.parameters() if p is not planes]
-    groups = [
-        {"params": [planes], "lr": PLANES_RATE, "first_rate": PLANES_RATE},
-        {"params": rest, "lr": DECODER_RATE, "first_rate": DECODER_RATE},
-    ]
-    return torch.optim.Adam(groups, betas=BETAS, fused=True)
-
-
-def _progress(number: int, spent: float, options: TrainOptions) -> float:
-    """Return how much of the training is over, by steps or by the clock, whichever is further."""
-    by_clock = 0.0 if options.budget_s is None else spent / options.budget_s
-    return max(number / options.steps, min(by_clock, 1.0))
-
-
-def _set_rates(optimizer: torch.optim.Adam, progress: float) -> None:
-    for group in optimizer.param_groups:
-        group["lr"] = group["first_rate"] * LAST_RATE**progress
+def _copied(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    return {name: values.detach().cpu().clone() for name, values in tensors.items()}

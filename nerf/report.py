@@ -1,8 +1,9 @@
-"""The files beside a trained field: metrics.json, history.csv, preview.png."""
+"""The files of a run: the field, and beside it metrics.json, history.csv and preview.png."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,17 +16,73 @@ from toonset.dataset.picture import encode_png
 from toonset.dataset.scene import Scene
 from toonset.files import write_bytes, write_json
 from toonset.nerf.layers import color_picture
+from toonset.nerf.manifest import write_manifest
 from toonset.nerf.metrics import compare, over_white
 from toonset.nerf.run_folder import write_field
-from toonset.nerf.trained import Step, TrainedField, Training
+from toonset.nerf.trained import HeldOut, Step, TrainedField, Training
 from toonset.nerf.turntable import turntable
 from toonset.nerf.views import render
 
 PREVIEW_VIEWS, PREVIEW_ELEVATION = 4, math.radians(10)
 
 
-def write_run(folder: Path, training: Training, scene: Scene) -> dict[str, Any]:
-    """Write all files of a run into an existing folder; return the content of metrics.json."""
+def write_run(
+    folder: Path,
+    training: Training,
+    scene: Scene,
+    test: Scene | None = None,
+    held_out: Sequence[HeldOut] = (),
+) -> dict[str, Any]:
+    """Write all files of a run into an existing folder; return the content of metrics.json.
+
+    Args:
+        folder: where to.
+        training: what to write.
+        scene: what was trained on.
+        test: held-out views, compared whole; None: none.
+        held_out: what was seen of them on the way.
+    """
+    metrics = {
+        **_course(training, held_out),
+        "train": compared(training.result, scene),
+        "test": None if test is None else compared(training.result, test),
+    }
+    write_bytes(folder / "preview.png", encode_png(preview(training.result)))
+    _write_files(folder, training, scene, metrics)
+    return metrics
+
+
+def write_unfinished(
+    folder: Path, training: Training, scene: Scene, held_out: Sequence[HeldOut] = ()
+) -> None:
+    """Write a field as far as it has come, without rendering it: it can be looked at and moved."""
+    _write_files(folder, training, scene, {**_course(training, held_out), "train": None})
+
+
+def compared(trained: TrainedField, scene: Scene) -> dict[str, float | None]:
+    """Return the mean figures of the field's renderings beside a scene's pictures."""
+    rows = []
+    for frame in scene.frames:
+        view = render(trained, frame.camera)
+        rows.append(compare(color_picture(view.rgb, view.alpha), frame.rgba))
+    return means(rows)
+
+
+def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
+    """Return how training went: its end, hull evidence, seconds, counts."""
+    last = training.history[-1] if training.history else None
+    return {
+        "stopped": training.stopped,
+        "steps": len(training.history),
+        "loss": None if last is None else last.loss,
+        "held_out": [asdict(seen) for seen in held_out],
+        "hull": asdict(training.evidence),
+        "counts": training.counts,
+        "seconds": {k: round(v, 3) for k, v in training.seconds.items()},
+    }
+
+
+def _write_files(folder: Path, training: Training, scene: Scene, metrics: dict[str, Any]) -> None:
     about = {
         "options": asdict(training.options),
         "scene": {"views": [frame.name for frame in scene.frames]},
@@ -33,30 +90,9 @@ def write_run(folder: Path, training: Training, scene: Scene) -> dict[str, Any]:
         "threads": torch.get_num_threads(),
     }
     write_json(folder / "config.json", write_field(folder, training.result, about))
-    metrics = metrics_of(training, scene)
     write_json(folder / "metrics.json", metrics)
     write_bytes(folder / "history.csv", _csv(training.history).encode())
-    write_bytes(folder / "preview.png", encode_png(preview(training.result)))
-    return metrics
-
-
-def metrics_of(training: Training, scene: Scene) -> dict[str, Any]:
-    """Return how training went: fit to the training views, hull evidence, seconds, counts."""
-    result = training.result
-    rows = []
-    for frame in scene.frames:
-        view = render(result, frame.camera)
-        rows.append(compare(color_picture(view.rgb, view.alpha), frame.rgba))
-    last = training.history[-1] if training.history else None
-    return {
-        "stopped": training.stopped,
-        "steps": len(training.history),
-        "loss": None if last is None else last.loss,
-        "train": means(rows),
-        "hull": asdict(training.evidence),
-        "counts": training.counts,
-        "seconds": {k: round(v, 3) for k, v in training.seconds.items()},
-    }
+    write_manifest(folder)
 
 
 def means(rows: list[dict[str, float | None]]) -> dict[str, float | None]:

@@ -1,18 +1,20 @@
 """A trained run on disk, and back.
 
-    model.safetensors   parameters of field and classifier, the hull as bytes
+    model.safetensors   parameters of field and classifier, and the hull
     config.json         what is needed to build them, and the resolved options
     metrics.json        how training went
     history.csv         every step's losses
     preview.png         four views of the result
+    manifest.json       the SHA-256 of them all
 
-Nothing is pickled. Loading checks every name, shape, type and value before use.
+Nothing is pickled, and no file names a place: a run folder may be moved. Loading checks every name,
+shape, type and value before use, then that the files are those that were written.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -25,11 +27,15 @@ from toonset.dataset.json_file import read_json, validation_reason
 from toonset.errors import BundleError
 from toonset.files import write_bytes
 from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.field import TriplaneField
+from toonset.nerf.field_kinds import build_field
+from toonset.nerf.fields import FieldSpec
 from toonset.nerf.hull import Hull
+from toonset.nerf.manifest import check_manifest
+from toonset.nerf.run_folder_tensors import packed, unpack
 from toonset.nerf.trained import TrainedField
 
-FORMAT = 1
+CONFIG, MODEL = "config.json", "model.safetensors"
+FORMAT = 2
 MOST_CELLS = 512  # along one side, of planes and hull alike
 MAX_MODEL_BYTES = 512 * 2**20
 
@@ -38,9 +44,10 @@ class FieldRecord(BaseModel):
     """What builds a `TrainedField` around the tensors of model.safetensors."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    kind: Literal["triplane", "mlp", "voxel"]
     resolution: int = Field(ge=1, le=MOST_CELLS)
     channels: int = Field(ge=1, le=256)
-    hidden: int = Field(ge=1, le=1024)
+    hidden: int = Field(ge=0, le=1024)
     hull_low: tuple[float, float, float]
     hull_voxel: float = Field(gt=0, le=1e9)
     hull_shape: tuple[int, int, int]
@@ -51,16 +58,17 @@ class FieldRecord(BaseModel):
     size_px: int = Field(ge=1, le=16384)
 
     @classmethod
-    def of(cls, trained: TrainedField, resolution: int) -> FieldRecord:
+    def of(cls, trained: TrainedField) -> FieldRecord:
         """Return the record of a field."""
-        field = trained.field
+        spec = trained.field.spec
         low = trained.hull.low.tolist()
         shape = tuple(trained.hull.support.shape)
         palette = None if trained.palette is None else [tuple(c) for c in trained.palette.tolist()]
         return cls(
-            resolution=resolution,
-            channels=field.hidden.in_features,
-            hidden=field.hidden.out_features,
+            kind=spec.kind,
+            resolution=spec.resolution,
+            channels=spec.channels,
+            hidden=spec.hidden,
             hull_low=(low[0], low[1], low[2]),
             hull_voxel=trained.hull.voxel,
             hull_shape=(shape[0], shape[1], shape[2]),
@@ -86,8 +94,8 @@ def write_field(folder: Path, trained: TrainedField, about: dict[str, Any]) -> d
         trained: the field.
         about: further entries of config.json (options, versions).
     """
-    record = FieldRecord.of(trained, trained.field.resolution)
-    write_bytes(folder / "model.safetensors", save(_tensors(trained)))
+    record = FieldRecord.of(trained)
+    write_bytes(folder / MODEL, save(packed(trained)))
     return {"format": FORMAT, "field": record.model_dump(mode="json"), **about}
 
 
@@ -97,18 +105,13 @@ def read_field(folder: Path) -> TrainedField:
     Raises:
         BundleError: a file is missing or damaged, or holds what no training writes.
     """
-    config_file, model_file = folder / "config.json", folder / "model.safetensors"
+    config_file, model_file = folder / CONFIG, folder / MODEL
     for file in (config_file, model_file):
         if not file.is_file():
             raise BundleError(f"{file}: does not exist; `toonset train` writes run folders")
-    record = _record(config_file)
-    tensors = _load(model_file)
-    trained = _empty(record)
-    expected = _tensors(trained)
-    _check(model_file, tensors, expected)
-    for name, values in expected.items():
-        values.copy_(tensors[name])
-    trained.hull.support.copy_(tensors["hull"].float() / 255)
+    trained = _empty(_record(config_file))
+    unpack(_load(model_file), trained, str(model_file))
+    check_manifest(folder, (CONFIG, MODEL))
     return trained
 
 
@@ -132,21 +135,13 @@ def _record(file: Path) -> FieldRecord:
 def _empty(record: FieldRecord) -> TrainedField:
     low = np.array(record.hull_low)
     hull = Hull(low, record.hull_voxel, torch.zeros(record.hull_shape))
-    field = TriplaneField(hull.box, record.resolution, record.channels, record.hidden)
+    spec = FieldSpec(record.kind, record.resolution, record.channels, record.hidden)
+    field = build_field(spec, hull.box)
     palette = None if record.palette is None else np.array(record.palette, dtype=np.uint8)
     classifier = None if palette is None else PaletteClassifier(len(palette))
     return TrainedField(
         field, hull, record.step, record.samples, classifier, palette, record.k, record.size_px
     )
-
-
-def _tensors(trained: TrainedField) -> dict[str, Tensor]:
-    result = {f"field.{k}": v.detach() for k, v in trained.field.named_parameters()}
-    if trained.classifier is not None:
-        named = trained.classifier.named_parameters()
-        result |= {f"classifier.{k}": v.detach() for k, v in named}
-    result["hull"] = (trained.hull.support * 255).round().to(torch.uint8)
-    return result
 
 
 def _load(file: Path) -> dict[str, Tensor]:
@@ -158,18 +153,3 @@ def _load(file: Path) -> dict[str, Tensor]:
         raise BundleError(f"{file}: cannot be read ({error.strerror})") from error
     except (SafetensorError, ValueError, KeyError) as error:
         raise BundleError(f"{file}: is damaged ({error}); train again") from error
-
-
-def _check(file: Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
-    if found.keys() != expected.keys():
-        odd = ", ".join(sorted(found.keys() ^ expected.keys()))
-        raise BundleError(f"{file}: tensors missing or unknown: {odd}; train again")
-    for name, tensor in found.items():
-        want = expected[name]
-        if tensor.shape != want.shape or tensor.dtype != want.dtype:
-            raise BundleError(
-                f"{file}: {name} is {tuple(tensor.shape)} {tensor.dtype}, config.json asks for "
-                f"{tuple(want.shape)} {want.dtype}; train again"
-            )
-        if not bool(torch.isfinite(tensor).all()):
-            raise BundleError(f"{file}: {name} holds values that are not finite; train again")

@@ -41,13 +41,31 @@ class TrainedField:
 
 @dataclass(frozen=True)
 class Step:
-    """One line of the training history: losses are means over the step's rays."""
+    """One line of the training history: losses are means over the step's rays.
+
+    `seconds` of training had passed when the step was done.
+    """
 
     step: int
     loss: float
     photometric: float
     cross_entropy: float
     seconds: float
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Held-out views, looked at in between: a sample of them, so a little off the final figure.
+
+    Attributes:
+        step: steps done.
+        seconds: of training.
+        psnr: over white, mean of the views, dB.
+    """
+
+    step: int
+    seconds: float
+    psnr: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +76,7 @@ class Training:
         result: the field.
         options: as given.
         history: every step.
-        stopped: why it ended: "steps", "budget", or what went wrong at which step.
+        stopped: why it ended: "steps", "budget", "interrupted", or what went wrong at which step.
         evidence: for the hull's tolerance.
         seconds: of every part.
         counts: views, rays, samples, parameters.

@@ -1,0 +1,31 @@
+"""What `toonset train` says at its end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+
+def summary(run: Path, metrics: dict[str, Any]) -> str:
+    """Return the content of metrics.json for people."""
+    fit, counts, hull = metrics["train"], metrics["counts"], metrics["hull"]
+    seconds = sum(metrics["seconds"].values())
+    tried = ", ".join(f"{100 * iou:.1f} %" for iou in hull["left_out_iou"])
+    evidence = f" (left-out views' outlines met with 0, 1 against: {tried})" if tried else ""
+    return "\n".join(
+        [
+            f"{counts['views']} views, {counts['rays']} rays, {counts['parameters']} parameters; "
+            f"{metrics['steps']} steps in {seconds:.1f} s",
+            f"hull: filled where at most {hull['missing']} views say background{evidence}",
+            f"fit to the drawings: {_figures(fit)}",
+            *([f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []),
+            f"{run}: preview.png shows it; next: toonset render {run} --turntable 36",
+        ]
+    )
+
+
+def _figures(means: dict[str, float | None]) -> str:
+    """Return the figures of some views."""
+    inside = means["psnr_mask"]
+    in_masks = "" if inside is None else f", inside the masks {inside:.2f} dB"
+    return f"PSNR {means['psnr']:.2f} dB{in_masks}"

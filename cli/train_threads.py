@@ -1,0 +1,81 @@
+"""How many CPU threads training uses: as told, or as many as make it faster here and now."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import typer
+
+AUTO = "auto"
+MOST_ASKED = 1024
+MOST = 8  # a step's work is too small for more
+TRIAL_S = 0.05  # per number of threads
+WORTH = 1.15  # how much faster twice the threads must be
+
+
+def checked(text: str) -> str:
+    """Return what was asked for if it is "auto" or a number.
+
+    Raises:
+        typer.BadParameter: it is neither.
+    """
+    number = text.isascii() and text.isdigit() and 1 <= int(text) <= MOST_ASKED
+    if text != AUTO and not number:
+        raise typer.BadParameter(f"{text!r} is neither auto nor a number", param_hint="--threads")
+    return text
+
+
+def threads_of(text: str) -> int:
+    """Return the number of threads that "auto" or a number stands for."""
+    return measured(most_threads()) if text == AUTO else int(text)
+
+
+def most_threads() -> int:
+    """Return how many threads may run at once here."""
+    try:
+        return min(MOST, len(os.sched_getaffinity(0)))
+    except AttributeError:  # not on every system
+        return min(MOST, os.cpu_count() or 1)
+
+
+def measured(most: int) -> int:
+    """Return how many threads do a training step's kind of work fastest; other programs count.
+
+    Numbers are doubled as long as that pays: on a machine that others use, threads wait for each
+    other, and one is faster than two.
+    """
+    import torch
+
+    best, count = 1, 2
+    rate = _rate(1) if most > 1 else 0.0
+    while count <= most:
+        faster = _rate(count)
+        if faster < WORTH * rate:
+            break
+        best, rate, count = count, faster, 2 * count
+    torch.set_num_threads(best)
+    return best
+
+
+def _rate(threads: int) -> float:
+    """Return rounds per second of the lookups and products that a step is made of."""
+    import torch
+    import torch.nn.functional as F
+
+    torch.set_num_threads(threads)
+    generator = torch.Generator().manual_seed(0)
+    rows = torch.randint(0, 16_384, (16_384, 12), generator=generator, dtype=torch.int32)
+    weights = torch.rand(16_384, 12, generator=generator)
+    table, decoder = torch.rand(16_384, 16, generator=generator), torch.ones(16, 32)
+
+    def work() -> None:
+        features = F.embedding_bag(rows, table, per_sample_weights=weights, mode="sum")
+        F.relu(features @ decoder).sum()
+
+    work()  # starts the threads
+    began, rounds = time.perf_counter(), 0
+    while time.perf_counter() - began < TRIAL_S:
+        work()
+        rounds += 1
+    return rounds / (time.perf_counter() - began)
