@@ -28,13 +28,13 @@ def border_doubts(ground: Background, found: Survey) -> tuple[str, ...]:
 def figure_doubts(
     found: Survey, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
 ) -> tuple[str, ...]:
-    """Return a line for every cut, every wide view, and everything left out that may be a view."""
+    """Return a line for every cut in doubt, every wide view, all left out that may be views."""
     return (*_cuts(found), *_wide_views(views), *_like_views(found, views, rgba))
 
 
 def _cuts(found: Survey) -> list[str]:
     said = []
-    for cut in found.cuts:
+    for cut in (cut for cut in found.cuts if cut.in_doubt):
         x, y, width, height = (value * found.cell_px for value in cut.box)
         said.append(
             f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "

@@ -119,7 +119,7 @@ def split_sheet(
         ground.sure,
         border_doubts(ground, found) + (() if by_hand else figure_doubts(found, views, rgba)),
         () if by_hand else _left_out(found),
-        _remarks(ground, found, holes),
+        _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
     )
 
 
@@ -216,7 +216,7 @@ def _left_out(found: Survey) -> tuple[LeftOut, ...]:
     )
 
 
-def _remarks(ground: Background, found: Survey, holes: int) -> tuple[str, ...]:
+def _remarks(ground: Background, found: Survey, holes: int, cuts: int) -> tuple[str, ...]:
     said = [] if ground.kind in ("plain", "transparent") else [str(ground)]
     kinds = found.grouping.kinds
     said += [f"{NAMES[kind]} left out ({kinds.count(kind)})" for kind in NAMES if kind in kinds]
@@ -224,6 +224,8 @@ def _remarks(ground: Background, found: Survey, holes: int) -> tuple[str, ...]:
         said.append(f"ruled lines were taken for paper ({len(found.lines)})")
     if found.shadow.any():
         said.append("shadows on the ground were left out")
+    if cuts:
+        said.append(f"touching figures were cut apart ({cuts})")
     if holes:
         said.append(f"enclosed patches in the background's colour became holes ({holes})")
     return tuple(said)

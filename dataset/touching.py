@@ -40,6 +40,11 @@ class Cut:
     crossed: float
     sure: float
 
+    @property
+    def in_doubt(self) -> bool:
+        """Return whether a person should look at it."""
+        return self.sure < SURE
+
 
 @dataclass(frozen=True, eq=False)
 class _Patches:
@@ -77,7 +82,7 @@ def part_touching(
     painted: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
 ) -> tuple[Blobs, list[Cut]]:
-    """Return the patches of a sheet with touching figures apart, and the cuts in doubt.
+    """Return the patches of a sheet with touching figures apart, and the cuts that were made.
 
     Paper that two touching figures enclose between them becomes nobody's.
 
@@ -96,13 +101,12 @@ def part_touching(
         box = patches.boxes[label]
         if box[2] < WIDE_ALONE * box[3] or box[3] < LEAST_HEIGHT:
             continue
-        sure = _part(patches, label, top + 1)
-        if sure is not None:
+        cut = _part(patches, label, top + 1)
+        if cut is not None:
             top += 1
             queue += [label, top]
-            cuts.append(sure)
-    doubtful = [cut for cut in cuts if cut.sure < SURE]
-    return (_measured(patches.labels, top) if cuts else blobs), doubtful
+            cuts.append(cut)
+    return (_measured(patches.labels, top) if cuts else blobs), cuts
 
 
 def _part(patches: _Patches, label: int, new: int) -> Cut | None:

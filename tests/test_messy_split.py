@@ -86,6 +86,9 @@ def test_hand_in_hand_is_cut_between_the_hands() -> None:
     assert len(sheet.views) == 3
     assert abs(figure_boxes(sheet)[0][0] + figure_boxes(sheet)[0][2] - 125) <= 3
     assert sheet.warnings == ()  # both halves look like the third figure: no doubt
+    assert "touching figures were cut apart (1)" in sheet.remarks
+    by_hand = SheetOptions(boxes=((30, 0, 95, 200), (125, 0, 95, 200)))
+    assert not any("cut apart" in said for said in split_sheet(opaque(picture), by_hand).remarks)
 
 
 def test_a_figure_with_wide_arms_stays_whole() -> None:

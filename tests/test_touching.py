@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from toonset.dataset.figures import find_blobs
-from toonset.dataset.touching import part_touching
+from toonset.dataset.touching import Cut, part_touching
 from toonset.dataset.touching_choice import best_option, find_options
 from toonset.dataset.touching_flanks import CAP, flanks, right_flank, unlikeness
 from toonset.dataset.touching_paths import DETOUR, distinct_ways, least_costs
@@ -34,11 +34,11 @@ def row(width: int, *people: tuple[int, int, int]) -> np.ndarray:
     return picture
 
 
-def parted(rgb: np.ndarray) -> tuple[list[tuple[int, ...]], list[float]]:
-    """Return the boxes of the patches from left to right, and how sure announced cuts are."""
+def parted(rgb: np.ndarray) -> tuple[list[tuple[int, ...]], list[Cut]]:
+    """Return the boxes of the patches from left to right, and the cuts."""
     painted = (rgb != 255).any(axis=-1)
     blobs, cuts = part_touching(find_blobs(painted), painted, rgb)
-    return sorted(tuple(int(v) for v in box) for box in blobs.boxes), [cut.sure for cut in cuts]
+    return sorted(tuple(int(v) for v in box) for box in blobs.boxes), cuts
 
 
 def slow_costs(price: np.ndarray) -> np.ndarray:
@@ -108,8 +108,9 @@ def test_a_hand_on_a_body_goes_with_its_arm(mirrored: bool) -> None:
 
 
 def test_three_in_a_row_become_three() -> None:
-    boxes, _ = parted(row(420, (70, 50, 50), (189, 50, 50), (308, 50, 50)))
+    boxes, cuts = parted(row(420, (70, 50, 50), (189, 50, 50), (308, 50, 50)))
     assert [round(box[2] / 10) for box in boxes] == [12, 12, 12]
+    assert len(cuts) == 2
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
