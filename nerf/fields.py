@@ -72,7 +72,7 @@ class Field(nn.Module, ABC):
     Colour does not depend on the viewing direction: a drawing has no highlights that move.
     """
 
-    decoder_rate = 0.02  # Adam's, for everything that is no table
+    decoder_rate = 0.05  # Adam's, for everything that is no table
 
     def __init__(self, spec: FieldSpec) -> None:
         """Remember what the field is built from."""

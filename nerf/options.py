@@ -17,8 +17,8 @@ class TrainOptions:
         budget_s: stop after this many seconds of training; results then depend on the machine.
         seed: of initial weights and ray order. Same seed, same result, bit for bit, on a CPU.
         device: "auto" (a GPU where there is one), "cpu" or "cuda".
-        resolution: cells of the planes along the character's longest side; None: 3/4 cell per
-            pixel of the tallest figure, 48 to 160 (finer planes fit each drawing's own pixels and
+        resolution: cells of the planes along the character's longest side; None: one cell per
+            pixel of the tallest figure, 48 to 256 (finer planes fit each drawing's own pixels and
             predict new views worse).
         smoothness: weight of the planes' total variation at eight views; fewer views get more.
         palette_weight: weight of the classifier's cross-entropy.

@@ -34,7 +34,7 @@ from toonset.nerf.shape import hull_of, per_px
 from toonset.nerf.trained import TrainedField, Training
 
 CHANNELS, HIDDEN = 16, 32
-CELLS_PER_PX, CELLS = 0.75, (48, 160)
+CELLS_PER_PX, CELLS = 1.0, (48, 256)
 STEPS_ALONG = 160  # samples that the longest side of the hull would take
 MOST_SAMPLES = 24  # per ray, from its first inside the hull
 MLP_LAYERS, MLP_WIDTH = 4, 64
