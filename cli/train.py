@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -34,10 +35,24 @@ def train(
         ),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option("--steps", min=1, help="Optimiser steps (default: 300).")
+        int | None,
+        typer.Option("--steps", min=1, help="Optimiser steps (default: 300)."),
     ] = None,
     budget: Annotated[
         float | None, typer.Option("--budget", min=0.1, help="Train for at most SECONDS.")
+    ] = None,
+    preset: Annotated[
+        str,
+        typer.Option(
+            "--preset",
+            help="fast; or paper: the plain method, along whole rays, 2,000 steps, minutes.",
+        ),
+    ] = "fast",
+    field: Annotated[
+        str | None,
+        typer.Option(
+            "--field", help="triplane (default); to compare with: mlp, voxel, hull (no training)."
+        ),
     ] = None,
     no_palette: Annotated[
         bool, typer.Option("--no-palette", help="Colours only: no palette, no labels.")
@@ -83,15 +98,20 @@ def train(
 
     Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says how to go on.
     """
-    if device not in DEVICES:
-        wanted = ", ".join(DEVICES)
-        raise typer.BadParameter(f"{device!r} is none of {wanted}", param_hint="--device")
+    from toonset.nerf.options import FIELDS
+    from toonset.nerf.preset import PRESETS
+    from toonset.nerf.preset import preset as preset_options
+
+    _check_choice(device, DEVICES, "--device")
+    _check_choice(preset, PRESETS, "--preset")
+    _check_choice(field or FIELDS[0], FIELDS, "--field")
+    given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle
     request = Request(
         bundle,
         test or _test_of(root),
         Place(out or root / "run", force),
-        {"steps": steps, "budget_s": budget, "device": device, "seed": seed},
+        {**preset_options(preset), **{k: v for k, v in given.items() if v is not None}},
         checked(threads),
         preview_every,
         palette=not no_palette,
@@ -100,6 +120,12 @@ def train(
     code = run(request, Printer(as_json, quiet))
     if code:
         raise typer.Exit(code)
+
+
+def _check_choice(value: str, choices: Sequence[str], option: str) -> None:
+    """Refuse a value that is none of an option's choices."""
+    if value not in choices:
+        raise typer.BadParameter(f"{value!r} is none of {', '.join(choices)}", param_hint=option)
 
 
 def _test_of(root: Path) -> Path | None:

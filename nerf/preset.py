@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from typing import Any
+
 from toonset.nerf.options import TrainOptions
 
+PRESETS = ("fast", "paper")
 PAPER_STEPS = 2000
+
+
+def preset(name: str) -> dict[str, Any]:
+    """Return the options of a preset that differ from the defaults; "fast" is the defaults."""
+    if name == "fast":
+        return {}
+    defaults = asdict(TrainOptions())
+    return {key: value for key, value in asdict(paper()).items() if value != defaults[key]}
 
 
 def paper(steps: int = PAPER_STEPS) -> TrainOptions:

@@ -1,0 +1,116 @@
+"""Laws of the plain method's rays: stratified samples through the box, and its preset."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from toonset.camera import Camera
+from toonset.dataset.scene import Frame, Scene
+from toonset.nerf.bounds import Box
+from toonset.nerf.field_box import BINS, BoxRays, nearest_labels, open_box, without_empty_space
+from toonset.nerf.field_hull import paint
+from toonset.nerf.field_voxel import VoxelField
+from toonset.nerf.fields import Places
+from toonset.nerf.hull import Hull, carve
+from toonset.nerf.march import march, rays_of
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.preset import PRESETS, preset
+
+SIDE = 24
+PALETTE = np.array([[250, 0, 0], [0, 0, 250]], dtype=np.uint8)
+
+
+def drum(k: float = 0.1) -> Scene:
+    """Return four views of an upright square block, red where x > 0 and blue elsewhere."""
+    frames = []
+    for i in range(4):
+        yaw = np.pi / 2 * i
+        camera = Camera.looking_at(np.zeros(3), yaw, 0.0, 8.0, (SIDE, SIDE), k=k)
+        rgba = np.zeros((SIDE, SIDE, 4), dtype=np.uint8)
+        rgba[4:20, 6:18, 3] = 255
+        right = camera.rotation[0][0]  # how much of world x points to the picture's right
+        rgba[..., 2] = 250
+        red = np.full(SIDE, i == 1) if abs(right) < 0.5 else (np.arange(SIDE) >= 12) == (right > 0)
+        rgba[:, red, :3] = (250, 0, 0)
+        frames.append(Frame(f"{i}.png", camera, rgba))
+    return Scene(tuple(frames), PALETTE, "drum")
+
+
+def rays_in_box(seed: int = 0) -> tuple[BoxRays, Hull]:
+    hull = open_box(drum())
+    return BoxRays(drum(), hull, seed, torch.Generator().manual_seed(seed)), hull
+
+
+def test_every_bin_has_one_sample_and_samples_fill_the_ray() -> None:
+    rays, hull = rays_in_box()
+    batch = rays.batch(0, 7)
+    assert isinstance(batch.constants, Places)
+    points = batch.constants.points.view(-1, BINS, 3).double()
+    inside = (points - torch.as_tensor(hull.low)) / float(hull.box.size.max())
+    assert bool(((inside > -1e-4) & (inside < 1 + 1e-4)).all())
+    steps = (points[:, 1:] - points[:, :-1]).norm(dim=-1)
+    lengths = batch.length.view(-1, BINS).double()
+    torch.testing.assert_close(steps, lengths[:, :-1], atol=1e-4, rtol=1e-3)
+    bins = lengths.sum(1, keepdim=True) / (BINS - 0.5)  # a bin's length, to within half of one
+    assert bool((steps < 2.05 * bins).all())
+    assert bool((lengths >= 0).all())
+
+
+def test_samples_depend_on_seed_and_step_alone() -> None:
+    rays, _ = rays_in_box()
+    first = rays.batch(0, 3).length
+    rays.batch(0, 4)
+    assert torch.equal(rays.batch(0, 3).length, first)
+    assert not torch.equal(rays.batch(0, 4).length, first)
+    assert not torch.equal(rays_in_box(1)[0].batch(0, 3).length, first)
+
+
+def test_batches_hold_every_ray_once_background_too() -> None:
+    rays, _ = rays_in_box()
+    sizes = [len(rays.batch(i, 0).rgb) for i in range(len(rays))]
+    assert sum(sizes) == rays.rays
+    alphas = torch.cat([rays.batch(i, 0).alpha for i in range(len(rays))])
+    assert int((alphas == 1).sum()) == 4 * 16 * 12
+    assert int((alphas == 0).sum()) > 100
+
+
+def test_labels_are_the_nearest_colours_by_l2_of_the_figure_alone() -> None:
+    rgba = np.array([[[200, 30, 40, 255], [90, 0, 140, 255], [0, 0, 250, 90]]], dtype=np.uint8)
+    assert nearest_labels(rgba, PALETTE).tolist() == [0, 1, 255]
+    assert nearest_labels(rgba, None).tolist() == [255] * 3
+
+
+def test_empty_space_is_skipped_and_no_other() -> None:
+    field = VoxelField(Box(np.zeros(3), np.ones(3)), 8)
+    with torch.no_grad():
+        field.grid[:, 0] = -30.0
+        field.grid.view(9, 9, 9, 4)[2, 2, 2, 0] = 30.0
+    hull = without_empty_space(Hull(np.zeros(3), 1 / 32, torch.ones(32, 32, 32)), field)
+    points = torch.rand(4000, 3, generator=torch.Generator().manual_seed(0))
+    seen = field(points)[0] * hull.voxel > 0.02
+    assert bool((hull.support_at(points)[seen] > 0.99).all())
+    assert 0.001 < float(hull.support.mean()) < 0.1
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_painted_hull_has_the_drawings_colours_where_they_see_it(side: float) -> None:
+    scene = drum(0.0)
+    cameras = [frame.camera for frame in scene.frames]
+    alphas = [torch.as_tensor(frame.rgba[..., 3] / np.float32(255)) for frame in scene.frames]
+    hull = carve(cameras, alphas, 32, 0)
+    field = VoxelField(hull.box, 24)
+    paint(field, hull, scene)
+    camera = Camera.looking_at(np.zeros(3), side * 0.9, 0.0, 8.0, (SIDE, SIDE))
+    pixels = np.array([[12 - side * 1.0, 12.0]])  # of the side that this camera looks at
+    samples = march(rays_of(camera, pixels, hull), hull, hull.voxel, 4)
+    density, rgb = field(samples.points[2:3])
+    assert float(density.detach()) * hull.voxel > 0.2
+    wanted = [1.0, 0, 0] if side > 0 else [0, 0, 1.0]
+    assert float((rgb[0] - torch.tensor(wanted)).abs().max()) < 0.1
+
+
+def test_presets_are_options() -> None:
+    assert [TrainOptions(**preset(name)).carve for name in PRESETS] == [True, False]
+    assert preset("fast") == {}
