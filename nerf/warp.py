@@ -1,0 +1,180 @@
+"""Bent drawings: a smooth displacement per drawing under which the outlines are one body's.
+
+corrected(x) = drawn(x + d(x)). The rays of the cameras stay; the drawing is resampled once, with
+its alpha and its labels. What a rendering must be given back to look drawn again is in
+`toonset.nerf.warp_back`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from toonset.dataset.scene import Frame, Scene
+from toonset.nerf.registration import (
+    FEWEST_VIEWS,
+    alpha_of,
+    has_figure,
+    size_ratio,
+)
+from toonset.nerf.warp_fit import fit_moves
+from toonset.nerf.warp_moves import CONTROLS, Bends
+from toonset.nerf.warp_outline import Square, outlines_of
+from toonset.palette.labels import UNLABELLED
+
+EXPECTED = 0.01  # of the figure's square: a careful hand's error, as a first guess
+ROUNDS = 8
+MOST = 0.03  # of the figure's square: the longest displacement; more is another pose
+_BENDS = Bends.expected()
+
+
+@dataclass(frozen=True, eq=False)
+class Warp:
+    """One drawing's displacement.
+
+    Attributes:
+        square: where the figure is, in pixels of the drawing.
+        numbers: (k,) of `Bends`, in units of the square.
+    """
+
+    square: Square
+    numbers: Float[np.ndarray, " k"]
+
+    @classmethod
+    def none(cls) -> Warp:
+        """Return the warp that moves nothing."""
+        return cls(Square(np.zeros(2), 1.0), np.zeros(2 * CONTROLS**2))
+
+    def at(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+        """Return the displacement at pixels, in pixels; never longer than MOST."""
+        move = _BENDS.at(self.square.unit(pixels), self.numbers)
+        length = np.linalg.norm(move, axis=-1, keepdims=True)
+        # smooth, and exact for short ones: a hard limit would crease the drawing
+        shorter = move / (1 + (length / MOST) ** 4) ** 0.25
+        return self.square.size * shorter
+
+    def back(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+        """Return the inverse's displacement: where x + at(x) = y, it is x - y."""
+        move = np.zeros_like(pixels)
+        for _ in range(6):  # the displacement's slope is well below 1
+            move = -self.at(pixels + move)
+        return move
+
+    @property
+    def is_none(self) -> bool:
+        """Return whether nothing is moved."""
+        return not np.any(self.numbers)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the warp as plain numbers."""
+        return {
+            "low_px": self.square.low.tolist(),
+            "size_px": self.square.size,
+            "numbers": self.numbers.tolist(),
+        }
+
+    @classmethod
+    def from_json(cls, value: dict[str, Any]) -> Warp:
+        """Return the warp of `to_json`."""
+        square = Square(np.array(value["low_px"], dtype=float), float(value["size_px"]))
+        return cls(square, np.array(value["numbers"], dtype=float))
+
+
+@dataclass(frozen=True, eq=False)
+class Unbending:
+    """What was found about the drawings' bends.
+
+    Attributes:
+        applied: whether the drawings were resampled.
+        gain_nats: log marginal likelihood for bends over none; applied where > 0.
+        error_px: typical size of the displacement that the sheet asks for, pixels.
+        apart_px: root mean square disagreement of the outlines, before and after, pixels.
+        warps: per frame of the scene, what was applied.
+    """
+
+    applied: bool
+    gain_nats: float
+    error_px: float
+    apart_px: tuple[float, float]
+    warps: tuple[Warp, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers for a report, without the warps."""
+        return {
+            "applied": self.applied,
+            "gain_nats": round(self.gain_nats, 3),
+            "error_px": round(self.error_px, 4),
+            "apart_px": [round(value, 4) for value in self.apart_px],
+        }
+
+
+def unbent(scene: Scene) -> tuple[Scene, Unbending]:
+    """Return the scene with its drawings unbent, and how.
+
+    Drawings that agree within a rim's own error are returned as they are, to the bit; so are
+    pictures without a figure, and scenes with fewer than FEWEST_VIEWS.
+
+    Raises:
+        BundleError: the cameras do not belong together (see `box_of_masks`).
+    """
+    drawn = [i for i, frame in enumerate(scene.frames) if has_figure(frame)]
+    warps = [Warp.none() for _ in scene.frames]
+    if len(drawn) < FEWEST_VIEWS:
+        return scene, Unbending(False, 0.0, 0.0, (0.0, 0.0), tuple(warps))
+    frames = [scene.frames[i] for i in drawn]
+    outlines = outlines_of([f.camera for f in frames], [alpha_of(f) for f in frames])
+    fit = fit_moves(outlines, _BENDS, EXPECTED, ROUNDS)
+    ratio = size_ratio(frames, outlines)
+    apart = (fit.apart_px[0] / ratio, fit.apart_px[1] / ratio)
+    error = fit.tau * outlines.size_px / ratio
+    if fit.gain_nats <= 0:
+        return scene, Unbending(False, fit.gain_nats, error, apart, tuple(warps))
+    changed = list(scene.frames)
+    for i, outline, own in zip(drawn, outlines.views, fit.numbers, strict=True):
+        square = Square(outline.square.low / ratio, outline.square.size / ratio)
+        warps[i] = Warp(square, own)
+        changed[i] = warped(changed[i], warps[i])
+    found = Unbending(True, fit.gain_nats, error, apart, tuple(warps))
+    return replace(scene, frames=tuple(changed)), found
+
+
+def warped(frame: Frame, warp: Warp) -> Frame:
+    """Return the frame with its drawing resampled: corrected(x) = drawn(x + d(x))."""
+    grid = frame.camera.pixel_grid()
+    places = grid + warp.at(grid.reshape(-1, 2)).reshape(grid.shape)
+    labels = None if frame.labels is None else resampled_labels(frame.labels, places)
+    return replace(frame, rgba=resampled(frame.rgba, places), labels=labels)
+
+
+def resampled(
+    rgba: UInt8[np.ndarray, "height width 4"], places: Float[np.ndarray, "height width 2"]
+) -> UInt8[np.ndarray, "height width 4"]:
+    """Return straight-alpha colours taken from `places` (pixels), nothing beyond the edges."""
+    straight = rgba.astype(np.float32) / 255
+    straight[..., :3] *= straight[..., 3:]  # what is transparent has no colour to mix in
+    maps = (places - 0.5).astype(np.float32)
+    # cubic: linear interpolation would blur a line of one pixel to half its depth
+    found = cv2.remap(straight, maps, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
+    alpha = found[..., 3:].clip(0, 1)
+    seen = alpha > 0.5 / 255
+    color = np.where(seen, found[..., :3] / np.where(seen, alpha, 1), 0)
+    return (np.concatenate([color, alpha], axis=-1).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def resampled_labels(
+    labels: UInt8[np.ndarray, "height width"], places: Float[np.ndarray, "height width 2"]
+) -> UInt8[np.ndarray, "height width"]:
+    """Return the nearest labels at `places`, none beyond the edges."""
+    maps = (places - 0.5).astype(np.float32)
+    return cv2.remap(
+        labels,
+        maps,
+        None,
+        cv2.INTER_NEAREST,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=(UNLABELLED,) * 4,
+    )
