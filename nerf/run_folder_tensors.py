@@ -133,7 +133,8 @@ def _fill(
 
 def _inflated(found: UInt8[Tensor, " bytes"], shape: torch.Size, where: str) -> Tensor:
     size = int(np.prod(shape))
-    message = f"{where}: hull is not {' x '.join(map(str, shape))} bytes, deflated; train again"
+    grid = " x ".join(map(str, shape))
+    message = f"{where}: hull is damaged, it does not inflate to {grid} bytes; train again"
     if found.dtype != torch.uint8 or found.ndim != 1:
         raise BundleError(message)
     inflate = zlib.decompressobj()

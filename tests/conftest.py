@@ -7,10 +7,12 @@ import io
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -83,6 +85,20 @@ def run_shell(*arguments: object, **options: Any) -> Outcome:
     return Outcome(done.returncode, done.stdout, done.stderr)
 
 
+def run_and_interrupt(sign: str, folder: Path, *arguments: object) -> Outcome:
+    """Run in a folder as a process of its own; press Ctrl-C when a line on stderr holds `sign`."""
+    command = [sys.executable, "-m", "toonset", *map(str, arguments)]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # a shell's background jobs, these tests perhaps, ignore Ctrl-C and hand that down
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, cwd=folder, preexec_fn=heard, **pipes) as process:
+        assert process.stderr is not None
+        assert any(sign in line for line in process.stderr)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+    return Outcome(process.returncode, out, err)
+
+
 def contents(folder: Path) -> dict[str, str]:
     """Return every path below a folder with what is there: hash, link target or kind."""
     found = {}
@@ -107,6 +123,12 @@ def toonset() -> Command:
 def shell() -> Command:
     """Return the command line, run as a process."""
     return run_shell
+
+
+@pytest.fixture(scope="session")
+def interrupted() -> Command:
+    """Return the command line, run as a process that hears Ctrl-C."""
+    return run_and_interrupt
 
 
 @pytest.fixture(scope="session")

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -271,26 +268,14 @@ def test_no_verb_of_a_user_needs_opengl(drawn: Path, tmp_path):
     assert not modules & {"pyrender", "OpenGL"}
 
 
-@pytest.mark.parametrize(("verb", "sign"), [("calibrate", "search"), ("train", "training")])
-def test_ctrl_c_leaves_nothing_behind(verb, sign, drawn: Path, bundle: Path, tmp_path, snapshot):
-    arguments: dict[str, list[Any]] = {
-        "calibrate": [drawn / "sheet.png", "--mesh", drawn / "mannequin.obj", "-o", "new"],
-        "train": [bundle, *FAST],
-    }
-    before = snapshot(tmp_path)
-    command = [sys.executable, "-m", "toonset", verb, *map(str, arguments[verb])]
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    # a shell's background jobs, these tests perhaps, ignore Ctrl-C and hand that down
-    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    with subprocess.Popen(command, cwd=tmp_path, preexec_fn=heard, **pipes) as process:
-        assert process.stderr is not None
-        assert any(sign in line for line in process.stderr)
-        process.send_signal(signal.SIGINT)
-        out, rest = process.communicate(timeout=120)
-    assert (process.returncode, out) == (130, "")
-    assert rest.endswith("toonset: interrupted\n")
-    assert "Traceback" not in rest
-    assert snapshot(tmp_path) == before
+def test_ctrl_c_leaves_nothing_behind(drawn: Path, tmp_path, interrupted, snapshot):
+    done = interrupted(
+        "search", tmp_path, "calibrate", drawn / "sheet.png", "--mesh", drawn / "mannequin.obj"
+    )
+    assert (done.code, done.out) == (130, "")
+    assert done.err.endswith("toonset: interrupted\n")
+    assert "Traceback" not in done.err
+    assert snapshot(tmp_path) == {}
 
 
 def test_one_process_can_draw_and_then_train():

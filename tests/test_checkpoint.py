@@ -1,0 +1,315 @@
+"""Trainings that stop and go on, that go wrong, and what is kept of them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from toonset.camera import Camera
+from toonset.dataset.scene import Frame, Scene
+from toonset.errors import BundleError
+from toonset.nerf import fitting
+from toonset.nerf.checkpoint import check_scene, read_checkpoint, scene_digest, write_checkpoint
+from toonset.nerf.checkpoint_good import DIVERGED, WINDOW, LastGood
+from toonset.nerf.checkpoint_state import FitState
+from toonset.nerf.field_rays import PRUNE_AFTER
+from toonset.nerf.fitting import Moment
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.progress import Status
+from toonset.nerf.progress_watch import INTERRUPTED, Looking, Onlooker, sample_of
+from toonset.nerf.trained import Training
+from toonset.nerf.training import train
+
+SIDE = 24
+PALETTE = np.array([[220, 40, 30], [30, 60, 200]], dtype=np.uint8)
+STEPS, CUT = PRUNE_AFTER + 10, PRUNE_AFTER + 3  # the rays have changed on the way
+OPTIONS = TrainOptions(steps=STEPS, device="cpu", resolution=16, missing_views=0)
+
+
+def ball(yaw: float, side: int = SIDE) -> Frame:
+    """Return a drawn ball, red on its left and blue on its right, with labels."""
+    camera = Camera.looking_at(np.zeros(3), yaw, 0.1, 0.4 * side, (side, side))
+    origins, directions = camera.rays(camera.pixel_grid())
+    along = -(origins * directions).sum(-1)
+    nearest = origins + along[..., None] * directions
+    inside = (nearest**2).sum(-1) <= 1
+    depth = np.sqrt(np.maximum(1 - (nearest**2).sum(-1), 0))
+    red = (nearest - depth[..., None] * directions)[..., 0] > 0
+    labels = np.where(inside, np.where(red, 0, 1), 255).astype(np.uint8)
+    rgba = np.zeros((side, side, 4), dtype=np.uint8)
+    rgba[inside] = np.concatenate(
+        [PALETTE[labels[inside]], np.full((inside.sum(), 1), 255)], axis=1
+    )
+    return Frame(f"{yaw:.2f}.png", camera, rgba, labels)
+
+
+def balls(*yaws: float) -> Scene:
+    return Scene(tuple(ball(yaw) for yaw in yaws), PALETTE, "balls")
+
+
+SCENE, HELD_OUT = balls(0.0, 1.3, 2.6, 4.0, 5.2), balls(0.7, 3.0)
+
+
+class Cut(Onlooker):
+    """Ends a training after some steps, as Ctrl-C would, and keeps its state."""
+
+    state: FitState
+
+    def look(self, moment: Moment) -> str:
+        if len(moment.history) == CUT:
+            self.state = moment.state()
+            return INTERRUPTED
+        return super().look(moment)
+
+
+def quiet(status: Status) -> None:
+    assert status.steps <= status.of
+
+
+def onlooker(folder: Path, kind: type[Onlooker] = Onlooker) -> Onlooker:
+    looking = Looking(quiet, lambda: False, HELD_OUT, folder, preview_every_s=0.2)
+    return kind(looking, SCENE, OPTIONS)
+
+
+def bits(training: Training) -> list[torch.Tensor]:
+    result = training.result
+    assert result.classifier is not None
+    return [*result.field.parameters(), *result.classifier.parameters()]
+
+
+@pytest.fixture(scope="module")
+def whole() -> Training:
+    return train(SCENE, OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def cut(tmp_path_factory: pytest.TempPathFactory) -> tuple[Training, FitState]:
+    watch = onlooker(tmp_path_factory.mktemp("cut"), Cut)
+    assert isinstance(watch, Cut)
+    return train(SCENE, OPTIONS, watch=watch), watch.state
+
+
+def test_looking_on_changes_no_bit(
+    whole: Training, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("CHECKPOINT_S", "FIRST_LOOK_S"):
+        monkeypatch.setattr(f"toonset.nerf.progress_watch.{name}", 0.05)
+    watch = onlooker(tmp_path)
+    watched = train(SCENE, OPTIONS, watch=watch)
+    assert {p.name for p in tmp_path.iterdir()} >= {"preview.png", "checkpoint.json"}
+    assert watch.held_out
+    assert 15 < watch.held_out[-1].psnr < 60
+    assert all(torch.equal(a, b) for a, b in zip(bits(whole), bits(watched), strict=True))
+
+
+def test_a_resumed_training_ends_bit_identical(
+    whole: Training, cut: tuple[Training, FitState], tmp_path: Path
+) -> None:
+    stopped, state = cut
+    assert (stopped.stopped, len(stopped.history)) == ("interrupted", CUT)
+    write_checkpoint(tmp_path, state, OPTIONS, SCENE)
+    checkpoint = read_checkpoint(tmp_path)
+    check_scene(checkpoint, SCENE, tmp_path)
+    assert checkpoint.options == OPTIONS
+    assert checkpoint.state.rays  # samples were dropped before the cut
+    watch = onlooker(tmp_path)
+    watch.start = checkpoint.state
+    torch.rand(7)  # what else the process does with torch's generator
+    resumed = train(SCENE, OPTIONS, watch=watch)
+    assert resumed.stopped == "steps"
+    assert [s.loss for s in resumed.history] == [s.loss for s in whole.history]
+    assert all(torch.equal(a, b) for a, b in zip(bits(whole), bits(resumed), strict=True))
+    seconds = [s.seconds for s in resumed.history]
+    assert seconds == sorted(seconds)
+    # and every part of the state counts: without Adam's memory it ends elsewhere
+    forgetful = {name: torch.zeros_like(values) for name, values in state.squares.items()}
+    watch.start = replace(checkpoint.state, squares=forgetful)
+    other = train(SCENE, OPTIONS, watch=watch)
+    assert not all(torch.equal(a, b) for a, b in zip(bits(whole), bits(other), strict=True))
+
+
+def test_a_checkpoint_keeps_every_part_of_the_state(
+    cut: tuple[Training, FitState], tmp_path: Path
+) -> None:
+    state = cut[1]
+    write_checkpoint(tmp_path, state, OPTIONS, SCENE)
+    loaded = read_checkpoint(tmp_path).state
+    assert (loaded.history, loaded.queue) == (state.history, state.queue)
+    for field in fields(FitState):
+        a, b = getattr(state, field.name), getattr(loaded, field.name)
+        if isinstance(a, torch.Tensor):
+            assert torch.equal(a, b)
+        elif isinstance(a, dict):
+            assert a.keys() == b.keys()
+            assert all(torch.equal(a[name], b[name]) for name in a)
+
+
+def test_a_training_killed_while_it_writes_keeps_its_last_checkpoint(
+    cut: tuple[Training, FitState], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state = cut[1]
+    earlier = replace(state, history=state.history[:-1])
+    write_checkpoint(tmp_path, earlier, OPTIONS, SCENE)
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("toonset.nerf.checkpoint.write_json", killed)
+        with pytest.raises(KeyboardInterrupt):
+            write_checkpoint(tmp_path, state, OPTIONS, SCENE)
+    assert read_checkpoint(tmp_path).state.steps == state.steps - 1
+    write_checkpoint(tmp_path, state, OPTIONS, SCENE)
+    assert len(list(tmp_path.iterdir())) == 2  # the earlier one is gone
+    moved = shutil.move(tmp_path, tmp_path.with_name("moved"))
+    assert read_checkpoint(Path(moved)).state.steps == state.steps
+
+
+def flip_a_bit(folder: Path) -> None:
+    file = next(folder.glob("*.safetensors"))
+    data = bytearray(file.read_bytes())
+    data[-9] ^= 1
+    file.write_bytes(data)
+
+
+def change(**values: object) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        content = json.loads((folder / "checkpoint.json").read_text())
+        for name, value in values.items():
+            part, _, key = name.rpartition("__")
+            (content[part] if part else content)[key] = value
+        (folder / "checkpoint.json").write_text(json.dumps(content))
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (flip_a_bit, "another SHA-256"),
+        (lambda folder: next(folder.glob("*.safetensors")).unlink(), "no such file"),
+        (lambda folder: (folder / "checkpoint.json").unlink(), "no such file"),
+        (lambda folder: (folder / "checkpoint.json").write_text("{"), "no valid JSON"),
+        (change(schema="toonset-checkpoint/9"), "newer than this toonset"),
+        (change(tensors__name="../x.safetensors"), "tensors.name"),
+        (change(options__steps="many"), "steps"),
+        (change(options__magic=1), "options magic are of another toonset"),
+        (change(threads=0), "threads"),
+    ],
+)
+def test_a_damaged_checkpoint_gets_one_clear_line(
+    cut: tuple[Training, FitState],
+    damage: Callable[[Path], object],
+    message: str,
+    tmp_path: Path,
+) -> None:
+    write_checkpoint(tmp_path, cut[1], OPTIONS, SCENE)
+    damage(tmp_path)
+    with pytest.raises(BundleError, match=message) as refused:
+        read_checkpoint(tmp_path)
+    assert str(refused.value).count("\n") == 0
+
+
+def test_a_checkpoint_goes_on_with_its_own_scene_only(
+    cut: tuple[Training, FitState], tmp_path: Path
+) -> None:
+    write_checkpoint(tmp_path, cut[1], OPTIONS, SCENE)
+    checkpoint = read_checkpoint(tmp_path)
+    first, *others = SCENE.frames
+    touched = first.rgba.copy()
+    touched[SIDE // 2, SIDE // 2, 0] ^= 1
+    for frame in (
+        replace(first, rgba=touched),
+        replace(first, camera=replace(first.camera, scale=first.camera.scale * (1 + 1e-12))),
+        replace(first, labels=None),
+    ):
+        changed = replace(SCENE, frames=(frame, *others))
+        with pytest.raises(BundleError, match="other pictures, cameras or labels"):
+            check_scene(checkpoint, changed, tmp_path)
+    assert scene_digest(replace(SCENE, name="elsewhere")) == scene_digest(SCENE)
+    watch = onlooker(tmp_path)
+    watch.start = replace(checkpoint.state, parameters={})
+    with pytest.raises(BundleError, match="of another field"):
+        train(SCENE, replace(OPTIONS, steps=1), watch=watch)
+
+
+# ---- trainings that go wrong
+
+
+def judged(losses: list[float]) -> tuple[str, float, int]:
+    """Return what is said of these losses, the weight kept, and at which step it was said."""
+    model = nn.Linear(1, 1, bias=False)
+    good = LastGood(model, [])
+    for step, loss in enumerate(losses):
+        with torch.no_grad():
+            model.weight.fill_(step)
+        if wrong := good.wrong(torch.tensor(loss), loss, step):
+            return wrong, float(model.weight.detach()), step
+    return good.wrong_at_end(len(losses)), float(model.weight.detach()), len(losses)
+
+
+def test_a_loss_that_stays_high_goes_back_to_the_best_state() -> None:
+    fine = [1.0] + [0.1] * (3 * WINDOW)
+    wrong, kept, step = judged(fine + [0.1 * DIVERGED * 1.1] * 2 * WINDOW)
+    assert step == 4 * WINDOW
+    assert wrong == f"diverged: mean loss 1.1 in the 20 steps to 80, kept the state of step {60}"
+    assert kept == 60
+    wrong, kept, _ = judged([0.3] + [0.7] * 3 * WINDOW)  # worse than before the first step
+    assert wrong.startswith("diverged: mean loss 0.7 in the 20 steps to 20")
+    assert kept == 0
+    wrong, kept, _ = judged([*fine, float("inf")])
+    assert (wrong, kept) == (
+        f"loss not finite at step {3 * WINDOW + 1}, kept the state of step 60",
+        60,
+    )
+
+
+@pytest.mark.parametrize(
+    "losses",
+    [
+        [1.0] + [0.1] * 100,
+        [1.0] + [0.1] * 60 + [0.4] * 40,  # a harder part of the training
+        [1.0] + [0.1, 0.1, 0.1, 0.9] * 40,  # single bad batches
+        [0.5 * 0.97**step for step in range(300)],
+        [0.01] * 100,
+        [],
+    ],
+)
+def test_a_loss_that_wanders_is_left_alone(losses: list[float]) -> None:
+    assert judged(losses)[0] == ""
+
+
+def test_a_training_that_runs_away_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fitting, "TABLES_RATE", 1e6)
+    training = train(SCENE, OPTIONS)
+    assert training.stopped.startswith(("diverged", "loss not finite", "parameters not finite"))
+    assert "kept the state of step" in training.stopped
+    assert all(bool(torch.isfinite(values).all()) for values in bits(training))
+
+
+# ---- held-out views
+
+
+def test_held_out_views_are_a_small_even_sample() -> None:
+    many = balls(*np.linspace(0, 5, 9).tolist())
+    chosen = sample_of(many)
+    assert [f.name for f in chosen] == [many.frames[i].name for i in (0, 2, 4, 6)]
+    large = Scene((ball(0.5, 601),), None, "large")
+    small = sample_of(large)[0]
+    assert small.rgba.shape[:2] == small.camera.size_wh[::-1] == (150, 150)
+    exact = ball(0.5, 150)
+    assert small.camera.project(np.eye(3))[0] == pytest.approx(
+        large.frames[0].camera.project(np.eye(3))[0] / 4
+    )
+    assert np.abs(small.rgba[75, 75].astype(int) - exact.rgba[75, 75]).max() <= 2
+    edge = small.rgba[(small.rgba[..., 3] > 20) & (small.rgba[..., 3] < 235)]
+    assert len(edge)
+    assert np.abs(edge[:, None, :3].astype(int) - PALETTE).max(-1).min(1).max() < 130

@@ -1,0 +1,182 @@
+"""`toonset train` as a user lives with it: stopping, going on, and what it says on the way."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+
+from toonset.cli.train_stop import Stopper
+from toonset.cli.train_threads import measured
+from toonset.cli.train_voice import LOG_S, Pace
+
+FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
+RUN_FILES = {
+    *("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png"),
+    "manifest.json",
+}
+
+
+@pytest.fixture
+def ctrl_c_after(monkeypatch):
+    """Return what makes the training hear Ctrl-C after a number of steps."""
+
+    def set_up(steps: int) -> None:
+        asked = iter(range(1, 10_000))
+        real = Stopper.__call__
+
+        def call(self: Stopper) -> bool:
+            if next(asked) == steps:
+                self._hear(signal.SIGINT, None)
+            return real(self)
+
+        monkeypatch.setattr(Stopper, "__call__", call)
+
+    return set_up
+
+
+def test_a_run_stopped_and_resumed_holds_the_same_bytes(
+    bundle: Path, toonset, ctrl_c_after, monkeypatch, tmp_path, snapshot
+):
+    monkeypatch.chdir(tmp_path)
+    before = snapshot(bundle)
+    assert toonset("train", bundle, "-o", "whole", *FAST, "-q").code == 0
+    assert {path.name for path in (tmp_path / "whole").iterdir()} == RUN_FILES
+    with monkeypatch.context():
+        ctrl_c_after(5)
+        cut = toonset("train", bundle, "-o", "cut run", *FAST)
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert (cut.code, cut.out) == (130, "")
+    assert "stopping after this step" in cut.err
+    assert "stopped after step 5 of 12; cut run.unfinished can be rendered as it is" in cut.err
+    assert f"go on with: toonset train {bundle} -o 'cut run' --resume\n" in cut.err
+    assert not (tmp_path / "cut run").exists()
+    # what there is can be looked at, and is not lost by mistake
+    unfinished = tmp_path / "cut run.unfinished"
+    turn = ("--turntable", 1, "--size", 16, "-o", "turn", "-q")
+    assert toonset("render", unfinished, *turn).code == 0
+    assert "5 steps" in toonset("info", unfinished).out
+    kept = snapshot(unfinished)
+    assert (
+        "holds an unfinished training; go on with --resume, or begin anew with --force"
+        in toonset("train", bundle, "-o", "cut run", *FAST).reason
+    )
+    asked = toonset("train", bundle, "-o", "cut run", "--resume", "--steps", 20)
+    assert "was begun with --steps 12, not 20; leave --steps out" in asked.reason
+    assert snapshot(unfinished) == kept
+    # the hint, as it is printed
+    done = toonset("train", bundle, "-o", "cut run", "--resume")
+    assert done.code == 0
+    assert "going on after step 5 of 12" in done.err
+    assert not unfinished.exists()
+    for name in ("model.safetensors", "config.json"):
+        assert (tmp_path / "cut run" / name).read_bytes() == (
+            tmp_path / "whole" / name
+        ).read_bytes()
+    assert snapshot(bundle) == before
+    again = toonset("train", bundle, "-o", "cut run", "--resume", "--force")
+    assert "holds no checkpoint.json, so there is nothing to resume" in again.reason
+
+
+def test_ctrl_c_keeps_what_there_is(bundle: Path, tmp_path, interrupted):
+    done = interrupted(
+        *("training", tmp_path, "train", bundle, "--threads", 1, "--device", "cpu"),
+        *("--steps", 1_000_000),
+    )
+    assert (done.code, done.out) == (130, "")
+    assert "go on with: toonset train" in done.err
+    assert done.err.endswith("toonset: interrupted\n")
+    assert "Traceback" not in done.err
+    assert not (bundle / "run").exists()
+    assert (bundle / "run.unfinished" / "checkpoint.json").is_file()
+    assert len(list((bundle / "run.unfinished").glob("*.tmp"))) == 0
+
+
+def test_held_out_views_are_looked_at_and_reported(bundle: Path, toonset, tmp_path):
+    shutil.copytree(bundle / "images", bundle / "test" / "images")
+    shutil.copy(bundle / "transforms.json", bundle / "test")
+    done = toonset("train", bundle, *FAST, "--json")
+    assert done.code == 0
+    assert done.json["test"]["psnr"] == pytest.approx(done.json["train"]["psnr"])
+    assert "left" in done.err  # how long it will take
+    without = toonset("train", bundle, "-o", tmp_path / "o", *FAST, "--json", "--no-palette")
+    assert without.json["test"] is not None  # found beside the bundle's pictures
+    assert "memory: about" in without.err
+
+
+def test_a_training_that_went_wrong_is_written_with_its_reason(bundle: Path, toonset, monkeypatch):
+    monkeypatch.setattr("toonset.nerf.fitting.TABLES_RATE", float("inf"))
+    done = toonset("train", bundle, *FAST, "--quiet")
+    assert done.code == 3
+    assert "training stopped early: " in done.err
+    assert "kept the state of step 0" in done.err
+    metrics = json.loads((bundle / "run" / "metrics.json").read_text())
+    assert "kept the state of step 0" in metrics["stopped"]
+    assert toonset("check", bundle / "run").code == 0
+
+
+def test_too_little_memory_is_said_before_anything_is_done(
+    bundle: Path, toonset, monkeypatch, snapshot
+):
+    before = snapshot(bundle)
+    with monkeypatch.context() as patch:
+        patch.setattr("toonset.nerf.memory.free_bytes", lambda: 10**6)
+        reason = toonset("train", bundle, *FAST).reason.splitlines()[-1]
+    assert "GB of memory, 0.0 GB are free; end other programs" in reason
+    assert snapshot(bundle) == before
+
+    def full(*_: object) -> None:
+        raise RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 9")
+
+    monkeypatch.setattr("toonset.nerf.training.hull_of", full)
+    done = toonset("train", bundle, *FAST, "-q")
+    assert done.reason.startswith("out of memory (training asked for more than this machine has)")
+    assert snapshot(bundle) == before
+
+
+def test_changed_files_of_a_run_are_refused(run: Path, toonset, tmp_path):
+    from safetensors.torch import load_file, save_file
+
+    moved = Path(shutil.move(run, tmp_path / "else where"))
+    assert toonset("check", moved).code == 0
+    turn = ("render", moved, "--turntable", 1, "-o", tmp_path / "o")
+    tensors = load_file(moved / "model.safetensors")
+    tensors["field.planes"][0, 0] += 1  # nothing else would tell
+    save_file(tensors, moved / "model.safetensors")
+    assert "model.safetensors: is not the file that training wrote" in toonset(*turn).reason
+    assert toonset("check", moved).code == 2
+    (moved / "manifest.json").unlink()
+    assert "manifest.json" in toonset(*turn).reason
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "two", "1.5", "², "])
+def test_threads_are_a_number_or_auto(text: str, toonset, bundle: Path):
+    said = toonset("train", bundle, f"--threads={text}").reason
+    assert "is neither auto nor a number" in said
+
+
+def test_auto_threads_never_exceed_what_there_is():
+    assert measured(1) == 1
+    assert measured(2) in (1, 2)
+
+
+def test_a_log_gets_a_line_now_and_then_and_a_terminal_a_live_one():
+    now = [0.0]
+
+    def lines(live: bool, seconds: float, steps: int) -> int:
+        pace = Pace(live, lambda: now[0])
+        said = 0
+        for step in range(steps):
+            said += pace.due((step + 1) / steps)
+            now[0] += seconds / steps
+        return said
+
+    assert lines(False, 6, 300) in (3, 4)
+    assert lines(False, 60, 3000) in (10, 11)  # every tenth
+    assert lines(False, 3600, 10_000) in range(int(3600 / LOG_S) - 5, int(3600 / LOG_S) + 12)
+    assert lines(False, 0.5, 300) == 1
+    assert lines(True, 6, 300) in range(50, 62)
