@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.background import Background
-from toonset.dataset.figures import LOWEST, shared_colors
+from toonset.dataset.figures import LOWEST, Blobs, shared_colors
+from toonset.dataset.parts import LEAST_PART
 from toonset.dataset.survey import Survey
 from toonset.view import View
 
@@ -15,6 +16,7 @@ NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a sm
 PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the narrowest's: no view
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
+NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
 WIDE = 1.8  # times the median width: two figures that touch
 
 
@@ -29,7 +31,12 @@ def figure_doubts(
     found: Survey, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
 ) -> tuple[str, ...]:
     """Return a line for every cut in doubt, every wide view, all left out that may be views."""
-    return (*_cuts(found), *_wide_views(views), *_like_views(found, views, rgba))
+    return (
+        *_cuts(found),
+        *_wide_views(views),
+        *_near_parts(found, views),
+        *_like_views(found, views, rgba),
+    )
 
 
 def _cuts(found: Survey) -> list[str]:
@@ -51,6 +58,46 @@ def _wide_views(views: list[View]) -> list[str]:
         if among_others or width > BROAD * view.figure_box[3]:
             said.append(f"view {view.name} is unusually wide: do two figures touch?")
     return said
+
+
+def _near_parts(found: Survey, views: list[View]) -> list[str]:
+    """Return a line for every part apart that stands as near to another view as parts do."""
+    parts, bodies = _parts_apart(found)
+    own = [_gap(found.blobs, n, bodies[k]) for n, k in parts]
+    reach = NEARER * max((gap for gap in own if np.isfinite(gap)), default=0.0)
+    said = []
+    for (number, figure), gap in zip(parts, own, strict=True):
+        for other, body in enumerate(bodies):
+            if other != figure and np.isfinite(gap) and _gap(found.blobs, number, body) <= reach:
+                x, y, _, _ = (int(value) * found.cell_px for value in found.blobs.boxes[number])
+                said.append(
+                    f"a part at {x}, {y} went to view {views[figure].name}: "
+                    f"is it a part of {views[other].name}, which is near, too?"
+                )
+    return said
+
+
+def _parts_apart(found: Survey) -> tuple[list[tuple[int, int]], list[int]]:
+    """Return patches that are parts, with the numbers of their views, and the views' bodies."""
+    parts, bodies = list[tuple[int, int]](), list[int]()
+    areas = found.blobs.areas
+    for figure in range(found.grouping.count):
+        own = np.flatnonzero(found.grouping.figure_of_blob == figure)
+        bodies.append(int(own[areas[own].argmax()]))
+        least = LEAST_PART * areas[bodies[-1]]
+        parts += [(int(n), figure) for n in own if n != bodies[-1] and areas[n] >= least]
+    return parts, bodies
+
+
+def _gap(blobs: Blobs, part: int, body: int) -> float:
+    """Return how far a part is beside a body, in the body's heights; infinite at no level of it."""
+    x, y, width, height = blobs.boxes[part]
+    left, top, _, tall = blobs.boxes[body]
+    beside = blobs.mask(body)[max(0, y - top) : max(0, y + height - top)]
+    columns = np.flatnonzero(beside.any(axis=0))
+    if not len(columns):
+        return np.inf
+    return float(max(left + columns[0] - x - width, x - left - columns[-1] - 1, 0) / tall)
 
 
 def _like_views(found: Survey, views: list[View], rgba: np.ndarray) -> list[str]:

@@ -121,8 +121,7 @@ def _is_open_shade(piece: np.ndarray, dim: Dim, body: np.ndarray, room: np.ndarr
 
 def _lit(piece: np.ndarray, dim: Dim, room: np.ndarray) -> Bool[np.ndarray, "height width"]:
     """Return a patch, with what is as light or lighter around it, without its darker parts."""
-    darker = float(np.percentile(dim.light[piece], 25))
-    lighter = dim.light >= darker - TONE - dim.noise / 255
+    lighter = dim.light >= float(np.median(dim.light[piece])) - TONE - dim.noise / 255
     return _grown(piece & lighter, EDGE * room.shape[0], dim.mask & room & lighter)
 
 

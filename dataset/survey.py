@@ -19,6 +19,7 @@ from toonset.dataset.parts import Grouping, group_blobs
 from toonset.dataset.shadows import find_shadows
 from toonset.dataset.swatch_strips import strip_seams
 from toonset.dataset.touching import Cut, part_touching
+from toonset.dataset.touching_parts import part_shared
 from toonset.view import Box
 
 LARGEST_SIDE = 4096  # pixels: a larger sheet is surveyed on cells
@@ -96,7 +97,9 @@ def survey(
         blobs = find_blobs(~paper)
     blobs, cuts = part_touching(blobs, painted & ~ruled & ~shadow, small[..., :3])
     mains = without_strangers(blobs, find_mains(blobs), painted, small[..., :3])
-    grouping = group_blobs(blobs, mains, small[..., :3])
+    blobs, bodies, shared = part_shared(blobs, mains)
+    grouping = group_blobs(blobs, mains, small[..., :3], bodies)
+    cuts += shared
     return Survey(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
 
 

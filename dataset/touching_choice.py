@@ -25,6 +25,7 @@ MOST_CROSSED = 0.4  # of the height in paint, lines or not: figures touch, they 
 AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
 AS_LARGE = 0.3  # of the patch's area: the same, for two figures of equal size less
 WIDE_ALONE = 0.5  # times its own height: what is wider may be two figures
+TWO_WIDE = 0.7  # times its own height: what is narrower is rarely two figures
 ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
 SAME = 0.0015  # of the paint: two cuts that differ by less are one
 ELSEWHERE = 0.15  # of the paint: two cuts that differ by more are between other figures
@@ -72,13 +73,13 @@ def find_options(
         others: sides of the sheet's figures that are known, those of this patch included.
     """
     found: list[Option] = []
-    height = len(sight.drawn)
+    height, width = sight.drawn.shape
     for ways in distinct_ways(sight.prices(), sight.drawn, DEAREST * height):
         for way in ways:
             option = _option(sight, colors, others, way)
             if option is not None and not any(_are_same(option, o, sight) for o in found):
                 found.append(option)
-        if not found:  # where the cheapest ways part no two figures, dearer ones do not either
+        if not found and width < TWO_WIDE * height:  # one look is enough at a single figure
             break
     return found
 
