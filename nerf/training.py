@@ -64,7 +64,7 @@ def train(
     """
     tell = progress or (lambda _: None)
     clock = [time.perf_counter()]
-    device = device_of(options.device)
+    options, device = _resolved(options), device_of(options.device)
     torch.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
     tell("carving the hull" if options.carve else "placing the box")
@@ -72,10 +72,6 @@ def train(
     clock.append(time.perf_counter())
     tell("laying out the rays")
     start = _untrained(scene, hull, options)
-    if options.field == "hull":
-        assert isinstance(start.field, VoxelField)
-        paint(start.field, hull, scene)
-        options = replace(options, steps=0)
     rays, counts = _rays(scene, start, options, generator, device)
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)
@@ -83,16 +79,17 @@ def train(
     weights = _weights(options, len(scene.frames))
     history, stopped = fit(model, rays, weights, options, generator, watch, begin)
     model.to("cpu")
-    if not options.carve:
-        start = replace(start, hull=without_empty_space(hull, start.field))
     hull_s, rays_s = np.diff(clock).tolist()
     steps_s = history[-1].seconds if history else 0.0  # without what the watch has taken
     seconds = {"hull": hull_s, "rays": rays_s, "steps": steps_s}
-    counts |= {
-        "views": len(scene.frames),
-        "parameters": sum(p.numel() for p in model.parameters()),
-    }
-    return Training(start, options, tuple(history), stopped, evidence, seconds, counts)
+    counts |= {"views": len(scene.frames), "parameters": sum(p.numel() for p in model.parameters())}
+    result = _finished(start, options)
+    return Training(result, options, tuple(history), stopped, evidence, seconds, counts)
+
+
+def _resolved(options: TrainOptions) -> TrainOptions:
+    """Return the options without contradictions: a painted hull is carved, nothing is fitted."""
+    return replace(options, steps=0, carve=True) if options.field == "hull" else options
 
 
 def _rays(
@@ -124,13 +121,24 @@ def _weights(options: TrainOptions, views: int) -> Weights:
 
 
 def _untrained(scene: Scene, hull: Hull, options: TrainOptions) -> TrainedField:
-    colors = scene.palette
-    classifier = None if colors is None else PaletteClassifier(len(colors))
     field = build_field(_spec(scene, options), hull.box)
+    colors = scene.palette
+    if options.field == "hull":
+        assert isinstance(field, VoxelField)
+        paint(field, hull, scene)
+        colors = None  # no step would teach the classifier
+    classifier = None if colors is None else PaletteClassifier(len(colors))
     along, most = (STEPS_ALONG, MOST_SAMPLES) if options.carve else (BINS, 2 * BINS)
     step = float(hull.box.size.max()) / along
     k, size_px = _typical_camera(scene, hull)
     return TrainedField(field, hull, step, most, classifier, colors, k, size_px)
+
+
+def _finished(trained: TrainedField, options: TrainOptions) -> TrainedField:
+    """Return the field as it is rendered: without a hull, its own empty space is skipped."""
+    if options.carve:
+        return trained
+    return replace(trained, hull=without_empty_space(trained.hull, trained.field))
 
 
 def _spec(scene: Scene, options: TrainOptions) -> FieldSpec:

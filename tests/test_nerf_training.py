@@ -226,6 +226,30 @@ def test_turntable_frames_the_figure(training: Training) -> None:
     assert encode_gif(pictures)[:6] == b"GIF89a"
 
 
+@pytest.mark.parametrize(
+    ("options", "least"),
+    [
+        (replace(QUICK, field="voxel"), 22.0),
+        (replace(QUICK, field="hull"), 17.0),
+        (replace(QUICK, field="mlp", steps=3), 5.0),
+        (replace(QUICK, carve=False, smoothness=0.0, steps=40), 15.0),
+    ],
+    ids=["voxel", "hull", "mlp", "box"],
+)
+def test_other_fields_are_trained_rendered_and_read_again(
+    tmp_path: Path, options: TrainOptions, least: float
+) -> None:
+    scene, test = labelled(train_scene())[0], held_out()
+    training = train(scene, options)
+    write_run(tmp_path, training, replace(scene, frames=scene.frames[:1]))
+    loaded, camera = read_field(tmp_path), test.frames[0].camera
+    first, again = render(training.result, camera), render(loaded, camera)
+    np.testing.assert_array_equal(first.rgb, again.rgb)
+    found = compare(color_picture(first.rgb, first.alpha), test.frames[0].rgba)["psnr"]
+    assert found is not None
+    assert found > least
+
+
 @pytest.fixture
 def run_folder(tmp_path: Path, training: Training) -> Path:
     write_run(tmp_path, training, labelled(train_scene())[0])
