@@ -50,6 +50,7 @@ class Watch(Protocol):
 
     def look(self, moment: Moment) -> str:
         """Look at a training after each step; return why it should end, or nothing."""
+        ...
 
 
 def fit(
@@ -138,7 +139,7 @@ class _Loop:
         self._options, self._generator = options, generator
         tables = {id(values) for values in model.field.tables()}
         named = sorted(model.named_parameters(), key=lambda pair: id(pair[1]) not in tables)
-        self._parameters = dict(named)  # tables first, as in the groups
+        self._parameters: dict[str, Tensor] = dict(named)  # tables first, as in the groups
         values = list(self._parameters.values())
         fast = Group(values[: len(tables)], TABLES_RATE)
         slow = Group(values[len(tables) :], model.field.decoder_rate)
@@ -179,9 +180,12 @@ class _Loop:
 
     def state(self) -> FitState:
         """Return a copy of everything that the rest of the training depends on."""
+        parameters, means, squares = (_copied(group) for group in self._groups())
         return FitState(
             tuple(self.history),
-            *(_copied(group) for group in self._groups()),
+            parameters,
+            means,
+            squares,
             tuple(self._queue),
             self._generator.get_state(),
             torch.get_rng_state(),
@@ -204,8 +208,8 @@ class _Loop:
 
     def _groups(self) -> tuple[dict[str, Tensor], dict[str, Tensor], dict[str, Tensor]]:
         names, adam = list(self._parameters), self._adam
-        moments = (dict(zip(names, some, strict=True)) for some in (adam.first, adam.second))
-        return self._parameters, *moments
+        means = dict(zip(names, adam.first, strict=True))
+        return self._parameters, means, dict(zip(names, adam.second, strict=True))
 
 
 def _copied(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
