@@ -15,7 +15,7 @@ from safetensors.torch import load_file, save_file
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError, PaletteError
-from toonset.nerf import fitting
+from toonset.nerf import field_loss, fitting
 from toonset.nerf.animation import encode_gif
 from toonset.nerf.batches import Batch
 from toonset.nerf.evaluation import evaluate
@@ -126,11 +126,11 @@ def test_same_seed_same_bits_other_seed_other_bits() -> None:
 def test_a_loss_that_is_no_number_keeps_the_last_good_state(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    real = fitting.loss_terms
+    real = field_loss.loss_terms
     calls = iter(range(1000))
 
     def poisoned(
-        model: fitting.Model, batch: Batch, weights: fitting.Weights
+        model: field_loss.Model, batch: Batch, weights: field_loss.Weights
     ) -> tuple[torch.Tensor, ...]:
         first, *rest = real(model, batch, weights)
         return (first * (float("nan") if next(calls) == 25 else 1.0), *rest)
