@@ -186,5 +186,5 @@ def _missed_in(
     small = np.zeros(inside.shape, dtype=np.float32)
     small[inside] = found.apart / ratio
     size = frame.camera.size_wh
-    large = small if small.shape[::-1] == size else cv2.resize(small, size)
+    large = small if outline.camera.size_wh == size else cv2.resize(small, size)
     return np.where(alpha_of(frame) >= 0.5, large, 0)

@@ -28,6 +28,7 @@ CORRELATED = 5.0  # rim points in a row that err together
 FOREIGN = 0.02  # of the square: larger disagreements are more and more another shape, no error
 LEAST, MOST = 0.001, 0.012  # of the square: limits of tau; a larger one would bend other shapes
 SETTLED = 3  # rounds before tau is learned
+AFRESH = 3  # rounds after which whole rays are searched again, not only near the last best point
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,29 +71,31 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     views, count = len(outlines.views), len(moves.covariance)
     precision = np.kron(np.eye(views), np.linalg.inv(moves.covariance))
     numbers = np.zeros((views, count))
-    near: list[np.ndarray] | None = None
-    first: _Normal | None = None
-    for round_ in range(rounds + 1):
-        touches = _touches(Placed.of(outlines, moves, numbers), near if round_ % 3 else None)
-        near = [t.along for t in touches]
-        normal = _normal(Placed.of(outlines, moves, numbers), touches)
-        flat = numbers.reshape(-1)
-        if first is None:
-            first = normal
-            idle = normal.cost - _log_volume(normal.matrix, moves.covariance * tau**2, views)
-            if idle <= 0:  # even a perfect fit would not be worth its numbers
-                return Fit(numbers, 0.0, float(idle / 2), (normal.apart, normal.apart))
+    first, near = _linearised(outlines, moves, numbers, None)
+    idle = first.cost - _log_volume(first.matrix, moves.covariance * tau**2, views)
+    if idle <= 0:  # even a perfect fit would not be worth its numbers
+        return Fit(numbers, 0.0, float(idle / 2), (first.apart, first.apart))
+    normal, flat = first, numbers.reshape(-1)
+    for round_ in range(1, rounds + 1):
+        prior = precision / tau**2
+        flat = flat - np.linalg.solve(normal.matrix + prior, normal.slope + prior @ flat)
+        numbers = flat.reshape(views, count)
+        normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
         if round_ >= SETTLED:
             tau = _learned(normal.matrix, precision, flat, tau)
-        if round_ == rounds:
-            break
-        prior = precision / tau**2
-        step = np.linalg.solve(normal.matrix + prior, normal.slope + prior @ flat)
-        numbers = numbers - step.reshape(views, count)
     spent = normal.cost + flat @ precision @ flat / tau**2
     volume = _log_volume(normal.matrix, moves.covariance * tau**2, views)
     gain = (first.cost - spent - volume) / 2
     return Fit(numbers, tau, float(gain), (first.apart, normal.apart))
+
+
+def _linearised(
+    outlines: Outlines, moves: Moves, numbers: np.ndarray, near: list[np.ndarray] | None
+) -> tuple[_Normal, list[np.ndarray]]:
+    """Return the normal equations at `numbers`, and where along the rays they were taken."""
+    placed = Placed.of(outlines, moves, numbers)
+    touches = _touches(placed, near)
+    return _normal(placed, touches), [found.along for found in touches]
 
 
 def _touches(placed: Placed, near: list[np.ndarray] | None) -> list[Touch]:

@@ -17,14 +17,12 @@ REACH = 0.5  # of the square: distance over which a hand's error changes
 
 
 class Moves(Protocol):
-    """A family of displacements of one drawing.
+    """A family of displacements of one drawing."""
 
-    Attributes:
-        covariance: (k, k) of the numbers, for displacements of about 1; times the variance that
-            is expected.
-    """
-
-    covariance: Float[np.ndarray, "k k"]
+    @property
+    def covariance(self) -> Float[np.ndarray, "k k"]:
+        """Return the numbers' covariance for displacements of about 1."""
+        ...
 
     def jacobian(self, unit: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2 k"]:
         """Return the displacement per number at places of the square."""

@@ -7,7 +7,7 @@ for every sheet; the antialiased rim keeps its place to a tenth of a pixel.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -91,7 +91,7 @@ def outlines_of(
     """
     figure = max(max(_box(alpha)[1]) for alpha in alphas)
     factor = min(1.0, FIGURE_PX / figure)
-    small = [camera.resized(factor) if factor < 1 else camera for camera in cameras]
+    small = [_resized(camera, factor) if factor < 1 else camera for camera in cameras]
     pictures = [
         cv2.resize(alpha, camera.size_wh, interpolation=cv2.INTER_AREA) if factor < 1 else alpha
         for alpha, camera in zip(alphas, small, strict=True)
@@ -122,6 +122,20 @@ def signed_distance(
     distance -= np.sign(distance) * np.float32(0.5)  # from pixel centres to the rim between them
     known = (alpha > SURE) & (alpha < 1 - SURE) & (np.abs(distance) < 1)
     return np.where(known, alpha - 0.5, distance).astype(np.float32)
+
+
+def _resized(camera: Camera, factor: float) -> Camera:
+    """Return the camera of the picture stretched to a whole number of pixels."""
+    width, height = camera.size_wh
+    size = (max(1, round(factor * width)), max(1, round(factor * height)))
+    across, down = size[0] / width, size[1] / height
+    return replace(
+        camera,
+        scale=camera.scale * across,
+        center=camera.center * np.array([across, down]),
+        size_wh=size,
+        pixel_aspect=camera.pixel_aspect * down / across,
+    )
 
 
 def _outline(camera: Camera, alpha: Float[np.ndarray, "height width"], side: float) -> Outline:

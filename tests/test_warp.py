@@ -191,7 +191,7 @@ def test_the_same_bits_twice() -> None:
 
 
 def test_larger_pictures_are_compared_at_one_size() -> None:
-    large = outlines(sheet(4, 3 * SIDE))
+    large = outlines(sheet(4, 2 * SIDE))
     assert large.views[0].square.size < 1.2 * FIGURE_PX
     fit = fit_moves(large, ShiftAndScale.expected(), 0.01, 2)
     assert fit.gain_nats <= 0
