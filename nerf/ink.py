@@ -14,6 +14,7 @@ All other strokes are drawn features and stay. Doubt keeps a stroke.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,12 +31,14 @@ from toonset.nerf.ink_evidence import (
 from toonset.nerf.ink_nearest import distance_to, nearest
 from toonset.nerf.ink_strokes import (
     Lines,
+    Strokes,
     drawn_by_pen,
     lines_of,
+    mean_width,
     outline_width,
-    rim_width,
-    stroke_width,
+    rims_px,
     strokes_of,
+    strokes_px,
 )
 from toonset.palette.labels import UNLABELLED
 
@@ -80,53 +83,86 @@ def without_ink(scene: Scene) -> tuple[Scene, InkStyle | None]:
     Raises:
         BundleError: the views share no volume.
     """
-    frames = scene.frames
-    widths = [outline_width(frame.rgba) for frame in frames]
-    drawn = [width for width in widths if width > 0]
-    if not drawn or len(drawn) < FEWEST_OUTLINED * len(widths):
+    widths = [outline_width(frame.rgba) for frame in scene.frames]
+    outlined = [width for width in widths if width > 0]
+    if not outlined or len(outlined) < FEWEST_OUTLINED * len(widths):
         return scene, None
-    lines = [lines_of(frame.rgba, float(np.median(drawn))) for frame in frames]
-    hints, jump = depth_hints(scene, float(np.median(drawn)))
-    bare = [_cleaned(f, line, line.inner) for f, line in zip(frames, lines, strict=True)]
-    outline = rim_width(lines)
+    width = float(np.median(outlined))
+    lines = [lines_of(frame.rgba, width) for frame in scene.frames]
+    hints, jump = depth_hints(scene, width)
+    ink = _ink_color(scene, lines)
+    drawings = [_read(*each, ink) for each in zip(scene.frames, lines, hints, strict=True)]
     style = InkStyle(
-        rgb=_ink_color(scene, lines),
-        outline_px=outline,
-        inner_px=outline,
+        rgb=ink,
+        outline_px=_width_px(drawings, [np.zeros_like(line.inner) for line in lines], ink),
+        inner_px=0.0,
         views_px=tuple(widths),
-        px_per_unit=float(np.median([frame.camera.scale for frame in frames])),
-        jump=jump if _inked_share(hints, lines) >= INKED else None,
-        borders=lined_pairs(bare, lines, hints),
+        px_per_unit=float(np.median([frame.camera.scale for frame in scene.frames])),
+        jump=jump if _inked_share(drawings) >= INKED else None,
+        borders=lined_pairs([d.bare for d in drawings], [d.pen for d in drawings], lines, hints),
     )
-    contours = [_contour(*each, style) for each in zip(frames, bare, lines, hints, strict=True)]
-    cleaned = tuple(_cleaned(*each) for each in zip(frames, lines, contours, strict=True))
-    inner = stroke_width(lines, contours) or outline
-    return replace(scene, frames=cleaned), replace(style, inner_px=inner)
+    contours = [_contour(drawing, style.borders) for drawing in drawings]
+    frames = tuple(_cleaned(*each) for each in zip(scene.frames, lines, contours, strict=True))
+    inner = _width_px(drawings, contours, ink) or style.outline_px
+    return replace(scene, frames=frames), replace(style, inner_px=inner)
 
 
-def _contour(
-    frame: Frame, bare: Frame, lines: Lines, hints: Hints, style: InkStyle
-) -> Bool[np.ndarray, "height width"]:
-    """Return the inner strokes of the ink that depth jumps or colour borders explain."""
-    explained = hints.to_jump <= hints.reach_px
-    if bare.labels is not None:
-        explained |= distance_to(on_borders(bare.labels, style.borders)) <= lines.width_px
+@dataclass(frozen=True, eq=False)
+class _Drawing:
+    """A frame; the same with paint under all its lines; its lines; those of the outline's pen."""
+
+    frame: Frame
+    bare: Frame
+    lines: Lines
+    pen: Strokes
+    hints: Hints
+
+
+def _read(frame: Frame, lines: Lines, hints: Hints, ink: tuple[int, int, int]) -> _Drawing:
+    bare = _cleaned(frame, lines, lines.inner)
     strokes = strokes_of(lines)
-    size = np.bincount(strokes.number.ravel(), minlength=strokes.count)
-    known = np.bincount(strokes.number[explained], minlength=strokes.count)
-    taken = (known >= EXPLAINED * size) & ~strokes.dots
-    taken &= drawn_by_pen(strokes, lines, frame.rgba, bare.rgba, style.rgb)
-    return taken[strokes.number]
+    pen = strokes.only(drawn_by_pen(strokes, lines, frame.rgba, bare.rgba, ink))
+    return _Drawing(frame, bare, lines, pen, hints)
 
 
-def _inked_share(hints: list[Hints], lines: list[Lines]) -> float:
+def _contour(drawing: _Drawing, pairs: Pairs) -> Bool[np.ndarray, "height width"]:
+    """Return the pen's strokes that depth jumps or colour borders explain."""
+    pen, hints = drawing.pen, drawing.hints
+    explained = hints.to_jump <= hints.reach_px
+    if drawing.bare.labels is not None:
+        to_border = distance_to(on_borders(drawing.bare.labels, pairs))
+        explained |= to_border <= drawing.lines.width_px
+    size = np.bincount(pen.number.ravel(), minlength=pen.count)
+    known = np.bincount(pen.number[explained], minlength=pen.count)
+    return pen.only((known >= EXPLAINED * size) & ~pen.dots).number > 0
+
+
+def _inked_share(drawings: Sequence[_Drawing]) -> float:
     """Return which share of the hull's depth jumps lies near ink, over all views."""
     jumps = inked = 0
-    for hint, line in zip(hints, lines, strict=True):
-        edges = hint.edges & ~line.outline
+    for drawing in drawings:
+        edges = drawing.hints.edges & ~drawing.lines.outline
+        near = distance_to(drawing.lines.inner) <= drawing.hints.reach_px
         jumps += int(edges.sum())
-        inked += int((edges & (distance_to(line.inner) <= hint.reach_px)).sum())
+        inked += int((edges & near).sum())
     return inked / max(jumps, 1)
+
+
+def _width_px(
+    drawings: Sequence[_Drawing],
+    contours: Sequence[Bool[np.ndarray, "height width"]],
+    ink: tuple[int, int, int],
+) -> float:
+    """Return the mean width of the contours, or of the outlines where all contours are empty."""
+    pictures = [(drawing.frame.rgba, drawing.bare.rgba) for drawing in drawings]
+    rims = [drawing.lines.under(np.zeros_like(drawing.lines.inner)) for drawing in drawings]
+    if not any(contour.any() for contour in contours):
+        return mean_width(pictures, rims, rims_px(d.lines for d in drawings), ink)
+    regions = [
+        drawing.lines.under(contour) & ~rim
+        for drawing, contour, rim in zip(drawings, contours, rims, strict=True)
+    ]
+    return mean_width(pictures, regions, strokes_px(contours), ink)
 
 
 def _cleaned(frame: Frame, lines: Lines, contour: Bool[np.ndarray, "height width"]) -> Frame:

@@ -13,15 +13,15 @@ from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.hull import LEVEL, Hull, carve
 from toonset.nerf.ink_nearest import distance_to
-from toonset.nerf.ink_strokes import Lines
+from toonset.nerf.ink_strokes import Lines, Strokes
 from toonset.nerf.march import march, pixels_near, rays_of
 from toonset.palette.labels import UNLABELLED
 
 VOXELS = 96  # along the hull's longest side: a hint needs no more
-JUMP = 0.03  # of the figure's height: smaller steps of the hull are the voxels' own
+JUMP = 0.04  # of the figure's height: smaller steps of the hull are the voxels' own
 SLIP = 0.02  # of the figure's height: drawings and hull disagree by as much
 LEAST_BORDER = 8  # pixels of a border over all views, for it to be judged by itself
-LINED = 0.5  # of a border's length must be under ink
+LINED = 0.85  # of a border must be under ink: who draws borders draws nearly all of them
 
 Pairs = tuple[tuple[int, int], ...]
 
@@ -91,20 +91,26 @@ def _depth(hull: Hull, camera: Camera) -> Float[np.ndarray, "height width"]:
     return depth.reshape(height, width)
 
 
-def lined_pairs(frames: Sequence[Frame], lines: Sequence[Lines], hints: Sequence[Hints]) -> Pairs:
+def lined_pairs(
+    frames: Sequence[Frame],
+    pens: Sequence[Strokes],
+    lines: Sequence[Lines],
+    hints: Sequence[Hints],
+) -> Pairs:
     """Return the pairs of labels whose borders, away from depth jumps, are mostly under ink.
 
     Args:
         frames: with labels under all ink.
+        pens: strokes of the same frames that are ink.
         lines: of the same frames.
         hints: of the same frames.
     """
     total, inked = np.zeros((256, 256), int), np.zeros((256, 256), int)
-    for frame, line, hint in zip(frames, lines, hints, strict=True):
+    for frame, pen, line, hint in zip(frames, pens, lines, hints, strict=True):
         if frame.labels is None:
             return ()
         counted = (hint.to_jump > hint.reach_px) & ~line.outline
-        near_ink = distance_to(line.inner) <= 1
+        near_ink = distance_to(pen.number > 0) <= 1
         for low, high, at in _borders(frame.labels):
             use = counted[at]
             np.add.at(total, (low[use], high[use]), 1)

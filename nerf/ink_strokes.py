@@ -21,6 +21,7 @@ DIAGONAL = 1.1  # mean length of a skeleton's step over all directions
 IMPURE = 0.1  # of the way from ink to paint: a stroke's middle may be so far off
 LEVELS = 12  # levels that middles may be off the ink in any case
 CORE = 0.25  # quantile of a stroke's middle pixels that must be pure
+CLEAR = 60  # levels from paint to ink, Euclidean, for a pixel's share of ink to be told
 LONGER = 2.5  # times its width: a shorter stroke is a dot
 SQUARE = np.ones((3, 3), dtype=np.uint8)
 
@@ -92,6 +93,11 @@ class Strokes:
     count: int
     dots: Bool[np.ndarray, " count"]
 
+    def only(self, chosen: Bool[np.ndarray, " count"]) -> Strokes:
+        """Return the strokes without those not chosen; their numbers stay."""
+        kept = np.where(chosen[self.number], self.number, 0)
+        return Strokes(kept, self.skeleton & (kept > 0), self.count, self.dots)
+
 
 def strokes_of(lines: Lines) -> Strokes:
     """Return the strokes within the figure."""
@@ -138,22 +144,45 @@ def drawn_by_pen(
     return pen
 
 
-def stroke_width(lines: Iterable[Lines], chosen: Iterable[np.ndarray]) -> float:
-    """Return the mean width of the chosen strokes of all views: ink over length, 0 without any."""
-    ink = length = 0.0
-    for line, stroke in zip(lines, chosen, strict=True):
-        ink += float(line.cover[_grown(stroke) & ~line.outline].sum()) / 255
-        length += DIAGONAL * float(skeletonize(stroke).sum())
-    return ink / length if length else 0.0
+def mean_width(
+    pictures: Iterable[tuple[np.ndarray, np.ndarray]],
+    regions: Iterable[Bool[np.ndarray, "height width"]],
+    length_px: float,
+    ink: tuple[int, int, int],
+) -> float:
+    """Return the mean width of lines: how much ink there is over how long they are.
+
+    A pixel's share of ink is how far its colour lies from the paint's towards the ink's. Where the
+    paint is nearly as dark as the ink nothing is told; it counts as all the rest.
+
+    Args:
+        pictures: every drawing, and the same with paint under its lines; both RGBA.
+        regions: pixels that may hold ink of the lines measured.
+        length_px: of these lines in all drawings; 0 gives 0.
+        ink: its colour.
+    """
+    inked = told = area = 0.0
+    for (drawn, paint), region in zip(pictures, regions, strict=True):
+        alpha = drawn[region][:, 3] / 255.0
+        room = paint[region][:, :3].astype(np.float64) - ink
+        above = ((drawn[region][:, :3].astype(np.float64) - ink) * room).sum(axis=1)
+        square = (room**2).sum(axis=1)
+        clear = square > CLEAR**2
+        share = (1 - above / np.maximum(square, 1)).clip(0, 1)
+        inked += float((share * alpha)[clear].sum())
+        told += float(alpha[clear].sum())
+        area += float(alpha.sum())
+    return inked / told * area / length_px if told and length_px else 0.0
 
 
-def rim_width(lines: Iterable[Lines]) -> float:
-    """Return the mean width of the outlines: ink in the band over the silhouettes' length."""
-    ink = length = 0.0
-    for line in lines:
-        ink += float(line.cover[line.outline].sum()) / 255
-        length += float(perimeter(line.figure))
-    return ink / max(length, 1.0)
+def rims_px(lines: Iterable[Lines]) -> float:
+    """Return the length of all silhouettes."""
+    return sum(float(perimeter(line.figure)) for line in lines)
+
+
+def strokes_px(strokes: Iterable[Bool[np.ndarray, "height width"]]) -> float:
+    """Return the length of all strokes."""
+    return sum(DIAGONAL * float(skeletonize(stroke).sum()) for stroke in strokes)
 
 
 def _grown(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
