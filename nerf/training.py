@@ -147,6 +147,8 @@ def _spec(scene: Scene, options: TrainOptions) -> FieldSpec:
         return FieldSpec("mlp", 1, MLP_LAYERS, MLP_WIDTH)
     if options.field == "triplane":
         return FieldSpec("triplane", cells, CHANNELS, HIDDEN)
+    if options.field == "voxel":  # whose cost grows with the cube of it
+        return FieldSpec("voxel", max(1, cells * 3 // 4), 4, 0)
     return FieldSpec("voxel", cells, 4, 0)
 
 
