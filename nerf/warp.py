@@ -156,9 +156,9 @@ def resampled(
     """Return straight-alpha colours taken from `places` (pixels), nothing beyond the edges."""
     straight = rgba.astype(np.float32) / 255
     straight[..., :3] *= straight[..., 3:]  # what is transparent has no colour to mix in
-    maps = (places - 0.5).astype(np.float32)
     # cubic: linear interpolation would blur a line of one pixel to half its depth
-    found = cv2.remap(straight, maps, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
+    maps = _maps(places)
+    found = cv2.remap(straight, *maps, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
     alpha = found[..., 3:].clip(0, 1)
     seen = alpha > 0.5 / 255
     color = np.where(seen, found[..., :3] / np.where(seen, alpha, 1), 0)
@@ -169,12 +169,14 @@ def resampled_labels(
     labels: UInt8[np.ndarray, "height width"], places: Float[np.ndarray, "height width 2"]
 ) -> UInt8[np.ndarray, "height width"]:
     """Return the nearest labels at `places`, none beyond the edges."""
-    maps = (places - 0.5).astype(np.float32)
+    outside = (UNLABELLED,) * 4
+    mode = cv2.BORDER_CONSTANT
     return cv2.remap(
-        labels,
-        maps,
-        None,
-        cv2.INTER_NEAREST,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=(UNLABELLED,) * 4,
+        labels, *_maps(places), cv2.INTER_NEAREST, borderMode=mode, borderValue=outside
     )
+
+
+def _maps(places: Float[np.ndarray, "height width 2"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and y as OpenCV wants them: the first pixel's centre is at 0."""
+    across, down = np.moveaxis(places - 0.5, -1, 0).astype(np.float32, order="C")
+    return across, down

@@ -28,7 +28,7 @@ CORRELATED = 5.0  # rim points in a row that err together
 FOREIGN = 0.02  # of the square: larger disagreements are more and more another shape, no error
 LEAST, MOST = 0.001, 0.012  # of the square: limits of tau; a larger one would bend other shapes
 SETTLED = 3  # rounds before tau is learned
-AFRESH = 3  # rounds after which whole rays are searched again, not only near the last best point
+AFRESH = 4  # rounds after which whole rays are searched again, not only near the last best point
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,7 +77,8 @@ def bent_sheet(rms_px: float = 1.5) -> tuple[Scene, tuple[np.ndarray, ...]]:
         figure = frame.rgba[..., 3] > 127
         field = displacement_field(np.random.default_rng(i), figure, rms_px)
         place = (frame.camera.pixel_grid() + field - 0.5).astype(np.float32)
-        rgba = cv2.remap(frame.rgba, place, None, cv2.INTER_LINEAR, borderMode=0)
+        across, down = place[..., 0].copy(), place[..., 1].copy()
+        rgba = cv2.remap(frame.rgba, across, down, cv2.INTER_LINEAR)
         frames.append(replace(frame, rgba=rgba))
         fields.append(field)
     return replace(sheet(), frames=tuple(frames)), tuple(fields)
