@@ -92,8 +92,8 @@ class Onlooker:
     def look(self, moment: Moment) -> str:
         """Look at a training after a step; return why it should end, or nothing."""
         spent = moment.history[-1].seconds
-        if self.looking.stop() and len(moment.history) < self.options.steps:
-            self._save(moment)
+        unfinished = len(moment.history) < self.options.steps
+        if self.looking.stop() and unfinished and self._save(moment):
             return INTERRUPTED
         if self._views and spent >= self._test_at:
             took = self._look_at_held_out(moment)
@@ -107,11 +107,15 @@ class Onlooker:
         self.looking.tell(status_of(moment, self.options.steps, psnr))
         return ""
 
-    def _save(self, moment: Moment) -> None:
+    def _save(self, moment: Moment) -> bool:
+        """Write a checkpoint, unless something is wrong: the next step will tell."""
         self._saved_at = moment.history[-1].seconds
+        state = moment.state()
+        if not all(bool(torch.isfinite(values).all()) for values in state.parameters.values()):
+            return False
         if self.looking.folder is not None:
-            state = moment.state()
             write_checkpoint(self.looking.folder, state, self.options, self.scene)
+        return True
 
     def _show(self, moment: Moment) -> None:
         self._preview_at = moment.history[-1].seconds
@@ -128,11 +132,8 @@ class Onlooker:
         return time.perf_counter() - began
 
     def _shown(self) -> TrainedField:
-        """Return the field where it can be rendered: on the CPU."""
-        model = Model(self._trained.field, self._trained.classifier)
-        if all(values.device.type == "cpu" for values in model.parameters()):
-            return self._trained
-        there = copy.deepcopy(model).to("cpu")
+        """Return a copy on the CPU: what a renderer keeps of it must not outlive the step."""
+        there = copy.deepcopy(Model(self._trained.field, self._trained.classifier)).to("cpu")
         return replace(self._trained, field=there.field, classifier=there.classifier)
 
 

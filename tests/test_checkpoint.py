@@ -24,7 +24,13 @@ from toonset.nerf.field_rays import PRUNE_AFTER
 from toonset.nerf.fitting import Moment
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.progress import Status
-from toonset.nerf.progress_watch import INTERRUPTED, Looking, Onlooker, sample_of
+from toonset.nerf.progress_watch import (
+    INTERRUPTED,
+    Looking,
+    Onlooker,
+    held_out_psnr,
+    sample_of,
+)
 from toonset.nerf.trained import Training
 from toonset.nerf.training import train
 
@@ -106,7 +112,8 @@ def test_looking_on_changes_no_bit(
     watched = train(SCENE, OPTIONS, watch=watch)
     assert {p.name for p in tmp_path.iterdir()} >= {"preview.png", "checkpoint.json"}
     assert watch.held_out
-    assert 15 < watch.held_out[-1].psnr < 60
+    assert 15 < held_out_psnr(whole.result, sample_of(HELD_OUT)) < 60
+    assert watch.held_out[0].psnr < held_out_psnr(whole.result, sample_of(HELD_OUT))
     assert all(torch.equal(a, b) for a, b in zip(bits(whole), bits(watched), strict=True))
 
 
@@ -239,6 +246,38 @@ def test_a_checkpoint_goes_on_with_its_own_scene_only(
     watch.start = replace(checkpoint.state, parameters={})
     with pytest.raises(BundleError, match="of another field"):
         train(SCENE, replace(OPTIONS, steps=1), watch=watch)
+
+
+def test_a_training_whose_samples_move_resumes_bit_identical_too(tmp_path: Path) -> None:
+    options = replace(OPTIONS, carve=False, steps=9)
+    whole = train(SCENE, options)
+    states = []
+
+    class After(Onlooker):
+        def look(self, moment: Moment) -> str:
+            states.append(moment.state())
+            return INTERRUPTED if len(moment.history) == 4 else ""
+
+    looking = Looking(quiet, lambda: False)
+    train(SCENE, options, watch=After(looking, SCENE, options))
+    write_checkpoint(tmp_path, states[-1], options, SCENE)
+    start = read_checkpoint(tmp_path).state
+    resumed = train(SCENE, options, watch=Onlooker(looking, SCENE, options, start))
+    assert all(torch.equal(a, b) for a, b in zip(bits(whole), bits(resumed), strict=True))
+
+
+def test_a_state_with_what_is_no_number_is_never_kept(
+    cut: tuple[Training, FitState], tmp_path: Path
+) -> None:
+    state = cut[1]
+    name, values = next(iter(state.parameters.items()))
+    bad = replace(state, parameters=state.parameters | {name: values * float("nan")})
+    for kept, expected in ((state, INTERRUPTED), (bad, "")):
+        folder = tmp_path / (expected or "bad")
+        watch = Onlooker(Looking(quiet, lambda: True, folder=folder), SCENE, OPTIONS)
+        watch.begin(cut[0].result)
+        assert watch.look(Moment(list(kept.history), 0.5, lambda kept=kept: kept)) == expected
+        assert folder.exists() == bool(expected)
 
 
 # ---- trainings that go wrong
