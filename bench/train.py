@@ -1,136 +1,162 @@
-"""Training: seconds against held-out PSNR, per setting, with the nearest drawing as baseline."""
+"""Training: seconds against how near held-out views come, per method, beside baselines."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
-from jaxtyping import UInt8
 
-from toonset.bench.cases import TrainCase
-from toonset.bench.record import Direction, Record, summarise
-from toonset.camera import rotation_distance
-from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.labelling import labelled, without_palette
-from toonset.nerf.layers import color_picture
-from toonset.nerf.metrics import compare
-from toonset.nerf.options import TrainOptions
-from toonset.nerf.trained import TrainedField
-from toonset.nerf.training import train
-from toonset.nerf.views import render
+from toonset.bench.record import Direction, Record, aligned, summarise
+from toonset.bench.train_plan import METHODS, Job
+from toonset.bench.train_run import RunResult, Seen, near_end, run_job
+from toonset.nerf.metrics_view import load_judges
 
-NEAREST = "nearest drawing"
+NEAR_END_DB = 0.5
 
 
 @dataclass(frozen=True)
-class Setting:
-    """One point of the chart."""
+class Column:
+    """A figure of a run: in the table and among the records.
 
-    options: TrainOptions
-    palette: bool = True
+    Attributes:
+        metric: name of the record.
+        unit: of it.
+        direction: which is better.
+        heading: in the table; "" = in the records only.
+        form: number format of the table.
+        value: of a run; None where it has none.
+    """
 
-
-SETTINGS: dict[str, Setting] = {
-    "75 steps": Setting(TrainOptions(steps=75)),
-    "150 steps": Setting(TrainOptions(steps=150)),
-    "default": Setting(TrainOptions()),
-    "600 steps": Setting(TrainOptions(steps=600)),
-    "no palette": Setting(TrainOptions(), palette=False),
-}
-QUICK = ("75 steps", "default")
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """One case's figures: means over the held-out views, seconds of training and of one view."""
-
-    psnr: float
-    psnr_mask: float
-    ssim: float
-    seconds: float
-    render_seconds: float
+    metric: str
+    unit: str
+    direction: Direction
+    heading: str
+    form: str
+    value: Callable[[RunResult], float | None]
 
 
-def bench_training(
-    cases: Iterable[TrainCase],
-    seed: int,
-    *,
-    quick: bool,
-    progress: Callable[[str], None] = lambda text: None,
-) -> list[Record]:
-    """Return records of held-out quality and seconds per setting and condition."""
-    outcomes: dict[tuple[str, str], list[Outcome]] = {}
-    for case in cases:
-        for method in [NEAREST, *(QUICK if quick else SETTINGS)]:
-            progress(f"{case.name}: {method}")
-            key = (case.group, method)
-            outcomes.setdefault(key, []).append(_run(method, case, seed))
-    return [
-        record
-        for (group, method), found in outcomes.items()
-        for record in _records(method, group, found, seed)
-    ]
+def run_jobs(
+    jobs: Sequence[Job], progress: Callable[[str], None] = lambda text: None
+) -> Iterator[tuple[Job, RunResult]]:
+    """Yield every job with its result, as soon as it is done; one at a time, for they are timed."""
+    judges = load_judges()
+    for number, job in enumerate(jobs, 1):
+        progress(f"{number} of {len(jobs)}: {job.name}, seed {job.seed}")
+        yield job, run_job(job, judges)
 
 
-def _run(method: str, case: TrainCase, seed: int) -> Outcome:
-    if method == NEAREST:
-        return _outcome(case, lambda frame: _nearest(case.train, frame), 0.0)
-    setting = SETTINGS[method]
-    options = TrainOptions(steps=setting.options.steps, seed=seed)
-    start = time.perf_counter()
-    scene = labelled(case.train)[0] if setting.palette else without_palette(case.train)
-    trained = train(scene, options).result
-    seconds = time.perf_counter() - start
-    return _outcome(case, lambda frame: _picture(trained, frame), seconds)
+def records_of(runs: Sequence[RunResult], seed: int) -> list[Record]:
+    """Return the records of all groups and methods, in the order of `in_order`."""
+    records = []
+    for (group, method), found in _grouped(runs):
+        for column in COLUMNS:
+            values = [v for v in map(column.value, found) if v is not None]
+            if values:
+                records.append(
+                    summarise(
+                        values,
+                        method=method,
+                        metric=column.metric,
+                        unit=column.unit,
+                        direction=column.direction,
+                        seed=seed,
+                        group=group,
+                    )
+                )
+    return records
 
 
-def _picture(trained: TrainedField, frame: Frame) -> UInt8[np.ndarray, "height width 4"]:
-    rendering = render(trained, frame.camera)
-    return color_picture(rendering.rgb, rendering.alpha)
+def table_of(runs: Sequence[RunResult]) -> str:
+    """Return means over cases and seeds, medians of seconds, as a text per group and method."""
+    lines: list[str] = []
+    for group, listed in groupby(_grouped(runs), key=lambda entry: entry[0][0]):
+        shown = [column for column in COLUMNS if column.heading]
+        rows = [("method", "n", *(column.heading for column in shown))]
+        for (_, method), found in listed:
+            cells = [_cell(column, found) for column in shown]
+            rows.append((method, str(len(found)), *cells))
+        lines += ["", group, *aligned(rows, words=1)]
+    failed = [f"{r.case}, {r.group}, {r.method}, seed {r.seed}: {r.note}" for r in runs if r.note]
+    return "\n".join([*lines[1:], *(["", "failed", *failed] if failed else [])])
 
 
-def _nearest(scene: Scene, frame: Frame) -> UInt8[np.ndarray, "height width 4"]:
-    turns = [rotation_distance(f.camera.rotation, frame.camera.rotation) for f in scene.frames]
-    nearest = scene.frames[int(np.argmin(turns))].rgba
-    if nearest.shape != frame.rgba.shape:  # cells of different sizes: aligned at their corner
-        blank = np.zeros_like(frame.rgba)
-        height, width = np.minimum(nearest.shape[:2], blank.shape[:2])
-        blank[:height, :width] = nearest[:height, :width]
-        return blank
-    return nearest
+def in_order(runs: Sequence[RunResult]) -> list[RunResult]:
+    """Return the runs that succeeded, group by group as they came, methods as they are listed."""
+    runs = [run for run in runs if not run.note]
+    groups = list(dict.fromkeys(run.group for run in runs))
+    methods = list(METHODS)
+    return sorted(runs, key=lambda run: (groups.index(run.group), methods.index(run.method)))
 
 
-def _outcome(case: TrainCase, picture_of: Callable[[Frame], np.ndarray], seconds: float) -> Outcome:
-    start = time.perf_counter()
-    pictures = [picture_of(frame) for frame in case.test.frames]
-    each = (time.perf_counter() - start) / len(pictures)
-    found = [compare(p, f.rgba) for p, f in zip(pictures, case.test.frames, strict=True)]
-
-    def mean(name: str) -> float:
-        return float(np.mean([v for v in (figures[name] for figures in found) if v is not None]))
-
-    return Outcome(mean("psnr"), mean("psnr_mask"), mean("ssim"), seconds, each)
+def _grouped(runs: Sequence[RunResult]) -> list[tuple[tuple[str, str], list[RunResult]]]:
+    ordered = groupby(in_order(runs), key=lambda run: (run.group, run.method))
+    return [(key, list(found)) for key, found in ordered]
 
 
-def _records(method: str, group: str, found: Sequence[Outcome], seed: int) -> list[Record]:
-    rows: list[tuple[str, str, Direction, list[float]]] = [
-        ("held-out PSNR", "dB", "higher", [o.psnr for o in found]),
-        ("held-out PSNR in mask", "dB", "higher", [o.psnr_mask for o in found]),
-        ("held-out SSIM", "1", "higher", [o.ssim for o in found]),
-        ("seconds", "s", "lower", [o.seconds for o in found]),
-        ("seconds per rendered view", "s", "lower", [o.render_seconds for o in found]),
-    ]
-    return [
-        summarise(
-            samples,
-            method=method,
-            metric=metric,
-            unit=unit,
-            direction=direction,
-            seed=seed,
-            group=group,
-        )
-        for metric, unit, direction, samples in rows
-    ]
+def _cell(column: Column, found: Sequence[RunResult]) -> str:
+    values = [v for v in map(column.value, found) if v is not None]
+    if not values:
+        return "-"
+    timed = column.unit == "s"
+    return column.form.format(np.median(values) if timed else np.mean(values))
+
+
+def _figure(name: str) -> Callable[[RunResult], float | None]:
+    return lambda run: run.figures.get(name)
+
+
+def _near_end(read: Callable[[Seen], float]) -> Callable[[RunResult], float | None]:
+    """Return what reads seconds off the curve; a curve that began so near tells nothing."""
+
+    def value(run: RunResult) -> float | None:
+        if len(run.curve) < 2 or (near := near_end(run.curve, NEAR_END_DB)) == run.curve[0]:
+            return None
+        return read(near)
+
+    return value
+
+
+def _quality(
+    metric: str, name: str, heading: str, form: str, unit: str = "1", lower: bool = False
+) -> Column:
+    direction: Direction = "lower" if lower else "higher"
+    return Column(f"held-out {metric}", unit, direction, heading, form, _figure(name))
+
+
+COLUMNS = (
+    Column("seconds", "s", "lower", "s", "{:.1f}", lambda run: run.seconds),
+    Column("CPU seconds", "s", "lower", "CPU s", "{:.1f}", lambda run: run.cpu_seconds),
+    Column(
+        *("seconds to 0.5 dB below the end", "s", "lower", "s to -0.5 dB", "{:.1f}"),
+        _near_end(lambda seen: seen.seconds),
+    ),
+    Column(
+        *("CPU seconds to 0.5 dB below the end", "s", "lower", "CPU s to", "{:.1f}"),
+        _near_end(lambda seen: seen.cpu_seconds),
+    ),
+    _quality("PSNR", "psnr", "PSNR", "{:.2f}", "dB"),
+    _quality("PSNR in mask", "psnr_mask", "in mask", "{:.2f}", "dB"),
+    _quality("PSNR, 2 px tolerated", "psnr_shift", "+-2 px", "{:.2f}", "dB"),
+    _quality("SSIM", "ssim", "SSIM", "{:.3f}"),
+    _quality("FLIP", "flip", "FLIP", "{:.4f}", lower=True),
+    _quality("HaarPSI", "haarpsi", "HaarPSI", "{:.3f}"),
+    _quality("GMSD", "gmsd", "", "", lower=True),
+    _quality("LPIPS", "lpips", "", "", lower=True),
+    _quality("outline IoU", "silhouette_iou", "outline", "{:.3f}"),
+    _quality("lines F1", "ink_f1", "lines", "{:.2f}"),
+    _quality("label accuracy", "label_accuracy", "labels", "{:.3f}"),
+    _quality("label mIoU", "label_miou", "mIoU", "{:.3f}"),
+    _quality("palette PSNR", "palette_psnr", "pal. PSNR", "{:.2f}", "dB"),
+    _quality("palette PSNR in mask", "palette_psnr_mask", "", "", "dB"),
+    _quality("palette FLIP", "palette_flip", "pal. FLIP", "{:.4f}", lower=True),
+    Column(
+        *("seconds per rendered view", "s", "lower", "s a view", "{:.2f}"),
+        lambda run: run.render_seconds,
+    ),
+    Column(
+        *("parameters", "1", "lower", "", ""),
+        lambda run: run.parameters or None,
+    ),
+)

@@ -65,8 +65,9 @@ def bench(
     """Measure one stage: seconds against accuracy, per setting, beside a baseline.
 
     Prints a table and writes records.json and a chart per condition. `split` writes a picture of
-    the wrongly split sheets. `stability` sweeps errors of a sheet, to where calibration fails; the
-    same command again continues a stopped run.
+    the wrongly split sheets. `stability` sweeps errors of a sheet, to where calibration fails;
+    `train` draws held-out PSNR against seconds. Of both, the same command again continues a stopped
+    run.
     """
     from toonset.bench.record import as_dicts, machine
     from toonset.cli.bench_measure import measure
@@ -78,6 +79,9 @@ def bench(
     if subject is Subject.stability:
         _stability(out, only, seed, count, quick, force, printer)
         return
+    if subject is Subject.train:
+        _training(out, chosen, force, printer)
+        return
     check_output(out, [cases, sprites], WRITTEN, force=force)
     measured = measure(chosen, printer)
     with new_folder(out, force=force) as folder:
@@ -87,6 +91,15 @@ def bench(
     printer.say(f"machine: {machine()}, seed {seed}")
     printer.say(f"pictures in {out}" if measured.pictures else f"records in {out}")
     printer.result({"records": as_dicts(measured.records)}, measured.text)
+
+
+def _training(out: Path, chosen: Chosen, force: bool, printer: Printer) -> None:
+    from toonset.bench.record import machine
+    from toonset.cli.bench_train import train_into
+
+    text, records = train_into(out, chosen, printer, force=force)
+    printer.say(f"machine: {machine()}, seeds from {chosen.seed}; picture in {out / 'train.png'}")
+    printer.result({"records": records}, text)
 
 
 def _stability(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from toonset.cli.bench_chosen import Chosen, Subject
+from toonset.cli.bench_chosen import Chosen
 
 if TYPE_CHECKING:
     from toonset.bench.chart import Point
     from toonset.bench.record import Record
 
-CHARTED = ("rotation error modulo twin", "yaw error", "held-out PSNR")
+CHARTED = ("rotation error modulo twin", "yaw error")
 COLORS_FOUND = "F1 of colours"
 LEAST_S = 1e-3  # a chart's time axis is logarithmic
 
@@ -20,7 +20,6 @@ def charts_by_group(chosen: Chosen, records: list[Record]) -> dict[str, bytes]:
     from toonset.bench.chart import Point
 
     charts = {}
-    training = chosen.subject is Subject.train
     for group in dict.fromkeys(record.group for record in records):
         own = [record for record in records if record.group == group]
         seconds = {r.method: r.median for r in own if r.metric == "seconds"}
@@ -33,7 +32,7 @@ def charts_by_group(chosen: Chosen, records: list[Record]) -> dict[str, bytes]:
             points,
             title=f"{group}: median, whisker to p95",
             labels=(
-                "seconds of training" if training else "seconds per sheet",
+                "seconds per sheet",
                 f"{merits[0].metric} ({merits[0].unit})",
             ),
             n=merits[0].n,

@@ -28,7 +28,7 @@ class Measured:
 
 
 def measure(chosen: Chosen, printer: Printer) -> Measured:
-    """Return what one run measures; `stability` has a module of its own.
+    """Return what one run measures; `stability` and `train` have modules of their own.
 
     Raises:
         ToonsetError: no case of that name, or a folder without cases.
@@ -39,13 +39,11 @@ def measure(chosen: Chosen, printer: Printer) -> Measured:
         return _palettes(chosen, printer)
     if chosen.subject is Subject.labels:
         return _labels(chosen, printer)
-    records, text = _cameras_or_fields(chosen, printer)
+    records, text = _cameras(chosen, printer)
     return Measured(records, text, charts_by_group(chosen, records))
 
 
-def _cameras_or_fields(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
-    if chosen.subject is Subject.train:
-        return _training(chosen, printer)
+def _cameras(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
     if chosen.sprites is not None:
         from toonset.bench.calib_table import sprites_table
         from toonset.bench.sprites import bench_sprites, sprite_cases
@@ -70,20 +68,6 @@ def _calibration(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
     if chosen.baseline is Baseline.colmap:
         records += bench_colmap(sheets, chosen.seed, quick=quick, progress=progress)
     return records, sheets_table(records)
-
-
-def _training(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
-    from toonset.bench.cases import train_cases
-    from toonset.bench.record import table
-    from toonset.bench.train import bench_training
-
-    count = chosen.count or DEFAULT_COUNT
-    found = train_cases(chosen.cases, chosen.seed, count, half=chosen.half)
-    scenes = [case for case in found if chosen.only in case.name]
-    if not scenes:
-        raise _none_of(chosen)
-    records = bench_training(scenes, chosen.seed, quick=chosen.quick, progress=printer.progress)
-    return records, table(records)
 
 
 def _splitting(chosen: Chosen, printer: Printer) -> Measured:

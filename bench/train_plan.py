@@ -1,0 +1,131 @@
+"""What a training bench runs: cases, subsets of their views, methods, seeds, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from toonset.bench.cases import TrainCase
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.preset import paper
+
+NEAREST = "nearest drawing"
+VIEWS, QUICK_VIEWS = (8, 4, 3), (8,)
+SEEDS, QUICK_SEEDS = 3, 1
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to predict a view.
+
+    Attributes:
+        options: of training, the seed aside; None: no training, the nearest drawing is shown.
+        palette: with labels of a palette that is extracted in the seconds that count.
+        first_seed_only: so slow, or so little random, that one seed must do.
+    """
+
+    options: TrainOptions | None
+    palette: bool = True
+    first_seed_only: bool = False
+
+
+METHODS: dict[str, Method] = {
+    "default": Method(TrainOptions()),
+    NEAREST: Method(None, first_seed_only=True),
+    "coloured hull": Method(TrainOptions(field="hull"), palette=False, first_seed_only=True),
+    "75 steps": Method(TrainOptions(steps=75)),
+    "600 steps": Method(TrainOptions(steps=600)),
+    "no palette": Method(TrainOptions(), palette=False),
+    "voxel": Method(TrainOptions(field="voxel")),
+    "mlp": Method(TrainOptions(field="mlp"), first_seed_only=True),
+    "paper, 200 steps": Method(paper(200), first_seed_only=True),
+    "paper, 2000 steps": Method(paper(2000), first_seed_only=True),
+    "paper, no palette": Method(paper(2000), palette=False, first_seed_only=True),
+    "paper, mlp": Method(replace(paper(2000), field="mlp"), first_seed_only=True),
+}
+QUICK_METHODS = ("default", NEAREST, "coloured hull", "75 steps")
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One training and its figures.
+
+    Attributes:
+        case: all views; held-out ones are for the figures alone.
+        views: how many of the case's views are trained on.
+        method: name in `METHODS`.
+        seed: of everything random.
+    """
+
+    case: TrainCase
+    views: int
+    method: str
+    seed: int
+
+    @property
+    def group(self) -> str:
+        """Return the condition that figures are summarised over, e.g. "exact 150 px 8 views"."""
+        return f"{self.case.group} {side_px(self.case)} px {self.views} views"
+
+    @property
+    def name(self) -> str:
+        """Return what a person selects by."""
+        return f"{self.case.name} {side_px(self.case)} px {self.views} views {self.method}"
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return all that a result depends on, as plain data; the code aside."""
+        method = METHODS[self.method]
+        options = None if method.options is None else asdict(method.options)
+        return {"name": self.name, "seed": self.seed, "options": options, "palette": method.palette}
+
+
+def plan(cases: Iterable[TrainCase], seed: int, only: str = "", *, quick: bool) -> list[Job]:
+    """Return the jobs, what tells most first: a stopped run has filled the most of its tables.
+
+    Every seed begins when all cases have the one before; small pictures and many views go first.
+
+    Args:
+        cases: with all their views; several sizes of one case are several cases.
+        seed: the first.
+        only: keep jobs whose name contains this.
+        quick: one case per condition and size, one seed, eight views, few methods.
+    """
+    chosen = _first_of_groups(cases) if quick else list(cases)
+    jobs = [
+        Job(case, views, method, seed + number)
+        for number in range(QUICK_SEEDS if quick else SEEDS)
+        for case in chosen
+        for views in view_counts(case, QUICK_VIEWS if quick else VIEWS)
+        for method in (QUICK_METHODS if quick else METHODS)
+        if number == 0 or not METHODS[method].first_seed_only
+    ]
+    order = list(METHODS)
+    jobs.sort(key=lambda j: (j.seed, side_px(j.case), -j.views, order.index(j.method)))
+    return [job for job in jobs if only in job.name]
+
+
+def view_counts(case: TrainCase, wanted: Sequence[int]) -> list[int]:
+    """Return how many views are trained on; a case with fewer than 8 has all of its own first."""
+    have = len(case.train.frames)
+    return sorted({min(count, have) for count in wanted}, reverse=True)
+
+
+def subset(case: TrainCase, views: int) -> TrainCase:
+    """Return the case with so many training views, evenly taken from the first on."""
+    frames = case.train.frames
+    kept = tuple(frames[round(i * len(frames) / views)] for i in range(views))
+    return replace(case, train=replace(case.train, frames=kept))
+
+
+def side_px(case: TrainCase) -> int:
+    """Return the longest side of the held-out pictures."""
+    return max(max(frame.camera.size_wh) for frame in case.test.frames)
+
+
+def _first_of_groups(cases: Iterable[TrainCase]) -> list[TrainCase]:
+    found: dict[tuple[str, int], TrainCase] = {}
+    for case in cases:
+        found.setdefault((case.group, side_px(case)), case)
+    return list(found.values())

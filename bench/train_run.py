@@ -1,0 +1,218 @@
+"""One training of the bench: seconds, a curve of held-out PSNR while it went on, all figures."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import UInt8
+from torch import Tensor
+
+from toonset.bench.cases import TrainCase
+from toonset.bench.train_plan import METHODS, Job, subset
+from toonset.camera import rotation_distance
+from toonset.dataset.scene import Frame, Scene
+from toonset.errors import ToonsetError
+from toonset.nerf.checkpoint_state import FitState
+from toonset.nerf.evaluation import LAYERS, score_views
+from toonset.nerf.field_box import without_empty_space
+from toonset.nerf.field_loss import Model
+from toonset.nerf.fitting import Moment
+from toonset.nerf.labelling import labelled, without_palette
+from toonset.nerf.layers import color_picture
+from toonset.nerf.metrics import Figures, means, over_white, psnr_of
+from toonset.nerf.metrics_view import Judges, figures_of
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.trained import TrainedField
+from toonset.nerf.training import train
+from toonset.nerf.views import render
+
+CURVE_VIEWS = 4  # held-out views that every point of the curves is the mean of
+FIRST_LOOK_S, LOOK_FACTOR = 1.0, 2**0.5  # seconds of the first snapshot, and from one to the next
+
+
+@dataclass(frozen=True)
+class Seen:
+    """How near some held-out views were at a moment of a training."""
+
+    seconds: float
+    cpu_seconds: float
+    psnr: float
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What one job found.
+
+    Attributes:
+        group: condition that it is summarised under.
+        method: its name.
+        case: the character.
+        seed: of everything random.
+        figures: means over the held-out views; those of the palette's rendering begin with
+            "palette_".
+        seconds: of all training, after imports: palette, hull, rays, steps.
+        cpu_seconds: the same, summed over the cores; a busy machine does not change it much.
+        render_seconds: per view.
+        parameters: of the field and its classifier.
+        curve: PSNR in dB of some held-out views while the training went on, and at its end; empty
+            where it failed.
+        note: why it failed, or nothing.
+    """
+
+    group: str
+    method: str
+    case: str
+    seed: int
+    figures: Figures
+    seconds: float
+    cpu_seconds: float
+    render_seconds: float
+    parameters: int
+    curve: tuple[Seen, ...]
+    note: str = ""
+
+
+def run_job(job: Job, judges: Judges) -> RunResult:
+    """Return what training and rendering of one job gives; a refusal is a result, too."""
+    case, method = subset(job.case, job.views), METHODS[job.method]
+    try:
+        if method.options is None:
+            return _nearest_drawing(job, case, judges)
+        return _trained(job, case, replace(method.options, seed=job.seed), judges)
+    except ToonsetError as error:
+        return RunResult(*_named(job), {}, 0.0, 0.0, 0.0, 0, (), str(error))
+
+
+def _trained(job: Job, case: TrainCase, options: TrainOptions, judges: Judges) -> RunResult:
+    watch = Snapshots(time.perf_counter(), time.process_time(), carved=options.carve)
+    with_palette = METHODS[job.method].palette
+    scene = labelled(case.train)[0] if with_palette else without_palette(case.train)
+    training = train(scene, options, watch=watch)
+    seconds, cpu_seconds = watch.spent()
+    sample = curve_frames(case.test)
+    curve = [Seen(*spent, _psnr(trained, sample)) for spent, trained in watch.states()]
+    began = time.perf_counter()
+    curve.append(Seen(seconds, cpu_seconds, _psnr(training.result, sample)))
+    render_seconds = (time.perf_counter() - began) / len(sample)
+    views = score_views(training.result, case.test, judges)
+    layers = {layer: [v.figures[layer] for v in views if layer in v.figures] for layer in LAYERS}
+    figures = means(layers["rgb"])
+    figures |= {f"palette_{name}": value for name, value in means(layers["palette"]).items()}
+    return RunResult(
+        *_named(job),
+        figures,
+        seconds,
+        cpu_seconds,
+        render_seconds,
+        training.counts["parameters"],
+        tuple(curve),
+    )
+
+
+@dataclass
+class Snapshots:
+    """Watches a training and keeps its parameters at 1, 1.4, 2, ... seconds.
+
+    Attributes:
+        began: when the training's seconds began to count, as `time.perf_counter` says.
+        cpu_began: and the processor's, as `time.process_time` says.
+        carved: the field fills a hull, not a whole box.
+        kept: seconds, processor's seconds and parameters of each snapshot.
+    """
+
+    began: float
+    cpu_began: float
+    carved: bool = True
+    kept: list[tuple[tuple[float, float], dict[str, Tensor]]] = field(default_factory=list)
+
+    def spent(self) -> tuple[float, float]:
+        """Return the seconds and processor's seconds until now, without those of looking."""
+        return time.perf_counter() - self.began, time.process_time() - self.cpu_began
+
+    def begin(self, trained: TrainedField) -> FitState | None:
+        """Take the field that will be fitted, from its beginning."""
+        self._trained = trained
+        self._next = FIRST_LOOK_S
+        return None
+
+    def look(self, moment: Moment) -> str:
+        """Keep a snapshot when its time has come."""
+        before = self.spent()
+        if before[0] >= self._next:
+            self.kept.append((before, _copied(moment.state().parameters)))
+            while self._next <= before[0]:
+                self._next *= LOOK_FACTOR
+            after = self.spent()  # what looking took is not the training's
+            self.began += after[0] - before[0]
+            self.cpu_began += after[1] - before[1]
+        return ""
+
+    def states(self) -> Iterator[tuple[tuple[float, float], TrainedField]]:
+        """Yield each snapshot's seconds and itself as a field that can be rendered."""
+        for spent, parameters in self.kept:
+            model = copy.deepcopy(Model(self._trained.field, self._trained.classifier)).to("cpu")
+            model.load_state_dict(parameters, strict=False)
+            hull = self._trained.hull
+            hull = hull if self.carved else without_empty_space(hull, model.field)
+            fitted = replace(self._trained, field=model.field, classifier=model.classifier)
+            yield spent, replace(fitted, hull=hull)
+
+
+def curve_frames(test: Scene) -> tuple[Frame, ...]:
+    """Return some held-out views, evenly taken from all."""
+    count = min(CURVE_VIEWS, len(test.frames))
+    return tuple(test.frames[round(i * len(test.frames) / count)] for i in range(count))
+
+
+def near_end(curve: Sequence[Seen], below_end_db: float) -> Seen:
+    """Return when a curve comes within so many dB of its end for good, straight lines between."""
+    goal = curve[-1].psnr - below_end_db
+    for before, after in reversed(list(pairwise(curve))):
+        if before.psnr < goal:
+            share = (goal - before.psnr) / (after.psnr - before.psnr)
+            wall = before.seconds + share * (after.seconds - before.seconds)
+            cpu = before.cpu_seconds + share * (after.cpu_seconds - before.cpu_seconds)
+            return Seen(wall, cpu, goal)
+    return curve[0]
+
+
+def _named(job: Job) -> tuple[str, str, str, int]:
+    return job.group, job.method, job.case.name, job.seed
+
+
+def _nearest_drawing(job: Job, case: TrainCase, judges: Judges) -> RunResult:
+    pictures = [(_nearest(case.train, frame), frame) for frame in case.test.frames]
+    figures = means([figures_of(picture, frame.rgba, judges)[0] for picture, frame in pictures])
+    sample = curve_frames(case.test)
+    psnr = _mean_psnr((_nearest(case.train, frame), frame) for frame in sample)
+    return RunResult(*_named(job), figures, 0.0, 0.0, 0.0, 0, (Seen(0.0, 0.0, psnr),))
+
+
+def _nearest(scene: Scene, frame: Frame) -> UInt8[np.ndarray, "height width 4"]:
+    turns = [rotation_distance(f.camera.rotation, frame.camera.rotation) for f in scene.frames]
+    nearest = scene.frames[int(np.argmin(turns))].rgba
+    if nearest.shape != frame.rgba.shape:  # cells of different sizes: aligned at their corner
+        blank = np.zeros_like(frame.rgba)
+        height, width = np.minimum(nearest.shape[:2], blank.shape[:2])
+        blank[:height, :width] = nearest[:height, :width]
+        return blank
+    return nearest
+
+
+def _psnr(trained: TrainedField, frames: Sequence[Frame]) -> float:
+    views = ((render(trained, frame.camera), frame) for frame in frames)
+    return _mean_psnr((color_picture(view.rgb, view.alpha), frame) for view, frame in views)
+
+
+def _mean_psnr(pairs: Iterator[tuple[np.ndarray, Frame]]) -> float:
+    errors = [((over_white(p) - over_white(f.rgba)) ** 2).mean() for p, f in pairs]
+    return float(np.mean([psnr_of(float(error)) for error in errors]))
+
+
+def _copied(parameters: dict[str, Tensor]) -> dict[str, Tensor]:
+    return {name: values.detach().clone() for name, values in parameters.items()}

@@ -1,0 +1,113 @@
+"""`toonset bench train`: trainings in a folder that a later run continues.
+
+runs.json in the output folder is rewritten after every training. A run of the same version takes
+finished trainings from it: the same case, views, method, options and seed; table, records and
+picture show all that the folder has. Who has changed the code in between starts afresh with
+--force.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toonset import __version__
+from toonset.cli.bench_chosen import DEFAULT_COUNT, Chosen
+from toonset.cli.output import Printer, check_output
+from toonset.errors import BundleError
+
+if TYPE_CHECKING:
+    from toonset.bench.cases import TrainCase
+    from toonset.bench.train_plan import Job
+    from toonset.bench.train_run import RunResult
+
+RUNS, RECORDS, CURVES = "runs.json", "records.json", "train.png"
+WRITTEN = (RUNS, RECORDS, CURVES, "chart-*.png")
+QUICK_COUNT = 1
+
+
+def train_into(
+    folder: Path, chosen: Chosen, printer: Printer, *, force: bool
+) -> tuple[str, list[dict[str, Any]]]:
+    """Return table and records of the chosen trainings, after those that the folder lacks.
+
+    Raises:
+        ToonsetError: no training of that name, or a folder that may not be written or continued.
+    """
+    from toonset.bench.record import as_dicts
+    from toonset.bench.train import records_of, run_jobs, table_of
+    from toonset.bench.train_files import missing
+    from toonset.bench.train_plan import plan
+
+    jobs = plan(_cases(chosen), chosen.seed, chosen.only, quick=chosen.quick)
+    if not jobs:
+        raise BundleError(
+            f"no training's name contains {chosen.only!r}; names are like "
+            "'knight-exact 150 px 8 views default': correct --only"
+        )
+    done = _finished(folder, chosen, force=force)
+    lacking = missing(jobs, done)
+    printer.say(f"{len(lacking)} trainings, {len(jobs) - len(lacking)} are there already")
+    try:
+        for job, found in run_jobs(lacking, printer.progress):
+            done.append((job.identity, found))
+            _keep(folder, done)
+    finally:  # what a stopped run has found so far is worth a look, too
+        runs = _of_jobs(done, jobs)
+        _write(folder, runs, chosen.seed)
+    return table_of(runs), as_dicts(records_of(runs, chosen.seed))
+
+
+def _cases(chosen: Chosen) -> list[TrainCase]:
+    """Return the cases; a folder's in half size, then whole, unless half is asked for."""
+    from toonset.bench.cases import train_cases
+
+    count = chosen.count or (QUICK_COUNT if chosen.quick else DEFAULT_COUNT)
+    if chosen.cases is None:
+        return list(train_cases(None, chosen.seed, count))
+    sizes = (True,) if chosen.half or chosen.quick else (True, False)
+    return [
+        case for half in sizes for case in train_cases(chosen.cases, chosen.seed, count, half=half)
+    ]
+
+
+def _of_jobs(done: list[tuple[dict[str, Any], RunResult]], jobs: list[Job]) -> list[RunResult]:
+    """Return the results of the chosen jobs, in the jobs' order."""
+    found = []
+    for job in jobs:
+        found += [result for identity, result in done if identity == job.identity][:1]
+    return found
+
+
+def _finished(
+    folder: Path, chosen: Chosen, *, force: bool
+) -> list[tuple[dict[str, Any], RunResult]]:
+    """Return the trainings of an earlier run in `folder`; none if it is new or to be replaced."""
+    from toonset.bench.train_files import from_plain
+    from toonset.dataset.json_file import read_json
+
+    kept = folder / RUNS
+    if kept.is_file() and not force:
+        return from_plain(read_json(kept), __version__, str(kept))
+    check_output(folder, [chosen.cases], WRITTEN, force=force)
+    _keep(folder, [])
+    return []
+
+
+def _keep(folder: Path, done: list[tuple[dict[str, Any], RunResult]]) -> None:
+    from toonset.bench.train_files import as_plain
+    from toonset.files import write_json
+
+    write_json(folder / RUNS, as_plain(done, __version__))
+
+
+def _write(folder: Path, runs: list[RunResult], seed: int) -> None:
+    from toonset.bench.record import as_dicts, machine
+    from toonset.bench.train import in_order, records_of
+    from toonset.bench.train_chart import draw_curves
+    from toonset.files import write_bytes, write_json
+
+    caption = f"mean of 4 held-out views, seeds from {seed}, {machine()}"
+    write_json(folder / RECORDS, as_dicts(records_of(runs, seed)))
+    if in_order(runs):
+        write_bytes(folder / CURVES, draw_curves(runs, caption))

@@ -1,0 +1,313 @@
+"""The training bench: plan, snapshots, resuming, table and figure."""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from toonset.bench import train_run
+from toonset.bench.cases import TrainCase
+from toonset.bench.train import in_order, records_of, run_jobs, table_of
+from toonset.bench.train_chart import draw_curves, mean_curve
+from toonset.bench.train_files import as_plain, from_plain, missing
+from toonset.bench.train_plan import (
+    METHODS,
+    NEAREST,
+    QUICK_METHODS,
+    Job,
+    Method,
+    plan,
+    subset,
+    view_counts,
+)
+from toonset.bench.train_run import RunResult, Seen, Snapshots, curve_frames, near_end
+from toonset.camera import Camera
+from toonset.dataset.scene import Frame, Scene
+from toonset.errors import BundleError
+from toonset.nerf.labelling import without_palette
+from toonset.nerf.metrics_view import Judges
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.training import train
+
+JUDGES = Judges("no flip here", "no lpips here")
+
+
+def ball(yaw: float, side: int, name: str) -> Frame:
+    """Return a red ball with a blue right half, 2 units wide, drawn from `yaw`."""
+    camera = Camera.looking_at(np.zeros(3), yaw, 0.1, side / 3, (side, side), k=0.0)
+    pixel = camera.pixel_grid().reshape(-1, 2)
+    origins, directions = camera.rays(pixel)
+    b, c = (origins * directions).sum(-1), (origins**2).sum(-1) - 1
+    hit = b * b > c
+    point = origins + (-b - np.sqrt(np.maximum(b * b - c, 0)))[:, None] * directions
+    rgba = np.zeros((side * side, 4), dtype=np.uint8)
+    rgba[hit] = np.where(point[hit, :1] > 0, (40, 60, 200, 255), (200, 40, 40, 255))
+    return Frame(name, camera, rgba.reshape(side, side, 4))
+
+
+def case(name: str = "ball-exact", views: int = 8, side: int = 32) -> TrainCase:
+    def scene(count: int, turn: float) -> Scene:
+        yaws = [turn + 2 * np.pi * i / count for i in range(count)]
+        frames = [ball(yaw, side, f"{i:03d}.png") for i, yaw in enumerate(yaws)]
+        return Scene(tuple(frames), None, name)
+
+    return TrainCase(name, name.rsplit("-", 1)[-1], scene(views, 0.0), scene(4, np.pi / 8))
+
+
+@pytest.fixture
+def short_methods(monkeypatch: pytest.MonkeyPatch) -> dict[str, Method]:
+    """Replace the methods by quick ones."""
+    short = {
+        "default": Method(TrainOptions(steps=12, device="cpu")),
+        NEAREST: Method(None, first_seed_only=True),
+    }
+    for name in list(METHODS):
+        monkeypatch.delitem(METHODS, name)
+    for name, method in short.items():
+        monkeypatch.setitem(METHODS, name, method)
+    return short
+
+
+def result(method: str, psnr: float, *curve: Seen, case: str = "a", seed: int = 0) -> RunResult:
+    figures = {"psnr": psnr, "psnr_mask": None, "palette_psnr": psnr - 1}
+    end = curve[-1].seconds if curve else 0.0
+    return RunResult("exact 150 px 8 views", method, case, seed, figures, end, end, 0.1, 7, curve)
+
+
+def test_what_tells_most_comes_first() -> None:
+    cases = [case("big-exact", side=64), case("ball-exact"), case("ball-drawn", views=5)]
+    jobs = plan(cases, 7, quick=False)
+    keys = [(job.seed, max(job.case.test.frames[0].camera.size_wh), -job.views) for job in jobs]
+    assert keys == sorted(keys)
+    assert {job.seed for job in jobs} == {7, 8, 9}
+    assert {job.views for job in jobs if job.case.name == "ball-drawn"} == {5, 4, 3}
+    assert {job.method for job in jobs if job.seed == 7} == set(METHODS)
+    later = {job.method for job in jobs if job.seed > 7}
+    assert later == {name for name, method in METHODS.items() if not method.first_seed_only}
+    assert len({json.dumps(job.identity) for job in jobs}) == len(jobs)
+    assert {job.group for job in plan(cases, 0, "ball-drawn 32 px 4 views", quick=False)} == {
+        "drawn 32 px 4 views"
+    }
+
+
+def test_a_quick_plan_has_one_case_per_condition() -> None:
+    cases = [case("ball-exact"), case("cube-exact"), case("ball-drawn")]
+    jobs = plan(cases, 0, quick=True)
+    assert {job.case.name for job in jobs} == {"ball-exact", "ball-drawn"}
+    assert {(job.views, job.seed) for job in jobs} == {(8, 0)}
+    assert {job.method for job in jobs} == set(QUICK_METHODS) <= set(METHODS)
+
+
+def test_views_are_taken_evenly() -> None:
+    eight = case()
+    names = [frame.name for frame in subset(eight, 4).train.frames]
+    assert names == ["000.png", "002.png", "004.png", "006.png"]
+    assert subset(eight, 8).train.frames == eight.train.frames
+    assert len(subset(eight, 3).train.frames) == 3
+    assert subset(eight, 3).test is eight.test
+    assert view_counts(case(views=3), (8, 4, 3)) == [3]
+    test = case(views=9).train
+    assert [frame.name for frame in curve_frames(test)] == [
+        "000.png",
+        "002.png",
+        "004.png",
+        "007.png",
+    ]
+
+
+def test_a_training_and_its_curve(
+    short_methods: dict[str, Method], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train_run, "FIRST_LOOK_S", 0.0001)
+    jobs = [Job(case(), 8, method, 0) for method in short_methods]
+    trained, nearest = (found for _, found in run_jobs(jobs))
+    assert [seen.seconds for seen in trained.curve] == sorted(s.seconds for s in trained.curve)
+    assert len(trained.curve) > 1
+    assert trained.curve[-1].seconds == trained.seconds > 0
+    # all four held-out views are on the curve, so it ends at the figure
+    assert trained.figures["psnr"] == pytest.approx(trained.curve[-1].psnr, abs=1e-6)
+    assert trained.figures["label_accuracy"] is not None
+    assert trained.figures["palette_psnr"] is not None
+    assert nearest.curve[0].seconds == nearest.seconds == 0
+    assert trained.curve[-1].psnr > nearest.curve[0].psnr
+
+
+def test_snapshots_are_the_field_as_it_was_and_cost_no_training_time() -> None:
+    """Looked at after every step, the last snapshot is the result; looking does not count."""
+    options = TrainOptions(steps=5, device="cpu")
+
+    class Slow(Snapshots):
+        def look(self, moment):
+            self._next = 1e-6
+            return super().look(moment)
+
+    watch = Slow(time.perf_counter(), time.process_time())
+    scene = without_palette(case().train)
+    watched = train(scene, options, watch=watch)
+    alone = train(scene, options)
+    points = torch.rand(50, 3) - 0.5
+    expected = alone.result.field(points)
+    states = [trained for _, trained in watch.states()]
+    assert len(states) == 5
+    for found in (watched.result.field(points), states[-1].field(points)):
+        for value, known in zip(found, expected, strict=True):
+            torch.testing.assert_close(value, known, rtol=2e-2, atol=2e-2)  # stored in half
+    first, last = states[0].field(points)[0], states[-1].field(points)[0]
+    assert not torch.allclose(first, last)
+    times = [spent for spent, _ in watch.kept]
+    assert times == sorted(times)
+
+
+def test_looking_stops_the_clock() -> None:
+    watch = Snapshots(time.perf_counter(), time.process_time())
+    watch._next = 1e-6
+
+    class Moment:
+        def state(self):
+            time.sleep(0.3)
+            return type("State", (), {"parameters": {}})
+
+    before = watch.spent()[0]
+    watch.look(Moment())  # type: ignore[arg-type]
+    assert watch.spent()[0] - before < 0.2
+    assert watch.kept[0][0][0] - before < 0.2
+
+
+def test_a_refused_training_is_noted_and_the_others_go_on(
+    short_methods: dict[str, Method],
+) -> None:
+    alike = case()
+    one_side = tuple(alike.train.frames[0] for _ in range(8))
+    broken = replace(alike, train=replace(alike.train, frames=one_side))
+    jobs = [Job(broken, 8, "default", 0), Job(alike, 8, NEAREST, 0)]
+    failed, fine = (found for _, found in run_jobs(jobs))
+    assert "look along one line" in failed.note
+    assert (failed.figures, failed.curve) == ({}, ())
+    assert in_order([failed, fine]) == [fine]
+    text = table_of([failed, fine])
+    assert "failed\nball-exact, exact 32 px 8 views, default, seed 0: " in text
+    assert [record.method for record in records_of([failed], 0)] == []
+
+
+def test_when_a_curve_is_near_its_end_for_good() -> None:
+    curve = [Seen(1, 2, 20.0), Seen(2, 4, 29.8), Seen(3, 6, 29.0), Seen(5, 10, 30.0)]
+    near = near_end(curve, 0.5)  # 29.8 was near, but 29.0 came after it
+    assert (near.seconds, near.cpu_seconds, near.psnr) == (4.0, 8.0, 29.5)
+    assert near_end(curve, 20.0) == curve[0]
+    assert near_end(curve[:1], 0.5) == curve[0]
+    falling = [Seen(1, 1, 33.0), Seen(2, 2, 30.0)]
+    assert near_end(falling, 0.5) == falling[0]
+
+
+def test_mean_curves() -> None:
+    slow = [Seen(2, 2, 10.0), Seen(8, 8, 30.0)]
+    fast = [Seen(1, 1, 20.0), Seen(4, 4, 40.0)]
+    mean = mean_curve([slow, fast])
+    assert mean[0] == pytest.approx((2, (10 + 30) / 2))  # from where both have begun
+    assert mean[-1] == pytest.approx((8, (30 + 40) / 2))  # the faster one stays at its end
+    assert dict(mean_curve([[Seen(0, 0, 5.0)]])) == {0.1: 5.0}
+    rising = [psnr for _, psnr in mean]
+    assert rising == sorted(rising)
+
+
+def test_table_and_records() -> None:
+    runs = [
+        result(NEAREST, 18.0, Seen(0, 0, 18.0)),
+        result("default", 30.0, Seen(1, 1, 20), Seen(4, 4, 30)),
+        result("default", 31.0, Seen(1, 1, 20), Seen(6, 6, 31), case="b"),
+    ]
+    lines = table_of(runs).splitlines()
+    assert lines[0] == "exact 150 px 8 views"
+    rows = {line[:15].strip(): line[15:].split() for line in lines[2:]}
+    assert list(rows) == ["default", NEAREST]  # as the methods are listed
+    assert rows["default"][:2] == ["2", "5.0"]
+    assert "30.50" in rows["default"]
+    assert "18.00" in rows[NEAREST]
+    records = {(r.method, r.metric): r for r in records_of(runs, 3)}
+    psnr = records["default", "held-out PSNR"]
+    assert (psnr.n, psnr.median, psnr.seed, psnr.direction) == (2, 30.5, 3, "higher")
+    assert psnr.p95 == pytest.approx(30.05)  # the bad end
+    assert ("default", "held-out PSNR in mask") not in records
+    near = records["default", "seconds to 0.5 dB below the end"]
+    assert near.median == pytest.approx((1 + 3 * 9.5 / 10 + 1 + 5 * 10.5 / 11) / 2)
+    assert (NEAREST, "seconds to 0.5 dB below the end") not in records
+
+
+def test_the_figure_has_a_panel_per_condition() -> None:
+    one = [
+        result(NEAREST, 18.0, Seen(0, 0, 18.0)),
+        result("default", 30.0, Seen(1, 1, 20), Seen(4, 4, 30)),
+    ]
+    others = [replace(run, group=f"drawn {n}") for n in range(3) for run in one]
+    small = Image.open(io.BytesIO(draw_curves(one, "n")))
+    large = Image.open(io.BytesIO(draw_curves([*one, *others], "n")))
+    assert large.width > small.width
+    assert large.height > 1.5 * small.height
+    line = np.asarray(small.convert("RGB")).reshape(-1, 3).astype(int)
+    blue = np.abs(line - (0x00, 0x72, 0xB2)).max(axis=1) < 60  # the default's curve
+    assert blue.sum() > 200
+
+
+def test_results_survive_the_disk() -> None:
+    job = Job(case(), 8, "default", 0)
+    found = result("default", 30.0, Seen(1, 2, 20.0), Seen(4, 5, 30.0))
+    plain = json.loads(json.dumps(as_plain([(job.identity, found)], "1.0"), allow_nan=False))
+    assert from_plain(plain, "1.0", "runs.json") == [(job.identity, found)]
+    assert missing([job], from_plain(plain, "1.0", "")) == []
+    assert missing([replace(job, seed=1), replace(job, views=4)], [(job.identity, found)])
+    with pytest.raises(BundleError, match=r"made by toonset 1\.0, this is 2\.0; pass --force"):
+        from_plain(plain, "2.0", "runs.json")
+    for broken in ([], {}, {"format": 1, "version": "1.0", "runs": [{}]}, None):
+        with pytest.raises(BundleError, match="holds no runs of a training bench"):
+            from_plain(broken, "1.0", "runs.json")
+
+
+def test_other_options_are_another_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    job = Job(case(), 8, "default", 0)
+    before = job.identity
+    monkeypatch.setitem(METHODS, "default", Method(TrainOptions(steps=77)))
+    assert missing([job], [(before, result("default", 1.0))]) == [job]
+
+
+def test_a_stopped_bench_goes_on(
+    short_methods: dict[str, Method], toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import toonset.bench.cases as cases
+    import toonset.bench.train as bench
+
+    monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter([case()]))
+    monkeypatch.setattr("toonset.bench.train_plan.QUICK_METHODS", tuple(short_methods))
+    done: list[str] = []
+    honest = bench.run_job
+
+    def counted(job: Job, judges: Judges) -> RunResult:
+        if len(done) == 1 and job.method == NEAREST:
+            raise KeyboardInterrupt
+        done.append(job.method)
+        return honest(job, judges)
+
+    monkeypatch.setattr(bench, "run_job", counted)
+    out = tmp_path / "bench"
+    command = ("bench", "train", "--quick", "-o", out)
+    assert toonset(*command).code != 0
+    assert {path.name for path in out.iterdir()} == {"runs.json", "records.json", "train.png"}
+    monkeypatch.setattr(
+        bench, "run_job", lambda job, judges: done.append(job.method) or honest(job, judges)
+    )
+    again = toonset(*command, "--json")
+    assert again.code == 0, again
+    assert done == ["default", NEAREST]  # each once
+    assert "1 trainings, 1 are there already" in again.err
+    assert {r["method"] for r in again.json["records"]} == set(short_methods)
+    assert json.loads((out / "records.json").read_text()) == again.json["records"]
+    assert toonset(*command, "--only", "hat").reason.startswith("no training's name contains 'hat'")
+    (out / "drawing.png").write_bytes(b"mine")
+    assert "holds 'drawing.png'" in toonset(*command, "--force").reason
