@@ -97,8 +97,10 @@ def survey(
         blobs = find_blobs(~paper)
     blobs, cuts = part_touching(blobs, painted & ~ruled & ~shadow, small[..., :3])
     mains = without_strangers(blobs, find_mains(blobs), painted, small[..., :3])
-    blobs, bodies, shared = part_shared(blobs, mains)
-    grouping = group_blobs(blobs, mains, small[..., :3], bodies)
+    grouping = group_blobs(blobs, mains, small[..., :3])
+    blobs, bodies, shared = part_shared(blobs, mains, grouping)
+    if shared:
+        grouping = group_blobs(blobs, mains, small[..., :3], bodies)
     cuts += shared
     return Survey(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from toonset.dataset.figures import Blobs, as_box
-from toonset.dataset.parts import FARTHEST, FEET, LEAST_PART, PART_AREA, SAME_LEVEL
+from toonset.dataset.parts import FARTHEST, FEET, LEAST_PART, PART_AREA, SAME_LEVEL, Grouping
 from toonset.dataset.touching import Cut, measured
 
 TWICE = (1.4, 2.4)  # times a single part's area: two that overlap, two of different sizes
@@ -40,24 +40,23 @@ class _Place:
 
 
 def part_shared(
-    blobs: Blobs, mains: Int[np.ndarray, " mains"]
+    blobs: Blobs, mains: Int[np.ndarray, " mains"], grouping: Grouping
 ) -> tuple[Blobs, dict[int, int], list[Cut]]:
     """Return the patches with shared parts apart, the body of each half, and the cuts.
 
     Args:
         blobs: the patches.
         mains: numbers of those that are bodies of views.
+        grouping: what the patches are if they stay whole: the like of a half must be a part.
     """
-    typical = float(np.median(blobs.areas[mains])) if len(mains) else 0.0
-    able = (blobs.areas >= LEAST_PART * typical) & (blobs.areas <= PART_AREA * typical)
-    able[mains] = False
-    places = {int(n): _place(blobs, mains, int(n)) for n in np.flatnonzero(able)}
-    parts = {n: place for n, place in places.items() if -FARTHEST <= place.level <= FEET}
+    places = _places(blobs, mains, grouping)
+    singles = {n: place for n, place in places.items() if grouping.figure_of_blob[n] >= 0}
     labels, count = blobs.labels.copy(), len(blobs.areas)
     bodies: dict[int, int] = {}
     cuts: list[Cut] = []
-    for number, place in parts.items():
-        if place.left < 0 or place.right < 0 or not _is_double(blobs, number, parts):
+    for number, place in places.items():
+        between = place.left >= 0 and place.right >= 0
+        if not between or not _is_double(blobs, number, place, singles):
             continue
         right_half, neck = _halved(blobs.mask(number))
         if right_half is None:
@@ -67,6 +66,18 @@ def part_shared(
         bodies |= {number: place.left, count - 1: place.right}
         cuts.append(Cut(as_box(blobs.boxes[number]), neck / place.height, 1.0))
     return (measured(labels, count) if cuts else blobs), bodies, cuts
+
+
+def _places(
+    blobs: Blobs, mains: Int[np.ndarray, " mains"], grouping: Grouping
+) -> dict[int, _Place]:
+    """Return where the patches lie that are parts, or drawings of a part's size and level."""
+    typical = float(np.median(blobs.areas[mains])) if len(mains) else 0.0
+    able = (blobs.areas >= LEAST_PART * typical) & (blobs.areas <= PART_AREA * typical)
+    able &= ~np.isin(grouping.kinds, ("text", "swatch"))
+    able[mains] = False
+    places = {int(n): _place(blobs, mains, int(n)) for n in np.flatnonzero(able)}
+    return {n: place for n, place in places.items() if -FARTHEST <= place.level <= FEET}
 
 
 def _place(blobs: Blobs, mains: Int[np.ndarray, " mains"], number: int) -> _Place:
@@ -89,12 +100,13 @@ def _place(blobs: Blobs, mains: Int[np.ndarray, " mains"], number: int) -> _Plac
     )
 
 
-def _is_double(blobs: Blobs, number: int, parts: Mapping[int, _Place]) -> bool:
-    """Return whether other figures have parts of half its size at a patch's level."""
-    area, level = blobs.areas[number], parts[number].level
+def _is_double(blobs: Blobs, number: int, own: _Place, singles: Mapping[int, _Place]) -> bool:
+    """Return whether figures have parts of half its size at a patch's level."""
+    area = blobs.areas[number]
     return LEAST_SINGLES <= sum(
-        TWICE[0] <= area / blobs.areas[other] <= TWICE[1] and abs(place.level - level) <= SAME_LEVEL
-        for other, place in parts.items()
+        TWICE[0] <= area / blobs.areas[other] <= TWICE[1]
+        and abs(place.level - own.level) <= SAME_LEVEL
+        for other, place in singles.items()
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from toonset.dataset.figures import find_blobs, find_mains
+from toonset.dataset.parts import group_blobs
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.touching_parts import part_shared
 
@@ -28,7 +29,9 @@ def sheet_of(*middles: int, hands: int = 10) -> np.ndarray:
 def shared(rgb: np.ndarray) -> tuple[int, dict[int, int], int]:
     """Return the number of patches more than before, the bodies of halves, the number of cuts."""
     blobs = find_blobs((rgb != 255).any(axis=-1))
-    after, bodies, cuts = part_shared(blobs, find_mains(blobs))
+    mains = find_mains(blobs)
+    grouping = group_blobs(blobs, mains, rgb)
+    after, bodies, cuts = part_shared(blobs, mains, grouping)
     assert ((after.labels > 0) == (blobs.labels > 0)).all()
     assert after.areas.sum() == blobs.areas.sum()
     return len(after.areas) - len(blobs.areas), bodies, len(cuts)
@@ -70,5 +73,8 @@ def test_a_bar_twice_as_large_as_a_hand_stays_whole() -> None:
     assert shared(rgb) == (0, {}, 0)
 
 
-def test_a_sheet_without_figures_has_none() -> None:
-    assert shared(np.full((20, 30, 3), 255, np.uint8)) == (0, {}, 0)
+def test_letters_over_the_figures_stay_whole() -> None:
+    rgb = sheet_of(90, 250, 410, hands=0)
+    for x, word in ((120, "oo"), (200, "oo"), (330, "o0")):
+        cv2.putText(rgb, word, (x, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.9, (20, 20, 60), 5)
+    assert shared(rgb) == (0, {}, 0)
