@@ -68,6 +68,8 @@ def mean_curve(curves: Sequence[Sequence[Seen]]) -> list[tuple[float, float]]:
 
 
 def _draw_panel(axes: Any, runs: Sequence[RunResult]) -> None:
+    from matplotlib.ticker import LogFormatter
+
     for method, listed in groupby(runs, key=lambda run: run.method):
         found = list(listed)
         color, marker, width = _look(method)
@@ -85,7 +87,8 @@ def _draw_panel(axes: Any, runs: Sequence[RunResult]) -> None:
     axes.set_title(f"{runs[0].group}; {cases} cases, {seeds} seeds", loc="left", fontsize=9)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.tick_params(labelsize=8)
+    axes.xaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(1, 0.4)))
+    axes.tick_params(labelsize=8, which="both")
     axes.grid(True, which="both", alpha=0.25)
 
 
