@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
     from toonset.camera import Camera
     from toonset.nerf.trained import TrainedField
+    from toonset.nerf.views import Rendering
 
     Picture = UInt8[np.ndarray, "height width 4"]
     Named = list[tuple[str, Camera]]
 
 WRITTEN = ("*.png", "turntable.gif")
-LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha")
+LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha", "normal", "normal-camera")
 
 
 def render(
@@ -43,13 +44,21 @@ def render(
     size: Annotated[
         int | None, typer.Option("--size", min=8, max=4096, help="Side in px of a turntable view.")
     ] = None,
-    layer: Annotated[
-        str, typer.Option("--layer", help="rgb, palette, depth, labels or alpha.")
-    ] = "rgb",
+    layers: Annotated[
+        list[str] | None,
+        typer.Option("--layer", help=f"{', '.join(LAYER_NAMES)}; repeatable (default: rgb)."),
+    ] = None,
     recolor: Annotated[
         list[str] | None,
         typer.Option("--recolor", help="OLD=NEW, e.g. '#aa0000=#00aa00'; repeatable; palette."),
     ] = None,
+    palette: Annotated[
+        str | None,
+        typer.Option("--palette", help="Other colours, a file or '#aa0000,#00aa00'; in order."),
+    ] = None,
+    nearest: Annotated[
+        bool, typer.Option("--nearest", help="Match --palette by likeness, not by order.")
+    ] = False,
     gif: Annotated[
         bool | None, typer.Option("--gif/--no-gif", help="turntable.gif (default: turntables).")
     ] = None,
@@ -60,55 +69,80 @@ def render(
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Render a trained run: one PNG per camera, and a GIF of a turntable.
+    """Render a trained run: one PNG per camera and layer, and a GIF of a turntable.
 
-    The default layer is the field's own colour; `--layer palette` (implied by --recolor) shows
-    palette colours only.
+    The default layer is the field's own colour. `palette` (the default with --recolor or --palette)
+    shows palette colours only; `normal` codes x, y, z of the world as red, green, blue,
+    `normal-camera` right, up and towards the viewer. Several layers are written as NAME-LAYER.png.
     """
     printer = Printer(as_json, quiet)
-    layer = "palette" if recolor and layer == "rgb" else layer
-    _check_arguments(cameras, views, layer, recolor)
+    repaint = bool(recolor or palette)
+    wanted = layers or ["palette" if repaint else "rgb"]
+    _check_arguments(cameras, views, wanted, repaint=repaint)
     if cameras is not None and (elevation is not None or size is not None):
         raise typer.BadParameter("--elevation and --size belong to --turntable")
 
-    from toonset.files import new_folder, write_bytes
-    from toonset.nerf.recolor import recolored
+    from toonset.nerf.recolor import recolored, repainted
     from toonset.nerf.run_folder import read_field
     from toonset.nerf.threads import use_threads
 
     use_threads(threads)
     check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
+    trained = repainted(trained, palette, nearest=nearest) if palette else trained
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     animate = gif if gif is not None else views is not None
-    pictures = []
-    with new_folder(out, force=force) as folder:
-        for number, (name, camera) in enumerate(named):
-            printer.progress(f"rendering {number + 1} of {len(named)}")
-            data, picture = _layer(trained, camera, layer)
-            write_bytes(folder / name, data)
-            pictures.append(picture)
-        if animate:
-            from toonset.nerf.animation import encode_gif
-
-            write_bytes(folder / "turntable.gif", encode_gif(pictures))
+    files = _write(out, trained, named, wanted, printer, animate=animate, force=force)
     extra = " and turntable.gif" if animate else ""
-    files = [name for name, _ in named]
-    printer.result(
-        {"out": out, "layer": layer, "files": files, "gif": animate},
-        f"{out}: {len(files)} {'picture' if len(files) == 1 else 'pictures'} ({layer}){extra}",
-    )
+    shown = f"{len(files)} {'picture' if len(files) == 1 else 'pictures'} ({', '.join(wanted)})"
+    values = {"out": out, "layer": wanted[0], "layers": wanted, "files": files, "gif": animate}
+    printer.result(values, f"{out}: {shown}{extra}")
+
+
+def _write(
+    out: Path,
+    trained: TrainedField,
+    named: Named,
+    layers: list[str],
+    printer: Printer,
+    *,
+    animate: bool,
+    force: bool,
+) -> list[str]:
+    """Write all pictures, and a GIF of the first layer; return the pictures' names."""
+    from toonset.files import new_folder, write_bytes
+    from toonset.nerf.animation import encode_gif
+    from toonset.nerf.views import render as render_view
+    from toonset.nerf.views_bake import Baked
+
+    baked, files, turning = Baked.of(trained), [], []
+    with new_folder(out, force=force) as folder:
+        for number, (stem, camera) in enumerate(named):
+            printer.progress(f"rendering {number + 1} of {len(named)}")
+            view = render_view(baked, camera)
+            for layer in layers:
+                data, picture = _layer(trained, view, camera, layer)
+                files.append(f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png")
+                write_bytes(folder / files[-1], data)
+                if layer == layers[0]:
+                    turning.append(picture)
+        if animate:
+            write_bytes(folder / "turntable.gif", encode_gif(turning))
+    return files
 
 
 def _check_arguments(
-    cameras: Path | None, views: int | None, layer: str, recolor: list[str] | None
+    cameras: Path | None, views: int | None, layers: list[str], *, repaint: bool
 ) -> None:
     if (cameras is None) == (views is None):
         raise typer.BadParameter("give either --cameras transforms.json or --turntable N")
-    if layer not in LAYER_NAMES:
-        names = ", ".join(LAYER_NAMES)
-        raise typer.BadParameter(f"{layer!r} is none of {names}", param_hint="--layer")
-    if recolor and layer != "palette":
+    for layer in layers:
+        if layer not in LAYER_NAMES:
+            names = ", ".join(LAYER_NAMES)
+            raise typer.BadParameter(f"{layer!r} is none of {names}", param_hint="--layer")
+    if len(set(layers)) < len(layers):
+        raise typer.BadParameter("names a layer twice", param_hint="--layer")
+    if repaint and not {"palette", "labels"} & set(layers):
         raise typer.BadParameter("colours can be replaced on --layer palette only")
 
 
@@ -125,25 +159,26 @@ def _cameras(
 
     if cameras is None:
         turn = turntable(trained, views or 1, elevation, size)
-        return [(f"{i:03d}.png", camera) for i, camera in enumerate(turn)]
-    named = [(f"{Path(path).stem}.png", camera) for path, camera in read_cameras(cameras)]
+        return [(f"{i:03d}", camera) for i, camera in enumerate(turn)]
+    named = [(Path(path).stem, camera) for path, camera in read_cameras(cameras)]
     names = [name for name, _ in named]
     double = next((name for name in names if names.count(name) > 1), None)
     if double:
-        raise BundleError(f"{cameras}: two frames would be written as {double}; rename one")
+        raise BundleError(f"{cameras}: two frames would be written as {double}.png; rename one")
     return named
 
 
-def _layer(trained: TrainedField, camera: Camera, layer: str) -> tuple[bytes, Picture]:
-    """Return the PNG of one view, and the picture that a GIF shows."""
+def _layer(
+    trained: TrainedField, view: Rendering, camera: Camera, layer: str
+) -> tuple[bytes, Picture]:
+    """Return the PNG of one layer of a view, and the picture that a GIF shows."""
     import numpy as np
 
     from toonset.dataset.picture import encode_indexed_png, encode_png
     from toonset.nerf import layers
-    from toonset.nerf.views import render as render_view
+    from toonset.nerf.normals import normal_picture
     from toonset.palette.labels import UNLABELLED
 
-    view = render_view(trained, camera)
     if layer == "labels":
         labels = layers.label_picture(view)
         palette = trained.palette
@@ -157,6 +192,8 @@ def _layer(trained: TrainedField, camera: Camera, layer: str) -> tuple[bytes, Pi
         picture = layers.depth_picture(view)
     elif layer == "alpha":
         picture = layers.alpha_picture(view)
+    elif layer.startswith("normal"):
+        picture = normal_picture(view, camera, in_camera=layer == "normal-camera")
     else:
         picture = layers.color_picture(view.rgb, view.alpha)
     return encode_png(picture), picture

@@ -10,6 +10,7 @@ import numpy as np
 from toonset.errors import PaletteError
 from toonset.nerf.trained import TrainedField
 from toonset.palette.files import parse_colors
+from toonset.palette.labels import nearest_colors
 from toonset.palette.names import hex_of
 
 
@@ -39,6 +40,32 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
             raise PaletteError(f"--recolor {change!r}: the palette has {known}; choose one of them")
         palette[old.index(source)] = wanted
     return replace(trained, palette=palette)
+
+
+def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> TrainedField:
+    """Return the run in the colours of another palette, without training again.
+
+    Args:
+        trained: the run.
+        palette: a palette file, or typed colours.
+        nearest: give every colour of the run the nearest one (OKLab) of the palette; else the
+            first takes the place of the first and so on.
+
+    Raises:
+        PaletteError: no palette in the run, none in the file, or by order and other in number.
+    """
+    if trained.palette is None:
+        raise PaletteError("run: was trained without palette; train again without --no-palette")
+    colors = np.asarray(parse_colors(palette))
+    if nearest:
+        place = nearest_colors(trained.palette, colors, space="oklab")
+        return replace(trained, palette=colors[place])
+    if len(colors) != len(trained.palette):
+        raise PaletteError(
+            f"--palette {palette}: {len(colors)} colours, the run has {len(trained.palette)}; "
+            "give as many in the same order, or pass --match nearest"
+        )
+    return replace(trained, palette=colors)
 
 
 def _color(word: str, change: str) -> tuple[int, int, int]:

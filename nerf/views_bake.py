@@ -12,6 +12,7 @@ costs 0.03 dB on new views.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -59,8 +60,8 @@ class Baked:
         for chunk in cells.split(POINTS_PER_CHUNK):
             density, rgb = trained.field(_middles(hull, chunk))
             volume[chunk] = torch.cat([_unsoftened(density * trained.step)[:, None], rgb], dim=1)
-        values, corners = _side_by_side(volume.view(*read.shape, 4).numpy())
-        support, _ = _side_by_side(hull.support[..., None].numpy())
+        values, corners = _side_by_side(volume.view(*read.shape, 4).numpy(), "edge")
+        support, _ = _side_by_side(hull.support[..., None].numpy(), "constant")
         return cls(trained, values, support[..., 0], corners, _grown(hull.near, REACH))
 
     def near_something(self, points_world: Float[Tensor, "n 3"]) -> Bool[Tensor, " n"]:
@@ -119,14 +120,20 @@ def _middles(hull: Hull, cells: Int[Tensor, " n"]) -> Float[Tensor, "n 3"]:
 
 
 def _side_by_side(
-    volume: Float[np.ndarray, "x y z channels"],
+    volume: Float[np.ndarray, "x y z channels"], beyond: Literal["edge", "constant"]
 ) -> tuple[Float[np.ndarray, "height width channels"], Float[Tensor, "2 slices"]]:
-    """Return the slices of a volume in one picture, zeros round each, and where each begins."""
-    x, y, z = (n + 2 for n in volume.shape[:3])
+    """Return the slices of a volume in one picture, a voxel round each, and where each begins.
+
+    Args:
+        volume: values at voxels.
+        beyond: the voxel round a slice repeats its edge, or is zero.
+    """
+    volume = np.pad(volume, [(1, 1)] * 3 + [(0, 0)], mode=beyond)
+    x, y, z = volume.shape[:3]
     columns = max(1, round(np.sqrt(x * y / z)))
     rows = -(-x // columns)
     tiles = np.zeros((rows * columns, y, z, volume.shape[3]), dtype=np.float32)
-    tiles[1 : x - 1, 1:-1, 1:-1] = volume
+    tiles[:x] = volume
     grid = tiles.reshape(rows, columns, y, z, -1).swapaxes(1, 2).reshape(rows * y, columns * z, -1)
     number = torch.arange(x)
     corners = torch.stack([number % columns * z, number // columns * y]).float()
