@@ -80,8 +80,8 @@ def group_blobs(
         letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[mains, 3])))
         swatches = find_swatches(blobs.boxes[small], blobs.areas[small])
         typical = float(np.median(blobs.areas[mains]))
-        for i, number in enumerate(small):
-            nearest[i] = figure[known[number]] if number in known else nearest[i]
+        for i, part in enumerate(small.tolist()):
+            nearest[i] = figure[known[part]] if part in known else nearest[i]
         bodies = mains[nearest]
         for i, number in enumerate(small):
             within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
@@ -90,8 +90,7 @@ def group_blobs(
                 figure[number] = nearest[i]
         again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(mains), rgb)
         figure[small[again]] = nearest[again]
-        for number, body in known.items():
-            figure[number] = figure[body]
+        figure[list(known)] = figure[list(known.values())]
         for i, number in enumerate(small):
             if figure[number] >= 0:
                 continue
