@@ -25,7 +25,7 @@ def turntable(
         size_px: side of the square pictures; None: as the training pictures.
     """
     side = size_px or trained.size_px
-    low, high = _filled(trained.hull)
+    low, high = filled_box(trained.hull)
     target = (low + high) / 2
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     corners = low + corners * (high - low)
@@ -40,7 +40,8 @@ def turntable(
     )
 
 
-def _filled(hull: Hull) -> tuple[np.ndarray, np.ndarray]:
+def filled_box(hull: Hull) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest corner of what is inside the hull."""
     cells = np.argwhere(hull.inside.numpy())
     return hull.low + hull.voxel * cells.min(axis=0), hull.low + hull.voxel * (
         cells.max(axis=0) + 1

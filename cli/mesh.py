@@ -1,0 +1,61 @@
+"""`toonset mesh`: a trained run as a mesh in palette colours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+
+
+def mesh(
+    run: Annotated[Path, typer.Argument(help="A run folder, as `toonset train` writes it.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--out", help="File to write: .glb, .obj or .ply.", rich_help_panel=OUTPUT_PANEL
+        ),
+    ],
+    faces: Annotated[
+        int | None,
+        typer.Option("--faces", min=100, help="Triangles at most (default: as fine as the run)."),
+    ] = None,
+    recolor: Annotated[
+        list[str] | None,
+        typer.Option("--recolor", help="OLD=NEW, e.g. '#aa0000=#00aa00'; repeatable."),
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option("--threads", min=1, help="CPU threads (default: all cores).")
+    ] = None,
+    force: ForceFlag = False,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Turn a trained run into a closed mesh in palette colours, with crisp borders.
+
+    It lies in the mannequin's frame: +Y up, the character faces +Z. An OBJ comes with a material
+    and the palette as a picture, NAME.mtl and NAME.png.
+    """
+    printer = Printer(as_json, quiet)
+    from toonset.nerf.mesh_export import check_mesh_files, mesh_files, write_mesh_files
+    from toonset.nerf.recolor import recolored
+    from toonset.nerf.run_folder import read_field
+    from toonset.nerf.surface import surface_of
+    from toonset.nerf.threads import use_threads
+
+    check_mesh_files(out, force=force)
+    use_threads(threads)
+    trained = recolored(read_field(run), recolor or [])
+    printer.progress("finding the surface")
+    surface = surface_of(trained, faces)
+    files = mesh_files(surface, out)
+    write_mesh_files(files, out)
+    sizes = {name: len(data) for name, data in files.items()}
+    count = len(surface.faces)
+    printer.result(
+        {"out": out, "faces": count, "vertices": len(surface.vertices), "bytes": sizes},
+        f"{out}: {count} faces; "
+        + ", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes.items()),
+    )

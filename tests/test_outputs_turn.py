@@ -1,0 +1,117 @@
+"""A turn as GIF, WebP, MP4 and sprite sheet: what comes out is what went in."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+from toonset.errors import OutputError, SetupError
+from toonset.nerf.animation import duration_ms, encode_gif, encode_mp4, encode_webp
+from toonset.nerf.sprite_sheet import LARGEST_SIDE, sprite_json, sprite_sheet
+
+COLORS = np.array([[200, 40, 40], [40, 80, 200], [20, 20, 20], [250, 240, 10]], dtype=np.uint8)
+
+
+def turn(count: int = 6, height: int = 31, width: int = 25) -> list[np.ndarray]:
+    """Squares of flat colours that move to the right, soft on one side."""
+    pictures = []
+    for number in range(count):
+        picture = np.zeros((height, width, 4), dtype=np.uint8)
+        picture[5:27, 3 + number : 9 + number, :3] = COLORS[number % 4]
+        picture[5:27, 3 + number : 9 + number, 3] = 255
+        picture[5:27, 3 + number, 3] = 120
+        pictures.append(picture)
+    return pictures
+
+
+def frames_of(data: bytes, mode: str) -> list[np.ndarray]:
+    with Image.open(io.BytesIO(data)) as image:
+        assert image.info.get("loop") == 0
+        return [np.array(frame.convert(mode)) for frame in ImageSequence.Iterator(image)]
+
+
+def test_webp_loses_nothing() -> None:
+    pictures = turn()
+    found = frames_of(encode_webp(pictures), "RGBA")
+    assert len(found) == len(pictures)
+    for got, picture in zip(found, pictures, strict=True):
+        np.testing.assert_array_equal(got[..., 3], picture[..., 3])
+        seen = picture[..., 3] > 0
+        np.testing.assert_array_equal(got[seen], picture[seen])
+
+
+def test_gif_shows_flat_colours_over_white_without_flicker() -> None:
+    pictures = turn()
+    found = frames_of(encode_gif(pictures), "RGB")
+    assert len(found) == len(pictures)
+    for got, picture in zip(found, pictures, strict=True):
+        full, empty = picture[..., 3] == 255, picture[..., 3] == 0
+        assert (got[empty] == 255).all()
+        np.testing.assert_array_equal(got[full], picture[full][:, :3])
+
+
+@pytest.mark.parametrize("count", [1, 8, 36, 400])
+def test_a_turn_takes_three_seconds_or_what_viewers_can(count: int) -> None:
+    assert duration_ms(count) * count == pytest.approx(3000 if count < 150 else 8000, rel=0.01)
+
+
+@pytest.mark.parametrize("encode", [encode_gif, encode_webp, encode_mp4, sprite_sheet])
+def test_pictures_of_two_sizes_are_refused(encode: Any) -> None:
+    with pytest.raises(OutputError, match="2 sizes"):
+        encode([*turn(), np.zeros((8, 8, 4), np.uint8)])
+
+
+def test_mp4_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(SetupError, match="pip install av"):
+        encode_mp4(turn())
+
+
+def test_mp4_plays() -> None:
+    av = pytest.importorskip("av")
+    pictures = turn()
+    with av.open(io.BytesIO(encode_mp4(pictures))) as file:
+        assert file.streams.video[0].codec_context.name == "h264"
+        found = [frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)]
+    assert len(found) == len(pictures)
+    assert found[0].shape == (32, 26, 3)
+    for got, picture in zip(found, pictures, strict=True):
+        assert (got[:3] > 245).all()
+        column = int(np.nonzero(picture[15, :, 3])[0][0]) + 3  # in the middle of the square
+        assert np.abs(got[15, column].astype(int) - picture[15, column, :3]).max() < 30
+
+
+def test_sprites_are_the_pictures_cut_alike() -> None:
+    pictures = turn(7)
+    sheet = sprite_sheet(pictures)
+    about = json.loads(json.dumps(sprite_json(sheet, "turn.png", [(12.0, 27.0)] * 7)))
+    assert about["animations"]["turn"] == list(about["frames"])
+    assert about["meta"]["size"] == {"w": sheet.rgba.shape[1], "h": sheet.rgba.shape[0]}
+    assert about["meta"]["frameTags"][0]["to"] == 6
+    x0, y0 = sheet.crop_xy
+    for entry, picture in zip(about["frames"].values(), pictures, strict=True):
+        x, y, w, h = (entry["frame"][key] for key in "xywh")
+        cell = sheet.rgba[y : y + h, x : x + w]
+        assert (cell[[0, -1]] == 0).all()
+        assert (cell[:, [0, -1]] == 0).all()
+        whole = np.zeros_like(picture)
+        whole[y0 : y0 + h, x0 : x0 + w] = cell
+        np.testing.assert_array_equal(whole, picture)
+        assert entry["pivot"]["x"] * w + x0 == pytest.approx(12, abs=1e-3)
+        assert entry["pivot"]["y"] * h + y0 == pytest.approx(27, abs=1e-3)
+        assert entry["duration"] == duration_ms(7)
+
+
+def test_sprites_of_nothing_and_of_too_much() -> None:
+    empty = [np.zeros((6, 5, 4), np.uint8)] * 3
+    assert not sprite_sheet(empty).rgba.any()
+    wide = np.zeros((4, LARGEST_SIDE + 1, 4), np.uint8)
+    wide[...] = 255
+    with pytest.raises(OutputError, match="smaller --size"):
+        sprite_sheet([wide])
