@@ -19,6 +19,7 @@ Giblin, "Visual motion of curves and surfaces", 2000, chapter 2.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -48,23 +49,47 @@ ALL = 1 << 20  # samples per ray: no limit
 Volume = Float[Tensor, "1 1 x y z"]
 
 
-def faired(hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor]) -> Hull:
+def faired(
+    hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor], slack: float = 0.0
+) -> Hull:
     """Return the hull without the corners that no drawing asks for.
+
+    Drawings that disagree have no common hull: the space on which all of them agree is too small.
+    With slack, the surface may leave the hull by so much to meet all outlines in the mean.
 
     Args:
         hull: as carved from the same views.
         cameras: one per view.
         alphas: (height, width) coverage in [0, 1] per view.
+        slack: how far outlines are off, in the hull's voxels.
     """
+    reach = math.ceil(slack)
+    hull = _padded(hull, reach)
     factor = max(1, round(max(hull.support.shape) / COARSE))
-    outside = _signed_distance(hull, factor)
-    fair = _fit(outside, _contacts(hull, factor, outside.shape, cameras, alphas))
+    outside = _signed_distance(hull, factor) - slack / factor
+    fair = _fit(outside, _contacts(hull, factor, outside, cameras, alphas))
     x, y, z = hull.support.shape
     fine = F.interpolate(fair, scale_factor=factor, mode="trilinear")[0, 0, :x, :y, :z]
-    smooth = (LEVEL - SLOPE * factor * fine).clamp(0, 1).minimum(hull.support)
-    kept = _lost(replace(hull, support=smooth), hull, cameras, alphas)
-    grown = F.max_pool3d(kept[None, None].float(), 3, stride=1, padding=1)[0, 0]
-    return replace(hull, support=smooth.maximum(grown.minimum(hull.support)))
+    smooth = (LEVEL - SLOPE * factor * fine).clamp(0, 1).minimum(_grown(hull.support, reach))
+    sure = [
+        _shrunk(alpha, math.ceil(slack * hull.voxel * camera.scale))
+        for camera, alpha in zip(cameras, alphas, strict=True)
+    ]
+    kept = _lost(replace(hull, support=smooth), hull, cameras, sure)
+    return replace(hull, support=smooth.maximum(_grown(kept.float(), 1).minimum(hull.support)))
+
+
+def _padded(hull: Hull, voxels: int) -> Hull:
+    low, support = hull.low - voxels * hull.voxel, F.pad(hull.support, [voxels] * 6)
+    return Hull(low, hull.voxel, support)
+
+
+def _grown(volume: Float[Tensor, "x y z"], radius: int) -> Float[Tensor, "x y z"]:
+    return F.max_pool3d(volume[None, None], 2 * radius + 1, stride=1, padding=radius)[0, 0]
+
+
+def _shrunk(alpha: Float[Tensor, "height width"], radius: int) -> Float[Tensor, "height width"]:
+    return -F.max_pool2d(-alpha[None], 2 * radius + 1, stride=1, padding=radius)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +133,7 @@ def _signed_distance(hull: Hull, factor: int) -> Volume:
 def _contacts(
     hull: Hull,
     factor: int,
-    shape: torch.Size,
+    outside: Volume,
     cameras: Sequence[Camera],
     alphas: Sequence[Tensor],
 ) -> _Contacts:
@@ -119,10 +144,11 @@ def _contacts(
         chosen = np.linspace(0, len(pixels) - 1, min(most, len(pixels))).astype(int)
         parts.append(rays_of(camera, pixels[chosen], hull))
     rays = Rays(*(torch.cat([getattr(p, n) for p in parts]) for n in Rays.__annotations__))
-    samples = march(rays, hull, hull.voxel * factor, ALL)
+    coarse = Hull(hull.low, hull.voxel * factor, (LEVEL - outside[0, 0]).clamp(0, 1))
+    samples = march(rays, coarse, coarse.voxel, ALL)
     hit, ray = torch.unique_consecutive(samples.ray, return_inverse=True)
     low = torch.as_tensor(hull.low, dtype=torch.float32)
-    size = torch.tensor(shape[2:], dtype=torch.float32) * (hull.voxel * factor)
+    size = torch.tensor(outside.shape[2:], dtype=torch.float32) * coarse.voxel
     return _Contacts(((samples.points - low) * (2 / size) - 1).flip(-1), ray, len(hit))
 
 

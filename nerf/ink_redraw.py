@@ -8,6 +8,7 @@ a step's line lies on the nearer side, for it is that part's outline.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -18,7 +19,9 @@ from toonset.camera import Camera
 from toonset.nerf.ink import InkStyle
 from toonset.nerf.ink_evidence import step_edges
 from toonset.nerf.ink_nearest import depth_inside, distance_to, nearest, parts
-from toonset.nerf.views import Rendering
+
+if TYPE_CHECKING:
+    from toonset.nerf.views import Rendering
 
 SAMPLES_PER_LINE = 4.0  # across a line, at least
 FINEST = 4  # samples per pixel and axis, at most

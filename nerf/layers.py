@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from toonset.errors import PaletteError
+from toonset.nerf.ink_redraw import inked
 from toonset.nerf.views import Rendering
 
 
@@ -28,7 +29,10 @@ def palette_picture(
     """
     if rendering.shares is None or palette is None:
         raise PaletteError("run: was trained without palette; train again without --no-palette")
-    return color_picture(rendering.shares @ (palette / 255.0), rendering.alpha)
+    color = rendering.shares @ (palette / 255.0)
+    if rendering.ink is not None and rendering.ink_rgb is not None:
+        color = inked(color, rendering.alpha, rendering.ink, rendering.ink_rgb)
+    return color_picture(color, rendering.alpha)
 
 
 def depth_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:

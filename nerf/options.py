@@ -28,6 +28,9 @@ class TrainOptions:
             grid of voxels, or the hull with the drawings' colours (nothing is fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over white.
+        register: let cameras follow drawings that were placed or sized off.
+        unbend: bend drawings back that disagree with the others' outlines.
+        ink: take contour lines off before, and draw them again in renderings.
     """
 
     steps: int = 300
@@ -40,3 +43,6 @@ class TrainOptions:
     missing_views: int | None = None
     field: FieldName = "triplane"
     carve: bool = True
+    register: bool = True
+    unbend: bool = True
+    ink: bool = True

@@ -76,6 +76,7 @@ def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
         "steps": len(training.history),
         "loss": None if last is None else last.loss,
         "held_out": [asdict(seen) for seen in held_out],
+        "drawings": training.prepared.to_json(),
         "hull": asdict(training.evidence),
         "counts": training.counts,
         "seconds": {k: round(v, 3) for k, v in training.seconds.items()},

@@ -30,9 +30,11 @@ from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.field_kinds import build_field
 from toonset.nerf.fields import FieldSpec
 from toonset.nerf.hull import Hull
+from toonset.nerf.ink_record import InkRecord
 from toonset.nerf.manifest import check_manifest
 from toonset.nerf.run_folder_tensors import packed, unpack
 from toonset.nerf.trained import TrainedField
+from toonset.nerf.warp_record import KeysRecord
 
 CONFIG, MODEL = "config.json", "model.safetensors"
 FORMAT = 2
@@ -56,6 +58,8 @@ class FieldRecord(BaseModel):
     palette: list[tuple[int, int, int]] | None = Field(default=None, max_length=255)
     k: float = Field(ge=0, le=1e9)
     size_px: int = Field(ge=1, le=16384)
+    ink: InkRecord | None = None
+    keys: KeysRecord | None = None
 
     @classmethod
     def of(cls, trained: TrainedField) -> FieldRecord:
@@ -77,6 +81,8 @@ class FieldRecord(BaseModel):
             palette=palette,
             k=trained.k,
             size_px=trained.size_px,
+            ink=None if trained.ink is None else InkRecord.of(trained.ink),
+            keys=None if trained.keys is None else KeysRecord.of(trained.keys),
         )
 
 
@@ -140,7 +146,16 @@ def _empty(record: FieldRecord) -> TrainedField:
     palette = None if record.palette is None else np.array(record.palette, dtype=np.uint8)
     classifier = None if palette is None else PaletteClassifier(len(palette))
     return TrainedField(
-        field, hull, record.step, record.samples, classifier, palette, record.k, record.size_px
+        field,
+        hull,
+        record.step,
+        record.samples,
+        classifier,
+        palette,
+        record.k,
+        record.size_px,
+        None if record.ink is None else record.ink.style,
+        None if record.keys is None else record.keys.keys(),
     )
 
 

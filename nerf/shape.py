@@ -16,10 +16,18 @@ from toonset.nerf.options import TrainOptions
 
 OPAQUE = 128  # alpha from which a pixel belongs to the figure
 VOXELS_PER_PX, VOXELS = 1.25, (64, 208)
+SLACK = 1.5  # times the outlines' disagreement: as far as the surface may leave the hull
 
 
-def hull_of(scene: Scene, options: TrainOptions) -> tuple[Hull, HullEvidence]:
+def hull_of(
+    scene: Scene, options: TrainOptions, apart_px: float = 0.0
+) -> tuple[Hull, HullEvidence]:
     """Return the faired hull of a scene's masks and the evidence for its tolerance.
+
+    Args:
+        scene: posed pictures.
+        options: `missing_views` is used.
+        apart_px: by how much the outlines disagree, root mean square.
 
     Raises:
         BundleError: fewer than two views show a figure, or the views share no volume.
@@ -35,7 +43,9 @@ def hull_of(scene: Scene, options: TrainOptions) -> tuple[Hull, HullEvidence]:
     missing = options.missing_views
     evidence = HullEvidence(missing, ()) if missing is not None else choose_missing(cameras, alphas)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
-    hull = faired(carve(cameras, alphas, voxels, evidence.missing), cameras, alphas)
+    hull = carve(cameras, alphas, voxels, evidence.missing)
+    slack = SLACK * apart_px / (hull.voxel * max(camera.scale for camera in cameras))
+    hull = faired(hull, cameras, alphas, slack)
     # Run folders hold bytes: train on exactly what will be loaded.
     return replace(hull, support=(hull.support * 255).round() / 255), evidence
 

@@ -11,7 +11,10 @@ from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.evidence import HullEvidence
 from toonset.nerf.fields import Field
 from toonset.nerf.hull import Hull
+from toonset.nerf.ink import InkStyle
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.preparation import Prepared
+from toonset.nerf.warp_back import KeyWarps
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,8 @@ class TrainedField:
         palette: (colors, 3) sRGB; None without palette.
         k: 1 / distance of a typical training camera, 0 = orthographic; for turntables.
         size_px: longest side of the training pictures, for turntables.
+        ink: contour lines that were taken off the drawings; None: there were none.
+        keys: bends that were taken out of the drawings; None: there were none.
     """
 
     field: Field
@@ -37,6 +42,8 @@ class TrainedField:
     palette: UInt8[np.ndarray, "colors 3"] | None
     k: float
     size_px: int
+    ink: InkStyle | None = None
+    keys: KeyWarps | None = None
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,7 @@ class Training:
         options: as given.
         history: every step.
         stopped: why it ended: "steps", "budget", "interrupted", or what went wrong at which step.
+        prepared: the drawings as they were trained on, and what was done to them.
         evidence: for the hull's tolerance.
         seconds: of every part.
         counts: views, rays, samples, parameters.
@@ -86,6 +94,7 @@ class Training:
     options: TrainOptions
     history: tuple[Step, ...]
     stopped: str
+    prepared: Prepared
     evidence: HullEvidence
     seconds: dict[str, float]
     counts: dict[str, int]

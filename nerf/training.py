@@ -30,6 +30,7 @@ from toonset.nerf.fields import FieldSpec
 from toonset.nerf.fitting import Progress, Watch, fit
 from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.preparation import prepared
 from toonset.nerf.shape import hull_of, per_px
 from toonset.nerf.trained import TrainedField, Training
 
@@ -67,11 +68,17 @@ def train(
     options, device = _resolved(options), device_of(options.device)
     torch.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
+    tell("comparing the drawings")
+    ready = prepared(scene, options)
+    scene = ready.scene
+    clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
-    hull, evidence = hull_of(scene, options) if options.carve else (open_box(scene), NO_EVIDENCE)
+    hull, evidence = open_box(scene), NO_EVIDENCE
+    if options.carve:
+        hull, evidence = hull_of(scene, options, ready.apart_px)
     clock.append(time.perf_counter())
     tell("laying out the rays")
-    start = _untrained(scene, hull, options)
+    start = replace(_untrained(scene, hull, options), ink=ready.ink, keys=ready.keys)
     rays, counts = _rays(scene, start, options, generator, device)
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)
@@ -79,12 +86,12 @@ def train(
     weights = _weights(options, len(scene.frames))
     history, stopped = fit(model, rays, weights, options, generator, watch, begin)
     model.to("cpu")
-    hull_s, rays_s = np.diff(clock).tolist()
+    drawings_s, hull_s, rays_s = np.diff(clock).tolist()
     steps_s = history[-1].seconds if history else 0.0  # without what the watch has taken
-    seconds = {"hull": hull_s, "rays": rays_s, "steps": steps_s}
+    seconds = {"drawings": drawings_s, "hull": hull_s, "rays": rays_s, "steps": steps_s}
     counts |= {"views": len(scene.frames), "parameters": sum(p.numel() for p in model.parameters())}
     result = _finished(start, options)
-    return Training(result, options, tuple(history), stopped, evidence, seconds, counts)
+    return Training(result, options, tuple(history), stopped, ready, evidence, seconds, counts)
 
 
 def _resolved(options: TrainOptions) -> TrainOptions:

@@ -6,7 +6,7 @@ folds, where one colour meets the next. Outlines are soft through the hull's occ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -14,6 +14,8 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from toonset.camera import Camera
+from toonset.nerf.ink import InkStyle
+from toonset.nerf.ink_redraw import draw_ink, ink_scale, inked
 from toonset.nerf.losses import straight
 from toonset.nerf.march import pixels_near, rays_of
 from toonset.nerf.supersample import borders, places_within
@@ -39,6 +41,9 @@ class Rendering:
             without palette.
         shares: (height, width, colors) share of a pixel that each palette colour covers
             (premultiplied by alpha); None without palette.
+        ink: (height, width) share of a pixel that contour lines cover, already part of `rgb`; None
+            where the drawings have no lines.
+        ink_rgb: sRGB of the lines; None without.
     """
 
     rgb: Float[np.ndarray, "height width 3"]
@@ -46,11 +51,15 @@ class Rendering:
     depth: Float[np.ndarray, "height width"]
     labels: UInt8[np.ndarray, "height width"] | None
     shares: Float[np.ndarray, "height width colors"] | None
+    ink: Float[np.ndarray, "height width"] | None = None
+    ink_rgb: tuple[int, int, int] | None = None
 
 
 @torch.no_grad()
 def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     """Return the view of `camera`, orthographic or pinhole, of any size.
+
+    Contour lines that were taken off the drawings are drawn again, as wide as there.
 
     Args:
         source: a trained field; several views are faster from one `Baked.of(field)`.
@@ -66,7 +75,16 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     places = places_within(border.numpy())
     more = _cast(baked, camera, places.reshape(-1, 2))
     table[border] = more.view(*places.shape[:2], table.shape[2]).mean(dim=1)
-    return _rendering(table.numpy())
+    return _with_lines(_rendering(table.numpy()), baked.trained.ink, camera)
+
+
+def _with_lines(view: Rendering, style: InkStyle | None, camera: Camera) -> Rendering:
+    if style is None:
+        return view
+    ink = draw_ink(view, style, ink_scale(camera, style))
+    return replace(
+        view, rgb=inked(view.rgb, view.alpha, ink, style.rgb), ink=ink, ink_rgb=style.rgb
+    )
 
 
 def _cast(baked: Baked, camera: Camera, pixels: Float[np.ndarray, "n 2"]) -> Tensor:

@@ -1,0 +1,79 @@
+"""What happens to drawings before a field is fitted to them.
+
+In this order, each only where the drawings ask for it: cameras follow drawings that were placed or
+sized off (`registration`), drawings that bend are unbent (`warp`), contour lines are taken off
+(`ink`). What was taken away is kept, to be given back to renderings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from toonset.dataset.scene import Scene
+from toonset.nerf.bounds import box_of_masks
+from toonset.nerf.ink import InkStyle, without_ink
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.registration import OPAQUE, Registration, registered
+from toonset.nerf.warp import Unbending, unbent
+from toonset.nerf.warp_back import KeyWarps
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A scene that is ready to be fitted, and what was done to it.
+
+    Attributes:
+        scene: the drawings that a field is fitted to.
+        registration: how cameras moved; None: switched off.
+        unbending: how drawings were bent; None: switched off.
+        ink: the contour lines that were taken off; None: there are none, or switched off.
+    """
+
+    scene: Scene
+    registration: Registration | None
+    unbending: Unbending | None
+    ink: InkStyle | None
+
+    @property
+    def apart_px(self) -> float:
+        """Return by how much outlines still disagree, root mean square; 0: as exact as pixels."""
+        steps = [step for step in (self.registration, self.unbending) if step and step.applied]
+        return steps[-1].apart_px[1] if steps else 0.0
+
+    @property
+    def keys(self) -> KeyWarps | None:
+        """Return the drawings' bends, to be given back to renderings; None: they did not bend."""
+        if self.unbending is None or not self.unbending.applied:
+            return None
+        cameras = tuple(frame.camera for frame in self.scene.frames)
+        masks = [frame.rgba[..., 3] >= OPAQUE for frame in self.scene.frames]
+        shown = [i for i, mask in enumerate(masks) if mask.any()]
+        box = box_of_masks([cameras[i] for i in shown], [masks[i] for i in shown])
+        return KeyWarps(cameras, self.unbending.warps, (box.low + box.high) / 2)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what was found and done, for a report."""
+        registration, unbending = self.registration, self.unbending
+        return {
+            "registration": None if registration is None else registration.to_json(),
+            "unbending": None if unbending is None else unbending.to_json(),
+            "ink": None if self.ink is None else asdict(self.ink),
+        }
+
+
+def prepared(scene: Scene, options: TrainOptions) -> Prepared:
+    """Return the scene as `options` want it prepared.
+
+    Args:
+        scene: posed drawings; without labels the contour lines stay.
+        options: its `register`, `unbend` and `ink` switch the steps.
+    """
+    registration = unbending = ink = None
+    if options.register:
+        scene, registration = registered(scene)
+    if options.unbend:
+        scene, unbending = unbent(scene)
+    if options.ink and scene.palette is not None:
+        scene, ink = without_ink(scene)
+    return Prepared(scene, registration, unbending, ink)
