@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 WRITTEN = (
     *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
-    *("palette.*", "labels", "contours", "run"),  # what later verbs put beside
+    *("palette.*", "labels", "contours", "run", "run.unfinished"),  # what later verbs put beside
 )
 UNCERTAIN = 3  # exit code: files are written, but a view is not certain
 KNOWN_PANEL = "What you know"

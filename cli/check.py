@@ -67,8 +67,10 @@ def _problems(path: Path) -> list[Problem]:
 def _check_run(log: ProblemLog, run: Path) -> None:
     """Read a run as rendering would."""
     from toonset.dataset.json_file import read_json
+    from toonset.nerf.manifest import check_manifest
     from toonset.nerf.run_folder import read_field
 
     name = "" if run == log.root else f"{run.name}/"
     log.attempt(name, read_field, run)
+    log.attempt(f"{name}manifest.json", check_manifest, run)
     log.attempt(f"{name}metrics.json", read_json, run / "metrics.json")

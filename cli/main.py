@@ -22,7 +22,18 @@ from toonset.plain_text import one_line
 
 VERBS = (  # in the order in which they are used
     *("split", "calibrate", "palette", "train", "render", "evaluate"),
-    *("info", "check", "export", "import", "mannequin", "synth", "bench"),
+    *(
+        "mesh",
+        "planes",
+        "consistency",
+        "info",
+        "check",
+        "export",
+        "import",
+        "mannequin",
+        "synth",
+        "bench",
+    ),
 )
 
 INTERRUPTED, REFUSED = 130, 2

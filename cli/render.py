@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,10 +20,12 @@ if TYPE_CHECKING:
     from toonset.nerf.views import Rendering
 
     Picture = UInt8[np.ndarray, "height width 4"]
+    Layer = UInt8[np.ndarray, "height width *channels"]
     Named = list[tuple[str, Camera]]
 
 WRITTEN = ("*.png", "turntable.gif")
-LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha", "normal", "normal-camera")
+LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
+BENT = ("rgb", "palette", "labels")  # layers that --as-drawn bends
 
 
 def render(
@@ -59,6 +62,13 @@ def render(
     nearest: Annotated[
         bool, typer.Option("--nearest", help="Match --palette by likeness, not by order.")
     ] = False,
+    lines: Annotated[
+        bool, typer.Option("--lines/--no-lines", help="Draw the sheet's contour lines.")
+    ] = True,
+    as_drawn: Annotated[
+        bool,
+        typer.Option("--as-drawn", help="Bend views as the nearest drawings were bent by hand."),
+    ] = False,
     gif: Annotated[
         bool | None, typer.Option("--gif/--no-gif", help="turntable.gif (default: turntables).")
     ] = None,
@@ -90,6 +100,7 @@ def render(
     check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
+    trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     animate = gif if gif is not None else views is not None
     files = _write(out, trained, named, wanted, printer, animate=animate, force=force)
@@ -121,7 +132,7 @@ def _write(
             printer.progress(f"rendering {number + 1} of {len(named)}")
             view = render_view(baked, camera)
             for layer in layers:
-                data, picture = _layer(trained, view, camera, layer)
+                data, picture = _encoded(trained, _layer(trained, view, camera, layer), layer)
                 files.append(f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png")
                 write_bytes(folder / files[-1], data)
                 if layer == layers[0]:
@@ -129,6 +140,26 @@ def _write(
         if animate:
             write_bytes(folder / "turntable.gif", encode_gif(turning))
     return files
+
+
+def _style(
+    trained: TrainedField, layers: list[str], *, lines: bool, as_drawn: bool
+) -> TrainedField:
+    """Return the field with the lines and bends that the pictures should have.
+
+    Raises:
+        BundleError: an ink layer of drawings without lines, or --as-drawn of some that do not bend.
+    """
+    from dataclasses import replace
+
+    from toonset.errors import BundleError
+
+    if "ink" in layers and (trained.ink is None or not lines):
+        raise BundleError("run: its drawings have no contour lines; leave --layer ink out")
+    if as_drawn and trained.keys is None:
+        raise BundleError("run: its drawings were not bent; leave --as-drawn out")
+    ink, keys = trained.ink if lines else None, trained.keys if as_drawn else None
+    return replace(trained, ink=ink, keys=keys)
 
 
 def _check_arguments(
@@ -168,32 +199,39 @@ def _cameras(
     return named
 
 
-def _layer(
-    trained: TrainedField, view: Rendering, camera: Camera, layer: str
-) -> tuple[bytes, Picture]:
-    """Return the PNG of one layer of a view, and the picture that a GIF shows."""
+def _layer(trained: TrainedField, view: Rendering, camera: Camera, layer: str) -> Layer:
+    """Return one layer of a view as RGBA, or as a label map."""
+    from toonset.nerf import layers
+    from toonset.nerf.normals import normal_picture
+    from toonset.nerf.warp_back import give_back
+
+    made: dict[str, Callable[[], Layer]] = {
+        "rgb": lambda: layers.color_picture(view.rgb, view.alpha),
+        "palette": lambda: layers.palette_picture(view, trained.palette),
+        "labels": lambda: layers.label_picture(view),
+        "depth": lambda: layers.depth_picture(view),
+        "alpha": lambda: layers.alpha_picture(view),
+        "ink": lambda: layers.ink_picture(view),
+        "normal": lambda: normal_picture(view, camera, in_camera=False),
+        "normal-camera": lambda: normal_picture(view, camera, in_camera=True),
+    }
+    picture = made[layer]()
+    if trained.keys is None or layer not in BENT:
+        return picture
+    return give_back({layer: picture}, camera, trained.keys)[layer]
+
+
+def _encoded(trained: TrainedField, picture: Layer, layer: str) -> tuple[bytes, Picture]:
+    """Return the PNG of a layer, and the picture that a GIF shows."""
     import numpy as np
 
     from toonset.dataset.picture import encode_indexed_png, encode_png
-    from toonset.nerf import layers
-    from toonset.nerf.normals import normal_picture
     from toonset.palette.labels import UNLABELLED
 
-    if layer == "labels":
-        labels = layers.label_picture(view)
-        palette = trained.palette
-        assert palette is not None  # label_picture has refused a run without palette
-        colors = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[labels]
-        alpha = np.where(labels == UNLABELLED, 0, 255).astype(np.uint8)
-        return encode_indexed_png(labels, palette), np.dstack([colors, alpha])
-    if layer == "palette":
-        picture = layers.palette_picture(view, trained.palette)
-    elif layer == "depth":
-        picture = layers.depth_picture(view)
-    elif layer == "alpha":
-        picture = layers.alpha_picture(view)
-    elif layer.startswith("normal"):
-        picture = normal_picture(view, camera, in_camera=layer == "normal-camera")
-    else:
-        picture = layers.color_picture(view.rgb, view.alpha)
-    return encode_png(picture), picture
+    if layer != "labels":
+        return encode_png(picture), picture
+    palette = trained.palette
+    assert palette is not None  # label_picture has refused a run without palette
+    colors = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[picture]
+    alpha = np.where(picture == UNLABELLED, 0, 255).astype(np.uint8)
+    return encode_indexed_png(picture, palette), np.dstack([colors, alpha])

@@ -21,6 +21,7 @@ from toonset.cli.train_run import Request, run
 from toonset.cli.train_threads import AUTO, checked
 
 DEVICES = ("auto", "cpu", "cuda")
+INKS = ("redraw", "paint")
 WHILE_PANEL = "While it runs"
 
 
@@ -54,6 +55,20 @@ def train(
             "--field", help="triplane (default); to compare with: mlp, voxel, hull (no training)."
         ),
     ] = None,
+    ink: Annotated[
+        str,
+        typer.Option(
+            "--ink",
+            help="redraw: contour lines are taken off and drawn again in renderings; paint: they "
+            "are trained as colour.",
+        ),
+    ] = "redraw",
+    as_placed: Annotated[
+        bool, typer.Option("--as-placed", help="Trust the cameras: do not register drawings.")
+    ] = False,
+    as_bent: Annotated[
+        bool, typer.Option("--as-bent", help="Trust the outlines: do not unbend drawings.")
+    ] = False,
     no_palette: Annotated[
         bool, typer.Option("--no-palette", help="Colours only: no palette, no labels.")
     ] = False,
@@ -105,7 +120,9 @@ def train(
     _check_choice(device, DEVICES, "--device")
     _check_choice(preset, PRESETS, "--preset")
     _check_choice(field or FIELDS[0], FIELDS, "--field")
+    _check_choice(ink, INKS, "--ink")
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
+    given |= {name: False for name, off in _switches(ink, as_placed, as_bent).items() if off}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle
     request = Request(
         bundle,
@@ -120,6 +137,11 @@ def train(
     code = run(request, Printer(as_json, quiet))
     if code:
         raise typer.Exit(code)
+
+
+def _switches(ink: str, as_placed: bool, as_bent: bool) -> dict[str, bool]:
+    """Return which steps of the drawings' preparation are switched off."""
+    return {"ink": ink == "paint", "register": as_placed, "unbend": as_bent}
 
 
 def _check_choice(value: str, choices: Sequence[str], option: str) -> None:

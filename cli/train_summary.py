@@ -16,12 +16,31 @@ def summary(run: Path, metrics: dict[str, Any]) -> str:
         [
             f"{counts['views']} views, {counts['rays']} rays, {counts['parameters']} parameters; "
             f"{metrics['steps']} steps in {seconds:.1f} s",
+            *_drawings(metrics["drawings"]),
             f"hull: filled where at most {hull['missing']} views say background{evidence}",
             f"fit to the drawings: {_figures(fit)}",
             *([f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []),
             f"{run}: preview.png shows it; next: toonset render {run} --turntable 36",
         ]
     )
+
+
+def _drawings(found: dict[str, Any]) -> list[str]:
+    """Return what was done to the drawings, and on what evidence."""
+    lines = []
+    for name, done in (("registration", "moved and sized"), ("unbending", "bent back")):
+        step = found[name]
+        if step is None:
+            continue
+        before, after = step["apart_px"]
+        moved = f"drawings {done}: outlines {before:.2f} px apart, {after:.2f} px after"
+        kept = f"drawings not {done}: outlines {before:.2f} px apart"
+        lines.append(f"{moved if step['applied'] else kept} ({step['gain_nats']:+.0f} nats)")
+    if found["ink"]:
+        ink = found["ink"]
+        widths = f"{ink['outline_px']:.1f} px outside, {ink['inner_px']:.1f} px inside"
+        lines.append(f"contour lines taken off, to be drawn again: {widths}")
+    return lines
 
 
 def _figures(means: dict[str, float | None]) -> str:

@@ -50,6 +50,14 @@ def alpha_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
     return _bytes(np.dstack([alpha, alpha, alpha, np.ones_like(alpha)]))
 
 
+def ink_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
+    """Return the contour lines alone, in their colour; nothing where there are none."""
+    if rendering.ink is None or rendering.ink_rgb is None:
+        return np.zeros((*rendering.alpha.shape, 4), dtype=np.uint8)
+    color = np.array(rendering.ink_rgb) / 255.0
+    return color_picture(rendering.ink[..., None] * color, rendering.ink)
+
+
 def label_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width"]:
     """Return the label map, 255 where nothing is seen.
 
