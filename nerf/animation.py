@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib
 import io
 from collections.abc import Sequence
+from fractions import Fraction
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Int, UInt8
 from PIL import Image
+from scipy.spatial.distance import cdist
 
 from toonset.errors import OutputError, SetupError
 from toonset.nerf.metrics import over_white
@@ -16,7 +18,7 @@ from toonset.nerf.metrics import over_white
 SECONDS_PER_TURN = 3.0
 SHORTEST_MS = 20  # viewers slow shorter frames down
 GIF_COLORS = 256
-FASTEST_MP4, SLOWEST_MP4 = 60, 1  # pictures per second that players show
+GIF_EXACT = 96  # of them: flat colours stay as they are, mixed ones share the others
 LOSSLESS_EFFORT = 60  # of 100: more takes three times as long for 2 %
 MP4_QUALITY = 16  # x264's constant rate factor: flat colours keep no visible blocks
 INSTALL_AV = "MP4 needs PyAV, which is missing here; install it: pip install av"
@@ -25,8 +27,8 @@ Pictures = Sequence[UInt8[np.ndarray, "height width 4"]]
 
 
 def duration_ms(count: int) -> int:
-    """Return how long each of `count` pictures of a turn is shown."""
-    return max(SHORTEST_MS, round(1000 * SECONDS_PER_TURN / count))
+    """Return how long each of `count` pictures of a turn is shown; a GIF counts hundredths."""
+    return max(SHORTEST_MS, 10 * round(100 * SECONDS_PER_TURN / count))
 
 
 def encode_gif(pictures: Pictures) -> bytes:
@@ -38,10 +40,15 @@ def encode_gif(pictures: Pictures) -> bytes:
         OutputError: the pictures differ in size.
     """
     check_one_size(pictures, "turntable.gif")
-    flat = [Image.fromarray(_flat(picture)) for picture in pictures]
-    strip = Image.fromarray(np.concatenate([np.asarray(image) for image in flat]))
-    shared = strip.quantize(GIF_COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    frames = [image.quantize(palette=shared, dither=Image.Dither.NONE) for image in flat]
+    flat = np.stack([_flat(picture) for picture in pictures])
+    colors, which, counts = np.unique(
+        flat.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True
+    )
+    shared = _shared_palette(colors, counts)
+    nearest = cdist(colors, shared, "sqeuclidean").argmin(axis=1).astype(np.uint8)
+    frames = [Image.fromarray(codes) for codes in nearest[which].reshape(flat.shape[:3])]
+    for frame in frames:
+        frame.putpalette(shared.tobytes())
     buffer = io.BytesIO()
     frames[0].save(
         buffer,
@@ -53,6 +60,19 @@ def encode_gif(pictures: Pictures) -> bytes:
         disposal=1,
     )
     return buffer.getvalue()
+
+
+def _shared_palette(
+    colors: UInt8[np.ndarray, "n 3"], counts: Int[np.ndarray, " n"]
+) -> UInt8[np.ndarray, "few 3"]:
+    """Return at most 256 colours: the common ones as they are, and means of the others."""
+    if len(colors) <= GIF_COLORS:
+        return colors
+    order = np.argsort(-counts, kind="stable")
+    common, rare = colors[order[:GIF_EXACT]], colors[order[GIF_EXACT:]]
+    means = Image.fromarray(rare[None]).quantize(GIF_COLORS - GIF_EXACT, Image.Quantize.MEDIANCUT)
+    rest = np.array(means.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    return np.concatenate([common, rest[: GIF_COLORS - GIF_EXACT]])
 
 
 def encode_webp(pictures: Pictures) -> bytes:
@@ -93,10 +113,10 @@ def encode_mp4(pictures: Pictures) -> bytes:
     except ImportError as error:
         raise SetupError(INSTALL_AV) from error
     frames = [_even(_flat(picture)) for picture in pictures]
-    rate = round(1000 / duration_ms(len(frames)))
+    rate = Fraction(1000, duration_ms(len(frames)))
     buffer = io.BytesIO()
     with av.open(buffer, "w", format="mp4") as file:
-        stream = file.add_stream("libx264", rate=min(max(rate, SLOWEST_MP4), FASTEST_MP4))
+        stream = file.add_stream("libx264", rate=rate)
         stream.height, stream.width = frames[0].shape[:2]
         stream.pix_fmt = "yuv420p"
         stream.options = {"crf": str(MP4_QUALITY), "tune": "animation"}

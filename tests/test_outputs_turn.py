@@ -48,7 +48,10 @@ def test_webp_loses_nothing() -> None:
 
 def test_gif_shows_flat_colours_over_white_without_flicker() -> None:
     pictures = turn()
-    found = frames_of(encode_gif(pictures), "RGB")
+    data = encode_gif(pictures)
+    with Image.open(io.BytesIO(data)) as image:
+        assert image.info["duration"] == duration_ms(len(pictures))
+    found = frames_of(data, "RGB")
     assert len(found) == len(pictures)
     for got, picture in zip(found, pictures, strict=True):
         full, empty = picture[..., 3] == 255, picture[..., 3] == 0
@@ -56,9 +59,21 @@ def test_gif_shows_flat_colours_over_white_without_flicker() -> None:
         np.testing.assert_array_equal(got[full], picture[full][:, :3])
 
 
+def test_gif_of_many_colours_keeps_the_flat_ones() -> None:
+    rng = np.random.default_rng(2)
+    pictures = turn()
+    for picture in pictures:
+        picture[28:, :, :3] = rng.integers(0, 256, (3, 25, 3))
+        picture[28:, :, 3] = 255
+    for got, picture in zip(frames_of(encode_gif(pictures), "RGB"), pictures, strict=True):
+        flat = (picture[..., 3] == 255) & (np.arange(31) < 28)[:, None]
+        np.testing.assert_array_equal(got[flat], picture[flat][:, :3])
+        assert np.abs(got[28:].astype(int) - picture[28:, :, :3]).mean() < 20
+
+
 @pytest.mark.parametrize("count", [1, 8, 36, 400])
 def test_a_turn_takes_three_seconds_or_what_viewers_can(count: int) -> None:
-    assert duration_ms(count) * count == pytest.approx(3000 if count < 150 else 8000, rel=0.01)
+    assert duration_ms(count) * count == pytest.approx(3000 if count < 150 else 8000, rel=0.05)
 
 
 @pytest.mark.parametrize("encode", [encode_gif, encode_webp, encode_mp4, sprite_sheet])
