@@ -13,7 +13,7 @@
 A texel's column is the plane's second axis, its row the first; texel (i, j) lies at low + cell * i,
 low + cell * j. Nothing is kept in alpha, which browsers multiply into colours.
 
-Layout after MERF (Reiser et al. 2023) and its web viewers: planes and weights apart, bytes only.
+Source of the idea, planes as byte pictures and the decoder apart: MERF, Reiser et al. 2023.
 """
 
 from __future__ import annotations

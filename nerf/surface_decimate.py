@@ -3,8 +3,7 @@
 A vertex' cost is its squared distance from the planes of the faces that were merged into it. On an
 edge between two labels stands one more plane, upright on each face, so borders cost what outlines
 cost. An edge collapses only where the surface stays closed (its ends share exactly two neighbours)
-and no face turns over. Libraries that were looked at know no borders of colours, or open the
-surface there.
+and no face turns over.
 
 Source: Garland and Heckbert, "Surface simplification using quadric error metrics", 1997, and for
 borders "Simplifying surfaces with color and texture", 1998; link condition: Dey et al. 1999.
