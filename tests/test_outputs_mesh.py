@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from toonset.dataset.mesh_file import load_mesh
 from toonset.errors import BundleError, OutputError, PaletteError
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.fields import Constants, Field, FieldSpec, Places
 from toonset.nerf.hull import Hull
+from toonset.nerf.layers import palette_picture
 from toonset.nerf.mesh_export import check_mesh_files, mesh_files, split_by_label, write_mesh_files
 from toonset.nerf.surface import Surface, surface_of
 from toonset.nerf.surface_cut import cut
 from toonset.nerf.surface_decimate import decimated
 from toonset.nerf.trained import TrainedField
+from toonset.nerf.turntable import turntable
+from toonset.nerf.turntable_files import turntable_files
+from toonset.nerf.views import render
 
 PALETTE = np.array([[200, 40, 40], [40, 80, 200], [250, 240, 10]], dtype=np.uint8)
 RADIUS, VOXEL, CELLS = 1.0, 0.085, 31
@@ -200,6 +206,20 @@ def test_only_border_vertices_come_twice(surface: Surface) -> None:
     twice = len(vertices) - len(surface.vertices)
     pairs = {(v, k) for f, k in zip(surface.faces.tolist(), surface.labels, strict=True) for v in f}
     assert twice == len(pairs) - len(surface.vertices) > 0
+
+
+def test_all_formats_of_a_turn() -> None:
+    trained = ball()
+    cameras = turntable(trained, 4, 0.2, 24)
+    pictures = [palette_picture(render(trained, camera), PALETTE) for camera in cameras]
+    files = turntable_files(["gif", "webp", "sprites"], pictures, trained, cameras)
+    assert list(files) == ["turntable.gif", "turntable.webp", "sprites.png", "sprites.json"]
+    about = json.loads(files["sprites.json"])
+    with Image.open(io.BytesIO(files["sprites.png"])) as image:
+        assert image.size == (about["meta"]["size"]["w"], about["meta"]["size"]["h"])
+    for frame in about["frames"].values():  # the ball stands on the pivot, seen a little from above
+        assert frame["pivot"]["x"] == pytest.approx(0.5, abs=0.05)
+        assert 0.85 < frame["pivot"]["y"] <= 1
 
 
 def test_places_that_cannot_be_written(tmp_path: Path) -> None:
