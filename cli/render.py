@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Layer = UInt8[np.ndarray, "height width *channels"]
     Named = list[tuple[str, Camera]]
 
-WRITTEN = ("*.png", "turntable.gif")
+WRITTEN = ("*.png", "turntable.*", "sprites.json")
 LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
 BENT = ("rgb", "palette", "labels")  # layers that --as-drawn bends
 
@@ -69,6 +69,12 @@ def render(
         bool,
         typer.Option("--as-drawn", help="Bend views as the nearest drawings were bent by hand."),
     ] = False,
+    formats: Annotated[
+        str | None,
+        typer.Option(
+            "--format", help="Of all views together: gif, webp, mp4, sprites; comma-separated."
+        ),
+    ] = None,
     gif: Annotated[
         bool | None, typer.Option("--gif/--no-gif", help="turntable.gif (default: turntables).")
     ] = None,
@@ -79,7 +85,7 @@ def render(
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Render a trained run: one PNG per camera and layer, and a GIF of a turntable.
+    """Render a trained run: one PNG per camera and layer, and files of a whole turntable.
 
     The default layer is the field's own colour. `palette` (the default with --recolor or --palette)
     shows palette colours only; `normal` codes x, y, z of the world as red, green, blue,
@@ -96,17 +102,23 @@ def render(
     from toonset.nerf.run_folder import read_field
     from toonset.nerf.threads import use_threads
 
+    together = _formats(formats, gif, turning=views is not None)
     use_threads(threads)
     check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
     trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
-    animate = gif if gif is not None else views is not None
-    files = _write(out, trained, named, wanted, printer, animate=animate, force=force)
-    extra = " and turntable.gif" if animate else ""
+    files, turns = _write(out, trained, named, wanted, printer, together, force=force)
+    extra = "".join(f", {name} ({size} kB)" for name, size in turns.items())
     shown = f"{len(files)} {'picture' if len(files) == 1 else 'pictures'} ({', '.join(wanted)})"
-    values = {"out": out, "layer": wanted[0], "layers": wanted, "files": files, "gif": animate}
+    values = {
+        "out": out,
+        "layer": wanted[0],
+        "layers": wanted,
+        "files": files,
+        "together": list(turns),
+    }
     printer.result(values, f"{out}: {shown}{extra}")
 
 
@@ -116,13 +128,13 @@ def _write(
     named: Named,
     layers: list[str],
     printer: Printer,
+    formats: Sequence[str],
     *,
-    animate: bool,
     force: bool,
-) -> list[str]:
-    """Write all pictures, and a GIF of the first layer; return the pictures' names."""
+) -> tuple[list[str], dict[str, int]]:
+    """Write all pictures and files of the first layer; return names, and the latter's kB."""
     from toonset.files import new_folder, write_bytes
-    from toonset.nerf.animation import encode_gif
+    from toonset.nerf.turntable_files import turntable_files
     from toonset.nerf.views import render as render_view
     from toonset.nerf.views_bake import Baked
 
@@ -137,9 +149,23 @@ def _write(
                 write_bytes(folder / files[-1], data)
                 if layer == layers[0]:
                     turning.append(picture)
-        if animate:
-            write_bytes(folder / "turntable.gif", encode_gif(turning))
-    return files
+        made = turntable_files(formats, turning, trained, [camera for _, camera in named])
+        for name, data in made.items():
+            write_bytes(folder / name, data)
+    return files, {name: math.ceil(len(data) / 1000) for name, data in made.items()}
+
+
+def _formats(given: str | None, gif: bool | None, *, turning: bool) -> tuple[str, ...]:
+    """Return the names of the files that hold all views."""
+    from toonset.nerf.turntable_files import FORMATS
+
+    names = tuple(dict.fromkeys(word.strip() for word in given.split(","))) if given else ()
+    for name in names:
+        if name not in FORMATS:
+            known = ", ".join(FORMATS)
+            raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--format")
+    wanted = gif if gif is not None else turning and not names
+    return names if "gif" in names or not wanted else ("gif", *names)
 
 
 def _style(

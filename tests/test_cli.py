@@ -18,7 +18,18 @@ from toonset.dataset.transforms import read_cameras
 
 VERBS = (
     *("split", "calibrate", "palette", "train", "render", "evaluate"),
-    *("info", "check", "export", "import", "mannequin", "synth", "bench"),
+    *(
+        "mesh",
+        "planes",
+        "consistency",
+        "info",
+        "check",
+        "export",
+        "import",
+        "mannequin",
+        "synth",
+        "bench",
+    ),
 )
 BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"}
 VIEWS = 5
