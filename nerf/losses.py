@@ -12,7 +12,7 @@ from torch import Tensor
 from toonset.palette.labels import UNLABELLED
 
 BACKDROP = 0.5  # grey behind the figure in training: neither white nor black parts hide holes
-OPACITY_WEIGHT = 1.0  # light paint over the grey backdrop says little of its opacity
+OPACITY_WEIGHT = 0.1
 REFERENCE_VIEWS = 8  # views for which `TrainOptions.smoothness` is stated
 OPAQUE_ENOUGH = 0.05  # opacity below which a rendered colour means nothing
 
