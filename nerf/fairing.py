@@ -120,7 +120,7 @@ def _signed_distance(hull: Hull, factor: int) -> Volume:
     x, y, z = (-n % factor for n in hull.support.shape)
     support = F.pad(hull.support, [0, z, 0, y, 0, x]).numpy()
     inside = support >= LEVEL
-    outer, inner = (ndimage.distance_transform_edt(part) for part in (~inside, inside))
+    outer, inner = (np.asarray(ndimage.distance_transform_edt(p)) for p in (~inside, inside))
     distance = np.where(inside, 0.5 - inner, outer - 0.5)
     # beside the surface the support says where between two voxels it lies
     slope = np.sqrt(sum(np.square(part) for part in np.gradient(support)))

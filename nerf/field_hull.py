@@ -55,8 +55,8 @@ def _filled(
     """Return the colours with the nearest known one where none is known."""
     if not bool(known.any()):
         return color
-    nearest = ndimage.distance_transform_edt(
-        ~known.numpy(), return_distances=False, return_indices=True
+    nearest = np.asarray(
+        ndimage.distance_transform_edt(~known.numpy(), return_distances=False, return_indices=True)
     )
     return color[tuple(torch.as_tensor(index) for index in nearest)]
 

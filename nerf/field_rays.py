@@ -24,15 +24,18 @@ class TrainingRays(Protocol):
 
     def __len__(self) -> int:
         """Return how many batches go through all rays once."""
+        ...
 
     def batch(self, index: int, step: int) -> Batch:
         """Return a batch for a step."""
+        ...
 
     def after(self, step: int, model: Model) -> None:
         """Take note that a step is done."""
 
     def state(self) -> dict[str, Tensor]:
         """Return what has changed since the start."""
+        ...
 
     def restore(self, state: dict[str, Tensor]) -> None:
         """Become what `state` was taken from."""

@@ -46,9 +46,11 @@ class Constants(Protocol):
 
     def to(self, device: torch.device) -> Self:
         """Return them on a device."""
+        ...
 
     def kept(self, samples: Bool[Tensor, " n"]) -> Self:
         """Return those of some of the points."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

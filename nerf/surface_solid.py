@@ -93,7 +93,7 @@ def _grown(
         return np.zeros(stopped.shape)
     outward = _distance(~stopped)
     distance = outward - _distance(stopped)
-    surface = inside & ~ndimage.binary_erosion(inside)
+    surface = inside & np.logical_not(ndimage.binary_erosion(inside))
     usual = float(np.median(outward[surface])) + 1  # the surface lies up to a voxel farther out
     rise = ndimage.gaussian_filter((usual - distance).clip(-RAMP, RAMP), SMOOTHING)
     return rise * (SOLID_FROM / RAMP) + SOLID_FROM
