@@ -18,6 +18,7 @@ from toonset.nerf.metrics_lines import TOLERANCE_PX
 from toonset.nerf.metrics_view import Judges, figures_of, load_judges
 from toonset.nerf.trained import TrainedField
 from toonset.nerf.views import Rendering, render
+from toonset.nerf.views_bake import Baked
 from toonset.palette.labels import label_image
 
 LAYERS = ("rgb", "palette")  # the field's own colour; in palette colours
@@ -59,10 +60,10 @@ def score_views(
     drawing's labels are the scene's own where its palette is the run's, else the run's palette
     applied to the drawing.
     """
-    views = []
+    baked, views = Baked.of(trained), []
     for number, frame in enumerate(scene.frames, 1):
         progress(f"{scene.name}: view {number} of {len(scene.frames)}")
-        views.append(_scored(trained, scene, frame, judges))
+        views.append(_scored(baked, scene, frame, judges))
     return tuple(views)
 
 
@@ -109,8 +110,8 @@ def _section(views: Sequence[ScoredView]) -> dict[str, Any]:
     return result | {"views": listed}
 
 
-def _scored(trained: TrainedField, scene: Scene, frame: Frame, judges: Judges) -> ScoredView:
-    view = render(trained, frame.camera)
+def _scored(baked: Baked, scene: Scene, frame: Frame, judges: Judges) -> ScoredView:
+    trained, view = baked.trained, render(baked, frame.camera)
     pictures = {"rgb": color_picture(view.rgb, view.alpha)}
     if trained.palette is not None:
         pictures["palette"] = palette_picture(view, trained.palette)

@@ -22,6 +22,7 @@ from toonset.nerf.run_folder import write_field
 from toonset.nerf.trained import HeldOut, Step, TrainedField, Training
 from toonset.nerf.turntable import turntable
 from toonset.nerf.views import render
+from toonset.nerf.views_bake import Baked
 
 PREVIEW_VIEWS, PREVIEW_ELEVATION = 4, math.radians(10)
 
@@ -61,9 +62,9 @@ def write_unfinished(
 
 def compared(trained: TrainedField, scene: Scene) -> dict[str, float | None]:
     """Return the mean figures of the field's renderings beside a scene's pictures."""
-    rows = []
+    baked, rows = Baked.of(trained), []
     for frame in scene.frames:
-        view = render(trained, frame.camera)
+        view = render(baked, frame.camera)
         rows.append(compare(color_picture(view.rgb, view.alpha), frame.rgba))
     return means(rows)
 
@@ -108,7 +109,8 @@ def means(rows: list[dict[str, float | None]]) -> dict[str, float | None]:
 def preview(trained: TrainedField) -> np.ndarray:
     """Return four views side by side over white, (height, 4 height, 3) bytes."""
     cameras = turntable(trained, PREVIEW_VIEWS, PREVIEW_ELEVATION)
-    views = [render(trained, camera) for camera in cameras]
+    baked = Baked.of(trained)
+    views = [render(baked, camera) for camera in cameras]
     pictures = [over_white(color_picture(view.rgb, view.alpha)) for view in views]
     return (np.concatenate(pictures, axis=1) * 255 + 0.5).astype(np.uint8)
 
