@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -163,7 +164,7 @@ def test_a_moved_bundle_goes_through_every_verb(bundle: Path, toonset, tmp_path,
         *("--layer", "palette"),
     )
     assert (turned.code, turned.err) == (0, "")
-    assert turned.out == "turn: 3 pictures (palette) and turntable.gif\n"
+    assert re.fullmatch(r"turn: 3 pictures \(palette\), turntable.gif \(\d+ kB\)\n", turned.out)
     assert len(list((tmp_path / "turn").iterdir())) == 4
     judged = toonset("evaluate", "bundle/run", "--test", "bundle", "--json")
     assert judged.code == 0
