@@ -21,7 +21,7 @@ from toonset.cli.train_run import Request, run
 from toonset.cli.train_threads import AUTO, checked
 
 DEVICES = ("auto", "cpu", "cuda")
-INKS = ("redraw", "paint")
+INKS = ("paint", "redraw")
 WHILE_PANEL = "While it runs"
 
 
@@ -59,10 +59,10 @@ def train(
         str,
         typer.Option(
             "--ink",
-            help="redraw: contour lines are taken off and drawn again in renderings; paint: they "
-            "are trained as colour.",
+            help="paint: contour lines are trained as colour; redraw: they are taken off and drawn "
+            "again in renderings, which may cost small eyes and mouths.",
         ),
-    ] = "redraw",
+    ] = "paint",
     as_placed: Annotated[
         bool, typer.Option("--as-placed", help="Trust the cameras: do not register drawings.")
     ] = False,
@@ -122,7 +122,9 @@ def train(
     _check_choice(field or FIELDS[0], FIELDS, "--field")
     _check_choice(ink, INKS, "--ink")
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
-    given |= {name: False for name, off in _switches(ink, as_placed, as_bent).items() if off}
+    switches = {"register": as_placed, "unbend": as_bent}
+    given |= {name: False for name, off in switches.items() if off}
+    given |= {"ink": True} if ink == "redraw" else {}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle
     request = Request(
         bundle,
@@ -137,11 +139,6 @@ def train(
     code = run(request, Printer(as_json, quiet))
     if code:
         raise typer.Exit(code)
-
-
-def _switches(ink: str, as_placed: bool, as_bent: bool) -> dict[str, bool]:
-    """Return which steps of the drawings' preparation are switched off."""
-    return {"ink": ink == "paint", "register": as_placed, "unbend": as_bent}
 
 
 def _check_choice(value: str, choices: Sequence[str], option: str) -> None:

@@ -30,7 +30,8 @@ class TrainOptions:
             figure's box, at new places in every step, against pictures over white.
         register: let cameras follow drawings that were placed or sized off.
         unbend: bend drawings back that disagree with the others' outlines.
-        ink: take contour lines off before, and draw them again in renderings.
+        ink: take contour lines off before, and draw them again in renderings: cleaner, but small
+            eyes and mouths may go with the lines.
     """
 
     steps: int = 300
@@ -45,4 +46,4 @@ class TrainOptions:
     carve: bool = True
     register: bool = True
     unbend: bool = True
-    ink: bool = True
+    ink: bool = False

@@ -29,6 +29,4 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
     as they are. A step takes 1,024
     rays of 96 samples, so that 2,000 steps end within six minutes on two cores.
     """
-    return TrainOptions(
-        steps=steps, carve=False, smoothness=0.0, register=False, unbend=False, ink=False
-    )
+    return TrainOptions(steps=steps, carve=False, smoothness=0.0, register=False, unbend=False)
