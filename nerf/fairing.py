@@ -126,8 +126,8 @@ def _signed_distance(hull: Hull, factor: int) -> Volume:
     slope = np.sqrt(sum(np.square(part) for part in np.gradient(support)))
     beside = (np.abs(distance) < 1.5) & (slope > 0.05)
     between = ((LEVEL - support) / np.maximum(slope, 0.05)).clip(-1.5, 1.5)
-    distance = torch.as_tensor(np.where(beside, between, distance), dtype=torch.float32)
-    return F.avg_pool3d(distance[None, None] / factor, factor).clamp(-REACH, REACH)
+    signed = torch.as_tensor(np.where(beside, between, distance), dtype=torch.float32)
+    return F.avg_pool3d(signed[None, None] / factor, factor).clamp(-REACH, REACH)
 
 
 def _contacts(
