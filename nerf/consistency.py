@@ -17,14 +17,8 @@ from jaxtyping import Bool, Float
 
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
-from toonset.nerf.registration import (
-    FEWEST_VIEWS,
-    Registration,
-    alpha_of,
-    has_figure,
-    registered,
-    size_ratio,
-)
+from toonset.nerf.registration import FEWEST_VIEWS, Registration, registered, size_ratio
+from toonset.nerf.silhouette import alpha_of, has_figure
 from toonset.nerf.warp import Unbending, unbent
 from toonset.nerf.warp_coherence import Placed, touch
 from toonset.nerf.warp_moves import ShiftAndScale

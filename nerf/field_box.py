@@ -19,9 +19,9 @@ from toonset.nerf.field_loss import Model
 from toonset.nerf.fields import Field, Places
 from toonset.nerf.hull import Hull
 from toonset.nerf.march import Rays, clip, rays_of
+from toonset.nerf.silhouette import OPAQUE, has_figure, mask_of
 from toonset.palette.labels import UNLABELLED
 
-OPAQUE = 128  # alpha from which a pixel belongs to the figure
 VOXELS = 96  # of the box, in the map of empty space that rendering skips
 BINS = 96  # along a ray through the box
 RAYS_PER_STEP = 1024
@@ -89,8 +89,8 @@ class BoxRays:
 
 def open_box(scene: Scene) -> Hull:
     """Return the box round the figure, full everywhere: no silhouette is carved."""
-    frames = [f for f in scene.frames if (f.rgba[..., 3] >= OPAQUE).any()]
-    masks = [frame.rgba[..., 3] >= OPAQUE for frame in frames]
+    frames = [frame for frame in scene.frames if has_figure(frame)]
+    masks = [mask_of(frame.rgba) for frame in frames]
     return full_hull(box_of_masks([frame.camera for frame in frames], masks))
 
 

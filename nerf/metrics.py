@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.nerf.silhouette import mask_of
+
 BEST_PSNR = 120.0  # reported for identical pictures, which have no finite value
 MOST_SHIFT_PX = 2  # of the whole picture that the shift-tolerant PSNR forgives
 SSIM_WINDOW, SSIM_SIGMA = 11, 1.5  # Wang et al. 2004
 SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
-OPAQUE = 128  # alpha from which a pixel belongs to the silhouette
 
 Figures = dict[str, float | None]  # by metric; None where it cannot be said
 
@@ -79,7 +80,7 @@ def silhouette_iou(
     rendered: UInt8[np.ndarray, "height width 4"], drawn: UInt8[np.ndarray, "height width 4"]
 ) -> float | None:
     """Return intersection over union of what is at least half opaque; None where nothing is."""
-    a, b = rendered[..., 3] >= OPAQUE, drawn[..., 3] >= OPAQUE
+    a, b = mask_of(rendered), mask_of(drawn)
     return float((a & b).sum() / (a | b).sum()) if (a | b).any() else None
 
 

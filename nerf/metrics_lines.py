@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from toonset.nerf.metrics import OPAQUE, over_white
+from toonset.nerf.metrics import over_white
+from toonset.nerf.silhouette import mask_of
 
 TOLERANCE_PX = 2
 DARK = 110 / 255  # luma of ink, over white
@@ -41,7 +42,7 @@ def line_pixels(
 
     Thin is what a morphological closing fills (the black-hat transform).
     """
-    rows = np.flatnonzero((rgba[..., 3] >= OPAQUE).any(axis=1))
+    rows = np.flatnonzero(mask_of(rgba).any(axis=1))
     height = rows[-1] - rows[0] + 1 if len(rows) else 0
     reach = max(LEAST_WIDE_PX, round(WIDEST * height)) // 2
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
@@ -54,7 +55,7 @@ def line_pixels(
 def _is_outlined(
     drawn: UInt8[np.ndarray, "height width 4"], lines: Bool[np.ndarray, "height width"]
 ) -> bool:
-    figure = drawn[..., 3] >= OPAQUE
+    figure = mask_of(drawn)
     rim = figure & _grown(~np.pad(figure, 1), 1)[1:-1, 1:-1]
     return bool(rim.any()) and float(_grown(lines, 1)[rim].mean()) >= OUTLINED
 

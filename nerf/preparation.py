@@ -14,7 +14,8 @@ from toonset.dataset.scene import Scene
 from toonset.nerf.bounds import box_of_masks
 from toonset.nerf.ink import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.registration import OPAQUE, Registration, registered
+from toonset.nerf.registration import Registration, registered
+from toonset.nerf.silhouette import mask_of
 from toonset.nerf.warp import Unbending, unbent
 from toonset.nerf.warp_back import KeyWarps
 
@@ -47,7 +48,7 @@ class Prepared:
         if self.unbending is None or not self.unbending.applied:
             return None
         cameras = tuple(frame.camera for frame in self.scene.frames)
-        masks = [frame.rgba[..., 3] >= OPAQUE for frame in self.scene.frames]
+        masks = [mask_of(frame.rgba) for frame in self.scene.frames]
         shown = [i for i, mask in enumerate(masks) if mask.any()]
         box = box_of_masks([cameras[i] for i in shown], [masks[i] for i in shown])
         return KeyWarps(cameras, self.unbending.warps, (box.low + box.high) / 2)

@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
+from toonset.nerf.silhouette import alpha_of, has_figure
 from toonset.nerf.warp_fit import Fit, fit_moves
 from toonset.nerf.warp_moves import ShiftAndScale
 from toonset.nerf.warp_outline import Outline, Outlines, outlines_of
@@ -23,7 +24,6 @@ from toonset.nerf.warp_outline import Outline, Outlines, outlines_of
 EXPECTED = 0.01  # of the figure's square: how far off drawings are placed, as a first guess
 ROUNDS = 6
 FEWEST_VIEWS = 3  # two outlines nearly always share a body
-OPAQUE = 128
 
 
 @dataclass(frozen=True)
@@ -97,16 +97,6 @@ def registered(scene: Scene) -> tuple[Scene, Registration]:
     error = fit.tau * outlines.size_px / ratio
     found = Registration(fit.gain_nats > 0, fit.gain_nats, error, apart, tuple(still))
     return (replace(scene, frames=tuple(moved)) if found.applied else scene), found
-
-
-def has_figure(frame: Frame) -> bool:
-    """Return whether a frame shows an opaque pixel."""
-    return bool((frame.rgba[..., 3] >= OPAQUE).any())
-
-
-def alpha_of(frame: Frame) -> Float[np.ndarray, "height width"]:
-    """Return a frame's coverage in [0, 1]."""
-    return frame.rgba[..., 3] / np.float32(255)
 
 
 def size_ratio(frames: Sequence[Frame], outlines: Outlines) -> float:

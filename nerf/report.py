@@ -17,7 +17,7 @@ from toonset.dataset.scene import Scene
 from toonset.files import write_bytes, write_json
 from toonset.nerf.layers import color_picture
 from toonset.nerf.manifest import write_manifest
-from toonset.nerf.metrics import compare, over_white
+from toonset.nerf.metrics import compare, means, over_white
 from toonset.nerf.run_folder import write_field
 from toonset.nerf.trained import HeldOut, Step, TrainedField, Training
 from toonset.nerf.turntable import turntable
@@ -95,15 +95,6 @@ def _write_files(folder: Path, training: Training, scene: Scene, metrics: dict[s
     write_json(folder / "metrics.json", metrics)
     write_bytes(folder / "history.csv", _csv(training.history).encode())
     write_manifest(folder)
-
-
-def means(rows: list[dict[str, float | None]]) -> dict[str, float | None]:
-    """Return the mean of every metric over the views that have it, None where none has."""
-    result: dict[str, float | None] = {}
-    for name in rows[0] if rows else ():
-        values = [v for v in (row[name] for row in rows) if v is not None]
-        result[name] = float(np.mean(values)) if values else None
-    return result
 
 
 def preview(trained: TrainedField) -> np.ndarray:

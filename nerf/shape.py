@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.scene import Scene
 from toonset.errors import BundleError
 from toonset.nerf.evidence import HullEvidence, choose_missing
 from toonset.nerf.fairing import faired
 from toonset.nerf.hull import Hull, carve
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.silhouette import alpha_of, figure_px
 
-OPAQUE = 128  # alpha from which a pixel belongs to the figure
 VOXELS_PER_PX, VOXELS = 1.25, (64, 208)
 SLACK = 1.5  # times the outlines' disagreement: as far as the surface may leave the hull
 
@@ -32,14 +32,14 @@ def hull_of(
     Raises:
         BundleError: fewer than two views show a figure, or the views share no volume.
     """
-    frames = [frame for frame in scene.frames if _figure_px(frame)]
+    frames = [frame for frame in scene.frames if figure_px(frame)]
     if len(frames) < 2:
         raise BundleError(
             f"{scene.name}: {len(frames)} picture(s) with an opaque figure; at least two views "
             "with transparent background are needed"
         )
     cameras = [frame.camera for frame in frames]
-    alphas = [torch.as_tensor(frame.rgba[..., 3] / np.float32(255)) for frame in frames]
+    alphas = [torch.as_tensor(alpha_of(frame)) for frame in frames]
     missing = options.missing_views
     evidence = HullEvidence(missing, ()) if missing is not None else choose_missing(cameras, alphas)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
@@ -52,12 +52,5 @@ def hull_of(
 
 def per_px(scene: Scene, factor: float, limits: tuple[int, int]) -> int:
     """Return `factor` times the size of the largest figure in pixels, within limits."""
-    size = max(_figure_px(frame) for frame in scene.frames)
+    size = max(figure_px(frame) for frame in scene.frames)
     return int(np.clip(round(factor * size), *limits))
-
-
-def _figure_px(frame: Frame) -> int:
-    """Return the longer side of a figure's box, 0 where there is none."""
-    mask = frame.rgba[..., 3] >= OPAQUE
-    sides = [np.flatnonzero(mask.any(axis=axis)) for axis in (0, 1)]
-    return max((int(side[-1] - side[0] + 1) if len(side) else 0) for side in sides)

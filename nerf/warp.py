@@ -15,12 +15,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.registration import (
-    FEWEST_VIEWS,
-    alpha_of,
-    has_figure,
-    size_ratio,
-)
+from toonset.nerf.registration import FEWEST_VIEWS, size_ratio
+from toonset.nerf.silhouette import alpha_of, has_figure
 from toonset.nerf.warp_fit import fit_moves
 from toonset.nerf.warp_moves import CONTROLS, Bends
 from toonset.nerf.warp_outline import Square, outlines_of
