@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, check_output
+from toonset.cli.render_layers import LAYER_NAMES, encoded
 
 if TYPE_CHECKING:
-    import numpy as np
-    from jaxtyping import UInt8
-
     from toonset.camera import Camera
     from toonset.nerf.trained import TrainedField
-    from toonset.nerf.views import Rendering
 
-    Picture = UInt8[np.ndarray, "height width 4"]
-    Layer = UInt8[np.ndarray, "height width *channels"]
     Named = list[tuple[str, Camera]]
 
-WRITTEN = ("*.png", "turntable.*", "sprites.json")
-LAYER_NAMES = ("rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
-BENT = ("rgb", "palette", "labels")  # layers that --as-drawn bends
+DEPTH_FILE = "depth.json"
+WRITTEN = ("*.png", "turntable.*", "sprites.json", DEPTH_FILE)
 
 
 def render(
@@ -89,7 +83,8 @@ def render(
 
     The default layer is the field's own colour. `palette` (the default with --recolor or --palette)
     shows palette colours only; `normal` codes x, y, z of the world as red, green, blue,
-    `normal-camera` right, up and towards the viewer. Several layers are written as NAME-LAYER.png.
+    `normal-camera` right, up and towards the viewer; `depth` has 16 bits, which depth.json turns
+    into world units. Several layers are written as NAME-LAYER.png.
     """
     printer = Printer(as_json, quiet)
     repaint = bool(recolor or palette)
@@ -133,23 +128,30 @@ def _write(
     force: bool,
 ) -> tuple[list[str], dict[str, int]]:
     """Write all pictures and files of the first layer; return names, and the latter's kB."""
-    from toonset.files import new_folder, write_bytes
+    from toonset.files import new_folder, write_bytes, write_json
+    from toonset.nerf.depth_levels import DepthLevels
     from toonset.nerf.turntable_files import turntable_files
     from toonset.nerf.views import render as render_view
     from toonset.nerf.views_bake import Baked
 
     baked, files, turning = Baked.of(trained), [], []
+    cameras = [camera for _, camera in named]
+    levels = DepthLevels.of(trained.hull, cameras)
     with new_folder(out, force=force) as folder:
         for number, (stem, camera) in enumerate(named):
             printer.progress(f"rendering {number + 1} of {len(named)}")
             view = render_view(baked, camera)
             for layer in layers:
-                data, picture = _encoded(trained, _layer(trained, view, camera, layer), layer)
+                data, picture = encoded(trained, view, camera, layer, levels)
                 files.append(f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png")
                 write_bytes(folder / files[-1], data)
                 if layer == layers[0]:
                     turning.append(picture)
-        made = turntable_files(formats, turning, trained, [camera for _, camera in named])
+        if "depth" in layers:
+            write_json(
+                folder / DEPTH_FILE, levels.to_json(files[layers.index("depth") :: len(layers)])
+            )
+        made = turntable_files(formats, turning, trained, cameras)
         for name, data in made.items():
             write_bytes(folder / name, data)
     return files, {name: math.ceil(len(data) / 1000) for name, data in made.items()}
@@ -223,41 +225,3 @@ def _cameras(
     if double:
         raise BundleError(f"{cameras}: two frames would be written as {double}.png; rename one")
     return named
-
-
-def _layer(trained: TrainedField, view: Rendering, camera: Camera, layer: str) -> Layer:
-    """Return one layer of a view as RGBA, or as a label map."""
-    from toonset.nerf import layers
-    from toonset.nerf.normals import normal_picture
-    from toonset.nerf.warp_back import give_back
-
-    made: dict[str, Callable[[], Layer]] = {
-        "rgb": lambda: layers.color_picture(view.rgb, view.alpha),
-        "palette": lambda: layers.palette_picture(view, trained.palette),
-        "labels": lambda: layers.label_picture(view),
-        "depth": lambda: layers.depth_picture(view),
-        "alpha": lambda: layers.alpha_picture(view),
-        "ink": lambda: layers.ink_picture(view),
-        "normal": lambda: normal_picture(view, camera, in_camera=False),
-        "normal-camera": lambda: normal_picture(view, camera, in_camera=True),
-    }
-    picture = made[layer]()
-    if trained.keys is None or layer not in BENT:
-        return picture
-    return give_back({layer: picture}, camera, trained.keys)[layer]
-
-
-def _encoded(trained: TrainedField, picture: Layer, layer: str) -> tuple[bytes, Picture]:
-    """Return the PNG of a layer, and the picture that a GIF shows."""
-    import numpy as np
-
-    from toonset.dataset.picture import encode_indexed_png, encode_png
-    from toonset.palette.labels import UNLABELLED
-
-    if layer != "labels":
-        return encode_png(picture), picture
-    palette = trained.palette
-    assert palette is not None  # label_picture has refused a run without palette
-    colors = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[picture]
-    alpha = np.where(picture == UNLABELLED, 0, 255).astype(np.uint8)
-    return encode_indexed_png(picture, palette), np.dstack([colors, alpha])

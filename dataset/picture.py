@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import UInt8, UInt16
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from toonset.dataset.pixel_modes import rgba_of
@@ -96,8 +96,10 @@ def encode_png(rgba: UInt8[np.ndarray, "height width channels"]) -> bytes:
     return buffer.getvalue()
 
 
-def encode_grey_png(values: UInt8[np.ndarray, "height width"]) -> bytes:
-    """Return an 8-bit grey PNG, a contour map for one."""
+def encode_grey_png(
+    values: UInt8[np.ndarray, "height width"] | UInt16[np.ndarray, "height width"],
+) -> bytes:
+    """Return a grey PNG of as many bits: a contour map, depth."""
     buffer = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(values)).save(buffer, "PNG")
     return buffer.getvalue()

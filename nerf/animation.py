@@ -6,6 +6,7 @@ import importlib
 import io
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int, UInt8
@@ -49,17 +50,7 @@ def encode_gif(pictures: Pictures) -> bytes:
     frames = [Image.fromarray(codes) for codes in nearest[which].reshape(flat.shape[:3])]
     for frame in frames:
         frame.putpalette(shared.tobytes())
-    buffer = io.BytesIO()
-    frames[0].save(
-        buffer,
-        "GIF",
-        save_all=True,
-        append_images=frames[1:],
-        duration=duration_ms(len(frames)),
-        loop=0,
-        disposal=1,
-    )
-    return buffer.getvalue()
+    return _loop(frames, "GIF", disposal=1)
 
 
 def _shared_palette(
@@ -83,18 +74,15 @@ def encode_webp(pictures: Pictures) -> bytes:
     """
     check_one_size(pictures, "turntable.webp")
     frames = [Image.fromarray(picture) for picture in pictures]
+    clear = (0, 0, 0, 0)
+    return _loop(frames, "WEBP", lossless=True, quality=LOSSLESS_EFFORT, background=clear)
+
+
+def _loop(frames: Sequence[Image.Image], kind: str, **settings: Any) -> bytes:
+    """Return pictures as a file of Pillow's format `kind` that turns for ever."""
+    shown = {"duration": duration_ms(len(frames)), "loop": 0}
     buffer = io.BytesIO()
-    frames[0].save(
-        buffer,
-        "WEBP",
-        save_all=True,
-        append_images=frames[1:],
-        duration=duration_ms(len(frames)),
-        loop=0,
-        lossless=True,
-        quality=LOSSLESS_EFFORT,
-        background=(0, 0, 0, 0),
-    )
+    frames[0].save(buffer, kind, save_all=True, append_images=frames[1:], **shown, **settings)
     return buffer.getvalue()
 
 
