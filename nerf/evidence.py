@@ -12,7 +12,8 @@ from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.errors import BundleError
-from toonset.nerf.hull import LEVEL, Hull, alpha_at, carve
+from toonset.nerf.hull import LEVEL, Hull, carve
+from toonset.nerf.hull_views import alpha_at
 from toonset.nerf.march import march, pixels_near, rays_of
 
 RESOLUTION = 64  # voxels: coarse, since only the ranking matters

@@ -18,7 +18,8 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.field_voxel import VoxelField
-from toonset.nerf.hull import LEVEL, Hull, project
+from toonset.nerf.hull import LEVEL, Hull
+from toonset.nerf.hull_views import project
 from toonset.nerf.march import march, rays_of
 
 DENSITY_SLOPE = 16.0  # of the grid's values over the hull's support: about 0 outside, 8 inside

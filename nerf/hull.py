@@ -13,6 +13,7 @@ Source: Laurentini, "The visual hull concept", 1994; n - 1 agreement: GaussianOb
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,18 +21,19 @@ from functools import cached_property
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
-from toonset.camera import MIN_RELATIVE_DEPTH, Camera
+from toonset.camera import Camera
 from toonset.errors import BundleError
 from toonset.nerf.bounds import Box, box_of_masks
+from toonset.nerf.hull_views import agreement, agreement_within
 
 LEVEL = 0.5
 EDGE = 0.02  # support from which a point can be part of the figure's soft border
 BLOCK = 4  # voxels along a block's edge
 COARSE = 48  # voxels along the cube in the first carving, which only finds the tight box
-POINTS_PER_CHUNK = 1 << 17  # keeps a chunk's intermediate arrays in cache
+POINTS_PER_CHUNK = 1 << 15  # keeps a chunk's intermediate arrays in cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +71,13 @@ class Hull:
     @cached_property
     def near(self) -> Bool[Tensor, "x y z"]:
         """Return the voxels in which the trilinear support can reach EDGE."""
-        return _grown(self.support >= EDGE)
+        return grown(self.support >= EDGE, 1)
 
     @cached_property
     def blocks(self) -> Bool[Tensor, "bx by bz"]:
         """Return the blocks of BLOCK voxels that are, or touch, one with a near voxel."""
         pooled = F.max_pool3d(self.near[None, None].float(), BLOCK, ceil_mode=True)
-        return _grown(pooled[0, 0] > 0)
+        return grown(pooled[0, 0] > 0, 1)
 
     def lookup(
         self, cells: Bool[Tensor, "x y z"], points_world: Float[Tensor, "n 3"], edge: int
@@ -108,6 +110,21 @@ def occupancy(support: Float[Tensor, " n"]) -> Float[Tensor, " n"]:
     A hard border would be as coarse as the samples; a soft one lets outlines fall between pixels.
     """
     return (support / LEVEL).clamp(0, 1)
+
+
+def grown(volume: Shaped[Tensor, "x y z"], by: int) -> Shaped[Tensor, "x y z"]:
+    """Return the largest value (of cells: whether any is set) within `by` cells along every axis.
+
+    By shifted copies: thirty times faster than `max_pool3d`.
+    """
+    for axis, length in enumerate(volume.shape):
+        widest = volume.clone()
+        for shift in range(1, min(by, length - 1) + 1):
+            for to, source in ((0, shift), (shift, 0)):
+                part = widest.narrow(axis, to, length - shift)
+                torch.maximum(part, volume.narrow(axis, source, length - shift), out=part)
+        volume = widest
+    return volume
 
 
 def carve(
@@ -151,68 +168,20 @@ def _carve_box(
     alphas: Sequence[Float[Tensor, "height width"]],
     missing: int,
 ) -> Hull:
-    counts = np.maximum(1, np.ceil(box.size / voxel - 1e-9)).astype(int)
-    axes = [
-        torch.as_tensor(box.low[i] + voxel * (np.arange(counts[i]) + 0.5), dtype=torch.float32)
-        for i in range(3)
-    ]
-    slabs = max(1, POINTS_PER_CHUNK // int(counts[1] * counts[2]))
-    parts = []
-    for start in range(0, counts[0], slabs):
-        points = torch.cartesian_prod(axes[0][start : start + slabs], axes[1], axes[2])
-        parts.append(agreement(points, cameras, alphas, missing))
-    support = torch.cat(parts).reshape(*counts.tolist())
-    return Hull(np.asarray(box.low), voxel, support)
-
-
-def agreement(
-    points_world: Float[Tensor, "n 3"],
-    cameras: Sequence[Camera],
-    alphas: Sequence[Float[Tensor, "height width"]],
-    missing: int,
-) -> Float[Tensor, " n"]:
-    """Return the (missing + 1)-th smallest of the views' alphas at the points."""
-    lowest = torch.full((missing + 1, len(points_world)), 1.0)
-    for camera, alpha in zip(cameras, alphas, strict=True):
-        value = alpha_at(points_world, camera, alpha)
-        for row in lowest:  # insertion into the sorted list of the smallest values so far
-            smaller, value = torch.minimum(row, value), torch.maximum(row, value)
-            row.copy_(smaller)
-    return lowest[missing]
-
-
-def alpha_at(
-    points_world: Float[Tensor, "n 3"], camera: Camera, alpha: Float[Tensor, "height width"]
-) -> Float[Tensor, " n"]:
-    """Return a view's alpha where the points appear in it; 0 behind the camera.
-
-    Beyond the picture's edge the nearest pixel counts, so that a figure which the picture cuts
-    off goes on, and background goes on as background.
-    """
-    pixels, in_front = project(points_world, camera)
-    size = torch.tensor(camera.size_wh, dtype=torch.float32)
-    grid = (pixels * (2 / size) - 1)[None, None]
-    values = F.grid_sample(alpha[None, None], grid, padding_mode="border", align_corners=False)
-    return torch.where(in_front, values[0, 0, 0], torch.zeros(()))
-
-
-def project(
-    points_world: Float[Tensor, "n 3"], camera: Camera
-) -> tuple[Float[Tensor, "n 2"], Bool[Tensor, " n"]]:
-    """Return the pixels of world points and whether they lie in front: `Camera.project` in torch.
-
-    Pixels behind the camera have no meaning.
-    """
-    dtype = points_world.dtype
-    rotation = torch.as_tensor(np.array(camera.rotation), dtype=dtype)
-    local = (points_world - torch.as_tensor(np.array(camera.target), dtype=dtype)) @ rotation.T
-    relative = 1 + camera.k * local[:, 2]
-    in_front = relative > MIN_RELATIVE_DEPTH
-    scale = torch.tensor([camera.scale, camera.scale * camera.pixel_aspect], dtype=dtype)
-    center = torch.as_tensor(np.array(camera.center), dtype=dtype)
-    pixels = center + scale * local[:, :2] / relative.clamp_min(MIN_RELATIVE_DEPTH)[:, None]
-    return pixels, in_front
-
-
-def _grown(cells: Bool[Tensor, "x y z"]) -> Bool[Tensor, "x y z"]:
-    return F.max_pool3d(cells[None, None].float(), 3, stride=1, padding=1)[0, 0] > 0
+    """Return the support on the grid of a box; only blocks that a border crosses are looked at."""
+    counts = np.maximum(1, np.ceil(box.size / voxel - 1e-9)).astype(int).tolist()
+    low = torch.as_tensor(box.low, dtype=torch.float32)
+    blocks = [-(-n // BLOCK) for n in counts]
+    number = torch.cartesian_prod(*(torch.arange(n) for n in blocks))
+    middles = low + voxel * BLOCK * (number + 0.5)
+    radius = voxel * (BLOCK - 1) / 2 * math.sqrt(3)
+    least, most = agreement_within(middles, radius, cameras, alphas, missing)
+    support = least[:, None].repeat(1, BLOCK**3)
+    inner = voxel * (torch.cartesian_prod(*[torch.arange(BLOCK) - (BLOCK - 1) / 2] * 3))
+    for chunk in (least < most).nonzero()[:, 0].split(POINTS_PER_CHUNK // BLOCK**3):
+        points = (middles[chunk, None] + inner).view(-1, 3)
+        support[chunk] = agreement(points, cameras, alphas, missing).view(-1, BLOCK**3)
+    volume = support.view(*blocks, BLOCK, BLOCK, BLOCK).permute(0, 3, 1, 4, 2, 5)
+    volume = volume.reshape([n * BLOCK for n in blocks])
+    x, y, z = counts
+    return Hull(np.asarray(box.low), voxel, volume[:x, :y, :z].contiguous())

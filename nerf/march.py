@@ -18,6 +18,7 @@ from toonset.camera import Camera
 from toonset.nerf.hull import BLOCK, EDGE, Hull
 
 RAYS_PER_CHUNK = 1 << 12  # intermediate arrays stay in cache
+SPARE_STRIDES = 2  # looked up at first beyond those that would be enough if every step counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +60,24 @@ class Samples:
     distance: Float[Tensor, " n"]
     support: Float[Tensor, " n"]
     rays: int
+
+    def at(self, index: Tensor, order: Int[Tensor, " n"]) -> Samples:
+        """Return some of the samples, with their numbers in their rays."""
+        points, ray, distance = self.points[index], self.ray[index], self.distance[index]
+        return Samples(points, ray, order, distance, self.support[index], self.rays)
+
+    def and_then(self, behind: Samples) -> Samples:
+        """Return these samples and others of the same rays, all behind them."""
+        names = ("points", "ray", "order", "distance", "support")
+        pairs = (torch.cat([getattr(self, name), getattr(behind, name)]) for name in names)
+        both = Samples(*pairs, self.rays)
+        index = both.ray.argsort(stable=True)
+        return both.at(index, order_in_ray(both.ray[index], self.rays))
+
+    def first(self, most: int) -> Samples:
+        """Return the first `most` samples of every ray."""
+        kept = self.order < most
+        return self if bool(kept.all()) else self.at(kept, self.order[kept])
 
 
 def rays_of(camera: Camera, pixels: Float[np.ndarray, "n 2"], hull: Hull) -> Rays:
@@ -111,14 +130,14 @@ def march(rays: Rays, hull: Hull, step: float, most: int, level: float = EDGE) -
     """
     total = len(rays.origins)
     bounds = range(0, max(total, 1), RAYS_PER_CHUNK)  # no rays: one empty chunk
-    parts = [_march_chunk(rays, slice(i, i + RAYS_PER_CHUNK), hull, step, level) for i in bounds]
-    ray = torch.cat([part[0] + i for part, i in zip(parts, bounds, strict=True)])
-    distance, points, support = (torch.cat([part[i] for part in parts]) for i in (1, 2, 3))
-    order = order_in_ray(ray, total)
-    if bool((order >= most).any()):
-        kept = order < most
-        ray, distance, points, order = ray[kept], distance[kept], points[kept], order[kept]
-        support = support[kept]
+    parts = [
+        _march_chunk(rays.at(slice(i, i + RAYS_PER_CHUNK)), hull, step, most, level) for i in bounds
+    ]
+    ray = torch.cat([part.ray + i for part, i in zip(parts, bounds, strict=True)])
+    points, order, distance, support = (
+        torch.cat([getattr(part, name) for part in parts])
+        for name in ("points", "order", "distance", "support")
+    )
     return Samples(points, ray, order, distance, support, total)
 
 
@@ -129,28 +148,58 @@ def order_in_ray(ray: Int[Tensor, " n"], rays: int) -> Int[Tensor, " n"]:
     return torch.arange(len(ray)) - first[ray]
 
 
-def _march_chunk(
-    rays: Rays, part: slice, hull: Hull, step: float, level: float
-) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"], Float[Tensor, "n 3"], Float[Tensor, " n"]]:
-    rays = rays.at(part)
+def _march_chunk(rays: Rays, hull: Hull, step: float, most: int, level: float) -> Samples:
     near, far = clip(rays, hull)
     stride = max(1, int(BLOCK * hull.voxel / step + 1e-6))  # steps that stay next to one block
     strides = ((far - near) / (stride * step)).ceil().clamp_min(0).long()
     ray = torch.repeat_interleave(torch.arange(len(near)), strides)
     number = order_in_ray(ray, len(near)) * stride
     middle = near[ray] + step * (number + stride / 2)
-    hit = hull.lookup(hull.blocks, _points(rays, ray, middle), BLOCK)
+    hit = hull.lookup(hull.blocks, _points(rays, ray, middle), BLOCK).nonzero()[:, 0]
     ray, number = ray[hit], number[hit]
-    ray = ray.repeat_interleave(stride)
-    number = (number[:, None] + torch.arange(stride)).reshape(-1)
-    distance = near[ray] + step * (number + 0.5)
-    points = _points(rays, ray, distance)
-    close = hull.lookup(hull.near, points, 1).nonzero()[:, 0]
-    points = points[close]
-    support = hull.support_at(points)
-    inside = (support >= level).nonzero()[:, 0]
-    close = close[inside]
-    return ray[close], distance[close], points[inside], support[inside]
+    # most rays have what they need after few strides: the others go on
+    front = order_in_ray(ray, len(near)) < most // stride + SPARE_STRIDES
+    lattice = _Lattice(rays, near, hull, step, stride, level)
+    samples = lattice.samples(ray[front], number[front])
+    wanting = torch.bincount(samples.ray, minlength=len(near)) < most
+    rest = ~front & wanting[ray]
+    if bool(rest.any()):
+        samples = samples.and_then(lattice.samples(ray[rest], number[rest]))
+    return samples.first(most)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lattice:
+    """Where samples of some rays may lie; see `march` for the arguments.
+
+    Attributes:
+        rays: the rays.
+        near: (rays,) where they enter the hull's box.
+        hull, step, level: as of `march`.
+        stride: steps that are looked up together.
+    """
+
+    rays: Rays
+    near: Float[Tensor, " rays"]
+    hull: Hull
+    step: float
+    stride: int
+    level: float
+
+    def samples(self, ray: Int[Tensor, " n"], number: Int[Tensor, " n"]) -> Samples:
+        """Return the samples in strides that begin at steps of these numbers."""
+        ray = ray.repeat_interleave(self.stride)
+        number = (number[:, None] + torch.arange(self.stride)).reshape(-1)
+        distance = self.near[ray] + self.step * (number + 0.5)
+        points = _points(self.rays, ray, distance)
+        close = self.hull.lookup(self.hull.near, points, 1).nonzero()[:, 0]
+        points = points[close]
+        support = self.hull.support_at(points)
+        inside = (support >= self.level).nonzero()[:, 0]
+        close = close[inside]
+        ray, rays = ray[close], len(self.near)
+        order = order_in_ray(ray, rays)
+        return Samples(points[inside], ray, order, distance[close], support[inside], rays)
 
 
 def _points(
