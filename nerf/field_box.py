@@ -15,7 +15,10 @@ from torch import Tensor
 from toonset.dataset.scene import Scene
 from toonset.nerf.batches import Batch
 from toonset.nerf.bounds import Box, box_of_masks
-from toonset.nerf.field_loss import Model
+from toonset.nerf.field import TriplaneField
+from toonset.nerf.field_loss import Model, Weights
+from toonset.nerf.field_mlp import MlpField
+from toonset.nerf.field_voxel import VoxelField
 from toonset.nerf.fields import Field, Places
 from toonset.nerf.hull import Hull
 from toonset.nerf.march import Rays, clip, rays_of
@@ -27,6 +30,31 @@ BINS = 96  # along a ray through the box
 RAYS_PER_STEP = 1024
 EMPTY_BELOW = 0.01  # opacity of a voxel that rendering skips
 POINTS_PER_CHUNK = 1 << 16
+OPACITY_WEIGHT = 0.25  # 3 colours' variance of 1/12: see `any_backdrop`
+CLEARER = 4.0  # by which softplus's argument starts lower: 0.002 per cell instead of 0.1
+
+
+def any_backdrop(palette: float, smoothness: float) -> Weights:
+    """Return the loss's weights that stand for pictures over a random colour.
+
+    The expected squared error over all backdrops is that over middle grey, plus the squared error
+    of opacity times the backdrops' variance. Over white alone, mist as white as the paper serves as
+    well as nothing, and hides the figure from other sides.
+    """
+    return Weights(palette, smoothness, backdrop=0.5, opacity=OPACITY_WEIGHT)
+
+
+@torch.no_grad()
+def clear(field: Field) -> Field:
+    """Return the field with a start so thin that rays see through the whole box.
+
+    Fields start as a mist which suits a thin hull; a box of a hundred cells would be opaque.
+    """
+    if isinstance(field, VoxelField):
+        field.grid[:, 0] -= CLEARER
+    elif isinstance(field, TriplaneField | MlpField):
+        field.out.bias[0] -= CLEARER
+    return field
 
 
 class BoxRays:

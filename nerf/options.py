@@ -27,7 +27,7 @@ class TrainOptions:
         field: what is fitted: planes with a small decoder; or, to compare with, a network alone, a
             grid of voxels, or the hull with the drawings' colours (nothing is fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
-            figure's box, at new places in every step, against pictures over white.
+            figure's box, at new places in every step, against pictures over any backdrop.
         register: let cameras follow drawings that were placed or sized off.
         unbend: bend drawings back that disagree with the others' outlines.
         ink: take contour lines off before, and draw them again in renderings: cleaner, but small

@@ -23,10 +23,9 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
     """Return the plain method: triplane, small decoder, classic volume rendering, classifier.
 
     Three planes with summed bilinear features; a decoder to density and colour; stratified samples
-    along the whole rays through the figure's box, drawn anew in every step; pictures over white; a
-    classifier of one hidden layer on the rendered colour, whose labels are the nearest palette
-    colours. No silhouette is used but to place the box, nothing is smoothed, and drawings are taken
-    as they are. A step takes 1,024
-    rays of 96 samples, so that 2,000 steps end within six minutes on two cores.
+    along the whole rays through the figure's box, drawn anew in every step; pictures over backdrops
+    of all colours; a classifier of one hidden layer on the rendered colour, whose labels are the
+    nearest palette colours. No silhouette is used but to place the box, nothing is smoothed, and
+    drawings are taken as they are. A step takes 1,024 rays of 96 samples.
     """
     return TrainOptions(steps=steps, carve=False, smoothness=0.0, register=False, unbend=False)

@@ -20,7 +20,14 @@ from toonset.nerf import losses
 from toonset.nerf.batches import make_batches
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.evidence import HullEvidence
-from toonset.nerf.field_box import BINS, BoxRays, open_box, without_empty_space
+from toonset.nerf.field_box import (
+    BINS,
+    BoxRays,
+    any_backdrop,
+    clear,
+    open_box,
+    without_empty_space,
+)
 from toonset.nerf.field_hull import paint
 from toonset.nerf.field_kinds import build_field
 from toonset.nerf.field_loss import Model, Weights
@@ -124,11 +131,13 @@ def _weights(options: TrainOptions, views: int) -> Weights:
     smoothness = losses.smoothness_weight(options.smoothness, views)
     if options.carve:
         return Weights(options.palette_weight, smoothness)
-    return Weights(options.palette_weight, smoothness, backdrop=1.0, opacity=0.0)
+    return any_backdrop(options.palette_weight, smoothness)
 
 
 def _untrained(scene: Scene, hull: Hull, options: TrainOptions) -> TrainedField:
     field = build_field(_spec(scene, options), hull.box)
+    if not options.carve:
+        field = clear(field)
     colors = scene.palette
     if options.field == "hull":
         assert isinstance(field, VoxelField)

@@ -9,11 +9,21 @@ import torch
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.bounds import Box
-from toonset.nerf.field_box import BINS, BoxRays, nearest_labels, open_box, without_empty_space
+from toonset.nerf.field_box import (
+    BINS,
+    BoxRays,
+    any_backdrop,
+    clear,
+    nearest_labels,
+    open_box,
+    without_empty_space,
+)
 from toonset.nerf.field_hull import paint
+from toonset.nerf.field_kinds import build_field
 from toonset.nerf.field_voxel import VoxelField
-from toonset.nerf.fields import Places
+from toonset.nerf.fields import FieldSpec, Kind, Places
 from toonset.nerf.hull import Hull, carve
+from toonset.nerf.losses import photometric
 from toonset.nerf.march import march, rays_of
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preset import PRESETS, preset
@@ -109,6 +119,39 @@ def test_the_painted_hull_has_the_drawings_colours_where_they_see_it(side: float
     assert float(density.detach()) * hull.voxel > 0.2
     wanted = [1.0, 0, 0] if side > 0 else [0, 0, 1.0]
     assert float((rgb[0] - torch.tensor(wanted)).abs().max()) < 0.1
+
+
+def test_the_loss_is_the_mean_over_backdrops_of_all_colours() -> None:
+    """Against pictures composited over uniformly random colours, three for every ray."""
+    generator = torch.Generator().manual_seed(0)
+    color, drawn = (torch.rand(50, 3, generator=generator) for _ in range(2))
+    opacity, alpha = (torch.rand(50, generator=generator) for _ in range(2))
+    weights = any_backdrop(0.0, 0.0)
+    found = photometric(color, opacity, drawn, alpha, weights.backdrop, weights.opacity)
+    over = torch.rand(4000, 50, 3, generator=generator)
+    rendered = color + (1 - opacity[:, None]) * over
+    picture = alpha[:, None] * drawn + (1 - alpha[:, None]) * over
+    expected = (rendered - picture).square().sum(-1).mean()
+    assert float(found) == pytest.approx(float(expected), rel=5e-3)
+
+
+@pytest.mark.parametrize("kind", ["triplane", "voxel", "mlp"])
+def test_rays_see_through_the_whole_box_at_first(kind: Kind) -> None:
+    torch.manual_seed(0)
+    cells = 48
+    made = build_field(
+        FieldSpec(kind, cells, 4, 8 * (kind != "voxel")), Box(np.zeros(3), np.ones(3))
+    )
+    along = (torch.arange(cells) + 0.5) / cells
+    points = torch.stack([along, torch.full_like(along, 0.4), torch.full_like(along, 0.6)], dim=1)
+
+    def seen_through() -> float:
+        with torch.no_grad():
+            return float(torch.exp(-made(points)[0].sum() / cells))
+
+    assert seen_through() < 0.1
+    clear(made)
+    assert seen_through() > 0.7
 
 
 def test_presets_are_options() -> None:
