@@ -20,6 +20,7 @@ from torch import Tensor, nn
 
 from toonset.nerf import losses
 from toonset.nerf.bounds import Box
+from toonset.nerf.decoder import two_layers
 from toonset.nerf.fields import DENSITY_SHIFT, Constants, Field, FieldSpec, Places, shape_of
 from toonset.nerf.interpolation import Operator
 
@@ -76,15 +77,14 @@ class TriplaneField(Field):
 
     def roughness(self) -> Float[Tensor, ""]:
         """Return the planes' total variation."""
-        return losses.total_variation(self.plane_images())
+        sizes = [(self.shape[a], self.shape[b]) for a, b in PLANES]
+        return losses.total_variation(self.planes, sizes)
 
     def decode(
         self, features: Float[Tensor, "n channels"]
     ) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:
         """Return density per world unit and RGB in [0, 1] of summed features."""
-        hidden = F.relu(self.hidden(features))
-        # outputs by rows: each is contiguous, which the functions below like better than columns
-        raw = torch.addmm(self.out.bias[:, None], self.out.weight, hidden.T)
+        raw = two_layers(features, self.hidden, self.out)
         return F.softplus(raw[0] + DENSITY_SHIFT) / self.cell, torch.sigmoid(raw[1:]).T
 
     def _features(self, points_world: Float[Tensor, "n 3"]) -> Float[Tensor, "n channels"]:

@@ -10,6 +10,7 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from toonset.nerf import losses
 from toonset.nerf.bounds import Box
 from toonset.nerf.fields import DENSITY_SHIFT, Constants, Field, FieldSpec, Places, shape_of
 from toonset.nerf.interpolation import Operator
@@ -58,9 +59,7 @@ class VoxelField(Field):
 
     def roughness(self) -> Float[Tensor, ""]:
         """Return the mean absolute step between neighbouring corners, summed over the channels."""
-        volume = self.grid.view(*self.shape, 4)
-        steps = [volume.diff(dim=axis).abs().sum() for axis in range(3)]
-        return torch.stack(steps).sum() / len(self.grid)
+        return losses.total_variation(self.grid, [self.shape])
 
     def corners(self) -> Float[Tensor, "corners 3"]:
         """Return the world positions of the grid's values, in the order of its rows."""

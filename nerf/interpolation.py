@@ -59,14 +59,15 @@ class Operator:
     def kept(self, samples: Bool[Tensor, " samples"]) -> Operator:
         """Return the operator of some of its samples; nothing is sorted again."""
         number = samples.cumsum(0, dtype=torch.int32) - 1
-        by_row = samples[self.samples_by_row]
-        before = torch.cat([by_row.new_zeros(1, dtype=torch.int32), by_row.cumsum(0)])
+        by_row = samples.index_select(0, self.samples_by_row)
+        before = torch.cat([number.new_zeros(1), by_row.cumsum(0, dtype=torch.int32)])
+        here, there = samples.nonzero()[:, 0], by_row.nonzero()[:, 0]
         return Operator(
-            self.rows[samples],
-            self.weights[samples],
-            number[self.samples_by_row[by_row]],
-            self.weights_by_row[by_row],
-            before[self.offsets].int(),
+            self.rows.index_select(0, here),
+            self.weights.index_select(0, here),
+            number.index_select(0, self.samples_by_row.index_select(0, there)),
+            self.weights_by_row.index_select(0, there),
+            before.index_select(0, self.offsets),
         )
 
     def __call__(
@@ -80,6 +81,7 @@ class _Apply(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, table: Tensor, operator: Operator) -> Tensor:
         ctx.operator = operator
+        table = table.detach()  # else a gradient is prepared for that is never asked
         return F.embedding_bag(
             operator.rows, table, per_sample_weights=operator.weights, mode="sum"
         )

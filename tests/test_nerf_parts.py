@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import fields
 
 import numpy as np
 import pytest
 import torch
 import torch.nn.functional as F
+from torch import nn
 
-from toonset.nerf import losses
+from toonset.nerf import decoder, losses
 from toonset.nerf.bounds import Box
 from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.interpolation import Operator
@@ -22,6 +24,36 @@ BOX = Box(np.array([-3.0, 10.0, 0.5]), np.array([1.0, 18.0, 2.5]))
 
 def test_every_pair_of_axes_has_one_plane() -> None:
     assert sorted(map(sorted, PLANES)) == [list(p) for p in itertools.combinations(range(3), 2)]
+
+
+def test_total_variation_is_the_mean_step_and_its_gradient() -> None:
+    torch.manual_seed(3)
+    shapes = [(4, 5), (3, 4, 2)]
+    table = torch.randn(44, 3, dtype=torch.float64, requires_grad=True)
+    grids = [g.view(*s, 3) for g, s in zip(table.split([20, 24]), shapes, strict=True)]
+    steps = [g.diff(dim=axis).abs().sum() for g in grids for axis in range(g.ndim - 1)]
+    slow = torch.stack(steps).sum() / 44
+    fast = losses.total_variation(table, shapes)
+    torch.testing.assert_close(fast, slow)
+    (expected,) = torch.autograd.grad(2 * slow, table)
+    (gradient,) = torch.autograd.grad(2 * fast, table)
+    torch.testing.assert_close(gradient, expected)
+    assert losses.total_variation(torch.ones(20, 2), [(4, 5)]) == 0
+
+
+@pytest.mark.parametrize("samples", [1, 7, 20])
+def test_two_layers_are_those_of_torch(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(decoder, "PART", 8)
+    torch.manual_seed(samples)
+    hidden, out = nn.Linear(5, 6).double(), nn.Linear(6, 4).double()
+    features = torch.randn(samples, 5, dtype=torch.float64, requires_grad=True)
+    inputs = [features, *hidden.parameters(), *out.parameters()]
+    fast, slow = decoder.two_layers(features, hidden, out), out(F.relu(hidden(features))).T
+    torch.testing.assert_close(fast, slow)
+    upstream = torch.randn_like(slow)
+    pairs = zip(*(torch.autograd.grad(y, inputs, upstream) for y in (fast, slow)), strict=True)
+    for gradient, expected in pairs:
+        torch.testing.assert_close(gradient, expected)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -92,6 +124,18 @@ def test_taps_equal_grid_sample() -> None:
     torch.testing.assert_close(fast, slow, atol=1e-5, rtol=1e-4)
 
 
+def test_an_operator_of_some_samples_is_that_of_their_rows() -> None:
+    torch.manual_seed(4)
+    rows, weights = torch.randint(0, 30, (50, 12)), torch.rand(50, 12)
+    kept = torch.rand(50) < 0.6
+    some, fresh = (
+        Operator.of(rows, weights, 30).kept(kept),
+        Operator.of(rows[kept], weights[kept], 30),
+    )
+    for field in fields(Operator):
+        torch.testing.assert_close(getattr(some, field.name), getattr(fresh, field.name))
+
+
 def test_operator_backward_is_the_transpose() -> None:
     torch.manual_seed(2)
     rows, weights = torch.randint(0, 30, (50, 12)), torch.rand(50, 12, dtype=torch.float64)
@@ -115,8 +159,6 @@ def test_losses_are_zero_only_where_they_should() -> None:
     assert losses.photometric(drawn * 0.5, half, drawn, half) == 0
     assert losses.photometric(drawn * 0.5, half, drawn, full) > 0
     assert losses.photometric(drawn, full, drawn, half) > 0
-    assert losses.total_variation([torch.ones(4, 5, 2)]) == 0
-    assert losses.total_variation([torch.eye(4)[..., None]]) > 0
     logits = torch.randn(4, 3)
     unlabelled = torch.full((4,), 255)
     assert losses.cross_entropy(logits, unlabelled) == 0
