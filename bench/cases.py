@@ -130,7 +130,7 @@ def train_cases(
             held_out = replace(drawn, views=16)
             train = _scene(make_turnaround(body, drawn, seed + i))
             test = _scene(make_turnaround(body, held_out, seed + i))
-            odd = Scene(test.frames[1::2], test.palette, test.name)  # between the training views
+            odd = replace(test, frames=test.frames[1::2])  # between the training views
             yield TrainCase(f"body {seed + i}", "clean", train, odd)
         return
     for case in _folders(folder, "views/transforms.json"):
@@ -160,7 +160,7 @@ def _scene(turnaround: Turnaround) -> Scene:
         Frame(view.name, camera, view.rgba)
         for view, camera in zip(turnaround.views, turnaround.cameras, strict=True)
     )
-    return Scene(made, None, turnaround.mesh.name)
+    return Scene(made, turnaround.palette, turnaround.mesh.name)
 
 
 def _synthetic_calib(name: str, group: str, condition: Condition, seed: int) -> CalibCase:

@@ -10,7 +10,7 @@ import numpy as np
 
 from toonset.bench.record import Direction, Record, aligned, summarise
 from toonset.bench.train_plan import METHODS, Job
-from toonset.bench.train_run import RunResult, Seen, near_end, run_job
+from toonset.bench.train_run import Look, RunResult, Seen, reached, run_job
 from toonset.nerf.metrics_view import load_judges
 
 NEAR_END_DB = 0.5
@@ -38,13 +38,18 @@ class Column:
 
 
 def run_jobs(
-    jobs: Sequence[Job], progress: Callable[[str], None] = lambda text: None
+    jobs: Sequence[Job],
+    progress: Callable[[str], None] = lambda text: None,
+    look: Look = lambda job, case, field: None,
 ) -> Iterator[tuple[Job, RunResult]]:
-    """Yield every job with its result, as soon as it is done; one at a time, for they are timed."""
+    """Yield every job with its result, as soon as it is done; one at a time, for they are timed.
+
+    `look` is shown the fields.
+    """
     judges = load_judges()
     for number, job in enumerate(jobs, 1):
         progress(f"{number} of {len(jobs)}: {job.name}, seed {job.seed}")
-        yield job, run_job(job, judges)
+        yield job, run_job(job, judges, look)
 
 
 def records_of(runs: Sequence[RunResult], seed: int) -> list[Record]:
@@ -111,9 +116,8 @@ def _near_end(read: Callable[[Seen], float]) -> Callable[[RunResult], float | No
     """Return what reads seconds off the curve; a curve that began so near tells nothing."""
 
     def value(run: RunResult) -> float | None:
-        if len(run.curve) < 2 or (near := near_end(run.curve, NEAR_END_DB)) == run.curve[0]:
-            return None
-        return read(near)
+        near = reached(run.curve, run.curve[-1].psnr - NEAR_END_DB)
+        return None if near is None or near == run.curve[0] else read(near)
 
     return value
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 from toonset.bench.cases import TrainCase
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preset import paper
 
 NEAREST = "nearest drawing"
-VIEWS, QUICK_VIEWS = (8, 4, 3), (8,)
-SEEDS, QUICK_SEEDS = 3, 1
+PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
+PALETTES: tuple[PaletteChoice, ...] = get_args(PaletteChoice)
+PAPER_STEPS = (200, 2000)
 
 
 @dataclass(frozen=True)
@@ -21,30 +22,67 @@ class Method:
 
     Attributes:
         options: of training, the seed aside; None: no training, the nearest drawing is shown.
-        palette: with labels of a palette that is extracted in the seconds that count.
+        palette: that of the labels: none, one extracted in the seconds that count, or the one that
+            the case comes with.
         first_seed_only: so slow, or so little random, that one seed must do.
     """
 
     options: TrainOptions | None
-    palette: bool = True
+    palette: PaletteChoice = "automatic palette"
     first_seed_only: bool = False
 
 
+PAPER: dict[str, Method] = {
+    f"paper, {palette}, {steps} steps": Method(paper(steps), palette, first_seed_only=True)
+    for palette in PALETTES
+    for steps in PAPER_STEPS
+}
 METHODS: dict[str, Method] = {
     "default": Method(TrainOptions()),
     NEAREST: Method(None, first_seed_only=True),
-    "coloured hull": Method(TrainOptions(field="hull"), palette=False, first_seed_only=True),
+    "coloured hull": Method(TrainOptions(field="hull"), "no palette", first_seed_only=True),
     "75 steps": Method(TrainOptions(steps=75)),
     "600 steps": Method(TrainOptions(steps=600)),
-    "no palette": Method(TrainOptions(), palette=False),
+    "without palette": Method(TrainOptions(), "no palette"),
+    "without smoothing": Method(TrainOptions(smoothness=0.0)),
+    "without registration": Method(TrainOptions(register=False), first_seed_only=True),
+    "without unbending": Method(TrainOptions(unbend=False), first_seed_only=True),
+    "without hull": Method(TrainOptions(carve=False), first_seed_only=True),
     "voxel": Method(TrainOptions(field="voxel")),
     "mlp": Method(TrainOptions(field="mlp"), first_seed_only=True),
-    "paper, 200 steps": Method(paper(200), first_seed_only=True),
-    "paper, 2000 steps": Method(paper(2000), first_seed_only=True),
-    "paper, no palette": Method(paper(2000), palette=False, first_seed_only=True),
+    **PAPER,
     "paper, mlp": Method(replace(paper(2000), field="mlp"), first_seed_only=True),
 }
-QUICK_METHODS = ("default", NEAREST, "coloured hull", "75 steps")
+FOR_THE_TABLE_ALONE = [name for name in PAPER if PAPER[name].palette != "automatic palette"]
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What a bench runs.
+
+    Attributes:
+        methods: names in `METHODS`.
+        views: numbers of training views.
+        seeds: how many.
+        one_case: one per condition and size is enough.
+    """
+
+    methods: tuple[str, ...]
+    views: tuple[int, ...] = (8,)
+    seeds: int = 1
+    one_case: bool = False
+
+
+SCOPES = {  # by subject and whether it must be quick
+    ("train", False): Scope(
+        tuple(name for name in METHODS if name not in FOR_THE_TABLE_ALONE), (8, 4, 3), 3
+    ),
+    ("train", True): Scope(("default", NEAREST, "coloured hull", "75 steps"), one_case=True),
+    ("paper", False): Scope(("default", *PAPER)),
+    ("paper", True): Scope(
+        ("default", *(name for name in PAPER if name.endswith(" 200 steps"))), one_case=True
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +119,7 @@ class Job:
         return {"name": self.name, "seed": self.seed, "options": options, "palette": method.palette}
 
 
-def plan(cases: Iterable[TrainCase], seed: int, only: str = "", *, quick: bool) -> list[Job]:
+def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list[Job]:
     """Return the jobs, what tells most first: a stopped run has filled the most of its tables.
 
     Every seed begins when all cases have the one before; small pictures and many views go first.
@@ -90,20 +128,26 @@ def plan(cases: Iterable[TrainCase], seed: int, only: str = "", *, quick: bool) 
         cases: with all their views; several sizes of one case are several cases.
         seed: the first.
         only: keep jobs whose name contains this.
-        quick: one case per condition and size, one seed, eight views, few methods.
+        scope: which of all possible jobs.
     """
-    chosen = _first_of_groups(cases) if quick else list(cases)
+    chosen = _first_of_groups(cases) if scope.one_case else list(cases)
     jobs = [
         Job(case, views, method, seed + number)
-        for number in range(QUICK_SEEDS if quick else SEEDS)
+        for number in range(scope.seeds)
         for case in chosen
-        for views in view_counts(case, QUICK_VIEWS if quick else VIEWS)
-        for method in (QUICK_METHODS if quick else METHODS)
-        if number == 0 or not METHODS[method].first_seed_only
+        for views in view_counts(case, scope.views)
+        for method in scope.methods
+        if _possible(METHODS[method], case, number)
     ]
     order = list(METHODS)
     jobs.sort(key=lambda j: (j.seed, side_px(j.case), -j.views, order.index(j.method)))
     return [job for job in jobs if only in job.name]
+
+
+def _possible(method: Method, case: TrainCase, number: int) -> bool:
+    if method.palette == "hand-picked palette" and case.train.palette is None:
+        return False
+    return number == 0 or not method.first_seed_only
 
 
 def view_counts(case: TrainCase, wanted: Sequence[int]) -> list[int]:

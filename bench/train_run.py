@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -13,7 +13,7 @@ from jaxtyping import UInt8
 from torch import Tensor
 
 from toonset.bench.cases import TrainCase
-from toonset.bench.train_plan import METHODS, Job, subset
+from toonset.bench.train_plan import METHODS, Job, PaletteChoice, subset
 from toonset.camera import rotation_distance
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import ToonsetError
@@ -22,7 +22,7 @@ from toonset.nerf.evaluation import LAYERS, score_views
 from toonset.nerf.field_box import without_empty_space
 from toonset.nerf.field_loss import Model
 from toonset.nerf.fitting import Moment
-from toonset.nerf.labelling import labelled, without_palette
+from toonset.nerf.labelling import labelled, relabelled, without_palette
 from toonset.nerf.layers import color_picture
 from toonset.nerf.metrics import Figures, means, over_white, psnr_of
 from toonset.nerf.metrics_view import Judges, figures_of
@@ -32,6 +32,7 @@ from toonset.nerf.training import train
 from toonset.nerf.views import render
 
 CURVE_VIEWS = 4  # held-out views that every point of the curves is the mean of
+Look = Callable[[Job, TrainCase, TrainedField], None]
 FIRST_LOOK_S, LOOK_FACTOR = 1.0, 2**0.5  # seconds of the first snapshot, and from one to the next
 
 
@@ -77,21 +78,22 @@ class RunResult:
     note: str = ""
 
 
-def run_job(job: Job, judges: Judges) -> RunResult:
+def run_job(job: Job, judges: Judges, look: Look = lambda job, case, field: None) -> RunResult:
     """Return what training and rendering of one job gives; a refusal is a result, too."""
     case, method = subset(job.case, job.views), METHODS[job.method]
     try:
         if method.options is None:
             return _nearest_drawing(job, case, judges)
-        return _trained(job, case, replace(method.options, seed=job.seed), judges)
+        return _trained(job, case, replace(method.options, seed=job.seed), judges, look)
     except ToonsetError as error:
         return RunResult(*_named(job), {}, 0.0, 0.0, 0.0, 0, (), str(error))
 
 
-def _trained(job: Job, case: TrainCase, options: TrainOptions, judges: Judges) -> RunResult:
+def _trained(
+    job: Job, case: TrainCase, options: TrainOptions, judges: Judges, look: Look
+) -> RunResult:
     watch = Snapshots(time.perf_counter(), time.process_time(), carved=options.carve)
-    with_palette = METHODS[job.method].palette
-    scene = labelled(case.train)[0] if with_palette else without_palette(case.train)
+    scene = _with_palette(case.train, METHODS[job.method].palette)
     training = train(scene, options, watch=watch)
     seconds, cpu_seconds = watch.spent()
     sample = curve_frames(case.test)
@@ -100,6 +102,7 @@ def _trained(job: Job, case: TrainCase, options: TrainOptions, judges: Judges) -
     curve.append(Seen(seconds, cpu_seconds, _psnr(training.result, sample)))
     render_seconds = (time.perf_counter() - began) / len(sample)
     views = score_views(training.result, case.test, judges)
+    look(job, case, training.result)
     layers = {layer: [v.figures[layer] for v in views if layer in v.figures] for layer in LAYERS}
     figures = means(layers["rgb"])
     figures |= {f"palette_{name}": value for name, value in means(layers["palette"]).items()}
@@ -112,6 +115,14 @@ def _trained(job: Job, case: TrainCase, options: TrainOptions, judges: Judges) -
         training.counts["parameters"],
         tuple(curve),
     )
+
+
+def _with_palette(scene: Scene, palette: PaletteChoice) -> Scene:
+    if palette == "automatic palette":
+        return labelled(scene)[0]
+    if palette == "no palette" or scene.palette is None:
+        return without_palette(scene)
+    return relabelled(scene, scene.palette)
 
 
 @dataclass
@@ -169,15 +180,16 @@ def curve_frames(test: Scene) -> tuple[Frame, ...]:
     return tuple(test.frames[round(i * len(test.frames) / count)] for i in range(count))
 
 
-def near_end(curve: Sequence[Seen], below_end_db: float) -> Seen:
-    """Return when a curve comes within so many dB of its end for good, straight lines between."""
-    goal = curve[-1].psnr - below_end_db
+def reached(curve: Sequence[Seen], psnr: float) -> Seen | None:
+    """Return when a curve comes to a PSNR for good, straight lines between; None: it does not."""
+    if curve[-1].psnr < psnr:
+        return None
     for before, after in reversed(list(pairwise(curve))):
-        if before.psnr < goal:
-            share = (goal - before.psnr) / (after.psnr - before.psnr)
+        if before.psnr < psnr:
+            share = (psnr - before.psnr) / (after.psnr - before.psnr)
             wall = before.seconds + share * (after.seconds - before.seconds)
             cpu = before.cpu_seconds + share * (after.cpu_seconds - before.cpu_seconds)
-            return Seen(wall, cpu, goal)
+            return Seen(wall, cpu, psnr)
     return curve[0]
 
 

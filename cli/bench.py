@@ -66,8 +66,8 @@ def bench(
 
     Prints a table and writes records.json and a chart per condition. `split` writes a picture of
     the wrongly split sheets. `stability` sweeps errors of a sheet, to where calibration fails;
-    `train` draws held-out PSNR against seconds. Of both, the same command again continues a stopped
-    run.
+    `train` draws held-out PSNR against seconds; `paper` makes the plain method's table and figure,
+    for hours. Of these three, the same command again continues a stopped run.
     """
     from toonset.bench.record import as_dicts, machine
     from toonset.cli.bench_measure import measure
@@ -79,7 +79,7 @@ def bench(
     if subject is Subject.stability:
         _stability(out, only, seed, count, quick, force, printer)
         return
-    if subject is Subject.train:
+    if subject in (Subject.train, Subject.paper):
         _training(out, chosen, force, printer)
         return
     check_output(out, [cases, sprites], WRITTEN, force=force)
@@ -95,11 +95,13 @@ def bench(
 
 def _training(out: Path, chosen: Chosen, force: bool, printer: Printer) -> None:
     from toonset.bench.record import machine
+    from toonset.cli.bench_paper import paper_into
     from toonset.cli.bench_train import train_into
 
-    text, records = train_into(out, chosen, printer, force=force)
-    printer.say(f"machine: {machine()}, seeds from {chosen.seed}; picture in {out / 'train.png'}")
-    printer.result({"records": records}, text)
+    into = paper_into if chosen.subject is Subject.paper else train_into
+    text, found = into(out, chosen, printer, force=force)
+    printer.say(f"machine: {machine()}, seeds from {chosen.seed}; pictures in {out}")
+    printer.result(found, text)
 
 
 def _stability(

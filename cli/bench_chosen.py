@@ -16,6 +16,7 @@ class Subject(StrEnum):
 
     calib = "calib"
     train = "train"
+    paper = "paper"
     stability = "stability"
     splitting = "split"  # a string has a method `split`
     palette = "palette"
@@ -48,8 +49,9 @@ class Chosen:
         Raises:
             BadParameter: one of them is given.
         """
-        if self.half and (self.subject is not Subject.train or self.cases is None):
-            raise typer.BadParameter("--half belongs to `train --cases`")
+        training = self.subject in (Subject.train, Subject.paper)
+        if self.half and (not training or self.cases is None):
+            raise typer.BadParameter("--half belongs to `train --cases` and `paper --cases`")
         if self.baseline is not None and self.subject is not Subject.calib:
             raise typer.BadParameter("--baseline belongs to `calib`")
         if self.sprites is not None and self.subject not in (Subject.calib, Subject.splitting):

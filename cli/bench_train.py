@@ -1,4 +1,4 @@
-"""`toonset bench train`: trainings in a folder that a later run continues.
+"""`toonset bench train`: trainings in a folder that a later run continues; `paper` runs them, too.
 
 runs.json in the output folder is rewritten after every training. A run of the same version takes
 finished trainings from it: the same case, views, method, options and seed; table, records and
@@ -19,7 +19,7 @@ from toonset.errors import BundleError
 if TYPE_CHECKING:
     from toonset.bench.cases import TrainCase
     from toonset.bench.train_plan import Job
-    from toonset.bench.train_run import RunResult
+    from toonset.bench.train_run import Look, RunResult
 
 RUNS, RECORDS, CURVES = "runs.json", "records.json", "train.png"
 WRITTEN = (RUNS, RECORDS, CURVES, "chart-*.png")
@@ -28,34 +28,63 @@ QUICK_COUNT = 1
 
 def train_into(
     folder: Path, chosen: Chosen, printer: Printer, *, force: bool
-) -> tuple[str, list[dict[str, Any]]]:
+) -> tuple[str, dict[str, Any]]:
     """Return table and records of the chosen trainings, after those that the folder lacks.
 
     Raises:
         ToonsetError: no training of that name, or a folder that may not be written or continued.
     """
     from toonset.bench.record import as_dicts
-    from toonset.bench.train import records_of, run_jobs, table_of
-    from toonset.bench.train_files import missing
-    from toonset.bench.train_plan import plan
+    from toonset.bench.train import records_of, table_of
 
-    jobs = plan(_cases(chosen), chosen.seed, chosen.only, quick=chosen.quick)
+    jobs = jobs_of(chosen)
+    runs = run_into(folder, jobs, chosen, printer, WRITTEN, force=force)
+    return table_of(runs), {"records": as_dicts(records_of(runs, chosen.seed))}
+
+
+def jobs_of(chosen: Chosen) -> list[Job]:
+    """Return what the command line asks for.
+
+    Raises:
+        BundleError: there is no training of that name.
+    """
+    from toonset.bench.train_plan import SCOPES, plan
+
+    scope = SCOPES[chosen.subject.value, chosen.quick]
+    jobs = plan(_cases(chosen), chosen.seed, chosen.only, scope)
     if not jobs:
         raise BundleError(
             f"no training's name contains {chosen.only!r}; names are like "
             "'knight-exact 150 px 8 views default': correct --only"
         )
-    done = _finished(folder, chosen, force=force)
+    return jobs
+
+
+def run_into(
+    folder: Path,
+    jobs: list[Job],
+    chosen: Chosen,
+    printer: Printer,
+    written: tuple[str, ...],
+    look: Look = lambda job, case, field: None,
+    *,
+    force: bool,
+) -> list[RunResult]:
+    """Return the jobs' results, after running those that the folder lacks."""
+    from toonset.bench.train import run_jobs
+    from toonset.bench.train_files import missing
+
+    done = _finished(folder, chosen, written, force=force)
     lacking = missing(jobs, done)
     printer.say(f"{len(lacking)} trainings, {len(jobs) - len(lacking)} are there already")
     try:
-        for job, found in run_jobs(lacking, printer.progress):
+        for job, found in run_jobs(lacking, printer.progress, look):
             done.append((job.identity, found))
             _keep(folder, done)
     finally:  # what a stopped run has found so far is worth a look, too
         runs = _of_jobs(done, jobs)
         _write(folder, runs, chosen.seed)
-    return table_of(runs), as_dicts(records_of(runs, chosen.seed))
+    return runs
 
 
 def _cases(chosen: Chosen) -> list[TrainCase]:
@@ -80,7 +109,7 @@ def _of_jobs(done: list[tuple[dict[str, Any], RunResult]], jobs: list[Job]) -> l
 
 
 def _finished(
-    folder: Path, chosen: Chosen, *, force: bool
+    folder: Path, chosen: Chosen, written: tuple[str, ...], *, force: bool
 ) -> list[tuple[dict[str, Any], RunResult]]:
     """Return the trainings of an earlier run in `folder`; none if it is new or to be replaced."""
     from toonset.bench.train_files import from_plain
@@ -89,7 +118,7 @@ def _finished(
     kept = folder / RUNS
     if kept.is_file() and not force:
         return from_plain(read_json(kept), __version__, str(kept))
-    check_output(folder, [chosen.cases], WRITTEN, force=force)
+    check_output(folder, [chosen.cases], written, force=force)
     _keep(folder, [])
     return []
 

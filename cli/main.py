@@ -21,19 +21,8 @@ from toonset.errors import ToonsetError
 from toonset.plain_text import one_line
 
 VERBS = (  # in the order in which they are used
-    *("split", "calibrate", "palette", "train", "render", "evaluate"),
-    *(
-        "mesh",
-        "planes",
-        "consistency",
-        "info",
-        "check",
-        "export",
-        "import",
-        "mannequin",
-        "synth",
-        "bench",
-    ),
+    *("split", "calibrate", "palette", "train", "render", "evaluate", "mesh", "planes"),
+    *("consistency", "info", "check", "export", "import", "mannequin", "synth", "bench"),
 )
 
 INTERRUPTED, REFUSED = 130, 2

@@ -57,11 +57,11 @@ def _section(
     columns = ["drawn", *(TITLES[layer] for layer in layers), f"{errors_are}, black 0, white 1"]
     image = Image.fromarray(sheet)
     pen = ImageDraw.Draw(image)
-    pen.text((GAP_PX, 4), f"{heading}{more}, worst first", BLACK, font=_font(TEXT_PX + 3))
+    pen.text((GAP_PX, 4), f"{heading}{more}, worst first", BLACK, font=font_of(TEXT_PX + 3))
     for column in range(min(COLUMNS, len(blocks))):
         for i, title in enumerate(columns):
             place = column * width + GAP_PX + i * (TILE_PX + GAP_PX), TEXT_PX + 2 * GAP_PX
-            pen.text(place, title, GREY, font=_font(TEXT_PX - 1))
+            pen.text(place, title, GREY, font=font_of(TEXT_PX - 1))
     return np.asarray(image)
 
 
@@ -74,9 +74,9 @@ def _block(view: ScoredView, layers: Sequence[str]) -> Rgb:
     width = len(tiles) * (TILE_PX + GAP_PX) + GAP_PX
     image = Image.new("RGB", (width, TILE_PX + CAPTION_PX), WHITE)
     for i, tile in enumerate(tiles):
-        image.paste(Image.fromarray(_fitted(tile)), (GAP_PX + i * (TILE_PX + GAP_PX), 0))
+        image.paste(Image.fromarray(tile_of(tile)), (GAP_PX + i * (TILE_PX + GAP_PX), 0))
     caption = f"{view.name}   {_caption(view.figures['rgb'])}"
-    ImageDraw.Draw(image).text((GAP_PX, TILE_PX + 2), caption, BLACK, font=_font(TEXT_PX))
+    ImageDraw.Draw(image).text((GAP_PX, TILE_PX + 2), caption, BLACK, font=font_of(TEXT_PX))
     return np.asarray(image)
 
 
@@ -107,8 +107,8 @@ def _heat(error: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height
     return colormaps["magma"](error.clip(0, 1))[..., :3]
 
 
-def _fitted(picture: Float[np.ndarray, "height width 3"]) -> Rgb:
-    """Return the picture at the tile's size on white, pixels kept square."""
+def tile_of(picture: Float[np.ndarray, "height width 3"]) -> Rgb:
+    """Return a picture in [0, 1] at the tile's size on white, pixels kept square."""
     height, width = picture.shape[:2]
     factor = TILE_PX / max(height, width)
     size = max(round(width * factor), 1), max(round(height * factor), 1)
@@ -120,5 +120,6 @@ def _fitted(picture: Float[np.ndarray, "height width 3"]) -> Rgb:
     return tile
 
 
-def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font_of(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Return the pictures' font."""
     return ImageFont.load_default(size_px)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from jaxtyping import UInt8
+
 from toonset.dataset.scene import Scene
 from toonset.palette.extract import extract_palette
 from toonset.palette.labels import label_image
@@ -13,10 +16,15 @@ from toonset.palette.palette import Palette
 def labelled(scene: Scene) -> tuple[Scene, Palette]:
     """Return the scene with palette and labels extracted from its own pictures."""
     palette = extract_palette([frame.rgba for frame in scene.frames])
+    return relabelled(scene, palette.rgb), palette
+
+
+def relabelled(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
+    """Return the scene with a palette and every pixel's label by it."""
     frames = tuple(
-        replace(frame, labels=label_image(frame.rgba, palette.rgb)) for frame in scene.frames
+        replace(frame, labels=label_image(frame.rgba, palette)) for frame in scene.frames
     )
-    return replace(scene, palette=palette.rgb, frames=frames), palette
+    return replace(scene, palette=palette, frames=frames)
 
 
 def without_palette(scene: Scene) -> Scene:

@@ -22,23 +22,26 @@ from toonset.bench.train_files import as_plain, from_plain, missing
 from toonset.bench.train_plan import (
     METHODS,
     NEAREST,
-    QUICK_METHODS,
+    SCOPES,
     Job,
     Method,
+    Scope,
     plan,
     subset,
     view_counts,
 )
-from toonset.bench.train_run import RunResult, Seen, Snapshots, curve_frames, near_end
+from toonset.bench.train_run import Look, RunResult, Seen, Snapshots, curve_frames, reached
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
+from toonset.nerf import field_box
 from toonset.nerf.labelling import without_palette
 from toonset.nerf.metrics_view import Judges
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.training import train
 
-JUDGES = Judges("no flip here", "no lpips here")
+# a grid in the whole box, of few rays a step: small scenes train in seconds
+QUICK = TrainOptions(device="cpu", carve=False, field="voxel", register=False, unbend=False)
 
 
 def ball(yaw: float, side: int, name: str) -> Frame:
@@ -64,10 +67,11 @@ def case(name: str = "ball-exact", views: int = 8, side: int = 32) -> TrainCase:
 
 
 @pytest.fixture
-def short_methods() -> Iterator[dict[str, Method]]:
+def short_methods(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Method]]:
     """Replace the methods by quick ones; their order, which is that of tables, comes back too."""
+    monkeypatch.setattr(field_box, "RAYS_PER_STEP", 256)
     short = {
-        "default": Method(TrainOptions(steps=12, device="cpu")),
+        "default": Method(replace(QUICK, steps=60)),
         NEAREST: Method(None, first_seed_only=True),
     }
     known = dict(METHODS)
@@ -86,26 +90,29 @@ def result(method: str, psnr: float, *curve: Seen, case: str = "a", seed: int = 
 
 def test_what_tells_most_comes_first() -> None:
     cases = [case("big-exact", side=64), case("ball-exact"), case("ball-drawn", views=5)]
-    jobs = plan(cases, 7, quick=False)
+    jobs = plan(cases, 7, "", SCOPES["train", False])
     keys = [(job.seed, max(job.case.test.frames[0].camera.size_wh), -job.views) for job in jobs]
     assert keys == sorted(keys)
     assert {job.seed for job in jobs} == {7, 8, 9}
     assert {job.views for job in jobs if job.case.name == "ball-drawn"} == {5, 4, 3}
-    assert {job.method for job in jobs if job.seed == 7} == set(METHODS)
+    own_palette = {name for name in METHODS if METHODS[name].palette == "hand-picked palette"}
+    methods = set(SCOPES["train", False].methods)
+    assert {job.method for job in jobs if job.seed == 7} == methods
+    assert not methods & own_palette
     later = {job.method for job in jobs if job.seed > 7}
-    assert later == {name for name, method in METHODS.items() if not method.first_seed_only}
+    assert later == {name for name in methods if not METHODS[name].first_seed_only}
     assert len({json.dumps(job.identity) for job in jobs}) == len(jobs)
-    assert {job.group for job in plan(cases, 0, "ball-drawn 32 px 4 views", quick=False)} == {
-        "drawn 32 px 4 views"
-    }
+    chosen = plan(cases, 0, "ball-drawn 32 px 4 views", SCOPES["train", False])
+    assert {job.group for job in chosen} == {"drawn 32 px 4 views"}
 
 
 def test_a_quick_plan_has_one_case_per_condition() -> None:
     cases = [case("ball-exact"), case("cube-exact"), case("ball-drawn")]
-    jobs = plan(cases, 0, quick=True)
+    scope = SCOPES["train", True]
+    jobs = plan(cases, 0, "", scope)
     assert {job.case.name for job in jobs} == {"ball-exact", "ball-drawn"}
     assert {(job.views, job.seed) for job in jobs} == {(8, 0)}
-    assert {job.method for job in jobs} == set(QUICK_METHODS) <= set(METHODS)
+    assert {job.method for job in jobs} == set(scope.methods) <= set(METHODS)
 
 
 def test_views_are_taken_evenly() -> None:
@@ -139,26 +146,26 @@ def test_a_training_and_its_curve(
     assert trained.figures["label_accuracy"] is not None
     assert trained.figures["palette_psnr"] is not None
     assert nearest.curve[0].seconds == nearest.seconds == 0
-    assert trained.curve[-1].psnr > nearest.curve[0].psnr
+    assert trained.curve[-1].psnr > trained.curve[0].psnr + 1
 
 
 def test_snapshots_are_the_field_as_it_was_and_cost_no_training_time() -> None:
     """Looked at after every step, the last snapshot is the result; looking does not count."""
-    options = TrainOptions(steps=5, device="cpu")
+    options = replace(QUICK, steps=3)
 
     class Slow(Snapshots):
         def look(self, moment):
             self._next = 1e-6
             return super().look(moment)
 
-    watch = Slow(time.perf_counter(), time.process_time())
+    watch = Slow(time.perf_counter(), time.process_time(), carved=False)
     scene = without_palette(case().train)
     watched = train(scene, options, watch=watch)
     alone = train(scene, options)
     points = torch.rand(50, 3) - 0.5
     expected = alone.result.field(points)
     states = [trained for _, trained in watch.states()]
-    assert len(states) == 5
+    assert len(states) == 3
     for found in (watched.result.field(points), states[-1].field(points)):
         for value, known in zip(found, expected, strict=True):
             torch.testing.assert_close(value, known, rtol=2e-2, atol=2e-2)  # stored in half
@@ -199,14 +206,14 @@ def test_a_refused_training_is_noted_and_the_others_go_on(
     assert [record.method for record in records_of([failed], 0)] == []
 
 
-def test_when_a_curve_is_near_its_end_for_good() -> None:
+def test_when_a_curve_comes_to_a_figure_for_good() -> None:
     curve = [Seen(1, 2, 20.0), Seen(2, 4, 29.8), Seen(3, 6, 29.0), Seen(5, 10, 30.0)]
-    near = near_end(curve, 0.5)  # 29.8 was near, but 29.0 came after it
-    assert (near.seconds, near.cpu_seconds, near.psnr) == (4.0, 8.0, 29.5)
-    assert near_end(curve, 20.0) == curve[0]
-    assert near_end(curve[:1], 0.5) == curve[0]
+    near = reached(curve, 29.5)  # 29.8 was past it, but 29.0 came after
+    assert near == Seen(4.0, 8.0, 29.5)
+    assert reached(curve, 10.0) == curve[0]
+    assert reached(curve, 30.1) is None
     falling = [Seen(1, 1, 33.0), Seen(2, 2, 30.0)]
-    assert near_end(falling, 0.5) == falling[0]
+    assert reached(falling, 29.5) == falling[0]
 
 
 def test_mean_curves() -> None:
@@ -286,24 +293,22 @@ def test_a_stopped_bench_goes_on(
     import toonset.bench.train as bench
 
     monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter([case()]))
-    monkeypatch.setattr("toonset.bench.train_plan.QUICK_METHODS", tuple(short_methods))
+    monkeypatch.setitem(SCOPES, ("train", True), Scope(tuple(short_methods)))
     done: list[str] = []
-    honest = bench.run_job
+    honest, stop = bench.run_job, True
 
-    def counted(job: Job, judges: Judges) -> RunResult:
-        if len(done) == 1 and job.method == NEAREST:
+    def counted(job: Job, judges: Judges, look: Look) -> RunResult:
+        if stop and done:
             raise KeyboardInterrupt
         done.append(job.method)
-        return honest(job, judges)
+        return honest(job, judges, look)
 
     monkeypatch.setattr(bench, "run_job", counted)
     out = tmp_path / "bench"
     command = ("bench", "train", "--quick", "-o", out)
     assert toonset(*command).code != 0
     assert {path.name for path in out.iterdir()} == {"runs.json", "records.json", "train.png"}
-    monkeypatch.setattr(
-        bench, "run_job", lambda job, judges: done.append(job.method) or honest(job, judges)
-    )
+    stop = False
     again = toonset(*command, "--json")
     assert again.code == 0, again
     assert done == ["default", NEAREST]  # each once

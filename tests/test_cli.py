@@ -14,24 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from toonset.cli.main import VERBS
 from toonset.dataset.mesh_file import load_mesh, save_obj
 from toonset.dataset.transforms import read_cameras
 
-VERBS = (
-    *("split", "calibrate", "palette", "train", "render", "evaluate"),
-    *(
-        "mesh",
-        "planes",
-        "consistency",
-        "info",
-        "check",
-        "export",
-        "import",
-        "mannequin",
-        "synth",
-        "bench",
-    ),
-)
 BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"}
 VIEWS = 5
 FAST = ("--threads", 1, "--device", "cpu")

@@ -1,0 +1,114 @@
+"""The paper's Table 1: palettes and iterations of the plain method, and how soon it is outdone."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from toonset.bench.chart import DEFAULT
+from toonset.bench.record import aligned
+from toonset.bench.train_plan import METHODS, PAPER
+from toonset.bench.train_run import RunResult, reached
+
+METRICS = ("psnr", "ssim", "flip", "lpips")
+BEFORE, AFTER = "field", "classifier"  # a view as the field has it, and in palette colours
+FORMS = {"psnr": "{:.2f}", "ssim": "{:.3f}", "flip": "{:.4f}", "lpips": "{:.3f}"}
+
+
+def paper_rows(runs: Sequence[RunResult]) -> list[dict[str, Any]]:
+    """Return the table: a row per method and layer, means over the cases' held-out views.
+
+    The default's rows come last. Seconds are medians over the cases; a metric that this machine
+    lacks is None.
+    """
+    rows = []
+    for method in (*PAPER, DEFAULT):
+        found = [run for run in runs if run.method == method and not run.note]
+        options = METHODS[method].options
+        for layer, prefix in ((BEFORE, ""), (AFTER, "palette_")):
+            if not found or options is None or f"{prefix}psnr" not in found[0].figures:
+                continue
+            row: dict[str, Any] = {
+                "method": "paper" if method in PAPER else method,
+                "palette": METHODS[method].palette,
+                "iterations": options.steps,
+                "layer": layer,
+                "n": len(found),
+            }
+            row |= {name: _mean(found, f"{prefix}{name}") for name in METRICS}
+            row["seconds"] = float(np.median([run.seconds for run in found]))
+            row["cpu_seconds"] = float(np.median([run.cpu_seconds for run in found]))
+            rows.append(row)
+    return rows
+
+
+def as_csv(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the rows as CSV; what there is no figure for is empty."""
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return buffer.getvalue()
+
+
+def as_text(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the rows as a table for people."""
+    heading = ("method", "palette", "iterations", "layer", *METRICS, "CPU s")
+    lines = [heading]
+    for row in rows:
+        figures = ["-" if row[m] is None else FORMS[m].format(row[m]) for m in METRICS]
+        first = (row["method"], row["palette"], str(row["iterations"]), row["layer"])
+        lines.append((*first, *figures, f"{row['cpu_seconds']:.1f}"))
+    return "\n".join(aligned(lines, words=4))
+
+
+def outdone(runs: Sequence[RunResult]) -> list[dict[str, Any]]:
+    """Return, per case, when the default passes the plain method's end for good, and at what share.
+
+    `share` is of the plain method's processor seconds; None where the default does not pass it.
+    PSNR is that of the curves: of some of the held-out views.
+    """
+    last = [name for name in PAPER if METHODS[name].palette == "automatic palette"][-1]
+    found = []
+    for slow in (run for run in runs if run.method == last and not run.note):
+        fast = [r for r in runs if (r.method, r.case, r.group) == (DEFAULT, slow.case, slow.group)]
+        if not fast or fast[0].note:
+            continue
+        goal = slow.curve[-1].psnr
+        passed = reached(fast[0].curve, goal)
+        cpu = None if passed is None else passed.cpu_seconds
+        found.append(
+            {
+                "case": slow.case,
+                "group": slow.group,
+                "paper": {"psnr": goal, "cpu_seconds": slow.cpu_seconds},
+                "default": {"psnr": fast[0].curve[-1].psnr, "cpu_seconds": fast[0].cpu_seconds},
+                "passed_after_cpu_s": cpu,
+                "share": None if cpu is None else cpu / slow.cpu_seconds,
+            }
+        )
+    return found
+
+
+def outdone_text(entry: dict[str, Any]) -> str:
+    """Return an entry of `outdone` as a line."""
+    slow, fast, share = entry["paper"], entry["default"], entry["share"]
+    end = (
+        f"{entry['case']}, {entry['group']}: the paper's method ends at {slow['psnr']:.2f} dB "
+        f"after {slow['cpu_seconds']:.0f} CPU s; the default "
+    )
+    if share is None:
+        return f"{end}does not get there ({fast['psnr']:.2f} dB)"
+    return (
+        f"{end}passes that after {entry['passed_after_cpu_s']:.1f} CPU s (1/{1 / share:.0f}) and "
+        f"ends at {fast['psnr']:.2f} dB after {fast['cpu_seconds']:.0f}"
+    )
+
+
+def _mean(runs: Sequence[RunResult], name: str) -> float | None:
+    values = [v for v in (run.figures.get(name) for run in runs) if v is not None]
+    return float(np.mean(values)) if values else None

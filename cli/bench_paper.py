@@ -1,0 +1,88 @@
+"""`toonset bench paper`: the plain method's table and figure, beside the default.
+
+Trainings are kept and continued as those of `bench train`. Pictures of each are kept in strips/,
+of which the figure is put together.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from toonset.cli.bench_chosen import Chosen
+from toonset.cli.bench_train import WRITTEN, jobs_of, run_into
+from toonset.cli.output import Printer
+
+if TYPE_CHECKING:
+    from toonset.bench.cases import TrainCase
+    from toonset.bench.train_plan import Job
+    from toonset.bench.train_run import Look
+    from toonset.nerf.trained import TrainedField
+
+STRIPS, TABLE, FIGURE = "strips", "table1", "figure4"
+WRITTEN_HERE = (*WRITTEN, STRIPS, f"{TABLE}.*", f"{FIGURE}-*.png")
+
+
+def paper_into(
+    folder: Path, chosen: Chosen, printer: Printer, *, force: bool
+) -> tuple[str, dict[str, Any]]:
+    """Return the paper's Table 1 and how soon the default outdoes it; draw the paper's Figure 4.
+
+    Raises:
+        ToonsetError: as `train_into`.
+    """
+    from toonset.bench.paper import as_csv, as_text, outdone, outdone_text, paper_rows
+    from toonset.bench.record import machine
+    from toonset.files import write_bytes, write_json
+    from toonset.nerf.metrics_view import load_judges
+
+    jobs = jobs_of(chosen)
+    look = _strips_into(folder)
+    runs = run_into(folder, jobs, chosen, printer, WRITTEN_HERE, look, force=force)
+    rows, passed = paper_rows(runs), outdone(runs)
+    absent = load_judges().absent
+    found = {"rows": rows, "outdone": passed, "absent": absent}
+    write_json(folder / f"{TABLE}.json", found | {"seed": chosen.seed, "machine": machine()})
+    if rows:
+        write_bytes(folder / f"{TABLE}.csv", as_csv(rows).encode())
+    for case in dict.fromkeys(job.case for job in jobs):
+        _draw(folder, case, [job for job in jobs if job.case is case])
+    reasons = [f"no {name}: {reason}" for name, reason in absent.items()]
+    return "\n".join([as_text(rows), *map(outdone_text, passed), *reasons]), found
+
+
+def _strips_into(folder: Path) -> Look:
+    """Return what keeps pictures of a training's result, if it has a palette."""
+
+    def look(job: Job, case: TrainCase, trained: TrainedField) -> None:
+        from toonset.bench.paper_picture import strip_of
+        from toonset.dataset.picture import encode_png
+        from toonset.files import write_bytes
+
+        if trained.palette is not None:
+            write_bytes(folder / _strip(job), encode_png(strip_of(trained, case)))
+
+    return look
+
+
+def _strip(job: Job) -> str:
+    return f"{STRIPS}/{_plain(job.name)}.png"
+
+
+def _draw(folder: Path, case: TrainCase, jobs: list[Job]) -> None:
+    """Draw the figure of a case from the strips that are there."""
+    from toonset.bench.paper_picture import drawn_strip, figure_of
+    from toonset.bench.train_plan import side_px
+    from toonset.dataset.picture import encode_png, load_rgba
+    from toonset.files import write_bytes
+
+    files = {job.method: folder / _strip(job) for job in jobs}
+    strips = {name: load_rgba(file)[..., :3] for name, file in files.items() if file.is_file()}
+    if strips:
+        name = f"{FIGURE}-{_plain(case.name)}-{side_px(case)}px.png"
+        write_bytes(folder / name, encode_png(figure_of(drawn_strip(case), strips)))
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^\w.-]+", "-", name)

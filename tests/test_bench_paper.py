@@ -1,0 +1,153 @@
+"""The paper's table and figure: what they say, that a stopped run goes on, and their files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from toonset.bench.cases import TrainCase
+from toonset.bench.paper import as_csv, as_text, outdone, outdone_text, paper_rows
+from toonset.bench.paper_picture import drawn_strip, figure_of, shown_frames
+from toonset.bench.train_plan import METHODS, PAPER, SCOPES, Job, Method, plan
+from toonset.bench.train_run import RunResult, Seen, run_job
+from toonset.camera import Camera
+from toonset.dataset.scene import Frame, Scene
+from toonset.nerf.evaluation_picture import TILE_PX
+from toonset.nerf.metrics_view import Judges
+from toonset.nerf.options import TrainOptions
+
+AUTOMATIC, LAST = "paper, automatic palette, 200 steps", "paper, automatic palette, 2000 steps"
+OWN = np.array([[200, 40, 40], [40, 60, 200]], dtype=np.uint8)
+
+
+def block(views: int, turn: float) -> Scene:
+    """Return views of an upright round block, red above and blue below."""
+    frames, side = [], 24
+    rgba = np.zeros((side, side, 4), dtype=np.uint8)
+    rgba[4:12, 8:16], rgba[12:20, 8:16] = (200, 40, 40, 255), (40, 60, 200, 255)
+    for i in range(views):
+        yaw = turn + 2 * np.pi * i / views
+        camera = Camera.looking_at(np.zeros(3), yaw, 0.1, 8.0, (side, side), k=0.0)
+        frames.append(Frame(f"{i:03d}.png", camera, rgba))
+    return Scene(tuple(frames), None, "block")
+
+
+def case() -> TrainCase:
+    return TrainCase("block-exact", "exact", block(8, 0.0), block(4, np.pi / 8))
+
+
+def found(method: str, *curve: Seen, case: str = "a", **figures: float) -> RunResult:
+    end = curve[-1]
+    seconds = end.seconds, end.cpu_seconds
+    return RunResult("exact 150 px 8 views", method, case, 0, figures, *seconds, 0.1, 7, curve)
+
+
+def runs() -> list[RunResult]:
+    slow = found(LAST, Seen(10, 20, 20.0), Seen(90, 180, 25.0), psnr=25.5, palette_psnr=24.0)
+    fast = found("default", Seen(1, 2, 23.0), Seen(5, 10, 27.0), psnr=27.5, palette_psnr=27.2)
+    bare = found("paper, no palette, 200 steps", Seen(9, 9, 20.0), psnr=20.0)
+    return [fast, bare, slow]
+
+
+def test_the_table_has_a_row_per_palette_steps_and_layer() -> None:
+    rows = paper_rows([*runs(), replace(runs()[2], case="b", figures={"psnr": 26.5})])
+    keys = [(row["method"], row["palette"], row["iterations"], row["layer"]) for row in rows]
+    assert keys == [
+        ("paper", "no palette", 200, "field"),
+        ("paper", "automatic palette", 2000, "field"),
+        ("paper", "automatic palette", 2000, "classifier"),
+        ("default", "automatic palette", TrainOptions().steps, "field"),
+        ("default", "automatic palette", TrainOptions().steps, "classifier"),
+    ]
+    assert [row["psnr"] for row in rows] == [20.0, 26.0, 24.0, 27.5, 27.2]
+    assert rows[1]["lpips"] is None
+    assert (rows[1]["n"], rows[1]["cpu_seconds"]) == (2, 180)
+    read = list(csv.DictReader(io.StringIO(as_csv(rows))))
+    assert [float(row["psnr"]) for row in read] == [row["psnr"] for row in rows]
+    assert read[0]["lpips"] == ""
+    assert len(as_text(rows).splitlines()) == 1 + len(rows)
+
+
+def test_when_the_default_outdoes_the_paper() -> None:
+    fast, _, slow = runs()
+    (entry,) = outdone([fast, slow])
+    assert entry["passed_after_cpu_s"] == 6.0  # half way from 23 to 27 dB, from 2 to 10 s
+    assert entry["share"] == pytest.approx(1 / 30)
+    assert "passes that after 6.0 CPU s (1/30) and ends at 27.00 dB" in outdone_text(entry)
+    (behind,) = outdone([replace(fast, curve=(Seen(1, 1, 24.0),)), slow])
+    assert behind["share"] is None
+    assert "does not get there (24.00 dB)" in outdone_text(behind)
+    assert outdone([slow]) == []
+
+
+def test_hand_picked_palettes_are_those_that_cases_come_with() -> None:
+    bare = case()
+    own = replace(bare, train=replace(bare.train, palette=OWN))
+    assert not any(
+        "hand-picked" in job.method for job in plan([bare], 0, "", SCOPES["paper", False])
+    )
+    jobs = plan([own], 0, "", SCOPES["paper", False])
+    assert {job.method for job in jobs} == {"default", *PAPER}
+    with_it = Method(TrainOptions(steps=1, field="voxel", device="cpu"), "hand-picked palette")
+    seen = []
+    METHODS["own"] = with_it
+    try:
+        run_job(Job(own, 4, "own", 0), Judges("", ""), lambda *given: seen.append(given[2].palette))
+    finally:
+        del METHODS["own"]
+    np.testing.assert_array_equal(seen, [OWN])
+
+
+def test_the_figure_is_put_together_of_drawings_and_strips() -> None:
+    two = case()
+    names = [frame.name for frame in shown_frames(two)]
+    assert names == ["001.png", "005.png", "000.png", "002.png"]  # two trained on, two held out
+    drawn = drawn_strip(two)
+    assert drawn.shape == (4 * TILE_PX, TILE_PX, 3)
+    red = np.full((4 * TILE_PX, 2 * TILE_PX, 3), (255, 0, 0), dtype=np.uint8)
+    figure = figure_of(drawn, {"one": red, "two": red})
+    assert (figure == (255, 0, 0)).all(axis=-1).sum() == 2 * red.shape[0] * red.shape[1]
+
+
+@pytest.fixture
+def short_methods() -> Iterator[None]:
+    """Let the quick bench have two methods of few steps."""
+    known, scope = dict(METHODS), SCOPES["paper", True]
+    plain = TrainOptions(steps=2, carve=False, field="voxel", register=False, unbend=False)
+    METHODS[AUTOMATIC] = Method(replace(plain, device="cpu"), first_seed_only=True)
+    METHODS["default"] = Method(TrainOptions(steps=2, device="cpu", field="voxel"))
+    SCOPES["paper", True] = replace(scope, methods=("default", AUTOMATIC), views=(4,))
+    yield
+    METHODS.update(known)
+    SCOPES["paper", True] = scope
+
+
+def test_the_command_writes_table_and_figure_and_goes_on(
+    short_methods: None, toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import toonset.bench.cases as cases
+
+    monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter([case()]))
+    out = tmp_path / "paper"
+    command = ("bench", "paper", "--quick", "-o", out)
+    first = toonset(*command, "--json")
+    assert first.code == 0, first
+    written = json.loads((out / "table1.json").read_text())
+    assert {name: written[name] for name in first.json} == first.json
+    assert [row["layer"] for row in first.json["rows"]] == ["field", "classifier"] * 2
+    assert len((out / "table1.csv").read_text().splitlines()) == 5
+    figure = Image.open(out / "figure4-block-exact-24px.png")
+    assert figure.width > 5 * TILE_PX  # drawings, and two pairs
+    again = toonset(*command)
+    assert "0 trainings, 2 are there already" in again.err
+    assert "paper" in again.out
+    (out / "mine.txt").write_text("mine")
+    assert "holds 'mine.txt'" in toonset(*command, "--force").reason
