@@ -17,9 +17,11 @@ from jaxtyping import Bool, Float
 
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
-from toonset.nerf.registration import FEWEST_VIEWS, Registration, registered, size_ratio
+from toonset.nerf.alignment import FEWEST_VIEWS
+from toonset.nerf.preparation import aligned
+from toonset.nerf.registration import Registration
 from toonset.nerf.silhouette import alpha_of, has_figure
-from toonset.nerf.warp import Unbending, unbent
+from toonset.nerf.warp import Unbending, Warp
 from toonset.nerf.warp_coherence import Placed, touch
 from toonset.nerf.warp_moves import ShiftAndScale
 from toonset.nerf.warp_outline import Outlines, outlines_of
@@ -34,9 +36,9 @@ class ViewReport:
 
     Attributes:
         name: of the picture.
-        shift_px: it sits too far right and down by this.
+        shift_px: it sits too far right and down by this, in the mean over its figure.
         scale: it is drawn so much larger than the others.
-        bend_rms_px: how far it must be bent, over its figure, after shift and size.
+        bend_rms_px: how far it must be bent, over its figure, beside shift and size.
         bend_most_px: the longest of these displacements.
         agreement: intersection over union of its mask and the outline of the shared shape: as
             drawn, and after shift, size and bend are taken out.
@@ -110,11 +112,12 @@ def consistency_of(scene: Scene) -> Consistency:
             f"{scene.name}: {len(drawn)} picture(s) with an opaque figure; at least "
             f"{FEWEST_VIEWS} are needed to say whether they agree"
         )
-    moved, registration = registered(scene)
-    fitted, unbending = unbent(moved)
+    fitted, registration, unbending = aligned(scene)
+    assert registration is not None
+    assert unbending is not None
     before, after = (_missed([s.frames[i] for i in drawn]) for s in (scene, fitted))
     reports = [
-        _report(scene, fitted, i, registration, unbending, before[n], after[n])
+        _report(scene.frames[i], fitted.frames[i], unbending.warps[i], before[n], after[n])
         for n, i in enumerate(drawn)
     ]
     odd = tuple(report.name for report in reports if report.unexplained[1] > ODD)
@@ -123,28 +126,36 @@ def consistency_of(scene: Scene) -> Consistency:
 
 
 def _report(
-    scene: Scene,
-    fitted: Scene,
-    index: int,
-    registration: Registration,
-    unbending: Unbending,
+    drawn: Frame,
+    fitted: Frame,
+    warp: Warp,
     before: Float[np.ndarray, "height width"],
     after: Float[np.ndarray, "height width"],
 ) -> ViewReport:
-    frame, move = scene.frames[index], registration.views[index]
-    figures = [alpha_of(s.frames[index]) >= 0.5 for s in (scene, fitted)]
-    bend = unbending.warps[index].at(frame.camera.pixel_grid()[figures[0]])
+    figures = [alpha_of(frame) >= 0.5 for frame in (drawn, fitted)]
+    pixels = drawn.camera.pixel_grid()[figures[0]]
+    ratio = fitted.camera.scale / drawn.camera.scale
+    place = fitted.camera.center + ratio * (pixels - drawn.camera.center)
+    shift, growth, bend = _parts(pixels, place - pixels + warp.at(place))
     length = np.linalg.norm(bend, axis=-1)
-    applied = registration.applied
     return ViewReport(
-        name=frame.name,
-        shift_px=move.shift_px if applied else (0.0, 0.0),
-        scale=move.scale if applied else 1.0,
+        name=drawn.name,
+        shift_px=(float(shift[0]), float(shift[1])),
+        scale=1 + growth,
         bend_rms_px=float(np.sqrt((length**2).mean())),
         bend_most_px=float(length.max()),
         agreement=(_explained(before, figures[0]), _explained(after, figures[1])),
         unexplained=(_share(before, figures[0]), _share(after, figures[1])),
     )
+
+
+def _parts(
+    pixels: Float[np.ndarray, "n 2"], moves: Float[np.ndarray, "n 2"]
+) -> tuple[Float[np.ndarray, " 2"], float, Float[np.ndarray, "n 2"]]:
+    """Return the shift and the growth that are nearest to displacements, and what they leave."""
+    away, shift = pixels - pixels.mean(axis=0), moves.mean(axis=0)
+    growth = float((away * moves).sum() / max(1.0, (away**2).sum()))
+    return shift, growth, moves - shift - growth * away
 
 
 def _explained(
@@ -165,7 +176,7 @@ def _share(
 def _missed(frames: Sequence[Frame]) -> list[Float[np.ndarray, "height width"]]:
     """Return per drawing by how many of its pixels each figure pixel's ray misses the others."""
     outlines = outlines_of([f.camera for f in frames], [alpha_of(f) for f in frames])
-    ratio = size_ratio(frames, outlines)
+    ratio = outlines.ratio(frames[0].camera)
     moves = ShiftAndScale.expected()
     placed = Placed.of(outlines, moves, np.zeros((len(frames), len(moves.covariance))))
     return [_missed_in(placed, view, outlines, frame, ratio) for view, frame in enumerate(frames)]

@@ -1,13 +1,13 @@
 """What happens to drawings before a field is fitted to them.
 
-In this order, each only where the drawings ask for it: cameras follow drawings that were placed or
-sized off (`registration`), drawings that bend are unbent (`warp`), contour lines are taken off
-(`ink`). What was taken away is kept, to be given back to renderings.
+Each only where the drawings ask for it: cameras follow drawings that were placed or sized off
+(`registration`), drawings that bend are unbent (`warp`), contour lines are taken off (`ink`). What
+was taken away is kept, to be given back to renderings.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from toonset.dataset.scene import Scene
@@ -70,11 +70,36 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
         scene: posed drawings; without labels the contour lines stay.
         options: its `register`, `unbend` and `ink` switch the steps.
     """
-    registration = unbending = ink = None
-    if options.register:
-        scene, registration = registered(scene)
-    if options.unbend:
-        scene, unbending = unbent(scene)
+    scene, registration, unbending = aligned(scene, options.register, options.unbend)
+    ink = None
     if options.ink and scene.palette is not None:
         scene, ink = without_ink(scene)
     return Prepared(scene, registration, unbending, ink)
+
+
+def aligned(
+    scene: Scene, register: bool = True, unbend: bool = True
+) -> tuple[Scene, Registration | None, Unbending | None]:
+    """Return the scene with drawings set right that disagree, and what was found of each kind.
+
+    Bends hold shifts and sizes, too: cameras are moved only where the drawings are more likely
+    placed off, and perhaps bent besides, than bent alone.
+
+    Args:
+        scene: posed drawings.
+        register: whether cameras may move; else there is no registration.
+        unbend: whether drawings may be bent; else there is no unbending.
+
+    Raises:
+        BundleError: the cameras do not belong together (see `box_of_masks`).
+    """
+    placed, registration = registered(scene) if register else (scene, None)
+    if not unbend:
+        return placed, registration, None
+    straight, unbending = unbent(scene)
+    if registration is None or not registration.applied:
+        return straight, registration, unbending
+    rest, left = unbent(placed)
+    if registration.gain_nats + max(0.0, left.gain_nats) >= unbending.gain_nats:
+        return rest, registration, left
+    return straight, replace(registration, applied=False), unbending

@@ -15,15 +15,12 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.registration import FEWEST_VIEWS, size_ratio
-from toonset.nerf.silhouette import alpha_of, has_figure
-from toonset.nerf.warp_fit import fit_moves
+from toonset.nerf.alignment import Alignment, alignment_of
 from toonset.nerf.warp_moves import CONTROLS, Bends
-from toonset.nerf.warp_outline import Square, outlines_of
+from toonset.nerf.warp_outline import Square
 from toonset.palette.labels import UNLABELLED
 
-EXPECTED = 0.01  # of the figure's square: a careful hand's error, as a first guess
-ROUNDS = 8
+ROUNDS = 8  # of Gauss-Newton
 MOST = 0.03  # of the figure's square: the longest displacement; more is another pose
 _BENDS = Bends.expected()
 
@@ -47,11 +44,12 @@ class Warp:
 
     def at(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """Return the displacement at pixels, in pixels; never longer than MOST."""
-        move = _BENDS.at(self.square.unit(pixels), self.numbers)
-        length = np.linalg.norm(move, axis=-1, keepdims=True)
-        # smooth, and exact for short ones: a hard limit would crease the drawing
-        shorter = move / (1 + (length / MOST) ** 4) ** 0.25
-        return self.square.size * shorter
+        return self.square.size * _limited(_BENDS.at(self.square.unit(pixels), self.numbers))
+
+    def on_grid(self, size_wh: tuple[int, int]) -> Float[np.ndarray, "height width 2"]:
+        """Return the displacement at all pixels of a picture, as `at` does."""
+        axes = self.square.axes(size_wh)
+        return self.square.size * _limited(_BENDS.on_grid(*axes, self.numbers))
 
     def back(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """Return the inverse's displacement: where x + at(x) = y, it is x - y."""
@@ -81,31 +79,14 @@ class Warp:
 
 
 @dataclass(frozen=True, eq=False)
-class Unbending:
+class Unbending(Alignment):
     """What was found about the drawings' bends.
 
     Attributes:
-        applied: whether the drawings were resampled.
-        gain_nats: log marginal likelihood for bends over none; applied where > 0.
-        error_px: typical size of the displacement that the sheet asks for, pixels.
-        apart_px: root mean square disagreement of the outlines, before and after, pixels.
         warps: per frame of the scene, what was applied.
     """
 
-    applied: bool
-    gain_nats: float
-    error_px: float
-    apart_px: tuple[float, float]
     warps: tuple[Warp, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers for a report, without the warps."""
-        return {
-            "applied": self.applied,
-            "gain_nats": round(self.gain_nats, 3),
-            "error_px": round(self.error_px, 4),
-            "apart_px": [round(value, 4) for value in self.apart_px],
-        }
 
 
 def unbent(scene: Scene) -> tuple[Scene, Unbending]:
@@ -117,31 +98,20 @@ def unbent(scene: Scene) -> tuple[Scene, Unbending]:
     Raises:
         BundleError: the cameras do not belong together (see `box_of_masks`).
     """
-    drawn = [i for i, frame in enumerate(scene.frames) if has_figure(frame)]
-    warps = [Warp.none() for _ in scene.frames]
-    if len(drawn) < FEWEST_VIEWS:
-        return scene, Unbending(False, 0.0, 0.0, (0.0, 0.0), tuple(warps))
-    frames = [scene.frames[i] for i in drawn]
-    outlines = outlines_of([f.camera for f in frames], [alpha_of(f) for f in frames])
-    fit = fit_moves(outlines, _BENDS, EXPECTED, ROUNDS)
-    ratio = size_ratio(frames, outlines)
-    apart = (fit.apart_px[0] / ratio, fit.apart_px[1] / ratio)
-    error = fit.tau * outlines.size_px / ratio
-    if fit.gain_nats <= 0:
-        return scene, Unbending(False, fit.gain_nats, error, apart, tuple(warps))
+    found, numbers = alignment_of(scene, _BENDS, ROUNDS)
     changed = list(scene.frames)
-    for i, outline, own in zip(drawn, outlines.views, fit.numbers, strict=True):
-        square = Square(outline.square.low / ratio, outline.square.size / ratio)
-        warps[i] = Warp(square, own)
-        changed[i] = warped(changed[i], warps[i])
-    found = Unbending(True, fit.gain_nats, error, apart, tuple(warps))
-    return replace(scene, frames=tuple(changed)), found
+    warps = [Warp.none() for _ in changed]
+    if found.applied:
+        for i, (square, own) in numbers.items():
+            warps[i] = Warp(square, own)
+            changed[i] = warped(changed[i], warps[i])
+    unbending = Unbending(**vars(found), warps=tuple(warps))
+    return (replace(scene, frames=tuple(changed)) if found.applied else scene), unbending
 
 
 def warped(frame: Frame, warp: Warp) -> Frame:
     """Return the frame with its drawing resampled: corrected(x) = drawn(x + d(x))."""
-    grid = frame.camera.pixel_grid()
-    places = grid + warp.at(grid.reshape(-1, 2)).reshape(grid.shape)
+    places = frame.camera.pixel_grid() + warp.on_grid(frame.camera.size_wh)
     labels = None if frame.labels is None else resampled_labels(frame.labels, places)
     return replace(frame, rgba=resampled(frame.rgba, places), labels=labels)
 
@@ -170,6 +140,13 @@ def resampled_labels(
     return cv2.remap(
         labels, *_maps(places), cv2.INTER_NEAREST, borderMode=mode, borderValue=outside
     )
+
+
+def _limited(move: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+    """Return displacements of a square, none longer than MOST."""
+    length = np.linalg.norm(move, axis=-1, keepdims=True)
+    # smooth, and exact for short ones: a hard limit would crease the drawing
+    return move / (1 + (length / MOST) ** 4) ** 0.25
 
 
 def _maps(places: Float[np.ndarray, "height width 2"]) -> tuple[np.ndarray, np.ndarray]:

@@ -10,9 +10,9 @@ Source: Rademacher, "View-dependent geometry", 1999, with 2D bends for 3D ones.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, Shaped
@@ -43,19 +43,6 @@ class KeyWarps:
     def is_none(self) -> bool:
         """Return whether nothing is given back anywhere."""
         return all(warp.is_none for warp in self.warps)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the warps and the middle; cameras are kept by their owner."""
-        return {
-            "middle": self.middle.tolist(),
-            "warps": [warp.to_json() for warp in self.warps],
-        }
-
-    @classmethod
-    def from_json(cls, value: Mapping[str, Any], cameras: Sequence[Camera]) -> KeyWarps:
-        """Return the warps of `to_json` with the same cameras in the same order."""
-        warps = tuple(Warp.from_json(warp) for warp in value["warps"])
-        return cls(tuple(cameras), warps, np.array(value["middle"], dtype=float))
 
 
 def give_back(

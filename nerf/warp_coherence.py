@@ -24,7 +24,7 @@ from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.nerf.warp_moves import Moves
-from toonset.nerf.warp_outline import Outline, Outlines, sample
+from toonset.nerf.warp_outline import Outlines, sample
 
 ALONG = 64  # points of a ray that are tried first
 CLOSER = 7  # points tried between its best and their neighbours
@@ -39,30 +39,32 @@ class Placed:
         outlines: as drawn.
         moves: the family of displacements.
         numbers: (views, k) each drawing's displacement, in units of its square.
+        displaced: per view (2, height, width) where a pixel's content comes from, less the pixel.
         distances: per view (1, height, width) signed distance of the moved drawing, pixels.
     """
 
     outlines: Outlines
     moves: Moves
     numbers: Float[np.ndarray, "views k"]
+    displaced: tuple[Float[Tensor, "2 height width"], ...]
     distances: tuple[Float[Tensor, "1 height width"], ...]
 
     @classmethod
     def of(cls, outlines: Outlines, moves: Moves, numbers: Float[np.ndarray, "views k"]) -> Placed:
         """Return the outlines moved by `numbers`."""
-        distances = []
+        displaced, distances = [], []
         for outline, own in zip(outlines.views, numbers, strict=True):
-            grid = outline.camera.pixel_grid()
-            values = outline.distance[:1]
-            if np.any(own):
-                places = _moved(outline, moves, own, grid.reshape(-1, 2))
-                values = torch.as_tensor(sample(values, places)).view(1, *grid.shape[:2])
-            distances.append(values)
-        return cls(outlines, moves, numbers, tuple(distances))
+            axes = outline.square.axes(outline.camera.size_wh)
+            move = outline.square.size * moves.on_grid(*axes, own)
+            places = outline.camera.pixel_grid() + move
+            values = sample(outline.distance[:1], places.reshape(-1, 2))
+            displaced.append(torch.as_tensor(np.moveaxis(move, -1, 0).astype(np.float32)))
+            distances.append(torch.as_tensor(values).view(1, *move.shape[:2]))
+        return cls(outlines, moves, numbers, tuple(displaced), tuple(distances))
 
     def source(self, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """Return where the moved drawing's pixels come from."""
-        return _moved(self.outlines.views[view], self.moves, self.numbers[view], pixels)
+        return pixels + sample(self.displaced[view], pixels).T
 
     def target(self, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """Return where the drawing's pixels have been moved to."""
@@ -136,10 +138,3 @@ def _best(
             cost += np.clip(distance, far, 0) ** 2
     best, rows = cost.argmin(axis=1), np.arange(len(cost))
     return along[rows, best], cost[rows, best]
-
-
-def _moved(
-    outline: Outline, moves: Moves, numbers: np.ndarray, pixels: np.ndarray
-) -> Float[np.ndarray, "n 2"]:
-    square = outline.square
-    return pixels + square.size * moves.at(square.unit(pixels), numbers)

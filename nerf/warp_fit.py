@@ -75,10 +75,12 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     idle = first.cost - _log_volume(first.matrix, moves.covariance * tau**2, views)
     if idle <= 0:  # even a perfect fit would not be worth its numbers
         return Fit(numbers, 0.0, float(idle / 2), (first.apart, first.apart))
-    normal, flat = first, numbers.reshape(-1)
+    normal, flat, common = first, numbers.reshape(-1), _common(outlines, moves)
+    weigh = common.T @ precision
     for round_ in range(1, rounds + 1):
         prior = precision / tau**2
         flat = flat - np.linalg.solve(normal.matrix + prior, normal.slope + prior @ flat)
+        flat = flat - common @ np.linalg.lstsq(weigh @ common, weigh @ flat, rcond=1e-9)[0]
         numbers = flat.reshape(views, count)
         normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
         if round_ >= SETTLED:
@@ -87,6 +89,25 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     volume = _log_volume(normal.matrix, moves.covariance * tau**2, views)
     gain = (first.cost - spent - volume) / 2
     return Fit(numbers, tau, float(gain), (first.apart, normal.apart))
+
+
+def _common(outlines: Outlines, moves: Moves) -> Float[np.ndarray, "m 4"]:
+    """Return what all numbers are where the body stands aside along an axis, or is larger.
+
+    That is no error of the drawings: of all numbers that differ by it, the smallest are meant.
+    (The equations leave it open but for perspective, through which errors would push the body.)
+    """
+    size = outlines.size_px
+    columns = []
+    for axis in np.eye(3) * outlines.radius:
+        parts = []
+        for outline in outlines.views:
+            camera = outline.camera
+            ends = pixels_of(camera, outlines.middle + np.stack([axis, -axis]) / 2)
+            parts.append(moves.even((ends[0] - ends[1]) / size, 0.0))
+        columns.append(np.concatenate(parts))
+    columns.append(np.concatenate([moves.even(np.zeros(2), 1.0) for _ in outlines.views]))
+    return np.stack(columns, axis=1)
 
 
 def _linearised(

@@ -34,6 +34,19 @@ class Moves(Protocol):
         """Return the displacements at places of the square."""
         ...
 
+    def on_grid(
+        self,
+        across: Float[np.ndarray, " width"],
+        down: Float[np.ndarray, " height"],
+        numbers: Float[np.ndarray, " k"],
+    ) -> Float[np.ndarray, "height width 2"]:
+        """Return the displacements at every pair of places along the square's sides."""
+        ...
+
+    def even(self, shift: Float[np.ndarray, " 2"], growth: float) -> Float[np.ndarray, " k"]:
+        """Return the numbers of shift + growth (2 unit - 1)."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class ShiftAndScale:
@@ -54,10 +67,23 @@ class ShiftAndScale:
         return result
 
     def at(
-        self, unit: Float[np.ndarray, "n 2"], numbers: Float[np.ndarray, " 3"]
-    ) -> Float[np.ndarray, "n 2"]:
+        self, unit: Float[np.ndarray, "*n 2"], numbers: Float[np.ndarray, " 3"]
+    ) -> Float[np.ndarray, "*n 2"]:
         """Return the displacements."""
         return numbers[:2] + numbers[2] * (2 * unit - 1)
+
+    def on_grid(
+        self,
+        across: Float[np.ndarray, " width"],
+        down: Float[np.ndarray, " height"],
+        numbers: Float[np.ndarray, " 3"],
+    ) -> Float[np.ndarray, "height width 2"]:
+        """Return the displacements at every pair of places along the square's sides."""
+        return self.at(np.stack(np.meshgrid(across, down), axis=-1), numbers)
+
+    def even(self, shift: Float[np.ndarray, " 2"], growth: float) -> Float[np.ndarray, " 3"]:
+        """Return the numbers of shift + growth (2 unit - 1)."""
+        return np.array([*shift, growth])
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +99,7 @@ class Bends:
     @classmethod
     def expected(cls) -> Bends:
         """Return the family."""
-        line = (np.arange(CONTROLS) - 1) / (CONTROLS - 3)
-        places = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+        places = _places()
         apart = ((places[:, None] - places[None]) ** 2).sum(axis=-1)
         field = np.exp(-apart / (2 * REACH**2)) + 1e-6 * np.eye(len(places))
         return cls(np.kron(np.eye(2), field))
@@ -92,6 +117,26 @@ class Bends:
     ) -> Float[np.ndarray, "n 2"]:
         """Return the displacements; beyond the square those of its edge."""
         return _tensor_basis(unit) @ numbers.reshape(2, -1).T
+
+    def on_grid(
+        self,
+        across: Float[np.ndarray, " width"],
+        down: Float[np.ndarray, " height"],
+        numbers: Float[np.ndarray, " k"],
+    ) -> Float[np.ndarray, "height width 2"]:
+        """Return the displacements at every pair of places along the square's sides."""
+        controls = numbers.reshape(2, CONTROLS, CONTROLS)
+        return np.moveaxis(_cubic_basis(down) @ controls @ _cubic_basis(across).T, 0, -1)
+
+    def even(self, shift: Float[np.ndarray, " 2"], growth: float) -> Float[np.ndarray, " k"]:
+        """Return the numbers of shift + growth (2 unit - 1)."""
+        return (shift + growth * (2 * _places() - 1)).T.reshape(-1)
+
+
+def _places() -> Float[np.ndarray, "controls 2"]:
+    """Return where the controls are; numbers linear in these make linear displacements."""
+    line = (np.arange(CONTROLS) - 1) / (CONTROLS - 3)
+    return np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
 
 
 def _tensor_basis(unit: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n controls"]:

@@ -38,6 +38,15 @@ class Square:
         """Return pixels as places in the square, (0, 0) to (1, 1)."""
         return (pixels - self.low) / self.size
 
+    def axes(
+        self, size_wh: tuple[int, int]
+    ) -> tuple[Float[np.ndarray, " width"], Float[np.ndarray, " height"]]:
+        """Return the places of a picture's columns and rows, pixel centres."""
+        across, down = (
+            (np.arange(n) + 0.5 - low) / self.size for n, low in zip(size_wh, self.low, strict=True)
+        )
+        return across, down
+
 
 @dataclass(frozen=True, eq=False)
 class Outline:
@@ -79,6 +88,10 @@ class Outlines:
     def size_px(self) -> float:
         """Return the squares' side, the same in all views."""
         return self.views[0].square.size
+
+    def ratio(self, first: Camera) -> float:
+        """Return how many pixels of the outlines a pixel of the pictures is; `first` is theirs."""
+        return self.views[0].camera.scale / first.scale
 
 
 def outlines_of(

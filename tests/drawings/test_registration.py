@@ -1,0 +1,85 @@
+"""Drawings placed and sized off: the cameras follow, the pixels stay."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from toonset.nerf.registration import registered
+
+
+@pytest.mark.parametrize("views", [3, 5, 8])
+def test_a_perfect_sheet_keeps_its_cameras(balls, views: int) -> None:
+    result, found = registered(balls.sheet(views))
+    assert result is balls.sheet(views)
+    assert not found.applied
+    assert found.gain_nats <= 0
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_shifts_and_sizes_are_found(balls, seed: int) -> None:
+    scene, shifts, sizes = balls.misplaced(seed)
+    result, found = registered(scene)
+    assert found.applied
+    scales = np.array([view.scale for view in found.views])
+    np.testing.assert_allclose(scales / scales.mean(), sizes / sizes.mean(), atol=0.016)
+    left = np.array(
+        [
+            after.camera.center - before.camera.center - shift
+            for before, after, shift in zip(
+                balls.sheet().frames, result.frames, shifts, strict=True
+            )
+        ]
+    )
+    # The body has no place of its own, and outlines say nothing of what is between two sides:
+    # told are heights against each other, and each side against the one opposite to it.
+    assert np.abs(left[:, 1] - left[:, 1].mean()).max() < 1.0
+    assert np.abs(left[:4, 0] + left[4:, 0]).max() < 1.0
+    assert np.sqrt((shifts**2).mean()) > 1
+
+
+def test_the_body_stays_where_it_stands(balls) -> None:
+    """What all drawings share is no error: taken for one, it would push the body off its place."""
+    scene, _ = balls.bent_sheet()
+    _, found = registered(scene)
+    shifts = np.array([view.shift_px for view in found.views])
+    assert np.abs(shifts).max() > 0.3
+    for axis in np.eye(3) / 2:
+        ends = np.array([0.0, 0.3, 0.0]) + np.stack([axis, -axis])
+        moved = [-np.diff(frame.camera.project(ends)[0], axis=0)[0] for frame in scene.frames]
+        assert abs((moved * shifts).sum()) < 0.002 * np.square(moved).sum()
+    assert np.mean([view.scale for view in found.views]) == pytest.approx(1, abs=1e-9)
+
+
+def test_pictures_are_not_touched(balls) -> None:
+    scene, _, _ = balls.misplaced(0)
+    result, _ = registered(scene)
+    for before, after in zip(scene.frames, result.frames, strict=True):
+        assert after.rgba is before.rgba
+        np.testing.assert_array_equal(after.camera.rotation, before.camera.rotation)
+
+
+def test_registering_twice_changes_little(balls) -> None:
+    scene, _, _ = balls.misplaced(1)
+    once, _ = registered(scene)
+    _, again = registered(once)
+    assert again.apart_px[0] < 0.6
+    shifts = np.array([view.shift_px for view in again.views])
+    assert np.abs(shifts).max() < 1.0
+
+
+def test_the_report_has_plain_numbers(balls) -> None:
+    _, found = registered(balls.misplaced(0)[0])
+    again = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert again["applied"] is True
+    assert len(again["views"]) == 8
+    assert again["apart_px"][1] < again["apart_px"][0]
+
+
+def test_two_drawings_keep_their_cameras(balls) -> None:
+    scene = balls.sheet(2)
+    result, found = registered(scene)
+    assert result is scene
+    assert len(found.views) == 2
