@@ -6,7 +6,7 @@ reaches a level there. Marching runs on two grids: blocks of voxels first, voxel
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -38,7 +38,10 @@ class Rays:
 
     def at(self, index: slice | Tensor) -> Rays:
         """Return some of the rays."""
-        return Rays(self.origins[index], self.directions[index], self.start[index])
+        parts = (self.origins, self.directions, self.start)
+        if isinstance(index, slice):
+            return Rays(*(part[index] for part in parts))
+        return Rays(*(part.index_select(0, index) for part in parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,23 +64,28 @@ class Samples:
     support: Float[Tensor, " n"]
     rays: int
 
-    def at(self, index: Tensor, order: Int[Tensor, " n"]) -> Samples:
+    def at(self, index: Int[Tensor, " n"], order: Int[Tensor, " n"]) -> Samples:
         """Return some of the samples, with their numbers in their rays."""
-        points, ray, distance = self.points[index], self.ray[index], self.distance[index]
-        return Samples(points, ray, order, distance, self.support[index], self.rays)
+        parts = (self.points, self.ray, self.distance, self.support)
+        points, ray, distance, support = (part.index_select(0, index) for part in parts)
+        return Samples(points, ray, order, distance, support, self.rays)
 
     def and_then(self, behind: Samples) -> Samples:
         """Return these samples and others of the same rays, all behind them."""
         names = ("points", "ray", "order", "distance", "support")
         pairs = (torch.cat([getattr(self, name), getattr(behind, name)]) for name in names)
         both = Samples(*pairs, self.rays)
-        index = both.ray.argsort(stable=True)
-        return both.at(index, order_in_ray(both.ray[index], self.rays))
+        in_front = torch.bincount(self.ray, minlength=self.rays)
+        both.order[len(self.ray) :] += in_front[behind.ray]
+        counts = in_front + torch.bincount(behind.ray, minlength=self.rays)
+        place = both.order + (counts.cumsum(0) - counts)[both.ray]
+        index = torch.empty_like(place).scatter_(0, place, torch.arange(len(place)))
+        return both.at(index, both.order.index_select(0, index))
 
     def first(self, most: int) -> Samples:
         """Return the first `most` samples of every ray."""
-        kept = self.order < most
-        return self if bool(kept.all()) else self.at(kept, self.order[kept])
+        kept = (self.order < most).nonzero()[:, 0]
+        return self if len(kept) == len(self.order) else self.at(kept, self.order[kept])
 
 
 def rays_of(camera: Camera, pixels: Float[np.ndarray, "n 2"], hull: Hull) -> Rays:
@@ -151,20 +159,18 @@ def order_in_ray(ray: Int[Tensor, " n"], rays: int) -> Int[Tensor, " n"]:
 def _march_chunk(rays: Rays, hull: Hull, step: float, most: int, level: float) -> Samples:
     near, far = clip(rays, hull)
     stride = max(1, int(BLOCK * hull.voxel / step + 1e-6))  # steps that stay next to one block
-    strides = ((far - near) / (stride * step)).ceil().clamp_min(0).long()
-    ray = torch.repeat_interleave(torch.arange(len(near)), strides)
-    number = order_in_ray(ray, len(near)) * stride
-    middle = near[ray] + step * (number + stride / 2)
-    hit = hull.lookup(hull.blocks, _points(rays, ray, middle), BLOCK).nonzero()[:, 0]
-    ray, number = ray[hit], number[hit]
+    strides = ((far - near) / (stride * step)).ceil().clamp_min(0)
+    number = torch.arange(int(strides.max()) if len(strides) else 0)
+    middle = near[:, None] + (stride * step) * (number + 0.5)
+    hit = _along(rays, middle, hull, hull.blocks, BLOCK).logical_and_(number < strides[:, None])
     # most rays have what they need after few strides: the others go on
-    front = order_in_ray(ray, len(near)) < most // stride + SPARE_STRIDES
+    front = hit & (hit.cumsum(1, dtype=torch.int16) <= most // stride + SPARE_STRIDES)
     lattice = _Lattice(rays, near, hull, step, stride, level)
-    samples = lattice.samples(ray[front], number[front])
+    samples = lattice.samples(front)
     wanting = torch.bincount(samples.ray, minlength=len(near)) < most
-    rest = ~front & wanting[ray]
+    rest = (hit ^ front).logical_and_(wanting[:, None])
     if bool(rest.any()):
-        samples = samples.and_then(lattice.samples(ray[rest], number[rest]))
+        samples = samples.and_then(lattice.samples(rest))
     return samples.first(most)
 
 
@@ -186,20 +192,40 @@ class _Lattice:
     stride: int
     level: float
 
-    def samples(self, ray: Int[Tensor, " n"], number: Int[Tensor, " n"]) -> Samples:
-        """Return the samples in strides that begin at steps of these numbers."""
-        ray = ray.repeat_interleave(self.stride)
-        number = (number[:, None] + torch.arange(self.stride)).reshape(-1)
-        distance = self.near[ray] + self.step * (number + 0.5)
+    def samples(self, strides: Bool[Tensor, "rays strides"]) -> Samples:
+        """Return the samples in these strides."""
+        ray, number = strides.nonzero().unbind(1)
+        step = (number * self.stride)[:, None] + torch.arange(self.stride)
+        distance = self.near[ray][:, None] + self.step * (step + 0.5)
+        close = _along(self.rays.at(ray), distance, self.hull, self.hull.near, 1)
+        close = close.view(-1).nonzero()[:, 0]
+        ray = ray.index_select(0, torch.div(close, self.stride, rounding_mode="floor"))
+        distance = distance.view(-1).index_select(0, close)
         points = _points(self.rays, ray, distance)
-        close = self.hull.lookup(self.hull.near, points, 1).nonzero()[:, 0]
-        points = points[close]
         support = self.hull.support_at(points)
-        inside = (support >= self.level).nonzero()[:, 0]
-        close = close[inside]
-        ray, rays = ray[close], len(self.near)
-        order = order_in_ray(ray, rays)
-        return Samples(points[inside], ray, order, distance[close], support[inside], rays)
+        every = Samples(points, ray, ray, distance, support, len(self.near))
+        inside = every.at((support >= self.level).nonzero()[:, 0], ray)
+        return replace(inside, order=order_in_ray(inside.ray, inside.rays))
+
+
+def _along(
+    rays: Rays,
+    distance: Float[Tensor, "rays places"],
+    hull: Hull,
+    cells: Bool[Tensor, "x y z"],
+    edge: int,
+) -> Bool[Tensor, "rays places"]:
+    """Return `hull.lookup(cells, points, edge)` at distances along rays.
+
+    Axis by axis, all rays at a time: a third of the time of making the points first.
+    """
+    index = torch.zeros(distance.shape, dtype=torch.int32)
+    for axis, count in enumerate(cells.shape):
+        slope = rays.directions[:, axis] / (hull.voxel * edge)
+        start = (rays.origins[:, axis] - float(hull.low[axis])) / (hull.voxel * edge)
+        cell = torch.addcmul(start[:, None], distance, slope[:, None]).int()
+        index.mul_(count).add_(cell.clamp_(0, count - 1))
+    return cells.reshape(-1).index_select(0, index.view(-1)).view(distance.shape)
 
 
 def _points(

@@ -21,7 +21,7 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from toonset.nerf.hull import EDGE, Hull, occupancy
+from toonset.nerf.hull import EDGE, Hull, grown, occupancy
 from toonset.nerf.trained import TrainedField
 
 POINTS_PER_CHUNK = 1 << 13
@@ -54,7 +54,7 @@ class Baked:
     def of(cls, trained: TrainedField) -> Baked:
         """Return the field, read at the voxels where the hull leaves anything."""
         hull = trained.hull
-        read = _grown(hull.near, 1)
+        read = grown(hull.near, 1)
         cells = read.reshape(-1).nonzero()[:, 0]
         volume = torch.zeros(read.numel(), 4)
         for chunk in cells.split(POINTS_PER_CHUNK):
@@ -62,7 +62,7 @@ class Baked:
             volume[chunk] = torch.cat([_unsoftened(density * trained.step)[:, None], rgb], dim=1)
         values, corners = _side_by_side(volume.view(*read.shape, 4).numpy(), "edge")
         support, _ = _side_by_side(hull.support[..., None].numpy(), "constant")
-        return cls(trained, values, support[..., 0], corners, _grown(hull.near, REACH))
+        return cls(trained, values, support[..., 0], corners, grown(hull.near, REACH))
 
     def near_something(self, points_world: Float[Tensor, "n 3"]) -> Bool[Tensor, " n"]:
         """Return whether any sample may lie within REACH voxels of each point."""
@@ -96,15 +96,6 @@ class Baked:
         values = cv2.remap(self.values, u, v, cv2.INTER_LINEAR)
         support = cv2.remap(self.support, u, v, cv2.INTER_LINEAR)
         return torch.from_numpy(values).view(-1, 4)[:n], torch.from_numpy(support).view(-1)[:n]
-
-
-def _grown(cells: Bool[Tensor, "x y z"], by: int) -> Bool[Tensor, "x y z"]:
-    grown = cells[None, None].float()
-    for axis in range(3):
-        size, padding = [1, 1, 1], [0, 0, 0]
-        size[axis], padding[axis] = 2 * by + 1, by
-        grown = F.max_pool3d(grown, size, stride=1, padding=padding)
-    return grown[0, 0] > 0
 
 
 def _unsoftened(optical_depth: Float[Tensor, " n"]) -> Float[Tensor, " n"]:
