@@ -17,6 +17,7 @@ import torch
 from toonset.dataset.scene import Scene
 from toonset.errors import BundleError, SetupError
 from toonset.nerf import losses
+from toonset.nerf.allocator import keep_freed_memory
 from toonset.nerf.batches import make_batches
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.evidence import HullEvidence
@@ -73,6 +74,7 @@ def train(
     tell = progress or (lambda _: None)
     clock = [time.perf_counter()]
     options, device = _resolved(options), device_of(options.device)
+    keep_freed_memory()
     torch.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")
