@@ -14,6 +14,7 @@ NEAREST = "nearest drawing"
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
 PALETTES: tuple[PaletteChoice, ...] = get_args(PaletteChoice)
 PAPER_STEPS = (200, 2000)
+TURN, HALF_TURN = 8, " half turn"  # views of a whole one; ends the groups of the others
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ METHODS: dict[str, Method] = {
     "without smoothing": Method(TrainOptions(smoothness=0.0)),
     "without registration": Method(TrainOptions(register=False), first_seed_only=True),
     "without unbending": Method(TrainOptions(unbend=False), first_seed_only=True),
+    "without symmetry": Method(TrainOptions(symmetric=False), first_seed_only=True),
     "without hull": Method(TrainOptions(carve=False), first_seed_only=True),
     "voxel": Method(TrainOptions(field="voxel")),
     "mlp": Method(TrainOptions(field="mlp"), first_seed_only=True),
@@ -64,18 +66,23 @@ class Scope:
         methods: names in `METHODS`.
         views: numbers of training views.
         seeds: how many.
+        half_turn: also of front, side and back alone, where there are eight views.
         one_case: one per condition and size is enough.
     """
 
     methods: tuple[str, ...]
     views: tuple[int, ...] = (8,)
     seeds: int = 1
+    half_turn: bool = False
     one_case: bool = False
 
 
 SCOPES = {  # by subject and whether it must be quick
     ("train", False): Scope(
-        tuple(name for name in METHODS if name not in FOR_THE_TABLE_ALONE), (8, 4, 3), 3
+        tuple(name for name in METHODS if name not in FOR_THE_TABLE_ALONE),
+        views=(8, 4, 3),
+        seeds=3,
+        half_turn=True,
     ),
     ("train", True): Scope(("default", NEAREST, "coloured hull", "75 steps"), one_case=True),
     ("paper", False): Scope(("default", *PAPER)),
@@ -109,7 +116,8 @@ class Job:
     @property
     def name(self) -> str:
         """Return what a person selects by."""
-        return f"{self.case.name} {side_px(self.case)} px {self.views} views {self.method}"
+        views = f"{self.views} views" + " of a half turn" * self.case.group.endswith(HALF_TURN)
+        return f"{self.case.name} {side_px(self.case)} px {views} {self.method}"
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -131,6 +139,8 @@ def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list
         scope: which of all possible jobs.
     """
     chosen = _first_of_groups(cases) if scope.one_case else list(cases)
+    if scope.half_turn:
+        chosen += [front_side_back(case) for case in chosen if len(case.train.frames) == TURN]
     jobs = [
         Job(case, views, method, seed + number)
         for number in range(scope.seeds)
@@ -161,6 +171,13 @@ def subset(case: TrainCase, views: int) -> TrainCase:
     frames = case.train.frames
     kept = tuple(frames[round(i * len(frames) / views)] for i in range(views))
     return replace(case, train=replace(case.train, frames=kept))
+
+
+def front_side_back(case: TrainCase) -> TrainCase:
+    """Return the case with three of its eight views: half a turn, one side is undrawn."""
+    frames = case.train.frames[: TURN // 2 + 1 : TURN // 4]
+    train = replace(case.train, frames=frames)
+    return replace(case, group=case.group + HALF_TURN, train=train)
 
 
 def side_px(case: TrainCase) -> int:

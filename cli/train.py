@@ -69,6 +69,12 @@ def train(
     as_bent: Annotated[
         bool, typer.Option("--as-bent", help="Trust the outlines: do not unbend drawings.")
     ] = False,
+    one_sided: Annotated[
+        bool,
+        typer.Option(
+            "--one-sided", help="Do not take an undrawn side from a symmetric body's mirror image."
+        ),
+    ] = False,
     no_palette: Annotated[
         bool, typer.Option("--no-palette", help="Colours only: no palette, no labels.")
     ] = False,
@@ -122,7 +128,7 @@ def train(
     _check_choice(field or FIELDS[0], FIELDS, "--field")
     _check_choice(ink, INKS, "--ink")
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
-    switches = {"register": as_placed, "unbend": as_bent}
+    switches = {"register": as_placed, "unbend": as_bent, "symmetric": one_sided}
     given |= {name: False for name, off in switches.items() if off}
     given |= {"ink": True} if ink == "redraw" else {}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle

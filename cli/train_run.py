@@ -27,7 +27,12 @@ FEW_VIEWS = 4
 DOUBTFUL = 3  # exit code: written, but training went wrong and was cut short
 FINE = ("steps", "budget")  # why a training may end
 RESUMED_AS = {"steps": "--steps", "budget_s": "--budget", "device": "--device", "seed": "--seed"}
-RESUMED_AS |= {"register": "--as-placed", "unbend": "--as-bent", "ink": "--ink"}
+RESUMED_AS |= {
+    "register": "--as-placed",
+    "unbend": "--as-bent",
+    "symmetric": "--one-sided",
+    "ink": "--ink",
+}
 RESUMED_AS |= {"field": "--field", "carve": "--preset", "smoothness": "--preset"}
 
 

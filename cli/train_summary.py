@@ -17,6 +17,7 @@ def summary(run: Path, metrics: dict[str, Any]) -> str:
             f"{counts['views']} views, {counts['rays']} rays, {counts['parameters']} parameters; "
             f"{metrics['steps']} steps in {seconds:.1f} s",
             *_drawings(metrics["drawings"]),
+            *_symmetry(metrics["symmetry"]),
             f"hull: filled where at most {hull['missing']} views say background{evidence}",
             f"fit to the drawings: {_figures(fit)}",
             *([f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []),
@@ -41,6 +42,16 @@ def _drawings(found: dict[str, Any]) -> list[str]:
         widths = f"{ink['outline_px']:.1f} px outside, {ink['inner_px']:.1f} px inside"
         lines.append(f"contour lines taken off, to be drawn again: {widths}")
     return lines
+
+
+def _symmetry(found: dict[str, Any] | None) -> list[str]:
+    """Return whether undrawn sides were taken from mirror images."""
+    if found is None:
+        return []
+    alike = f"left and right are {100 * min(found['alike']):.0f} % alike"
+    if not found["mirrored"]:
+        return [f"{alike}: no mirror images for the undrawn side"]
+    return [f"{alike}: the undrawn side is that of {', '.join(found['mirrored'])}, mirrored"]
 
 
 def _figures(means: dict[str, float | None]) -> str:

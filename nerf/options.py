@@ -30,6 +30,8 @@ class TrainOptions:
             figure's box, at new places in every step, against pictures over any backdrop.
         register: let cameras follow drawings that were placed or sized off.
         unbend: bend drawings back that disagree with the others' outlines.
+        symmetric: where drawings show that the body is its own mirror image, flip them for the side
+            that no drawing shows.
         ink: take contour lines off before, and draw them again in renderings: cleaner, but small
             eyes and mouths may go with the lines.
     """
@@ -46,4 +48,5 @@ class TrainOptions:
     carve: bool = True
     register: bool = True
     unbend: bool = True
+    symmetric: bool = True
     ink: bool = False

@@ -28,4 +28,6 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
     nearest palette colours. No silhouette is used but to place the box, nothing is smoothed, and
     drawings are taken as they are. A step takes 1,024 rays of 96 samples.
     """
-    return TrainOptions(steps=steps, carve=False, smoothness=0.0, register=False, unbend=False)
+    return TrainOptions(
+        steps=steps, carve=False, smoothness=0.0, register=False, unbend=False, symmetric=False
+    )

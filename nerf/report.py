@@ -78,6 +78,7 @@ def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
         "loss": None if last is None else last.loss,
         "held_out": [asdict(seen) for seen in held_out],
         "drawings": training.prepared.to_json(),
+        "symmetry": None if training.symmetry is None else training.symmetry.to_json(),
         "hull": asdict(training.evidence),
         "counts": training.counts,
         "seconds": {k: round(v, 3) for k, v in training.seconds.items()},

@@ -14,6 +14,7 @@ from toonset.nerf.hull import Hull
 from toonset.nerf.ink import InkStyle
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import Prepared
+from toonset.nerf.symmetry import Symmetry
 from toonset.nerf.warp_back import KeyWarps
 
 
@@ -88,6 +89,7 @@ class Training:
         evidence: for the hull's tolerance.
         seconds: of every part.
         counts: views, rays, samples, parameters.
+        symmetry: what the drawings say of left and right, if that was asked; see there.
     """
 
     result: TrainedField
@@ -98,3 +100,4 @@ class Training:
     evidence: HullEvidence
     seconds: dict[str, float]
     counts: dict[str, int]
+    symmetry: Symmetry | None = None

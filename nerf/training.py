@@ -40,6 +40,7 @@ from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import prepared
 from toonset.nerf.shape import hull_of, per_px
+from toonset.nerf.symmetry import completed
 from toonset.nerf.trained import TrainedField, Training
 
 CHANNELS, HIDDEN = 16, 32
@@ -79,7 +80,7 @@ def train(
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")
     ready = prepared(scene, options)
-    scene = ready.scene
+    scene, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
     hull, evidence = open_box(scene), NO_EVIDENCE
@@ -100,7 +101,9 @@ def train(
     seconds = {"drawings": drawings_s, "hull": hull_s, "rays": rays_s, "steps": steps_s}
     counts |= {"views": len(scene.frames), "parameters": sum(p.numel() for p in model.parameters())}
     result = _finished(start, options)
-    return Training(result, options, tuple(history), stopped, ready, evidence, seconds, counts)
+    return Training(
+        result, options, tuple(history), stopped, ready, evidence, seconds, counts, symmetry
+    )
 
 
 def _resolved(options: TrainOptions) -> TrainOptions:

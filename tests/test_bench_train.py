@@ -123,6 +123,10 @@ def test_views_are_taken_evenly() -> None:
     assert len(subset(eight, 3).train.frames) == 3
     assert subset(eight, 3).test is eight.test
     assert view_counts(case(views=3), (8, 4, 3)) == [3]
+    half = [job for job in plan([eight], 0, "", SCOPES["train", False]) if "half" in job.name]
+    assert {job.group for job in half} == {"exact half turn 32 px 3 views"}
+    names = [frame.name for frame in subset(half[0].case, 3).train.frames]
+    assert names == ["000.png", "002.png", "004.png"]
     test = case(views=9).train
     assert [frame.name for frame in curve_frames(test)] == [
         "000.png",
