@@ -21,32 +21,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, Int
-from scipy import ndimage
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.nerf.adam import Adam, Group
-from toonset.nerf.hull import LEVEL, Hull
+from toonset.nerf.fairing_distance import signed_distance
+from toonset.nerf.fairing_fit import Contacts, fit
+from toonset.nerf.hull import LEVEL, Hull, grown
 from toonset.nerf.march import Rays, march, rays_of
+from toonset.nerf.volume import Volume, trilinear
 
 COARSE = 64  # voxels along the longest side of the grid on which the surface bends
-BENDING = 1.0  # weight of the Laplacian; half and double cost 0.1 to 0.3 dB on left-out views
 OUTLINE_RAYS = 4000  # of all views together; half as many bend 5 % worse
-STEPS, RATE, LAST_RATE = 100, 0.1, 0.1  # of Adam; the rate decays exponentially to a tenth
-PYRAMID = (1, 2, 4, 8)  # coarse voxels per cell of each level
-REACH = 6.0  # coarse voxels: distances are clipped beyond
-BAND = 5.0  # coarse voxels from the hull's surface within which bending counts
 SLOPE = 0.7  # of the support per voxel of distance, where the fair surface makes the border
 NEAR_BEST = 0.98  # of a ray's best support: also kept, lest the ray hangs on a single voxel
 ALL = 1 << 20  # samples per ray: no limit
-
-Volume = Float[Tensor, "1 1 x y z"]
 
 
 def faired(
@@ -66,17 +60,17 @@ def faired(
     reach = math.ceil(slack)
     hull = _padded(hull, reach)
     factor = max(1, round(max(hull.support.shape) / COARSE))
-    outside = _signed_distance(hull, factor) - slack / factor
-    fair = _fit(outside, _contacts(hull, factor, outside, cameras, alphas))
+    outside = signed_distance(hull, factor) - slack / factor
+    fair = fit(outside, _contacts(hull, factor, outside, cameras, alphas))
     x, y, z = hull.support.shape
-    fine = F.interpolate(fair, scale_factor=factor, mode="trilinear")[0, 0, :x, :y, :z]
-    smooth = (LEVEL - SLOPE * factor * fine).clamp(0, 1).minimum(_grown(hull.support, reach))
+    fine = F.interpolate(fair[None, None], scale_factor=factor, mode="trilinear")[0, 0, :x, :y, :z]
+    smooth = (LEVEL - SLOPE * factor * fine).clamp_(0, 1).minimum(grown(hull.support, reach))
     sure = [
         _shrunk(alpha, math.ceil(slack * hull.voxel * camera.scale))
         for camera, alpha in zip(cameras, alphas, strict=True)
     ]
     kept = _lost(replace(hull, support=smooth), hull, cameras, sure)
-    return replace(hull, support=smooth.maximum(_grown(kept.float(), 1).minimum(hull.support)))
+    return replace(hull, support=torch.where(grown(kept, 1), smooth.maximum(hull.support), smooth))
 
 
 def _padded(hull: Hull, voxels: int) -> Hull:
@@ -84,50 +78,8 @@ def _padded(hull: Hull, voxels: int) -> Hull:
     return Hull(low, hull.voxel, support)
 
 
-def _grown(volume: Float[Tensor, "x y z"], radius: int) -> Float[Tensor, "x y z"]:
-    return F.max_pool3d(volume[None, None], 2 * radius + 1, stride=1, padding=radius)[0, 0]
-
-
 def _shrunk(alpha: Float[Tensor, "height width"], radius: int) -> Float[Tensor, "height width"]:
     return -F.max_pool2d(-alpha[None], 2 * radius + 1, stride=1, padding=radius)[0]
-
-
-@dataclass(frozen=True, eq=False)
-class _Contacts:
-    """Where outline rays may touch the surface.
-
-    Attributes:
-        points: (n, 3) in the units of `grid_sample`, packed ray after ray.
-        ray: (n,) which ray a point belongs to, ascending from 0.
-        rays: how many rays there are.
-    """
-
-    points: Float[Tensor, "n 3"]
-    ray: Int[Tensor, " n"]
-    rays: int
-
-    def lowest(self, volume: Volume) -> Float[Tensor, "rays 3"]:
-        """Return each ray's point of the smallest value."""
-        values = _at(volume, self.points)
-        best = values.new_full((self.rays,), torch.inf).scatter_reduce(0, self.ray, values, "amin")
-        hits = (values <= best[self.ray]).nonzero()[:, 0]
-        last = torch.zeros(self.rays, dtype=torch.long)
-        return self.points[last.scatter_reduce(0, self.ray[hits], hits, "amax")]
-
-
-def _signed_distance(hull: Hull, factor: int) -> Volume:
-    """Return the distance to the hull's surface in coarse voxels, negative inside."""
-    x, y, z = (-n % factor for n in hull.support.shape)
-    support = F.pad(hull.support, [0, z, 0, y, 0, x]).numpy()
-    inside = support >= LEVEL
-    outer, inner = (np.asarray(ndimage.distance_transform_edt(p)) for p in (~inside, inside))
-    distance = np.where(inside, 0.5 - inner, outer - 0.5)
-    # beside the surface the support says where between two voxels it lies
-    slope = np.sqrt(sum(np.square(part) for part in np.gradient(support)))
-    beside = (np.abs(distance) < 1.5) & (slope > 0.05)
-    between = ((LEVEL - support) / np.maximum(slope, 0.05)).clip(-1.5, 1.5)
-    signed = torch.as_tensor(np.where(beside, between, distance), dtype=torch.float32)
-    return F.avg_pool3d(signed[None, None] / factor, factor).clamp(-REACH, REACH)
 
 
 def _contacts(
@@ -136,7 +88,7 @@ def _contacts(
     outside: Volume,
     cameras: Sequence[Camera],
     alphas: Sequence[Tensor],
-) -> _Contacts:
+) -> Contacts:
     most = max(1, OUTLINE_RAYS // len(cameras))
     parts = []
     for camera, alpha in zip(cameras, alphas, strict=True):
@@ -144,12 +96,12 @@ def _contacts(
         chosen = np.linspace(0, len(pixels) - 1, min(most, len(pixels))).astype(int)
         parts.append(rays_of(camera, pixels[chosen], hull))
     rays = Rays(*(torch.cat([getattr(p, n) for p in parts]) for n in Rays.__annotations__))
-    coarse = Hull(hull.low, hull.voxel * factor, (LEVEL - outside[0, 0]).clamp(0, 1))
+    coarse = Hull(hull.low, hull.voxel * factor, (LEVEL - outside).clamp(0, 1))
     samples = march(rays, coarse, coarse.voxel, ALL)
     hit, ray = torch.unique_consecutive(samples.ray, return_inverse=True)
     low = torch.as_tensor(hull.low, dtype=torch.float32)
-    size = torch.tensor(outside.shape[2:], dtype=torch.float32) * coarse.voxel
-    return _Contacts(((samples.points - low) * (2 / size) - 1).flip(-1), ray, len(hit))
+    rows, weights = trilinear((samples.points - low) / coarse.voxel - 0.5, outside.shape)
+    return Contacts(rows, weights, ray, len(hit))
 
 
 def outline_points(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "n 2"]:
@@ -169,53 +121,6 @@ def outline_points(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray
         place[:, axis] += (first[crossing] - LEVEL) / (first[crossing] - second[crossing])
         points.append(place)
     return np.concatenate(points)
-
-
-def _fit(outside: Volume, contacts: _Contacts) -> Volume:
-    """Return the fair signed distance; `outside` is the hull's."""
-    sizes = [[-(-n // cell) for n in outside.shape[2:]] for cell in PYRAMID]
-    levels = [torch.zeros(1, 1, *size, requires_grad=True) for size in sizes]
-    optimizer = Adam([Group(levels, RATE)])
-    band = _inner(outside.abs() < BAND).float()
-    bending = BENDING / band.sum()
-    touching = contacts.points[:0]
-    for step in range(STEPS):
-        fair = outside + _sum(levels, outside.shape)
-        if step % 2 == 0:
-            touching = contacts.lowest(fair.detach().maximum(outside))
-        dip = F.relu(outside - fair).square().sum() / contacts.rays
-        bend = (_laplacian(fair) * band).square().sum()
-        loss = _at(fair, touching).square().mean() + bending * bend + dip
-        loss.backward()
-        optimizer.step(LAST_RATE ** (step / STEPS))
-    with torch.no_grad():
-        return outside + _sum(levels, outside.shape)
-
-
-def _sum(levels: Sequence[Tensor], shape: torch.Size) -> Volume:
-    x, y, z = shape[2:]
-    total = levels[0]
-    for cell, level in zip(PYRAMID[1:], levels[1:], strict=True):
-        up = F.interpolate(level, scale_factor=cell, mode="trilinear")
-        total = total + up[..., :x, :y, :z]
-    return total
-
-
-def _inner(volume: Tensor) -> Tensor:
-    return volume[..., 1:-1, 1:-1, 1:-1]
-
-
-def _laplacian(f: Volume) -> Volume:
-    """Return the sum of the six neighbours less six times the voxel, without the border."""
-    around = f[..., 2:, 1:-1, 1:-1] + f[..., :-2, 1:-1, 1:-1]
-    around = around + f[..., 1:-1, 2:, 1:-1] + f[..., 1:-1, :-2, 1:-1]
-    around = around + f[..., 1:-1, 1:-1, 2:] + f[..., 1:-1, 1:-1, :-2]
-    return around - 6 * _inner(f)
-
-
-def _at(volume: Volume, points: Float[Tensor, "n 3"]) -> Float[Tensor, " n"]:
-    grid = points[None, None, None]
-    return F.grid_sample(volume, grid, padding_mode="border", align_corners=False)[0, 0, 0, 0]
 
 
 def _lost(

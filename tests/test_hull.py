@@ -10,8 +10,7 @@ import torch.nn.functional as F
 from toonset.camera import Camera
 from toonset.errors import BundleError
 from toonset.nerf.bounds import box_of_masks
-from toonset.nerf.evidence import choose_missing, mask_iou
-from toonset.nerf.fairing import faired
+from toonset.nerf.evidence import choose_missing
 from toonset.nerf.hull import EDGE, LEVEL, Hull, carve, grown
 from toonset.nerf.hull_views import agreement, project
 from toonset.nerf.march import march, pixels_near, rays_of
@@ -99,20 +98,6 @@ def test_hull_of_a_box_is_the_box() -> None:
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
     np.testing.assert_allclose(hull.low + hull.voxel * low, -half, atol=0.05)
     np.testing.assert_allclose(hull.low + hull.voxel * high, half, atol=0.05)
-
-
-def test_fairing_removes_corners_but_no_outline() -> None:
-    cameras = [
-        Camera.looking_at(np.zeros(3), yaw, 0.0, 20.0, (64, 64)) for yaw in np.arange(8) * np.pi / 4
-    ]
-    u, v = np.moveaxis(cameras[0].pixel_grid() - 32, -1, 0) / 20.0
-    alpha = np.clip(0.5 + 20 * np.minimum(1 - np.abs(u), 1.2 - np.abs(v)), 0, 1)  # upright cylinder
-    alphas = [torch.as_tensor(alpha, dtype=torch.float32)] * 8
-    hull = carve(cameras, alphas, 96, 0)
-    smooth = faired(hull, cameras, alphas)
-    between = Camera.looking_at(np.zeros(3), np.pi / 8, 0.0, 20.0, (64, 64))
-    assert mask_iou(smooth, cameras[1], alphas[1]) > 0.98
-    assert mask_iou(smooth, between, alphas[0]) > mask_iou(hull, between, alphas[0]) + 0.02
 
 
 def test_evidence_tolerates_one_wrong_view_only_where_there_is_one() -> None:

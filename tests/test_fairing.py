@@ -1,0 +1,102 @@
+"""The fair surface: its parts beside torch's and scipy's, and what it does to a hull."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+from scipy import ndimage
+
+from toonset.camera import Camera
+from toonset.nerf.evidence import mask_iou
+from toonset.nerf.fairing import faired
+from toonset.nerf.fairing_distance import UNKNOWN, signed_distance, squared_distance
+from toonset.nerf.fairing_fit import Contacts, Pyramid
+from toonset.nerf.hull import Hull, carve
+from toonset.nerf.volume import add_bending, inner, laplacian, trilinear
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_squared_distance_is_scipys_within_reach(seed: int) -> None:
+    cells = np.random.default_rng(seed).random((14, 9, 20)) < 0.004
+    cells[3, 4, 5] = True
+    expected = np.square(ndimage.distance_transform_edt(~cells))
+    found = squared_distance(torch.as_tensor(cells), 6).numpy()
+    assert (expected <= 36).mean() > 0.3
+    np.testing.assert_allclose(found[expected <= 36], expected[expected <= 36], atol=1e-6)
+    assert (found[expected > 36] > 36).all()
+    assert (squared_distance(torch.zeros(3, 4, 5, dtype=torch.bool), 9) >= UNKNOWN).all()
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+def test_signed_distance_of_a_ball(factor: int) -> None:
+    places = torch.stack(torch.meshgrid(*[torch.arange(50) - 24.3] * 3, indexing="ij"))
+    ball = Hull(np.zeros(3), 1.0, (0.5 + 13.2 - places.norm(dim=0)).clamp(0, 1))
+    found = signed_distance(ball, factor)
+    padded = F.pad(places.norm(dim=0) - 13.2, [0, -50 % factor] * 3, value=99)
+    expected = F.avg_pool3d(padded[None] / factor, factor)[0]
+    wrong = factor * (found - expected).abs()  # in voxels, which are as rough as that
+    assert wrong[expected.abs() < 4].max() < 1
+    assert wrong[expected.abs() < 0.25 / factor].max() < 0.25
+
+
+def test_a_pyramid_is_the_sum_of_its_enlarged_levels() -> None:
+    torch.manual_seed(0)
+    shape = torch.Size([13, 8, 17])
+    pyramid = Pyramid.over(shape)
+    levels = [torch.randn_like(level).requires_grad_() for level in pyramid.zeros()]
+    slow = torch.zeros(shape)
+    for cell, level in zip((1, 2, 4, 8), levels, strict=True):
+        wide = F.interpolate(level[None, None], scale_factor=cell, mode="trilinear")
+        slow = slow + wide[0, 0, :13, :8, :17]
+    torch.testing.assert_close(pyramid.spread(levels), slow)
+    upstream = torch.randn(shape)
+    pairs = zip(
+        pyramid.gathered(upstream), torch.autograd.grad(slow, levels, upstream), strict=True
+    )
+    for gradient, expected in pairs:
+        torch.testing.assert_close(gradient, expected, rtol=1e-4, atol=1e-4)
+
+
+def test_bending_has_the_gradient_that_is_added() -> None:
+    torch.manual_seed(1)
+    f = torch.randn(5, 6, 7, dtype=torch.float64, requires_grad=True)
+    weights = torch.rand_like(inner(f))
+    (expected,) = torch.autograd.grad((weights * laplacian(f).square()).sum(), f)
+    gradient = torch.zeros_like(f)
+    add_bending(gradient, f.detach(), weights)
+    torch.testing.assert_close(2 * gradient, expected)
+    x, y, z = torch.meshgrid(*(torch.arange(n).double() for n in f.shape), indexing="ij")
+    torch.testing.assert_close(laplacian(x**2 + 3 * y - z**2 / 2), torch.ones_like(weights))
+
+
+def test_contacts_read_and_write_as_grid_sample_does() -> None:
+    torch.manual_seed(2)
+    volume = torch.randn(5, 4, 6, requires_grad=True)
+    at = torch.rand(40, 3) * torch.tensor([7.0, 6.0, 8.0]) - 1  # beyond the border, too
+    unit = (at + 0.5) * 2 / torch.tensor([5.0, 4.0, 6.0]) - 1
+    grid = unit.flip(-1)[None, None, None]
+    slow = F.grid_sample(volume[None, None], grid, padding_mode="border", align_corners=False)
+    slow = slow[0, 0, 0, 0]
+    contacts = Contacts(*trilinear(at, volume.shape), torch.arange(40) // 10, 4)
+    torch.testing.assert_close(contacts.values(volume.detach()), slow)
+    upstream, gradient = torch.randn(40), torch.zeros(5, 4, 6)
+    contacts.add_to(gradient, upstream)
+    torch.testing.assert_close(gradient, torch.autograd.grad(slow, volume, upstream)[0])
+    lowest = contacts.lowest(volume.detach())
+    torch.testing.assert_close(lowest.values(volume.detach()), slow.view(4, 10).amin(dim=1))
+
+
+def test_fairing_removes_corners_but_no_outline() -> None:
+    cameras = [
+        Camera.looking_at(np.zeros(3), yaw, 0.0, 20.0, (64, 64)) for yaw in np.arange(8) * np.pi / 4
+    ]
+    u, v = np.moveaxis(cameras[0].pixel_grid() - 32, -1, 0) / 20.0
+    alpha = np.clip(0.5 + 20 * np.minimum(1 - np.abs(u), 1.2 - np.abs(v)), 0, 1)  # upright cylinder
+    alphas = [torch.as_tensor(alpha, dtype=torch.float32)] * 8
+    hull = carve(cameras, alphas, 96, 0)
+    smooth = faired(hull, cameras, alphas)
+    between = Camera.looking_at(np.zeros(3), np.pi / 8, 0.0, 20.0, (64, 64))
+    assert mask_iou(smooth, cameras[1], alphas[1]) > 0.98
+    assert mask_iou(smooth, between, alphas[0]) > mask_iou(hull, between, alphas[0]) + 0.02
