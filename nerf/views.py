@@ -16,15 +16,14 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.nerf.ink import InkStyle
 from toonset.nerf.ink_redraw import draw_ink, ink_scale, inked
-from toonset.nerf.losses import straight
 from toonset.nerf.march import pixels_near, rays_of
 from toonset.nerf.supersample import borders, places_within
 from toonset.nerf.trained import TrainedField
 from toonset.nerf.views_bake import Baked
 from toonset.nerf.views_cast import cast
+from toonset.nerf.views_labels import NONE, labels_of, palette_shares
 from toonset.palette.labels import UNLABELLED
 
-RAYS_PER_CHUNK = 1 << 12  # that get labels together
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
 
 
@@ -66,16 +65,22 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
         camera: where it is seen from.
     """
     baked = source if isinstance(source, Baked) else Baked.of(source)
+    trained = baked.trained
     width, height = camera.size_wh
-    near = torch.as_tensor(pixels_near(camera, baked.trained.hull))
-    first = _cast(baked, camera, camera.pixel_grid()[near.numpy()])
-    table = torch.zeros(height, width, first.shape[1])
-    table[near] = first
-    border = borders(table[..., [0, 1, 2, 3, *range(5, first.shape[1])]])
-    places = places_within(border.numpy())
-    more = _cast(baked, camera, places.reshape(-1, 2))
-    table[border] = more.view(*places.shape[:2], table.shape[2]).mean(dim=1)
-    return _with_lines(_rendering(table.numpy()), baked.trained.ink, camera)
+    near = torch.as_tensor(pixels_near(camera, trained.hull))
+    seen, labels = torch.zeros(height, width, 5), torch.full((height, width), NONE)
+    seen[near] = _cast(baked, camera, camera.pixel_grid()[near.numpy()])
+    if trained.classifier is not None:
+        labels[near] = labels_of(trained.classifier, seen[near][:, :3], seen[near][:, 3])
+    border = borders(seen[..., :4].numpy(), labels.numpy())
+    places = places_within(border)
+    more = _cast(baked, camera, places.reshape(-1, 2)).view(*places.shape[:2], 5)
+    chosen, shares = torch.as_tensor(border), None
+    if trained.classifier is not None:
+        shares = palette_shares(trained.classifier, baked.paints, seen, labels, chosen, more)
+    seen[chosen] = more.mean(dim=1)
+    view = _rendering(seen.numpy(), None if shares is None else shares.numpy())
+    return _with_lines(view, trained.ink, camera)
 
 
 def _with_lines(view: Rendering, style: InkStyle | None, camera: Camera) -> Rendering:
@@ -87,8 +92,8 @@ def _with_lines(view: Rendering, style: InkStyle | None, camera: Camera) -> Rend
     )
 
 
-def _cast(baked: Baked, camera: Camera, pixels: Float[np.ndarray, "n 2"]) -> Tensor:
-    """Return rays' premultiplied colour, opacity, depth times opacity, and share of each label."""
+def _cast(baked: Baked, camera: Camera, pixels: Float[np.ndarray, "n 2"]) -> Float[Tensor, "n 5"]:
+    """Return rays' premultiplied colour, opacity, and depth times opacity."""
     rays = rays_of(camera, pixels, baked.trained.hull)
     seen = cast(baked, rays)
     forward = torch.as_tensor(np.array(camera.rotation[2]), dtype=torch.float32)
@@ -96,28 +101,17 @@ def _cast(baked: Baked, camera: Camera, pixels: Float[np.ndarray, "n 2"]) -> Ten
     # distance is opacity-weighted, hence the opacity before the constant parts
     seen[:, 4] *= rays.directions @ forward
     seen[:, 4] += seen[:, 3] * (rays.origins @ forward - offset)
-    return torch.cat([seen, _shares(baked.trained, seen[:, :3], seen[:, 3])], dim=1)
+    return seen
 
 
-def _shares(
-    trained: TrainedField, color: Float[Tensor, "rays 3"], opacity: Float[Tensor, " rays"]
-) -> Float[Tensor, "rays colors"]:
-    """Return each ray's opacity in the column of its label; no column without palette."""
-    if trained.classifier is None or trained.palette is None:
-        return torch.zeros(len(color), 0)
-    shares = torch.zeros(len(color), len(trained.palette))
-    for hit in (opacity > 0).nonzero()[:, 0].split(RAYS_PER_CHUNK):
-        label = trained.classifier(straight(color[hit], opacity[hit])).argmax(dim=1)
-        shares[hit, label] = opacity[hit]
-    return shares
-
-
-def _rendering(mean: Float[np.ndarray, "height width columns"]) -> Rendering:
+def _rendering(
+    mean: Float[np.ndarray, "height width 5"],
+    shares: Float[np.ndarray, "height width colors"] | None,
+) -> Rendering:
     alpha = mean[..., 3].clip(0, 1)
     seen = alpha >= SEEN_FROM
     depth = np.where(seen, mean[..., 4] / np.where(seen, alpha, 1), np.nan)
-    shares = mean[..., 5:]
-    if not shares.shape[2]:
-        return Rendering(mean[..., :3], alpha, depth, None, None)
-    labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
+    labels = None
+    if shares is not None:
+        labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
     return Rendering(mean[..., :3], alpha, depth, labels, shares)

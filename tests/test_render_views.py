@@ -122,13 +122,25 @@ def test_outlines_are_as_soft_as_pictures_of_many_rays() -> None:
 
 
 def test_borders_are_where_neighbours_differ() -> None:
-    values = torch.zeros(6, 7, 2)
+    values, labels = np.zeros((6, 9, 2), dtype=np.float32), np.zeros((6, 9), dtype=int)
     values[2, 3, 1] = 0.5
     values[5, 6, 0] = 0.01
-    found = borders(values).numpy()
-    expected = np.zeros((6, 7), dtype=bool)
-    expected[1:4, 2:5] = True
-    np.testing.assert_array_equal(found, expected)
+    labels[4, 8] = 1
+    expected = np.zeros((6, 9), dtype=bool)
+    expected[1:4, 3] = expected[2, 2:5] = expected[3:6, 8] = expected[4, 7] = True
+    np.testing.assert_array_equal(borders(values, labels), expected)
+
+
+def test_rays_leap_over_what_lies_between_two_balls_and_miss_none() -> None:
+    trained = ball(density=0.2)
+    support = torch.cat([trained.hull.support, torch.zeros(20, 28, 30), trained.hull.support], 2)
+    trained = replace(trained, hull=Hull(LOW, VOXEL, support))
+    camera = Camera.looking_at(np.array([0, 0, 1.5]), 0.05, 0.03, 9.0, (18, 18))
+    rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2), trained.hull)
+    fast, truth = cast(Baked.of(trained), rays).numpy(), slow(trained, rays)
+    away = truth[:, 4] / np.maximum(truth[:, 3], 1e-6)
+    assert (np.abs(away[truth[:, 3] > 0.5]) < 1.5).sum() > 20  # rays that meet both
+    np.testing.assert_allclose(fast, truth, atol=0.02)
 
 
 def test_places_share_a_pixel_evenly() -> None:
