@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from toonset.nerf.progress_watch import Onlooker
     from toonset.nerf.trained import Training
 
-FEW_VIEWS = 4
 DOUBTFUL = 3  # exit code: written, but training went wrong and was cut short
 FINE = ("steps", "budget")  # why a training may end
 RESUMED_AS = {"steps": "--steps", "budget_s": "--budget", "device": "--device", "seed": "--seed"}
@@ -126,6 +126,7 @@ def _prepared(
     printer: Printer,
 ) -> Scene:
     """Set torch up and return the scene with what is trained."""
+    from toonset.nerf.gaps import wide_gaps
     from toonset.nerf.memory import check_memory
     from toonset.nerf.threads import use_threads
     from toonset.nerf.training import device_of
@@ -134,11 +135,12 @@ def _prepared(
     asked = request.threads if checkpoint is None else str(checkpoint.record.threads)
     count = threads_of(asked)
     use_threads(count)
-    printer.say(f"{check_memory(scene, device)}; {count} CPU thread{'s' * (count > 1)}")
+    printer.say(f"{check_memory(scene, options, device)}; {count} CPU thread{'s' * (count > 1)}")
     palette = request.palette if checkpoint is None else checkpoint.record.with_palette
     scene = _with_palette(scene, palette, printer)
-    if 1 < len(scene.frames) < FEW_VIEWS:
-        printer.say(f"only {len(scene.frames)} views: what no drawing shows is a guess")
+    for gap in wide_gaps(scene) if len(scene.frames) > 1 else ():
+        turn = f"the {math.degrees(gap.radians):.0f} deg from {gap.after} to {gap.before}"
+        printer.say(f"no drawing in {turn}: shape and colours seen from there are a guess")
     return scene
 
 
