@@ -23,11 +23,12 @@ from toonset.nerf.warp_coherence import Placed, Touch, pixels_of, touch
 from toonset.nerf.warp_moves import Moves
 from toonset.nerf.warp_outline import Outlines
 
-NOISE, NOISE_PX = 0.0035, 0.4  # of the square, but at least so many pixels: a rim's own error
+NOISE, NOISE_PX = 0.00175, 0.2  # of the square, but at least so many pixels: a rim's own error
 CORRELATED = 5.0  # rim points in a row that err together
 FOREIGN = 0.02  # of the square: larger disagreements are more and more another shape, no error
-LEAST, MOST = 0.001, 0.012  # of the square: limits of tau; a larger one would bend other shapes
+LEAST, MOST = 0.001, 0.02  # of the square: limits of tau; a larger one would bend other shapes
 SETTLED = 3  # rounds before tau is learned
+FEWER = 7  # figure pixels of which one is looked at, where a mean is wanted
 AFRESH = 4  # rounds after which whole rays are searched again, not only near the last best point
 
 
@@ -75,12 +76,12 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     idle = first.cost - _log_volume(first.matrix, moves.covariance * tau**2, views)
     if idle <= 0:  # even a perfect fit would not be worth its numbers
         return Fit(numbers, 0.0, float(idle / 2), (first.apart, first.apart))
-    normal, flat, common = first, numbers.reshape(-1), _common(outlines, moves)
-    weigh = common.T @ precision
+    normal, flat = first, numbers.reshape(-1)
+    common, shares = _common(outlines, moves)
     for round_ in range(1, rounds + 1):
         prior = precision / tau**2
         flat = flat - np.linalg.solve(normal.matrix + prior, normal.slope + prior @ flat)
-        flat = flat - common @ np.linalg.lstsq(weigh @ common, weigh @ flat, rcond=1e-9)[0]
+        flat = flat - common @ (shares @ flat)
         numbers = flat.reshape(views, count)
         normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
         if round_ >= SETTLED:
@@ -91,23 +92,30 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     return Fit(numbers, tau, float(gain), (first.apart, normal.apart))
 
 
-def _common(outlines: Outlines, moves: Moves) -> Float[np.ndarray, "m 4"]:
+def _common(
+    outlines: Outlines, moves: Moves
+) -> tuple[Float[np.ndarray, "m 4"], Float[np.ndarray, "4 m"]]:
     """Return what all numbers are where the body stands aside along an axis, or is larger.
 
-    That is no error of the drawings: of all numbers that differ by it, the smallest are meant.
-    (The equations leave it open but for perspective, through which errors would push the body.)
+    That is no error of the drawings: of all numbers that differ by it, those are meant which move
+    the figures least. (The equations leave it open but for perspective, through which errors
+    would push the body.)
+
+    Returns:
+        A column per axis and one for size, and the rows that find each one's share in numbers.
     """
-    size = outlines.size_px
-    columns = []
-    for axis in np.eye(3) * outlines.radius:
-        parts = []
-        for outline in outlines.views:
-            camera = outline.camera
-            ends = pixels_of(camera, outlines.middle + np.stack([axis, -axis]) / 2)
-            parts.append(moves.even((ends[0] - ends[1]) / size, 0.0))
-        columns.append(np.concatenate(parts))
-    columns.append(np.concatenate([moves.even(np.zeros(2), 1.0) for _ in outlines.views]))
-    return np.stack(columns, axis=1)
+    columns, weighed = [], []
+    for outline in outlines.views:
+        figure = outline.camera.pixel_grid()[outline.distance[0].numpy() > 0][::FEWER]
+        jacobian = moves.jacobian(outline.square.unit(figure)).reshape(-1, len(moves.covariance))
+        ends = outlines.middle + outlines.radius * np.concatenate([np.eye(3), -np.eye(3)])
+        ends_px = pixels_of(outline.camera, ends) / outlines.size_px
+        own = [moves.even(shift, 0.0) for shift in ends_px[:3] - ends_px[3:]]
+        own.append(moves.even(np.zeros(2), 1.0))
+        columns.append(np.stack(own, axis=1))
+        weighed.append(jacobian.T @ (jacobian @ columns[-1]) / len(jacobian))
+    common, weights = np.concatenate(columns), np.concatenate(weighed).T
+    return common, np.linalg.pinv(weights @ common, rcond=1e-9) @ weights
 
 
 def _linearised(
