@@ -46,6 +46,7 @@ METHODS: dict[str, Method] = {
     "600 steps": Method(TrainOptions(steps=600)),
     "without palette": Method(TrainOptions(), "no palette"),
     "without smoothing": Method(TrainOptions(smoothness=0.0)),
+    "without fairing": Method(TrainOptions(fair=False), first_seed_only=True),
     "without registration": Method(TrainOptions(register=False), first_seed_only=True),
     "without unbending": Method(TrainOptions(unbend=False), first_seed_only=True),
     "without symmetry": Method(TrainOptions(symmetric=False), first_seed_only=True),

@@ -69,6 +69,9 @@ def train(
     as_bent: Annotated[
         bool, typer.Option("--as-bent", help="Trust the outlines: do not unbend drawings.")
     ] = False,
+    as_carved: Annotated[
+        bool, typer.Option("--as-carved", help="Keep the corners of the drawings' visual hull.")
+    ] = False,
     one_sided: Annotated[
         bool,
         typer.Option(
@@ -128,7 +131,8 @@ def train(
     _check_choice(field or FIELDS[0], FIELDS, "--field")
     _check_choice(ink, INKS, "--ink")
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
-    switches = {"register": as_placed, "unbend": as_bent, "symmetric": one_sided}
+    switches = {"fair": as_carved, "register": as_placed, "unbend": as_bent}
+    switches |= {"symmetric": one_sided}
     given |= {name: False for name, off in switches.items() if off}
     given |= {"ink": True} if ink == "redraw" else {}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle

@@ -28,6 +28,7 @@ DOUBTFUL = 3  # exit code: written, but training went wrong and was cut short
 FINE = ("steps", "budget")  # why a training may end
 RESUMED_AS = {"steps": "--steps", "budget_s": "--budget", "device": "--device", "seed": "--seed"}
 RESUMED_AS |= {
+    "fair": "--as-carved",
     "register": "--as-placed",
     "unbend": "--as-bent",
     "symmetric": "--one-sided",

@@ -28,6 +28,7 @@ class TrainOptions:
             grid of voxels, or the hull with the drawings' colours (nothing is fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over any backdrop.
+        fair: take the fairest surface inside the hull instead of the hull with its corners.
         register: let cameras follow drawings that were placed or sized off.
         unbend: bend drawings back that disagree with the others' outlines.
         symmetric: where drawings show that the body is its own mirror image, flip them for the side
@@ -46,6 +47,7 @@ class TrainOptions:
     missing_views: int | None = None
     field: FieldName = "triplane"
     carve: bool = True
+    fair: bool = True
     register: bool = True
     unbend: bool = True
     symmetric: bool = True

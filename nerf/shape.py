@@ -22,11 +22,11 @@ SLACK = 1.5  # times the outlines' disagreement: as far as the surface may leave
 def hull_of(
     scene: Scene, options: TrainOptions, apart_px: float = 0.0
 ) -> tuple[Hull, HullEvidence]:
-    """Return the faired hull of a scene's masks and the evidence for its tolerance.
+    """Return the hull of a scene's masks, faired, and the evidence for its tolerance.
 
     Args:
         scene: posed pictures.
-        options: `missing_views` is used.
+        options: `missing_views` and `fair` are used.
         apart_px: by how much the outlines disagree, root mean square.
 
     Raises:
@@ -45,7 +45,7 @@ def hull_of(
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
     hull = carve(cameras, alphas, voxels, evidence.missing)
     slack = SLACK * apart_px / (hull.voxel * max(camera.scale for camera in cameras))
-    hull = faired(hull, cameras, alphas, slack)
+    hull = faired(hull, cameras, alphas, slack) if options.fair else hull
     # Run folders hold bytes: train on exactly what will be loaded.
     return replace(hull, support=(hull.support * 255).round() / 255), evidence
 
