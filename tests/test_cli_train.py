@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from toonset.cli.train_run import RESUMED_AS
 from toonset.cli.train_stop import Stopper
 from toonset.cli.train_threads import measured
 from toonset.cli.train_voice import LOG_S, Pace
@@ -180,3 +181,20 @@ def test_a_log_gets_a_line_now_and_then_and_a_terminal_a_live_one():
     assert lines(False, 3600, 10_000) in range(int(3600 / LOG_S) - 5, int(3600 / LOG_S) + 12)
     assert lines(False, 0.5, 300) == 1
     assert lines(True, 6, 300) in range(50, 62)
+
+
+def test_every_switch_switches_its_option(toonset, monkeypatch) -> None:
+    asked: list[dict[str, object]] = []
+    monkeypatch.setattr("toonset.cli.train.run", lambda request, _: asked.append(request.options))
+    switches = {
+        ("--as-carved",): {"fair": False},
+        ("--as-placed",): {"register": False},
+        ("--as-bent",): {"unbend": False},
+        ("--one-sided",): {"symmetric": False},
+        ("--ink", "redraw"): {"ink": True},
+    }
+    for words in ((), *switches):
+        assert toonset("train", *words).code == 0
+    default = asked[0]
+    assert asked[1:] == [default | changed for changed in switches.values()]
+    assert RESUMED_AS.keys() >= {name for changed in switches.values() for name in changed}
