@@ -110,15 +110,16 @@ def calib_cases(folder: Path | None, seed: int, count: int, only: str = "") -> I
 
 
 def train_cases(
-    folder: Path | None, seed: int, count: int, *, half: bool = False
+    folder: Path | None, seed: int, count: int, *, half: bool = False, px: int = 150
 ) -> Iterator[TrainCase]:
-    """Yield the folder's training cases, or `count` synthetic ones at 150 px.
+    """Yield the folder's training cases, or `count` synthetic ones.
 
     Args:
         folder: case folders; None for synthetic ones.
         seed: first seed of the synthetic ones.
         count: of the synthetic ones.
         half: reduce a folder's pictures to half their size.
+        px: size of synthetic pictures.
 
     Raises:
         BundleError: the folder holds no case.
@@ -126,7 +127,7 @@ def train_cases(
     if folder is None:
         for i in range(count):
             body = random_body(seed + i)
-            drawn = SynthOptions(cell_px=150, outline_px=0, elevation_deg=8)
+            drawn = SynthOptions(cell_px=px, outline_px=0, elevation_deg=8)
             held_out = replace(drawn, views=16)
             train = _scene(make_turnaround(body, drawn, seed + i))
             test = _scene(make_turnaround(body, held_out, seed + i))

@@ -73,8 +73,8 @@ class Samples:
     def and_then(self, behind: Samples) -> Samples:
         """Return these samples and others of the same rays, all behind them."""
         names = ("points", "ray", "order", "distance", "support")
-        pairs = (torch.cat([getattr(self, name), getattr(behind, name)]) for name in names)
-        both = Samples(*pairs, self.rays)
+        pairs = {name: torch.cat([getattr(self, name), getattr(behind, name)]) for name in names}
+        both = Samples(**pairs, rays=self.rays)
         in_front = torch.bincount(self.ray, minlength=self.rays)
         both.order[len(self.ray) :] += in_front[behind.ray]
         counts = in_front + torch.bincount(behind.ray, minlength=self.rays)

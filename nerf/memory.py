@@ -13,25 +13,29 @@ import torch.nn.functional as F
 from toonset.dataset.scene import Scene
 from toonset.errors import BundleError
 from toonset.nerf.batches import MOST_RAYS
+from toonset.nerf.field_box import BINS, RAYS_PER_STEP
+from toonset.nerf.options import TrainOptions
 from toonset.nerf.shape import VOXELS, VOXELS_PER_PX, per_px
 from toonset.nerf.training import MOST_SAMPLES
 
-# Measured: peak resident memory over that before, eight views of 150 and 300 px.
-VOXEL_BYTES = 90  # of the hull's grid, while it is carved and rounded
-SAMPLE_BYTES = 350  # interpolation both ways, and its pruned copy
-FIXED_BYTES = 100 * 2**20  # activations of a batch, parameters, allocator
+# Measured by `python -m toonset.bench.train_floor`: peak resident memory over that before.
+VOXEL_BYTES = 40  # of the hull's grid, while it is carved and faired
+SAMPLE_BYTES = 260  # interpolation both ways, and its pruned copy
+FIXED_BYTES = 60 * 2**20  # activations of a batch, parameters, allocator
+PIXEL_BYTES = 200  # of a whole ray through the box, while rays are laid out
+BOX_SAMPLE_BYTES = 800  # of a step along whole rays: points, features, hidden values, gradients
 GIGABYTE = 1e9
 OUT_OF_MEMORY = ("can't allocate memory", "out of memory", "not enough memory")
 CGROUP = Path("/sys/fs/cgroup")
 
 
-def check_memory(scene: Scene, device: torch.device) -> str:
+def check_memory(scene: Scene, options: TrainOptions, device: torch.device) -> str:
     """Return how much memory a training needs and how much is free, in words.
 
     Raises:
         BundleError: it needs more than is free.
     """
-    need = needed_bytes(scene)
+    need = needed_bytes(scene, options)
     free = [free_bytes()]
     if device.type == "cuda":
         free.append(torch.cuda.mem_get_info(device)[0])
@@ -48,8 +52,12 @@ def check_memory(scene: Scene, device: torch.device) -> str:
     return f"memory: about {text} more, {there} are free"
 
 
-def needed_bytes(scene: Scene) -> int:
+def needed_bytes(scene: Scene, options: TrainOptions) -> int:
     """Return about how many bytes training takes beside those that are in use already."""
+    if not options.carve:
+        pixels = sum(frame.rgba.shape[0] * frame.rgba.shape[1] for frame in scene.frames)
+        samples = min(pixels, RAYS_PER_STEP) * BINS
+        return int(FIXED_BYTES + PIXEL_BYTES * pixels + BOX_SAMPLE_BYTES * samples)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS) ** 3 * _slenderness(scene)
     samples = min(MOST_RAYS, _rays(scene)) * MOST_SAMPLES
     return int(FIXED_BYTES + VOXEL_BYTES * voxels + SAMPLE_BYTES * samples)

@@ -11,6 +11,8 @@ import pytest
 import torch
 from safetensors.torch import save
 
+from toonset.bench.cases import train_cases
+from toonset.bench.train_growth import growths
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
@@ -18,9 +20,11 @@ from toonset.nerf import memory
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.field import TriplaneField
 from toonset.nerf.field_loss import Model
+from toonset.nerf.field_rays import PRUNE_AFTER
 from toonset.nerf.fitting import store_in_half
 from toonset.nerf.hull import Hull
 from toonset.nerf.manifest import check_manifest, write_manifest
+from toonset.nerf.options import TrainOptions
 from toonset.nerf.run_folder_tensors import packed, parameters_of, rows_near, unpack
 from toonset.nerf.trained import TrainedField
 
@@ -166,18 +170,19 @@ def test_the_estimate_grows_with_pictures_and_is_held_against_what_is_free(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     sizes = [
-        memory.needed_bytes(discs(side, views)) for side, views in ((60, 4), (60, 8), (120, 8))
+        memory.needed_bytes(discs(side, views), TrainOptions())
+        for side, views in ((60, 4), (60, 8), (120, 8))
     ]
     assert sizes == sorted(sizes)
     assert sizes[0] < sizes[1] < sizes[2] < 4e9
     cpu = torch.device("cpu")
     monkeypatch.setattr(memory, "free_bytes", lambda: sizes[0] - 1)
     with pytest.raises(BundleError, match=r"discs: training needs about .* GB of memory, .* free"):
-        memory.check_memory(discs(60, 4), cpu)
+        memory.check_memory(discs(60, 4), TrainOptions(), cpu)
     monkeypatch.setattr(memory, "free_bytes", lambda: sizes[0])
-    assert "are free" in memory.check_memory(discs(60, 4), cpu)
+    assert "are free" in memory.check_memory(discs(60, 4), TrainOptions(), cpu)
     monkeypatch.setattr(memory, "free_bytes", lambda: None)
-    assert "free" not in memory.check_memory(discs(60, 4), cpu)
+    assert "free" not in memory.check_memory(discs(60, 4), TrainOptions(), cpu)
 
 
 def test_a_control_group_with_less_than_the_machine_counts(
@@ -203,3 +208,12 @@ def test_running_out_of_memory_is_told_apart_from_other_errors() -> None:
         raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB")
     with pytest.raises(RuntimeError, match="mat1 and mat2"), memory.memory_errors():
         torch.mm(torch.ones(2, 3), torch.ones(2, 3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("carve", [True, False])
+def test_the_estimate_is_near_the_real_peak(carve: bool) -> None:
+    (case,) = train_cases(None, 0, 1)
+    options = TrainOptions(steps=PRUNE_AFTER + 2, device="cpu", carve=carve)
+    (row,) = growths({150: case.train}, options)
+    assert 0.7 * row.peak < row.estimate < 1.4 * row.peak

@@ -1,0 +1,75 @@
+"""What whole trainings take, by the size of the drawings: seconds of every part, and memory."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from toonset.dataset.scene import Scene
+from toonset.nerf.memory import needed_bytes
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.training import train
+
+
+@dataclass(frozen=True)
+class Growth:
+    """A whole training.
+
+    Attributes:
+        px: size of the drawings.
+        figure_px: opaque pixels of all drawings.
+        counts, seconds: of the training.
+        peak: most bytes in use over those before the training.
+        estimate: what `needed_bytes` says of it.
+    """
+
+    px: int
+    figure_px: int
+    counts: dict[str, int]
+    seconds: dict[str, float]
+    peak: int
+    estimate: int
+
+
+def growths(scenes: Mapping[int, Scene], options: TrainOptions) -> Iterator[Growth]:
+    """Train on scenes of some sizes, each in a process of its own, with one thread."""
+    context = multiprocessing.get_context("spawn")
+    for px, scene in scenes.items():
+        with context.Pool(1, _one_thread) as pool:
+            yield pool.apply(growth, (scene, px, options))
+
+
+def growth(scene: Scene, px: int, options: TrainOptions) -> Growth:
+    """Train in this process, which should have done nothing else, and return what it took."""
+    estimate, before = needed_bytes(scene, options), _resident_bytes("VmRSS")
+    training = train(scene, options)
+    peak = _resident_bytes("VmHWM") - before
+    opaque = sum(int((frame.rgba[..., 3] > 127).sum()) for frame in scene.frames)
+    voxels = {"voxels": training.result.hull.support.numel()}
+    return Growth(px, opaque, training.counts | voxels, training.seconds, peak, estimate)
+
+
+def _resident_bytes(which: str) -> int:
+    """Return the memory in use now (VmRSS) or at most (VmHWM); Linux."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(which))
+
+
+def print_growth(rows: Iterable[Growth]) -> None:
+    """Print trainings as a table, each as soon as it is done."""
+    print("| px | figure, px | rays | samples | voxels | hull | rays | steps | whole | GB | said |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    for row in rows:
+        numbers = [row.px, row.figure_px, *(row.counts[k] for k in ("rays", "samples", "voxels"))]
+        stages = [*(row.seconds[k] for k in ("hull", "rays", "steps")), sum(row.seconds.values())]
+        sizes = " | ".join(f"{size / 1e9:.2f}" for size in (row.peak, row.estimate))
+        print(f"| {' | '.join(map(str, numbers))} |", end="")
+        print(f" {' | '.join(f'{s:.1f} s' for s in stages)} | {sizes} |", flush=True)
+
+
+def _one_thread() -> None:
+    import torch
+
+    torch.set_num_threads(1)
