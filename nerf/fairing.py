@@ -10,7 +10,8 @@ distance f (negative inside, in voxels) minimises
 
 by Adam over a pyramid of grids. Where a ray touches is found anew in every step, so the contact
 may slide along the ray. Thin parts that the coarse grid loses come back from the hull: a ray
-through a drawing's mask keeps at least the voxels that f likes best.
+through a drawing's mask keeps at least the voxels that f likes best, and capes and blades, which
+hide each other from most views, are taken over whole.
 
 Sources: thin-plate energy of an implicit surface, Turk and O'Brien, "Shape transformation using
 variational implicit functions", 1999; contact of an outline ray with its surface, Cipolla and
@@ -30,7 +31,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.nerf.fairing_distance import signed_distance
+from toonset.nerf.fairing_distance import signed_distance, squared_distance
 from toonset.nerf.fairing_fit import Contacts, fit
 from toonset.nerf.hull import LEVEL, Hull, grown
 from toonset.nerf.march import Rays, march, rays_of
@@ -39,7 +40,9 @@ from toonset.nerf.volume import Volume, trilinear
 COARSE = 64  # voxels along the longest side of the grid on which the surface bends
 OUTLINE_RAYS = 4000  # of all views together; half as many bend 5 % worse
 SLOPE = 0.7  # of the support per voxel of distance, where the fair surface makes the border
-NEAR_BEST = 0.98  # of a ray's best support: also kept, lest the ray hangs on a single voxel
+SHEET = 0.8  # coarse voxels: half the thickness of what the coarse grid has no room for
+NEAREST = 2.0  # times a lost ray's least distance: what is as near is kept, too
+SPOT = 0.01  # coarse voxels more, lest a ray hangs on a single voxel
 ALL = 1 << 20  # samples per ray: no limit
 
 
@@ -69,7 +72,9 @@ def faired(
         _shrunk(alpha, math.ceil(slack * hull.voxel * camera.scale))
         for camera, alpha in zip(cameras, alphas, strict=True)
     ]
-    kept = _lost(replace(hull, support=smooth), hull, cameras, sure)
+    kept = _lost(replace(hull, support=smooth), fine, hull, cameras, sure)
+    if slack < 1:  # the hull of drawings that disagree has shards which no drawing shows
+        kept |= sheets(hull, factor)
     return replace(hull, support=torch.where(grown(kept, 1), smooth.maximum(hull.support), smooth))
 
 
@@ -123,10 +128,30 @@ def outline_points(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray
     return np.concatenate(points)
 
 
+def sheets(hull: Hull, factor: int) -> Bool[Tensor, "x y z"]:
+    """Return the thin parts of a hull, such as capes and blades: inside, but in no large ball.
+
+    What a ball leaves of corners that a drawing has carved off is not thin: it is as near to
+    the ball's places as half the ball.
+
+    Args:
+        hull: as carved.
+        factor: its voxels per coarse voxel, along an axis.
+    """
+    radius = SHEET * factor
+    inside = hull.support >= LEVEL
+    core = squared_distance(~inside, math.ceil(radius)) > radius**2
+    return inside & (squared_distance(core, math.ceil(2 * radius)) > (2 * radius) ** 2)
+
+
 def _lost(
-    fair: Hull, hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor]
+    fair: Hull, distance: Volume, hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor]
 ) -> Bool[Tensor, "x y z"]:
-    """Return, for rays through masks that no longer meet the inside, their best voxels."""
+    """Return, for rays through masks that no longer meet the inside, their nearest voxels.
+
+    A ray that just misses the surface keeps a spot; one that runs along a sheet which is lost as a
+    whole keeps the sheet.
+    """
     kept = torch.zeros(hull.support.numel(), dtype=torch.bool)
     for camera, alpha in zip(cameras, alphas, strict=True):
         drawn = (alpha >= LEVEL).numpy()
@@ -138,7 +163,8 @@ def _lost(
         missed = np.argwhere(drawn & ~seen)
         samples = march(rays_of(camera, missed[:, ::-1] + 0.5, hull), hull, hull.voxel, ALL, LEVEL)
         cells = hull.cell_index(samples.points, hull.support.shape, 1)
-        values = fair.support.reshape(-1)[cells]
-        best = torch.zeros(samples.rays).scatter_reduce(0, samples.ray, values, "amax")
-        kept[cells[values >= NEAR_BEST * best[samples.ray]]] = True
+        values = distance.reshape(-1)[cells]
+        best = torch.full((samples.rays,), torch.inf)
+        best = best.scatter_reduce(0, samples.ray, values, "amin").clamp_min(0)
+        kept[cells[values <= NEAREST * best[samples.ray] + SPOT]] = True
     return kept.view(hull.support.shape)

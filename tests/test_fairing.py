@@ -7,10 +7,11 @@ import pytest
 import torch
 import torch.nn.functional as F
 from scipy import ndimage
+from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.nerf.evidence import mask_iou
-from toonset.nerf.fairing import faired
+from toonset.nerf.fairing import faired, sheets
 from toonset.nerf.fairing_distance import UNKNOWN, signed_distance, squared_distance
 from toonset.nerf.fairing_fit import Contacts, Pyramid
 from toonset.nerf.hull import Hull, carve
@@ -100,3 +101,31 @@ def test_fairing_removes_corners_but_no_outline() -> None:
     between = Camera.looking_at(np.zeros(3), np.pi / 8, 0.0, 20.0, (64, 64))
     assert mask_iou(smooth, cameras[1], alphas[1]) > 0.98
     assert mask_iou(smooth, between, alphas[0]) > mask_iou(hull, between, alphas[0]) + 0.02
+
+
+def test_a_cape_is_a_sheet_and_a_body_with_its_corners_is_none() -> None:
+    x, y, z = torch.meshgrid(*(torch.arange(40.0),) * 3, indexing="ij")
+    body = ((x - 15).abs() + (y - 20).abs() < 11) & (z > 4) & (z < 36)  # a prism of sharp corners
+    cape = (x > 32) & (x < 36) & (y > 8) & (y < 32) & (z > 4) & (z < 36)
+    found = sheets(Hull(np.zeros(3), 1.0, (body | cape).float()), 3)
+    assert bool(found[cape].all())
+    assert not bool(found[~cape].any())
+
+
+def test_fairing_leaves_no_hole_in_a_cape() -> None:
+    x, y = np.meshgrid(np.linspace(-1, 1, 250), np.linspace(-1, 1, 250))
+    cape = np.stack([0.8 * x, y, np.full_like(x, -0.8)], axis=-1)
+    body = np.stack([0.5 * np.sin(np.pi * x), y, 0.5 * np.cos(np.pi * x)], axis=-1)
+    figure = np.concatenate([cape.reshape(-1, 3), body.reshape(-1, 3)])
+
+    def seen(yaw: float) -> tuple[Camera, Tensor]:
+        camera = Camera.looking_at(np.zeros(3), yaw, 0.0, 50.0, (128, 128))
+        alpha = torch.zeros(128, 128)
+        column, row = np.floor(camera.project(figure)[0]).astype(int).T
+        alpha[row, column] = 1.0
+        return camera, alpha
+
+    cameras, alphas = zip(*(seen(yaw) for yaw in np.arange(8) * np.pi / 4), strict=True)
+    smooth = faired(carve(cameras, alphas, 128, 0), cameras, alphas)
+    for between in (3, 5):  # beside the body, through what was the cape
+        assert mask_iou(smooth, *seen(between * np.pi / 8)) > 0.95
