@@ -71,13 +71,15 @@ def _strip(job: Job) -> str:
 
 
 def _draw(folder: Path, case: TrainCase, jobs: list[Job]) -> None:
-    """Draw the figure of a case from the strips that are there."""
+    """Draw the figure of a case from the strips that are there, the default's last."""
+    from toonset.bench.chart import DEFAULT
     from toonset.bench.paper_picture import drawn_strip, figure_of
     from toonset.bench.train_plan import side_px
     from toonset.dataset.picture import encode_png, load_rgba
     from toonset.files import write_bytes
 
-    files = {job.method: folder / _strip(job) for job in jobs}
+    ordered = sorted(jobs, key=lambda job: job.method == DEFAULT)
+    files = {job.method: folder / _strip(job) for job in ordered}
     strips = {name: load_rgba(file)[..., :3] for name, file in files.items() if file.is_file()}
     if strips:
         name = f"{FIGURE}-{_plain(case.name)}-{side_px(case)}px.png"
