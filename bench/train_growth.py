@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ class Growth:
         px: size of the drawings.
         figure_px: opaque pixels of all drawings.
         counts, seconds: of the training.
+        cpu: seconds, which hardly depend on what else the machine does.
         peak: most bytes in use over those before the training.
         estimate: what `needed_bytes` says of it.
     """
@@ -29,6 +31,7 @@ class Growth:
     figure_px: int
     counts: dict[str, int]
     seconds: dict[str, float]
+    cpu: float
     peak: int
     estimate: int
 
@@ -44,11 +47,13 @@ def growths(scenes: Mapping[int, Scene], options: TrainOptions) -> Iterator[Grow
 def growth(scene: Scene, px: int, options: TrainOptions) -> Growth:
     """Train in this process, which should have done nothing else, and return what it took."""
     estimate, before = needed_bytes(scene, options), _resident_bytes("VmRSS")
+    began = time.process_time()
     training = train(scene, options)
+    cpu = time.process_time() - began
     peak = _resident_bytes("VmHWM") - before
     opaque = sum(int((frame.rgba[..., 3] > 127).sum()) for frame in scene.frames)
     voxels = {"voxels": training.result.hull.support.numel()}
-    return Growth(px, opaque, training.counts | voxels, training.seconds, peak, estimate)
+    return Growth(px, opaque, training.counts | voxels, training.seconds, cpu, peak, estimate)
 
 
 def _resident_bytes(which: str) -> int:
@@ -59,11 +64,16 @@ def _resident_bytes(which: str) -> int:
 
 def print_growth(rows: Iterable[Growth]) -> None:
     """Print trainings as a table, each as soon as it is done."""
-    print("| px | figure, px | rays | samples | voxels | hull | rays | steps | whole | GB | said |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| px | figure, px | rays | samples | voxels |", end="")
+    print(" hull | rays | steps | whole | CPU | GB | said |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     for row in rows:
         numbers = [row.px, row.figure_px, *(row.counts[k] for k in ("rays", "samples", "voxels"))]
-        stages = [*(row.seconds[k] for k in ("hull", "rays", "steps")), sum(row.seconds.values())]
+        stages = [
+            *(row.seconds[k] for k in ("hull", "rays", "steps")),
+            sum(row.seconds.values()),
+            row.cpu,
+        ]
         sizes = " | ".join(f"{size / 1e9:.2f}" for size in (row.peak, row.estimate))
         print(f"| {' | '.join(map(str, numbers))} |", end="")
         print(f" {' | '.join(f'{s:.1f} s' for s in stages)} | {sizes} |", flush=True)

@@ -38,7 +38,7 @@ from toonset.nerf.march import Rays, march, rays_of
 from toonset.nerf.volume import Volume, trilinear
 
 COARSE = 64  # voxels along the longest side of the grid on which the surface bends
-OUTLINE_RAYS = 4000  # of all views together; half as many bend 5 % worse
+OUTLINE_RAYS = 4000  # of all views together
 SLOPE = 0.7  # of the support per voxel of distance, where the fair surface makes the border
 SHEET = 0.8  # coarse voxels: half the thickness of what the coarse grid has no room for
 NEAREST = 2.0  # times a lost ray's least distance: what is as near is kept, too

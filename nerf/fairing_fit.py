@@ -17,7 +17,7 @@ from torch import Tensor
 from toonset.nerf.adam import Adam, Group
 from toonset.nerf.volume import Volume, add_bending, along_axes, inner
 
-BENDING = 1.0  # weight of the Laplacian; half and double cost 0.1 to 0.3 dB on left-out views
+BENDING = 1.0  # weight of the Laplacian
 STEPS, RATE, LAST_RATE = 100, 0.1, 0.1  # of Adam; the rate decays exponentially to a tenth
 PYRAMID = (1, 2, 4, 8)  # coarse voxels per cell of each level
 BAND = 5.0  # coarse voxels from the hull's surface within which bending counts
