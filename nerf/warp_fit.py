@@ -4,6 +4,7 @@ Minimised over the numbers c_v of all drawings at once, by Gauss-Newton:
 
     sum over rim points and other views of rho(r / sigma)^2 / CORRELATED  +  c' K^-1 c / tau^2
 
+What all drawings share is the body's own place and size, and kept out (`_common`).
 tau, the size of the drawings' errors, comes from the sheet itself (expectation maximisation, as
 in MacKay 1992); whether there are errors at all is asked of the marginal likelihood against none,
 which charges every number that the data determine.
@@ -113,7 +114,7 @@ def _common(
         own = [moves.even(shift, 0.0) for shift in ends_px[:3] - ends_px[3:]]
         own.append(moves.even(np.zeros(2), 1.0))
         columns.append(np.stack(own, axis=1))
-        weighed.append(jacobian.T @ (jacobian @ columns[-1]) / len(jacobian))
+        weighed.append(jacobian.T @ (jacobian @ columns[-1]) / max(1, len(jacobian)))
     common, weights = np.concatenate(columns), np.concatenate(weighed).T
     return common, np.linalg.pinv(weights @ common, rcond=1e-9) @ weights
 
