@@ -28,7 +28,7 @@ from toonset.nerf.ink_evidence import (
     lined_pairs,
     on_borders,
 )
-from toonset.nerf.ink_nearest import distance_to, nearest
+from toonset.nerf.ink_nearest import distance_to, nearest, parts
 from toonset.nerf.ink_strokes import (
     Lines,
     Strokes,
@@ -47,6 +47,7 @@ EXPLAINED = 0.5  # of a stroke's pixels, for the stroke to be a contour
 INKED = 0.5  # of the hull's depth jumps, for the sheet to draw lines there
 INK_QUANTILE = 0.2  # darkest part of the rim: the rest is mixed with what it surrounds
 OPAQUE = 250
+BREAK_PX = 2  # between a stroke and the outline that it begins at
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,10 @@ def _read(frame: Frame, lines: Lines, hints: Hints, ink: tuple[int, int, int]) -
 
 
 def _contour(drawing: _Drawing, pairs: Pairs) -> Bool[np.ndarray, "height width"]:
-    """Return the pen's strokes that depth jumps or colour borders explain."""
+    """Return the pen's strokes that depth jumps or colour borders explain.
+
+    They begin at the outline: what hangs together without it is a drawn feature.
+    """
     pen, hints = drawing.pen, drawing.hints
     explained = hints.to_jump <= hints.reach_px
     if drawing.bare.labels is not None:
@@ -134,7 +138,10 @@ def _contour(drawing: _Drawing, pairs: Pairs) -> Bool[np.ndarray, "height width"
         explained |= to_border <= drawing.lines.width_px
     size = np.bincount(pen.number.ravel(), minlength=pen.count)
     known = np.bincount(pen.number[explained], minlength=pen.count)
-    return pen.only((known >= EXPLAINED * size) & ~pen.dots).number > 0
+    contour = pen.only((known >= EXPLAINED * size) & ~pen.dots).number > 0
+    part = parts(contour)
+    begun = np.unique(part[contour & (distance_to(drawing.lines.outline) <= BREAK_PX)])
+    return contour & np.isin(part, begun)
 
 
 def _inked_share(drawings: Sequence[_Drawing]) -> float:

@@ -97,6 +97,24 @@ def test_a_mouth_stays() -> None:
     assert (bare.frames[0].rgba[mouth] == (0, 0, 0, 255)).all()
 
 
+def test_an_eye_that_hangs_free_stays_though_its_border_has_a_line() -> None:
+    made = sheet(2, 2.0)
+    scene = scene_of(made)
+    _, style = without_ink(scene)
+    assert style is not None
+    rgba, labels = made.views[0].rgba.copy(), made.labels[0].copy()
+    flat = np.stack([depth_inside(labels == label) for label in range(len(made.palette))])
+    label, row, column = np.unravel_index(flat.argmax(), flat.shape)
+    other = next(a + b - label for a, b in style.borders if label in (a, b))
+    eye = slice(row - 4, row + 5), slice(column - 4, column + 5)
+    pupil = slice(row - 2, row + 3), slice(column - 2, column + 3)
+    rgba[eye], labels[eye] = (0, 0, 0, 255), 255
+    rgba[pupil], labels[pupil] = (*made.palette[other], 255), other
+    first = replace(scene.frames[0], rgba=rgba, labels=labels)
+    bare, _ = without_ink(replace(scene, frames=(first, *scene.frames[1:])))
+    assert (bare.frames[0].rgba[eye] == rgba[eye]).all()
+
+
 def test_black_cloth_stays() -> None:
     body = random_body(2)
     assert body.face_colors is not None
