@@ -10,7 +10,6 @@ say how far the fast picture is from it. Times are CPU time of one thread, media
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from dataclasses import dataclass
@@ -133,5 +132,4 @@ def _over_white(premultiplied: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     main(sys.argv[1:])
