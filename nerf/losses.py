@@ -15,6 +15,7 @@ from toonset.palette.labels import UNLABELLED
 
 BACKDROP = 0.5  # grey behind the figure in training: neither white nor black parts hide holes
 OPACITY_WEIGHT = 0.1
+DISAGREEING = 64.0  # times the smoothness; 16 and 256 are 0.1 dB worse on drawn sheets, 1 is 0.25
 REFERENCE_VIEWS = 8  # views for which `TrainOptions.smoothness` is stated
 OPAQUE_ENOUGH = 0.05  # opacity below which a rendered colour means nothing
 
@@ -93,9 +94,13 @@ class _TotalVariation(torch.autograd.Function):
         return signs * (gradients[0] / len(signs)), None
 
 
-def smoothness_weight(smoothness: float, views: int) -> float:
-    """Return the weight of the total variation: the fewer views, the more must be guessed."""
-    return smoothness * max(1.0, REFERENCE_VIEWS / max(views, 1)) ** 2
+def smoothness_weight(smoothness: float, views: int, *, agree: bool) -> float:
+    """Return the weight of the total variation: the fewer views, the more must be guessed.
+
+    Where drawings do not agree, fine planes would show every drawing's own version at once.
+    """
+    weight = smoothness * max(1.0, REFERENCE_VIEWS / max(views, 1)) ** 2
+    return weight if agree else DISAGREEING * weight
 
 
 def is_finite(loss: Tensor) -> bool:

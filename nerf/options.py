@@ -21,7 +21,8 @@ class TrainOptions:
         resolution: cells of the planes along the character's longest side; None: one cell per
             pixel of the tallest figure, 48 to 256 (finer planes fit each drawing's own pixels and
             predict new views worse).
-        smoothness: weight of the planes' total variation at eight views; fewer views get more.
+        smoothness: weight of the planes' total variation at eight views that agree; fewer views,
+            and drawings that had to be aligned, get more.
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
         field: what is fitted: planes with a small decoder; or, to compare with, a network alone, a

@@ -93,7 +93,7 @@ def train(
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)
     begin = watch.begin(start) if watch else None
-    weights = _weights(options, len(scene.frames))
+    weights = _weights(options, len(scene.frames), agree=ready.apart_px == 0)
     history, stopped = fit(model, rays, weights, options, generator, watch, begin)
     model.to("cpu")
     drawings_s, hull_s, rays_s = np.diff(clock).tolist()
@@ -132,8 +132,8 @@ def _rays(
     return FixedRays([batch.to(device) for batch in batches]), counts
 
 
-def _weights(options: TrainOptions, views: int) -> Weights:
-    smoothness = losses.smoothness_weight(options.smoothness, views)
+def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:
+    smoothness = losses.smoothness_weight(options.smoothness, views, agree=agree)
     if options.carve:
         return Weights(options.palette_weight, smoothness)
     return any_backdrop(options.palette_weight, smoothness)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from toonset.nerf.field import TriplaneField
+from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import aligned
+from toonset.nerf.training import train
 
 
 def test_drawings_that_agree_stay(balls) -> None:
@@ -49,3 +52,15 @@ def test_switches_are_heard(balls) -> None:
     assert registration.applied
     assert unbending is None
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
+
+
+def test_planes_are_smoother_where_drawings_were_bent_back(balls) -> None:
+    drawn, _ = balls.bent_sheet()
+    variation = []
+    for trusted in (False, True):
+        options = TrainOptions(steps=30, register=not trusted, unbend=not trusted)
+        field = train(drawn, options).result.field
+        assert isinstance(field, TriplaneField)
+        planes = field.planes.detach()
+        variation.append(float(planes.diff(dim=0).abs().mean()))
+    assert variation[0] < 0.5 * variation[1]
