@@ -58,7 +58,7 @@ def as_csv(rows: Sequence[dict[str, Any]]) -> str:
 def as_text(rows: Sequence[dict[str, Any]]) -> str:
     """Return the rows as a table for people."""
     heading = ("method", "palette", "iterations", "layer", *METRICS, "CPU s")
-    lines = [heading]
+    lines: list[tuple[str, ...]] = [heading]
     for row in rows:
         figures = ["-" if row[m] is None else FORMS[m].format(row[m]) for m in METRICS]
         first = (row["method"], row["palette"], str(row["iterations"]), row["layer"])

@@ -44,7 +44,7 @@ def case() -> TrainCase:
     return TrainCase("block-exact", "exact", block(8, 0.0), block(4, np.pi / 8))
 
 
-def found(method: str, *curve: Seen, case: str = "a", **figures: float) -> RunResult:
+def found(method: str, *curve: Seen, case: str = "a", **figures: float | None) -> RunResult:
     end = curve[-1]
     seconds = end.seconds, end.cpu_seconds
     return RunResult("exact 150 px 8 views", method, case, 0, figures, *seconds, 0.1, 7, curve)

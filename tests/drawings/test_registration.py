@@ -53,7 +53,7 @@ def test_the_body_stays_where_it_stands(balls) -> None:
     assert np.abs(moves).max() > 0.3
     for axis in np.eye(3) / 2:
         ends = np.array([0.0, 0.3, 0.0]) + np.stack([axis, -axis])
-        aside = [-np.diff(frame.camera.project(ends)[0], axis=0)[0] for frame in scene.frames]
+        aside = np.array([-np.diff(f.camera.project(ends)[0], axis=0)[0] for f in scene.frames])
         assert abs((aside * np.array(moves)).sum() / np.square(aside).sum()) < 5e-4  # world units
 
 
