@@ -15,7 +15,9 @@ from toonset.palette.labels import UNLABELLED
 
 BACKDROP = 0.5  # grey behind the figure in training: neither white nor black parts hide holes
 OPACITY_WEIGHT = 0.1
-DISAGREEING = 64.0  # times the smoothness; 16 and 256 are 0.1 dB worse on drawn sheets, 1 is 0.25
+# Times the smoothness. On drawn sheets, 16 costs 0.09 dB and 1 costs 0.24 (n = 4 development
+# characters), 250 costs 0.06 (n = 2).
+DISAGREEING = 64.0
 REFERENCE_VIEWS = 8  # views for which `TrainOptions.smoothness` is stated
 OPAQUE_ENOUGH = 0.05  # opacity below which a rendered colour means nothing
 
