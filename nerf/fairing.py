@@ -129,10 +129,10 @@ def outline_points(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray
 
 
 def sheets(hull: Hull, factor: int) -> Bool[Tensor, "x y z"]:
-    """Return the thin parts of a hull, such as capes and blades: inside, but in no large ball.
+    """Return the thin parts of a hull, such as capes and blades.
 
-    What a ball leaves of corners that a drawing has carved off is not thin: it is as near to
-    the ball's places as half the ball.
+    Balls of radius SHEET are put wherever they lie wholly inside. Thin is what is farther than
+    2 SHEET from all their centres; what is nearer and in no ball is a corner of a thick part.
 
     Args:
         hull: as carved.
