@@ -1,7 +1,7 @@
 """Adam by torch's fused kernel, which goes through memory once.
 
-`torch.optim` would call the same, but imports `torch._dynamo` as soon as an optimiser is made: 4 s
-of CPU, a third of a whole training here. The state is plain tensors.
+`torch.optim` would call the same, but imports torch's compiler, `torch._dynamo`, as soon as an
+optimiser is made. The state is plain tensors.
 """
 
 from __future__ import annotations
