@@ -46,10 +46,10 @@ def photometric(
 
 
 def straight(
-    color: Float[Tensor, "rays 3"], opacity: Float[Tensor, " rays"]
-) -> Float[Tensor, "rays 3"]:
+    color: Float[Tensor, "*rays 3"], opacity: Float[Tensor, "*rays"]
+) -> Float[Tensor, "*rays 3"]:
     """Return the colour without its opacity."""
-    return color / opacity.clamp_min(OPAQUE_ENOUGH)[:, None]
+    return color / opacity.clamp_min(OPAQUE_ENOUGH)[..., None]
 
 
 def cross_entropy(

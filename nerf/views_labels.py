@@ -72,7 +72,7 @@ def palette_shares(
     mixed = ((around >= LEAST_SEEN).sum(dim=1) > 1).nonzero()[:, 0]
     if len(mixed):
         parts[mixed] = _unmixed(
-            parts[mixed], _straight(color[mixed], opacity[mixed]), around[mixed], paints
+            parts[mixed], straight(color[mixed], opacity[mixed]), around[mixed], paints
         )
         whole[border] = parts.mean(dim=1)
     return whole
@@ -84,13 +84,10 @@ def _unmixed(
     around: Float[Tensor, "pixels colors"],
     paints: Float[Tensor, "colors 3"],
 ) -> Float[Tensor, "pixels rays colors"]:
-    """Return the shares of rays with blends of two paints divided between these.
+    """Return the shares of single labels, with blends of two paints divided between these.
 
-    Args:
-        shares: of single labels.
-        color: straight, of the same rays.
-        around: pixels in which each paint is seen round about; two at least in LEAST_SEEN.
-        paints: see `palette_shares`.
+    `color` is straight; `around` counts pixels in which each paint is seen, two paints or more in
+    LEAST_SEEN.
     """
     opacity = shares.sum(dim=2)
     off = (color - paints[shares.argmax(dim=2)]).square().sum(dim=2)
@@ -120,9 +117,3 @@ def _shares(
     """Return each ray's opacity in the column of its label."""
     shares = torch.zeros(*labels.shape, colors)
     return shares.scatter_(-1, labels.clamp_min(0)[..., None], opacity[..., None])
-
-
-def _straight(
-    color: Float[Tensor, "pixels rays 3"], opacity: Float[Tensor, "pixels rays"]
-) -> Float[Tensor, "pixels rays 3"]:
-    return straight(color.reshape(-1, 3), opacity.reshape(-1)).view(color.shape)

@@ -78,7 +78,7 @@ class ShiftAndScale:
         down: Float[np.ndarray, " height"],
         numbers: Float[np.ndarray, " 3"],
     ) -> Float[np.ndarray, "height width 2"]:
-        """Return the displacements at every pair of places along the square's sides."""
+        """Return `at` of the grid's places."""
         return self.at(np.stack(np.meshgrid(across, down), axis=-1), numbers)
 
     def even(self, shift: Float[np.ndarray, " 2"], growth: float) -> Float[np.ndarray, " 3"]:
@@ -124,7 +124,7 @@ class Bends:
         down: Float[np.ndarray, " height"],
         numbers: Float[np.ndarray, " k"],
     ) -> Float[np.ndarray, "height width 2"]:
-        """Return the displacements at every pair of places along the square's sides."""
+        """Return `at` of the grid's places, as a product of one basis per axis."""
         controls = numbers.reshape(2, CONTROLS, CONTROLS)
         return np.moveaxis(_cubic_basis(down) @ controls @ _cubic_basis(across).T, 0, -1)
 
