@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
+from toonset.bench.chart import DEFAULT
 from toonset.bench.record import Direction, Record, aligned, summarise
 from toonset.bench.train_plan import METHODS, Job
 from toonset.bench.train_run import Look, RunResult, Seen, reached, run_job
@@ -41,15 +42,34 @@ def run_jobs(
     jobs: Sequence[Job],
     progress: Callable[[str], None] = lambda text: None,
     look: Look = lambda job, case, field: None,
+    done: Sequence[RunResult] = (),
 ) -> Iterator[tuple[Job, RunResult]]:
     """Yield every job with its result, as soon as it is done; one at a time, for they are timed.
 
-    `look` is shown the fields.
+    What leaves out a step that found nothing to do in "default" has that training's result.
+
+    Args:
+        jobs: "default" before what is compared with it.
+        progress: called with what is about to be run.
+        look: is shown the fields.
+        done: results of earlier jobs.
     """
     judges = load_judges()
+    defaults = {_character(found): found for found in done if found.method == DEFAULT}
     for number, job in enumerate(jobs, 1):
+        known = defaults.get((job.group, job.case.name, job.seed))
+        if known and not known.note and METHODS[job.method].leaves_out not in (None, *known.acted):
+            yield job, replace(known, method=job.method)
+            continue
         progress(f"{number} of {len(jobs)}: {job.name}, seed {job.seed}")
-        yield job, run_job(job, judges, look)
+        found = run_job(job, judges, look)
+        if job.method == DEFAULT:
+            defaults[_character(found)] = found
+        yield job, found
+
+
+def _character(run: RunResult) -> tuple[str, str, int]:
+    return run.group, run.case, run.seed
 
 
 def records_of(runs: Sequence[RunResult], seed: int) -> list[Record]:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from toonset.bench.train_plan import Job
+from toonset.bench.train_plan import STEPS, Job
 from toonset.bench.train_run import RunResult, Seen
 from toonset.errors import BundleError
 
-FORMAT = 1
+FORMAT = 2
 
 
 def as_plain(runs: Sequence[tuple[dict[str, Any], RunResult]], version: str) -> dict[str, Any]:
@@ -63,6 +63,7 @@ def _result(data: Any) -> RunResult:
         render_seconds=float(data["render_seconds"]),
         parameters=int(data["parameters"]),
         curve=tuple(_seen(point) for point in data["curve"]),
+        acted=tuple(step for step in STEPS if step in data["acted"]),
         note=str(data["note"]),
     )
 

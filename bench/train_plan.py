@@ -7,10 +7,13 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
 from toonset.bench.cases import TrainCase
+from toonset.bench.chart import DEFAULT
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preset import paper
 
 NEAREST = "nearest drawing"
+Step = Literal["alignment", "symmetry"]
+STEPS: tuple[Step, ...] = get_args(Step)
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
 PALETTES: tuple[PaletteChoice, ...] = get_args(PaletteChoice)
 PAPER_STEPS = (200, 2000)
@@ -26,37 +29,57 @@ class Method:
         palette: that of the labels: none, one extracted in the seconds that count, or the one that
             the case comes with.
         first_seed_only: so slow, or so little random, that one seed must do.
+        most_views_only: there to show what time buys, which fewer views need not repeat.
+        leaves_out: the step that it goes without, if any. Where that had nothing to do in
+            "default", this is the same training, and is not run a second time.
+        curve: held-out PSNR is followed while it trains, with the most views.
     """
 
     options: TrainOptions | None
     palette: PaletteChoice = "automatic palette"
     first_seed_only: bool = False
+    most_views_only: bool = False
+    leaves_out: Step | None = None
+    curve: bool = False
+
+
+def _without(
+    step: Step | None = None, palette: PaletteChoice = "automatic palette", **changes: Any
+) -> Method:
+    return Method(TrainOptions(**changes), palette, first_seed_only=True, leaves_out=step)
 
 
 PAPER: dict[str, Method] = {
-    f"paper, {palette}, {steps} steps": Method(paper(steps), palette, first_seed_only=True)
+    f"paper, {palette}, {steps} steps": Method(
+        paper(steps), palette, first_seed_only=True, most_views_only=True, curve=True
+    )
     for palette in PALETTES
     for steps in PAPER_STEPS
 }
 METHODS: dict[str, Method] = {
-    "default": Method(TrainOptions()),
+    DEFAULT: Method(TrainOptions(), curve=True),
     NEAREST: Method(None, first_seed_only=True),
     "coloured hull": Method(TrainOptions(field="hull"), "no palette", first_seed_only=True),
-    "75 steps": Method(TrainOptions(steps=75)),
-    "600 steps": Method(TrainOptions(steps=600)),
-    "without palette": Method(TrainOptions(), "no palette"),
-    "without smoothing": Method(TrainOptions(smoothness=0.0)),
-    "without fairing": Method(TrainOptions(fair=False), first_seed_only=True),
-    "without registration": Method(TrainOptions(register=False), first_seed_only=True),
-    "without unbending": Method(TrainOptions(unbend=False), first_seed_only=True),
-    "without symmetry": Method(TrainOptions(symmetric=False), first_seed_only=True),
-    "without hull": Method(TrainOptions(carve=False), first_seed_only=True),
-    "voxel": Method(TrainOptions(field="voxel")),
-    "mlp": Method(TrainOptions(field="mlp"), first_seed_only=True),
+    "75 steps": Method(TrainOptions(steps=75), first_seed_only=True, most_views_only=True),
+    "600 steps": Method(TrainOptions(steps=600), first_seed_only=True, most_views_only=True),
+    "without palette": _without(palette="no palette"),
+    "without smoothing": _without(smoothness=0.0),
+    "without fairing": _without(fair=False),
+    "without registration": _without("alignment", register=False),
+    "without unbending": _without("alignment", unbend=False),
+    "without both": _without("alignment", register=False, unbend=False),
+    "without symmetry": _without("symmetry", symmetric=False),
+    "without hull": Method(TrainOptions(carve=False), first_seed_only=True, most_views_only=True),
+    "lines redrawn": Method(TrainOptions(ink=True), first_seed_only=True, most_views_only=True),
+    "voxel": Method(TrainOptions(field="voxel"), first_seed_only=True, curve=True),
+    "mlp": Method(TrainOptions(field="mlp"), first_seed_only=True, curve=True),
     **PAPER,
-    "paper, mlp": Method(replace(paper(2000), field="mlp"), first_seed_only=True),
+    "paper, mlp": Method(
+        replace(paper(2000), field="mlp"), first_seed_only=True, most_views_only=True
+    ),
 }
 FOR_THE_TABLE_ALONE = [name for name in PAPER if PAPER[name].palette != "automatic palette"]
+SLOW = ("without hull", "mlp", "paper, mlp", *PAPER)
 
 
 @dataclass(frozen=True)
@@ -67,14 +90,16 @@ class Scope:
         methods: names in `METHODS`.
         views: numbers of training views.
         seeds: how many.
-        half_turn: also of front, side and back alone, where there are eight views.
-        one_case: one per condition and size is enough.
+        half_turn: methods also of front, side and back alone, where there are eight views.
+        first_case: methods so slow that one case per condition and size must do.
+        one_case: so for all methods.
     """
 
     methods: tuple[str, ...]
     views: tuple[int, ...] = (8,)
     seeds: int = 1
-    half_turn: bool = False
+    half_turn: tuple[str, ...] = ()
+    first_case: tuple[str, ...] = ()
     one_case: bool = False
 
 
@@ -83,12 +108,13 @@ SCOPES = {  # by subject and whether it must be quick
         tuple(name for name in METHODS if name not in FOR_THE_TABLE_ALONE),
         views=(8, 4, 3),
         seeds=3,
-        half_turn=True,
+        half_turn=(DEFAULT, NEAREST, "coloured hull", "without symmetry", "voxel"),
+        first_case=SLOW,
     ),
-    ("train", True): Scope(("default", NEAREST, "coloured hull", "75 steps"), one_case=True),
-    ("paper", False): Scope(("default", *PAPER)),
+    ("train", True): Scope((DEFAULT, NEAREST, "coloured hull", "75 steps"), one_case=True),
+    ("paper", False): Scope((DEFAULT, *PAPER)),
     ("paper", True): Scope(
-        ("default", *(name for name in PAPER if name.endswith(" 200 steps"))), one_case=True
+        (DEFAULT, *(name for name in PAPER if name.endswith(" 200 steps"))), one_case=True
     ),
 }
 
@@ -108,6 +134,11 @@ class Job:
     views: int
     method: str
     seed: int
+
+    @property
+    def curve(self) -> bool:
+        """Return whether held-out PSNR is followed while it trains."""
+        return METHODS[self.method].curve and self.views == len(self.case.train.frames)
 
     @property
     def group(self) -> str:
@@ -139,26 +170,34 @@ def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list
         only: keep jobs whose name contains this.
         scope: which of all possible jobs.
     """
-    chosen = _first_of_groups(cases) if scope.one_case else list(cases)
+    cases = list(cases)
+    first = _first_of_groups(cases)
+    if scope.one_case:
+        cases = first
+    groups = [(case, scope.methods) for case in cases]
     if scope.half_turn:
-        chosen += [front_side_back(case) for case in chosen if len(case.train.frames) == TURN]
+        whole = [case for case in cases if len(case.train.frames) == TURN]
+        groups += [(front_side_back(case), scope.half_turn) for case in whole]
     jobs = [
         Job(case, views, method, seed + number)
         for number in range(scope.seeds)
-        for case in chosen
-        for views in view_counts(case, scope.views)
-        for method in scope.methods
-        if _possible(METHODS[method], case, number)
+        for case, methods in groups
+        for fewer, views in enumerate(view_counts(case, scope.views))
+        for method in methods
+        if (case in first or method not in scope.first_case)
+        and _wanted(METHODS[method], case, number, fewer)
     ]
     order = list(METHODS)
     jobs.sort(key=lambda j: (j.seed, side_px(j.case), -j.views, order.index(j.method)))
     return [job for job in jobs if only in job.name]
 
 
-def _possible(method: Method, case: TrainCase, number: int) -> bool:
+def _wanted(method: Method, case: TrainCase, number: int, fewer: int) -> bool:
     if method.palette == "hand-picked palette" and case.train.palette is None:
         return False
-    return number == 0 or not method.first_seed_only
+    if number > 0 and method.first_seed_only:
+        return False
+    return fewer == 0 or not method.most_views_only
 
 
 def view_counts(case: TrainCase, wanted: Sequence[int]) -> list[int]:

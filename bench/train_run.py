@@ -13,7 +13,7 @@ from jaxtyping import UInt8
 from torch import Tensor
 
 from toonset.bench.cases import TrainCase
-from toonset.bench.train_plan import METHODS, Job, PaletteChoice, subset
+from toonset.bench.train_plan import METHODS, Job, PaletteChoice, Step, subset
 from toonset.camera import rotation_distance
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import ToonsetError
@@ -27,7 +27,7 @@ from toonset.nerf.layers import color_picture
 from toonset.nerf.metrics import Figures, means, over_white, psnr_of
 from toonset.nerf.metrics_view import Judges, figures_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.trained import TrainedField
+from toonset.nerf.trained import TrainedField, Training
 from toonset.nerf.training import train
 from toonset.nerf.views import render
 
@@ -60,8 +60,9 @@ class RunResult:
         cpu_seconds: the same, summed over the cores; a busy machine does not change it much.
         render_seconds: per view.
         parameters: of the field and its classifier.
-        curve: PSNR in dB of some held-out views while the training went on, and at its end; empty
-            where it failed.
+        curve: PSNR in dB of some held-out views while the training went on, where the job asks for
+            it, and at its end; empty where it failed.
+        acted: the steps that found something to do.
         note: why it failed, or nothing.
     """
 
@@ -75,6 +76,7 @@ class RunResult:
     render_seconds: float
     parameters: int
     curve: tuple[Seen, ...]
+    acted: tuple[Step, ...] = ()
     note: str = ""
 
 
@@ -86,13 +88,16 @@ def run_job(job: Job, judges: Judges, look: Look = lambda job, case, field: None
             return _nearest_drawing(job, case, judges)
         return _trained(job, case, replace(method.options, seed=job.seed), judges, look)
     except ToonsetError as error:
-        return RunResult(*_named(job), {}, 0.0, 0.0, 0.0, 0, (), str(error))
+        return RunResult(*_named(job), {}, 0.0, 0.0, 0.0, 0, (), note=str(error))
 
 
 def _trained(
     job: Job, case: TrainCase, options: TrainOptions, judges: Judges, look: Look
 ) -> RunResult:
-    watch = Snapshots(time.perf_counter(), time.process_time(), carved=options.carve)
+    first_look_s = FIRST_LOOK_S if job.curve else np.inf
+    watch = Snapshots(
+        time.perf_counter(), time.process_time(), first_look_s=first_look_s, carved=options.carve
+    )
     scene = _with_palette(case.train, METHODS[job.method].palette)
     training = train(scene, options, watch=watch)
     seconds, cpu_seconds = watch.spent()
@@ -114,7 +119,19 @@ def _trained(
         render_seconds,
         training.counts["parameters"],
         tuple(curve),
+        acted_in(training),
     )
+
+
+def acted_in(training: Training) -> tuple[Step, ...]:
+    """Return the steps that found something to do: without the others, it is the same training."""
+    ready, symmetry = training.prepared, training.symmetry
+    found: list[Step] = []
+    if any(step and step.applied for step in (ready.registration, ready.unbending)):
+        found.append("alignment")
+    if symmetry and symmetry.mirrored:
+        found.append("symmetry")
+    return tuple(found)
 
 
 def _with_palette(scene: Scene, palette: PaletteChoice) -> Scene:
@@ -127,17 +144,19 @@ def _with_palette(scene: Scene, palette: PaletteChoice) -> Scene:
 
 @dataclass
 class Snapshots:
-    """Watches a training and keeps its parameters at 1, 1.4, 2, ... seconds.
+    """Watches a training and keeps its parameters at 1, 1.4, 2, ... times the first look.
 
     Attributes:
         began: when the training's seconds began to count, as `time.perf_counter` says.
         cpu_began: and the processor's, as `time.process_time` says.
+        first_look_s: seconds of the first snapshot; infinite: none are kept.
         carved: the field fills a hull, not a whole box.
         kept: seconds, processor's seconds and parameters of each snapshot.
     """
 
     began: float
     cpu_began: float
+    first_look_s: float = FIRST_LOOK_S
     carved: bool = True
     kept: list[tuple[tuple[float, float], dict[str, Tensor]]] = field(default_factory=list)
 
@@ -148,7 +167,7 @@ class Snapshots:
     def begin(self, trained: TrainedField) -> FitState | None:
         """Take the field that will be fitted, from its beginning."""
         self._trained = trained
-        self._next = FIRST_LOOK_S
+        self._next = self.first_look_s
         return None
 
     def look(self, moment: Moment) -> str:

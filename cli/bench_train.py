@@ -78,7 +78,7 @@ def run_into(
     lacking = missing(jobs, done)
     printer.say(f"{len(lacking)} trainings, {len(jobs) - len(lacking)} are there already")
     try:
-        for job, found in run_jobs(lacking, printer.progress, look):
+        for job, found in run_jobs(lacking, printer.progress, look, _of_jobs(done, jobs)):
             done.append((job.identity, found))
             _keep(folder, done)
     finally:  # what a stopped run has found so far is worth a look, too

@@ -71,7 +71,7 @@ def short_methods(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Method]
     """Replace the methods by quick ones; their order, which is that of tables, comes back too."""
     monkeypatch.setattr(field_box, "RAYS_PER_STEP", 256)
     short = {
-        "default": Method(replace(QUICK, steps=60)),
+        "default": Method(replace(QUICK, steps=60), curve=True),
         NEAREST: Method(None, first_seed_only=True),
     }
     known = dict(METHODS)
@@ -99,6 +99,9 @@ def test_what_tells_most_comes_first() -> None:
     methods = set(SCOPES["train", False].methods)
     assert {job.method for job in jobs if job.seed == 7} == methods
     assert not methods & own_palette
+    slow = {job.case.name for job in jobs if job.method == "mlp"}
+    assert slow == {"big-exact", "ball-exact", "ball-drawn"}  # the first of each group
+    assert {job.views for job in jobs if METHODS[job.method].most_views_only} == {8, 5}
     later = {job.method for job in jobs if job.seed > 7}
     assert later == {name for name in methods if not METHODS[name].first_seed_only}
     assert len({json.dumps(job.identity) for job in jobs}) == len(jobs)
@@ -192,6 +195,24 @@ def test_looking_stops_the_clock() -> None:
     watch.look(Moment())  # type: ignore[arg-type]
     assert watch.spent()[0] - before < 0.2
     assert watch.kept[0][0][0] - before < 0.2
+
+
+def test_what_had_nothing_to_do_is_not_left_out_by_training_again(
+    short_methods: dict[str, Method],
+) -> None:
+    options = replace(QUICK, symmetric=False)
+    METHODS["one-sided"] = Method(options, leaves_out="symmetry")
+    METHODS["as placed"] = Method(options, leaves_out="alignment")
+    alike = case()
+    bent = replace(result("default", 30.0, case=alike.name), acted=("alignment",))
+    bent = replace(bent, group="exact 32 px 8 views")
+    jobs = [Job(alike, 8, method, 0) for method in ("one-sided", "as placed")]
+    same, trained = (found for _, found in run_jobs(jobs, done=[bent]))
+    assert same == replace(bent, method="one-sided")
+    assert trained.figures["psnr"] != 30.0
+    (default,) = (found for _, found in run_jobs([Job(alike, 4, "default", 0)]))
+    assert default.acted == ()  # four sides of a ball, drawn exactly
+    assert len(default.curve) == 1  # followed with the most views only
 
 
 def test_a_refused_training_is_noted_and_the_others_go_on(
