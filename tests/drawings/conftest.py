@@ -100,6 +100,6 @@ def random_warp(seed: int, size: float = 0.01) -> Warp:
 
 @pytest.fixture(scope="session")
 def balls() -> SimpleNamespace:
-    """Return the functions above by name: tests cannot import one another."""
+    """Return the functions above by name."""
     shared = (camera_at, draw, sheet, bent_sheet, misplaced, random_warp)
     return SimpleNamespace(SIDE=SIDE, **{function.__name__: function for function in shared})
