@@ -1,12 +1,9 @@
-"""Imports: other programs' folders become bundles; what cannot be honoured is refused by name."""
+"""Imports: other programs' folders become bundles, with the cameras that they had."""
 
 from __future__ import annotations
 
 import json
-import math
 import shutil
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,80 +11,25 @@ import numpy as np
 import pycolmap
 import pytest
 
+from tests.exported_views import MODELS, TARGET, around
+from tests.imported_views import OWN_CAMERAS, WRITERS, change, tetrahedron, views_all_round
 from toonset.camera import Camera
 from toonset.dataset.colmap import write_colmap
-from toonset.dataset.export_blender_script import write_blender_script
 from toonset.dataset.export_blender_synthetic import write_blender_synthetic
-from toonset.dataset.export_gltf import write_gltf
 from toonset.dataset.export_opencv import write_opencv
 from toonset.dataset.export_transforms import write_transforms
-from toonset.dataset.export_views import ExportView
 from toonset.dataset.import_bundle import write_imported
 from toonset.dataset.import_views import read_import, turned
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.transforms import read_scene
-from toonset.errors import BundleError, ToonsetError
 from toonset.files import write_bytes, write_json
-from toonset.mesh import Mesh
 
-TARGET = np.array([0.1, 0.9, -0.05])
-MODELS = pytest.mark.parametrize("k", [0.0, 0.2], ids=["orthographic", "pinhole"])
-Writer = Callable[[Path, tuple[ExportView, ...], Mesh], object]
-WRITERS: dict[str, Writer] = {
-    "colmap": lambda out, views, mesh: write_colmap(out, views, None, mesh),
-    "colmap-old": lambda out, views, mesh: write_colmap(out, views, None, mesh, old_layout=True),
-    "colmap-text": lambda out, views, mesh: write_colmap(out, views, None, mesh, text=True),
-    "nerfstudio": lambda out, views, mesh: write_transforms(out, views, None, mesh),
-    "instant-ngp": lambda out, views, mesh: write_transforms(
-        out, views, None, mesh, instant_ngp=True
-    ),
-    "blender-synthetic": lambda out, views, mesh: write_blender_synthetic(out, views, None, mesh),
-    "blender": write_blender_script,
-    "gltf": write_gltf,
-    "opencv": write_opencv,
-    "opencv-xml": lambda out, views, mesh: write_opencv(out, views, mesh, xml=True),
-}
-OWN_CAMERAS = [name for name in WRITERS if name not in ("blender", "gltf")]
 EVERY = pytest.mark.parametrize("kind", WRITERS)
 
 
-def views_all_round(count: int = 4, *, k: float = 0.0) -> tuple[ExportView, ...]:
-    views = []
-    for i in range(count):
-        size = (60 + 3 * i, 80 - 2 * i)
-        camera = Camera.looking_at(
-            TARGET,
-            yaw=2 * math.pi * i / count + 0.2,
-            elevation=0.1 * i - 0.2,
-            roll=0.05 * i,
-            scale=37.0 + i,
-            size_wh=size,
-            center=np.array([31.3 + i, 38.7]),
-            k=k,
-        )
-        rng = np.random.default_rng(i)
-        rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
-        rgba[..., 3] = np.where(np.add.outer(np.arange(size[1]), np.arange(size[0])) > 40, 255, 0)
-        views.append(ExportView(f"{i:03d}.png", rgba, camera, 180.0 if k == 0 else 1 / k, 1.0))
-    return tuple(views)
-
-
-def tetrahedron() -> Mesh:
-    vertices = np.array([[0.0, 0, 0], [0.4, 0, 0.1], [0.1, 1.8, 0], [0, 0.2, 0.5]])
-    return Mesh(vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
-
-
-def around() -> np.ndarray:
-    """Return 1,000 points within 1 of the target."""
-    rng = np.random.default_rng(5)
-    direction = rng.normal(size=(1000, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    return TARGET + direction * rng.random((1000, 1)) ** (1 / 3)
-
-
 def off_px(a: Camera, b: Camera) -> float:
-    points = around()
+    points = around(TARGET)
     return float(np.linalg.norm(a.project(points)[0] - b.project(points)[0], axis=1).max())
 
 
@@ -272,160 +214,3 @@ def test_an_imported_bundle_trains(toonset, colmap: Path, tmp_path: Path) -> Non
     assert toonset("import", colmap, "-o", tmp_path / "b").code == 0
     few = ("--steps", 2, "--threads", 1, "--device", "cpu", "-q")
     assert toonset("train", tmp_path / "b", *few).code == 0
-
-
-# ---- what cannot be read
-
-
-def change(file: Path, edit: Callable[[Any], object]) -> None:
-    content = json.loads(file.read_text())
-    edit(content)
-    write_json(file, content)
-
-
-@pytest.fixture
-def opencv(tmp_path: Path) -> Path:
-    write_opencv(tmp_path / "out", views_all_round(2, k=0.2))
-    (tmp_path / "out" / "toonset.json").unlink()
-    return tmp_path / "out"
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("data: [ 0., 0., 0., 0., 0. ]", "data: [ .1, 0., 0., 0., 0. ]", "undistort the pictures"),
-        ("images/000.png", "../000.png", "lies outside of the folder"),
-        ("images/000.png", "images/9.png", "the picture does not exist"),
-        ("image_width: 60", "image_width: 61", "its camera says 61 x 80"),
-        ("image_width: 60", "image_width: -1", "must be positive"),
-        ("image_width: 60", "image_width: 2000000000", "megapixels"),
-        ("views:", "shots:", "0 entries in its list `views`"),
-        ("camera_matrix:", "lens:", "camera_matrix is missing or no matrix"),
-        ("tvec: !!opencv", "t: !!opencv", "tvec is missing"),
-        ("rows: 3", "rows: 9999999", "no OpenCV YAML"),
-        ("%YAML 1.2", "hello", "no OpenCV YAML"),
-        ("0., 0., 1. ]", ".Nan, 0., 1. ]", "not finite"),
-        ("data: [ 185", "data: [ -185", "camera_matrix is not"),
-        ("-\n      name", "name", "no OpenCV YAML"),
-    ],
-)
-def test_damaged_opencv_files_are_refused(
-    toonset, opencv: Path, tmp_path: Path, old: str, new: str, words: str
-) -> None:
-    file = opencv / "cameras.yml"
-    text = file.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new, 1))
-    assert words in toonset("import", opencv, "-o", tmp_path / "b").reason
-    assert not (tmp_path / "b").exists()
-
-
-def test_an_opencv_file_with_one_of_both_rotations_is_enough(toonset, opencv: Path, tmp_path: Path):
-    file = opencv / "cameras.yml"
-    whole = read_import(opencv)
-    file.write_text(file.read_text().replace("R: !!opencv", "Q: !!opencv"))
-    for old, new in zip(whole.views, read_import(opencv).views, strict=True):
-        np.testing.assert_allclose(new.camera.rotation, old.camera.rotation, atol=1e-9)
-
-
-def test_cut_off_opencv_files_are_refused_or_whole(toonset, opencv: Path, tmp_path: Path) -> None:
-    data = (opencv / "cameras.yml").read_bytes()
-    rng = np.random.default_rng(2)
-    codes = set()
-    for number in range(40):
-        cut = bytearray(data[: rng.integers(1, len(data))])
-        for _ in range(3):
-            cut[rng.integers(len(cut))] = rng.integers(256)
-        (opencv / "cameras.yml").write_bytes(cut)
-        done = toonset("import", opencv, "-o", tmp_path / f"b{number}")
-        codes.add(done.code)
-        assert done.code == 0 or "cameras.yml" in done.reason or "images" in done.reason
-    assert 2 in codes
-
-
-@pytest.mark.parametrize("kind", OWN_CAMERAS)
-def test_cameras_that_were_changed_beside_toonset_json_are_refused(
-    tmp_path: Path, kind: str
-) -> None:
-    WRITERS[kind](tmp_path / "out", views_all_round(k=0.2), tetrahedron())
-
-    def edit(content: dict[str, Any]) -> None:
-        content["views"][1]["camera"]["target"][0] += 0.3
-
-    change(tmp_path / "out" / "toonset.json", edit)
-    with pytest.raises(BundleError, match=r"disagree; remove toonset\.json"):
-        read_import(tmp_path / "out")
-
-
-@pytest.mark.parametrize(
-    ("edit", "words"),
-    [
-        (lambda c: c.update(schema="toonset-export/2"), "newer than this toonset"),
-        (lambda c: c["views"][0].update(picture="../../etc/passwd"), "lies outside"),
-        (lambda c: c["views"][0].pop("camera"), "field views.0.camera"),
-        (lambda c: c["views"][0]["camera"].update(scale=-1), "must be positive"),
-        (lambda c: c["views"][0].update(pinhole_distance=0), "pinhole_distance"),
-        (lambda c: c.update(views=[]), "views"),
-    ],
-)
-def test_damaged_records_are_refused(
-    tmp_path: Path, edit: Callable[[Any], object], words: str
-) -> None:
-    write_gltf(tmp_path / "out", views_all_round(2))
-    change(tmp_path / "out" / "toonset.json", edit)
-    with pytest.raises(ToonsetError, match=words):
-        read_import(tmp_path / "out")
-
-
-def test_a_bundle_is_no_import(toonset, tmp_path: Path) -> None:
-    write_opencv(tmp_path / "out", views_all_round(2))
-    bundle = tmp_path / "bundle"
-    write_imported(bundle, read_import(tmp_path / "out"), None)
-    assert "is of a bundle already" in toonset("import", bundle, "-o", tmp_path / "b").reason
-
-
-def test_what_holds_no_cameras_is_refused(toonset, tmp_path: Path) -> None:
-    (tmp_path / "empty").mkdir()
-    out = tmp_path / "b"
-    assert "holds no cameras" in toonset("import", tmp_path / "empty", "-o", out).reason
-    assert "does not exist" in toonset("import", tmp_path / "none", "-o", out).reason
-    (tmp_path / "x.png").write_bytes(encode_png(np.zeros((2, 2, 4), np.uint8)))
-    assert "holds no cameras" in toonset("import", tmp_path / "x.png", "-o", out).reason
-    assert not out.exists()
-
-
-def test_distorted_colmap_cameras_are_refused_by_name(toonset, tmp_path: Path) -> None:
-    write_colmap(tmp_path / "out", views_all_round(2, k=0.2))
-    sparse = tmp_path / "out" / "sparse" / "0"
-    model = pycolmap.Reconstruction(sparse)
-    lens = model.cameras[1]
-    lens.model = pycolmap.CameraModelId.OPENCV
-    lens.params = [100.0, 100.0, 30.0, 40.0, 0.1, 0, 0, 0]
-    model.write(sparse)
-    reason = toonset("import", tmp_path / "out", "-o", tmp_path / "b").reason
-    assert "OPENCV camera" in reason
-    assert "undistort" in reason
-
-
-def test_equal_names_in_one_folder_are_refused(tmp_path: Path) -> None:
-    views = views_all_round(2, k=0.2)
-    write_transforms(tmp_path / "out", views)
-    (tmp_path / "out" / "toonset.json").unlink()
-    write_bytes(tmp_path / "out" / "images" / "000.bmp", b"")
-
-    def edit(content: dict[str, Any]) -> None:
-        content["frames"][1]["file_path"] = "images/000.bmp"
-
-    change(tmp_path / "out" / "transforms.json", edit)
-    with pytest.raises(BundleError, match=r"2 pictures would be named images_000\.png"):
-        read_import(tmp_path / "out")
-
-
-def test_pictures_of_another_size_are_refused(toonset, tmp_path: Path) -> None:
-    views = views_all_round(2, k=0.2)
-    write_colmap(tmp_path / "out", views)
-    small = replace(views[0], rgba=views[0].rgba[:9, :9])
-    write_bytes(tmp_path / "out" / "images" / "000.png", encode_png(small.rgba))
-    reason = toonset("import", tmp_path / "out", "-o", tmp_path / "b").reason
-    assert "is 9 x 9 px, its camera says 60 x 80" in reason
-    assert not (tmp_path / "b").exists()

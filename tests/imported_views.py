@@ -1,0 +1,72 @@
+"""Views of many sizes, written by every export, for imports to read back."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.exported_views import TARGET
+from toonset.camera import Camera
+from toonset.dataset.colmap import write_colmap
+from toonset.dataset.export_blender_script import write_blender_script
+from toonset.dataset.export_blender_synthetic import write_blender_synthetic
+from toonset.dataset.export_gltf import write_gltf
+from toonset.dataset.export_opencv import write_opencv
+from toonset.dataset.export_transforms import write_transforms
+from toonset.dataset.export_views import ExportView
+from toonset.files import write_json
+from toonset.mesh import Mesh
+
+Writer = Callable[[Path, tuple[ExportView, ...], Mesh], object]
+WRITERS: dict[str, Writer] = {
+    "colmap": lambda out, views, mesh: write_colmap(out, views, None, mesh),
+    "colmap-old": lambda out, views, mesh: write_colmap(out, views, None, mesh, old_layout=True),
+    "colmap-text": lambda out, views, mesh: write_colmap(out, views, None, mesh, text=True),
+    "nerfstudio": lambda out, views, mesh: write_transforms(out, views, None, mesh),
+    "instant-ngp": lambda out, views, mesh: write_transforms(
+        out, views, None, mesh, instant_ngp=True
+    ),
+    "blender-synthetic": lambda out, views, mesh: write_blender_synthetic(out, views, None, mesh),
+    "blender": write_blender_script,
+    "gltf": write_gltf,
+    "opencv": write_opencv,
+    "opencv-xml": lambda out, views, mesh: write_opencv(out, views, mesh, xml=True),
+}
+OWN_CAMERAS = [name for name in WRITERS if name not in ("blender", "gltf")]
+
+
+def views_all_round(count: int = 4, *, k: float = 0.0) -> tuple[ExportView, ...]:
+    views = []
+    for i in range(count):
+        size = (60 + 3 * i, 80 - 2 * i)
+        camera = Camera.looking_at(
+            TARGET,
+            yaw=2 * math.pi * i / count + 0.2,
+            elevation=0.1 * i - 0.2,
+            roll=0.05 * i,
+            scale=37.0 + i,
+            size_wh=size,
+            center=np.array([31.3 + i, 38.7]),
+            k=k,
+        )
+        rng = np.random.default_rng(i)
+        rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
+        rgba[..., 3] = np.where(np.add.outer(np.arange(size[1]), np.arange(size[0])) > 40, 255, 0)
+        views.append(ExportView(f"{i:03d}.png", rgba, camera, 180.0 if k == 0 else 1 / k, 1.0))
+    return tuple(views)
+
+
+def tetrahedron() -> Mesh:
+    vertices = np.array([[0.0, 0, 0], [0.4, 0, 0.1], [0.1, 1.8, 0], [0, 0.2, 0.5]])
+    return Mesh(vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+
+
+def change(file: Path, edit: Callable[[Any], object]) -> None:
+    content = json.loads(file.read_text())
+    edit(content)
+    write_json(file, content)
