@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from dataclasses import replace
@@ -22,18 +21,12 @@ from toonset.bench.calib_figures import (
     angle_between,
     sheet_records,
 )
-from toonset.bench.calib_table import sheets_table, sprites_table
+from toonset.bench.calib_table import sheets_table
 from toonset.bench.cases import CONDITIONS, CalibCase, calib_cases
 from toonset.bench.record import Record
-from toonset.bench.sprites import MANNEQUIN, OWN_MESH, bench_sprites, sprite_cases
 from toonset.calib.result import SEVERITY
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.bodies import random_body
-from toonset.dataset.mesh_file import save_obj
-from toonset.dataset.picture import encode_png
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
-from toonset.errors import BundleError
 from toonset.view import View
 
 RECORDER = Recorder("default", "drawn", 0)
@@ -258,89 +251,7 @@ def test_what_is_missing_is_a_dash_and_failed_runs_are_told() -> None:
     assert "photo, COLMAP: views not placed 2 of 3" in text
 
 
-# ---- sprites
-
-
-@pytest.fixture(scope="module")
-def sprites(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a character of 4 sprites with its mesh, and one without."""
-    root = tmp_path_factory.mktemp("sprites")
-    options = SynthOptions(views=4, cell_px=64, outline_px=0, elevation_deg=30, supersample=2)
-    made = make_turnaround(random_body(5), options, 0)
-    (root / "body.obj").write_bytes(save_obj(made.mesh))
-    for name in ("exact", "free"):
-        place = root / "sprites" / name
-        place.mkdir(parents=True)
-        info: dict[str, object] = {"yaw_deg": [0, 90, 180, 270]}
-        if name == "exact":
-            info |= {"mesh": "body.obj", "alpha": "below 200 is the shadow"}
-        (place / "info.json").write_text(json.dumps(info))
-        for i, view in enumerate(made.views):
-            rgba = view.rgba.copy()
-            rgba[-4:, :, 3] = 150
-            (place / f"view_{i}.png").write_bytes(encode_png(rgba))
-    return root / "sprites"
-
-
-def test_a_shadow_is_cut_where_the_sprites_have_one(sprites: Path) -> None:
-    exact, free = sprite_cases(sprites)
-    assert (exact.group, free.group) == (OWN_MESH, MANNEQUIN)
-    assert not exact.views[0].rgba[-4:].any()
-    assert free.views[0].mask[-4:].all()
-    assert set(np.unique(exact.views[0].rgba[..., 3]) // 200) <= {0, 1}
-    assert exact.yaws == pytest.approx(np.radians([0, 90, 180, 270]))
-
-
-def test_sprites_with_their_mesh_are_measured_in_degrees(sprites: Path) -> None:
-    records = bench_sprites(sprite_cases(sprites, "exact"), 0)
-    assert {r.method for r in records} == {"default", "labels"}
-    exact = by_metric([r for r in records if r.method == "labels"])
-    assert exact["yaw error"].median < 3
-    assert exact["right 45 deg bin"].value == 1
-
-
-def test_sprites_without_a_mesh_are_asked_for_their_bin(
-    sprites: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = answer(np.stack([rotation_from_angles(math.radians(y), 0, 0) for y in (20, 70, 0, 0)]))
-    monkeypatch.setattr("toonset.bench.sprites.calibrate", lambda *_, **__: found)
-    records = bench_sprites(sprite_cases(sprites), 0)
-    free = by_metric([r for r in records if (r.group, r.method) == (MANNEQUIN, "default")])
-    assert (free["right 45 deg bin"].value, free["right 45 deg bin"].n) == (0.5, 4)
-    assert free["wrong but ok"].value == 2
-    assert "yaw error" not in free
-    text = sprites_table(records)
-    assert f"{OWN_MESH}: 4 views, 1 sheets" in text
-    assert max(map(len, text.splitlines())) <= 120
-
-
-@pytest.mark.parametrize("info", [{}, [], {"yaw_deg": ["left"]}, {"yaw_deg": []}, {"yaw_deg": 3}])
-def test_sprites_that_do_not_say_their_yaws_are_refused(tmp_path: Path, info: object) -> None:
-    (tmp_path / "cat").mkdir()
-    (tmp_path / "cat" / "info.json").write_text(json.dumps(info))
-    with pytest.raises(BundleError, match="yaw_deg"):
-        list(sprite_cases(tmp_path))
-
-
-def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
-    toonset, sprites, tmp_path, monkeypatch
-):
-    out = tmp_path / "out"
-    found = answer(np.stack([rotation_from_angles(math.radians(y), 0, 0) for y in (1, 88, 180, 9)]))
-    monkeypatch.setattr("toonset.bench.sprites.calibrate", lambda *_, **__: found)
-    command = ("bench", "calib", "--sprites", sprites, "--quiet", "-o", out)
-    done = toonset(*command, "--only", "exact")
-    assert done.code == 0, done
-    assert "right bin" in done.out
-    assert {p.name for p in out.iterdir()} == {
-        "records.json",
-        "chart-rendered-sprites-own-mesh.png",
-    }
-    assert {r["method"] for r in json.loads((out / "records.json").read_text())} == {
-        "default",
-        "labels",
-    }
-    assert "'dog'" in toonset(*command, "--force", "--only", "dog").reason
+# ---- the command
 
 
 @pytest.mark.parametrize(
