@@ -9,30 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image, ImageDraw
+from PIL import Image
 
+from tests.split_sheets import COLORS, COUNT, HIGH, PITCH, TOP, WIDE, drawn_sheet
 from toonset.dataset.sheet import SheetOptions, split_sheet
 from toonset.dataset.split_files import NAME, VERSION
 from toonset.dataset.split_read import read_split
-
-COLORS = ((200, 60, 40), (40, 120, 200), (60, 160, 70), (220, 180, 40))
-COUNT = len(COLORS)
-PITCH, TOP, WIDE, HIGH = 110, 20, 60, 160  # of the figures on the sheet
-
-
-def draw_figure(pen: ImageDraw.ImageDraw, x: int, y: int, color: tuple[int, int, int]) -> None:
-    pen.ellipse((x + 10, y, x + 50, y + 45), color, "black", 3)
-    pen.rectangle((x, y + 43, x + WIDE, y + 110), color, "black", 3)
-    pen.rectangle((x + 8, y + 108, x + 26, y + HIGH), color, "black", 3)
-    pen.rectangle((x + 34, y + 108, x + 52, y + HIGH), color, "black", 3)
-
-
-def drawn_sheet(paper: str = "white", colors: tuple[tuple[int, int, int], ...] = COLORS):
-    image = Image.new("RGB", (PITCH * len(colors), HIGH + 2 * TOP), paper)
-    pen = ImageDraw.Draw(image)
-    for number, color in enumerate(colors):
-        draw_figure(pen, 25 + PITCH * number, TOP, color)
-    return image
 
 
 @pytest.fixture
@@ -200,6 +182,13 @@ def test_a_known_background_is_used(sheet: Path, toonset):
     assert colors_of(Path("views")) == list(COLORS)
 
 
+def test_boxes_and_a_grid_contradict(sheet: Path, toonset):
+    done = toonset("split", sheet, "--boxes", "b.csv", "--grid", "4x1")
+    assert (done.code, done.out) == (2, "")
+    said = " ".join(done.err.replace("│", " ").split())
+    assert "--boxes and --grid both say where the figures are; drop one" in said
+
+
 # ---- inputs
 
 
@@ -257,79 +246,6 @@ def test_a_corrected_folder_is_read_again(sheet: Path, toonset):
     assert [source.name for source in found.sources] == ["sheet.png"]
     assert toonset("split", "again/split.json", "-o", "third").code == 0
     assert colors_of(Path("third")) == [COLORS[0], COLORS[2], COLORS[3]]
-
-
-# ---- what cannot be
-
-
-@pytest.fixture(scope="module")
-def prepared(toonset, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a sheet, what was split from it, and things that are broken."""
-    here = tmp_path_factory.mktemp("prepared")
-    drawn_sheet().save(here / "sheet.png")
-    drawn_sheet(colors=COLORS[:2]).save(here / "copy.png")
-    for name in ("empty", "bundle", "broken"):
-        (here / name).mkdir()
-    (here / "bundle" / "transforms.json").write_text("{}")
-    (here / "broken" / "split.json").write_text("{")
-    (here / "far.csv").write_text("x,y,w,h\n0,0,60,160\n400,0,60,160\n")
-    (here / "flat.csv").write_text("10,10,60,0\n")
-    assert toonset("split", here / "sheet.png", "-o", here / "done", "-q").code == 0
-    shutil.copytree(here / "done", here / "torn")
-    (here / "torn" / "split.json").unlink()
-    return here
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["sheet.png", "--drop", "4"], "--drop: there is no view 4; the 4 views are numbered from"),
-        (["sheet.png", "--drop", "0-3"], "--drop: leaves none of 4 views; keep at least one"),
-        (["sheet.png", "--drop", "first"], "--drop: 'first' is no number of a view; write them"),
-        (["sheet.png", "--drop", "3-1"], "--drop: '3-1' ends before it starts; write 1-3"),
-        (["sheet.png", "--background", "whit"], "--background: 'whit' is no colour; write '#rr"),
-        (["sheet.png", "--grid", "8by1"], "--grid: '8by1' is no grid of 1 to 1000 cells; write"),
-        (["sheet.png", "--grid", "0x1"], "--grid: '0x1' is no grid"),
-        (["sheet.png", "--grid", "x8"], "--grid: 'x8' is no grid"),
-        (["sheet.png", "--views", "front,3q"], "--views: 2 labels for 4 views"),
-        (
-            ["sheet.png", "--drop", "0", "--views", "front,3q,side,back"],
-            "--views: 4 labels for 3 views (--drop left 3 of 4); give one per kept view",
-        ),
-        (["sheet.png", "--views", "front,3q,sde,back"], "'sde' is no direction; did you mean"),
-        (["sheet.png", "--boxes", "none.json"], "none.json: no such file; check the name of the"),
-        (["sheet.png", "--boxes", "far.csv"], "--boxes: box 1 (x 400, y 0, 60 x 160 px) leaves"),
-        (["sheet.png", "--boxes", "flat.csv"], "flat.csv:1: 60 x 0 px is empty"),
-        (["sheet.png", "--boxes", "sheet.png"], "sheet.png: is a PNG picture, no file of boxes"),
-        (["sheet.png", "copy.png", "--boxes", "far.csv"], "has boxes of 1 sheet(s), 2 are given"),
-        (["sheet.png", "sheet.png"], "sheet.png: is given twice; name every drawing once"),
-        (["sheet.png", "./sheet.png"], "sheet.png: is given twice"),
-        (["sheet.png", "none.png"], "none.png: no such file"),
-        (["empty"], "empty: is a folder without pictures; name a sheet, or its folder"),
-        (["bundle"], "bundle: holds transforms.json, so it is no folder of sheets; give bundle/im"),
-        (["torn"], "torn: holds overlay.png and images/ as a split folder does, but no split.json"),
-        (["done", "--grid", "4x1"], "--grid: done is cut already; give the sheet that it was cut"),
-        (["broken"], "broken/split.json: is no valid JSON"),
-        (["sheet.png", "-o", "sheet.png"], "sheet.png: is a file, a folder is needed"),
-        (["sheet.png", "-o", "done"], "done: exists already; pass --force to replace it"),
-        (["done", "-o", "done", "--force"], "done: holds done, --force would delete it"),
-        (["sheet.png", "-o", "empty/..", "--force"], "which this command does not write"),
-    ],
-)
-def test_a_mistake_is_one_line(
-    arguments, words, prepared: Path, toonset, snapshot, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(shutil.copytree(prepared, tmp_path / "here"))
-    before = snapshot(Path())
-    assert words in toonset("split", *arguments).reason
-    assert snapshot(Path()) == before
-
-
-def test_boxes_and_a_grid_contradict(sheet: Path, toonset):
-    done = toonset("split", sheet, "--boxes", "b.csv", "--grid", "4x1")
-    assert (done.code, done.out) == (2, "")
-    said = " ".join(done.err.replace("│", " ").split())
-    assert "--boxes and --grid both say where the figures are; drop one" in said
 
 
 # ---- calibrate takes the same
