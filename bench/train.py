@@ -41,7 +41,7 @@ class Column:
 def run_jobs(
     jobs: Sequence[Job],
     progress: Callable[[str], None] = lambda text: None,
-    look: Look = lambda job, case, field: None,
+    look: Look = lambda *_: None,
     done: Sequence[RunResult] = (),
 ) -> Iterator[tuple[Job, RunResult]]:
     """Yield every job with its result, as soon as it is done; one at a time, for they are timed.
@@ -51,7 +51,7 @@ def run_jobs(
     Args:
         jobs: "default" before what is compared with it.
         progress: called with what is about to be run.
-        look: is shown the fields.
+        look: is shown the fields and their held-out views.
         done: results of earlier jobs.
     """
     judges = load_judges()

@@ -18,7 +18,7 @@ from toonset.camera import rotation_distance
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import ToonsetError
 from toonset.nerf.checkpoint_state import FitState
-from toonset.nerf.evaluation import LAYERS, score_views
+from toonset.nerf.evaluation import LAYERS, ScoredView, score_views
 from toonset.nerf.field_box import without_empty_space
 from toonset.nerf.field_loss import Model
 from toonset.nerf.fitting import Moment
@@ -32,7 +32,7 @@ from toonset.nerf.training import train
 from toonset.nerf.views import render
 
 CURVE_VIEWS = 4  # held-out views that every point of the curves is the mean of
-Look = Callable[[Job, TrainCase, TrainedField], None]
+Look = Callable[[Job, TrainCase, TrainedField, Sequence[ScoredView]], None]
 FIRST_LOOK_S, LOOK_FACTOR = 1.0, 2**0.5  # seconds of the first snapshot, and from one to the next
 
 
@@ -80,7 +80,7 @@ class RunResult:
     note: str = ""
 
 
-def run_job(job: Job, judges: Judges, look: Look = lambda job, case, field: None) -> RunResult:
+def run_job(job: Job, judges: Judges, look: Look = lambda *_: None) -> RunResult:
     """Return what training and rendering of one job gives; a refusal is a result, too."""
     case, method = subset(job.case, job.views), METHODS[job.method]
     try:
@@ -107,7 +107,7 @@ def _trained(
     curve.append(Seen(seconds, cpu_seconds, _psnr(training.result, sample)))
     render_seconds = (time.perf_counter() - began) / len(sample)
     views = score_views(training.result, case.test, judges)
-    look(job, case, training.result)
+    look(job, case, training.result, views)
     layers = {layer: [v.figures[layer] for v in views if layer in v.figures] for layer in LAYERS}
     figures = means(layers["rgb"])
     figures |= {f"palette_{name}": value for name, value in means(layers["palette"]).items()}

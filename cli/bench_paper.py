@@ -6,18 +6,19 @@ of which the figure is put together.
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toonset.cli.bench_chosen import Chosen
-from toonset.cli.bench_train import WRITTEN, jobs_of, run_into
+from toonset.cli.bench_train import WRITTEN, file_name, jobs_of, run_into
 from toonset.cli.output import Printer
 
 if TYPE_CHECKING:
     from toonset.bench.cases import TrainCase
     from toonset.bench.train_plan import Job
     from toonset.bench.train_run import Look
+    from toonset.nerf.evaluation import ScoredView
     from toonset.nerf.trained import TrainedField
 
 STRIPS, TABLE, FIGURE = "strips", "table1", "figure4"
@@ -55,7 +56,7 @@ def paper_into(
 def _strips_into(folder: Path) -> Look:
     """Return what keeps pictures of a training's result, if it has a palette."""
 
-    def look(job: Job, case: TrainCase, trained: TrainedField) -> None:
+    def look(job: Job, case: TrainCase, trained: TrainedField, _: Sequence[ScoredView]) -> None:
         from toonset.bench.paper_picture import strip_of
         from toonset.dataset.picture import encode_png
         from toonset.files import write_bytes
@@ -67,7 +68,7 @@ def _strips_into(folder: Path) -> Look:
 
 
 def _strip(job: Job) -> str:
-    return f"{STRIPS}/{_plain(job.name)}.png"
+    return f"{STRIPS}/{file_name(job.name)}.png"
 
 
 def _draw(folder: Path, case: TrainCase, jobs: list[Job]) -> None:
@@ -82,9 +83,5 @@ def _draw(folder: Path, case: TrainCase, jobs: list[Job]) -> None:
     files = {job.method: folder / _strip(job) for job in ordered}
     strips = {name: load_rgba(file)[..., :3] for name, file in files.items() if file.is_file()}
     if strips:
-        name = f"{FIGURE}-{_plain(case.name)}-{side_px(case)}px.png"
+        name = f"{FIGURE}-{file_name(case.name)}-{side_px(case)}px.png"
         write_bytes(folder / name, encode_png(figure_of(drawn_strip(case), strips)))
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[^\w.-]+", "-", name)

@@ -8,6 +8,8 @@ picture show all that the folder has. Who has changed the code in between starts
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +22,11 @@ if TYPE_CHECKING:
     from toonset.bench.cases import TrainCase
     from toonset.bench.train_plan import Job
     from toonset.bench.train_run import Look, RunResult
+    from toonset.nerf.evaluation import ScoredView
+    from toonset.nerf.trained import TrainedField
 
-RUNS, RECORDS, CURVES = "runs.json", "records.json", "train.png"
-WRITTEN = (RUNS, RECORDS, CURVES, "chart-*.png")
+RUNS, RECORDS, CURVES, VIEWS = "runs.json", "records.json", "train.png", "views"
+WRITTEN = (RUNS, RECORDS, CURVES, VIEWS, "chart-*.png")
 QUICK_COUNT = 1
 
 
@@ -31,6 +35,8 @@ def train_into(
 ) -> tuple[str, dict[str, Any]]:
     """Return table and records of the chosen trainings, after those that the folder lacks.
 
+    The default's held-out views lie beside the drawings' in a picture per case.
+
     Raises:
         ToonsetError: no training of that name, or a folder that may not be written or continued.
     """
@@ -38,7 +44,7 @@ def train_into(
     from toonset.bench.train import records_of, table_of
 
     jobs = jobs_of(chosen)
-    runs = run_into(folder, jobs, chosen, printer, WRITTEN, force=force)
+    runs = run_into(folder, jobs, chosen, printer, WRITTEN, _views_into(folder), force=force)
     return table_of(runs), {"records": as_dicts(records_of(runs, chosen.seed))}
 
 
@@ -66,7 +72,7 @@ def run_into(
     chosen: Chosen,
     printer: Printer,
     written: tuple[str, ...],
-    look: Look = lambda job, case, field: None,
+    look: Look = lambda *_: None,
     *,
     force: bool,
 ) -> list[RunResult]:
@@ -85,6 +91,29 @@ def run_into(
         runs = _of_jobs(done, jobs)
         _write(folder, runs, chosen.seed)
     return runs
+
+
+def _views_into(folder: Path) -> Look:
+    """Return what draws a default training's held-out views beside the truth."""
+
+    def look(job: Job, _: TrainCase, trained: TrainedField, views: Sequence[ScoredView]) -> None:
+        from toonset.bench.chart import DEFAULT
+        from toonset.dataset.picture import encode_png
+        from toonset.files import write_bytes
+        from toonset.nerf.evaluation_picture import contact_sheet
+
+        if job.method == DEFAULT:
+            heading = f"{job.name}, seed {job.seed}, held-out views"
+            errors_are = "mean difference" if views[0].figures["rgb"]["flip"] is None else "FLIP"
+            picture = encode_png(contact_sheet([(heading, views)], errors_are))
+            write_bytes(folder / VIEWS / file_name(f"{job.name} {job.seed}.png"), picture)
+
+    return look
+
+
+def file_name(text: str) -> str:
+    """Return the text without what file names should not have."""
+    return re.sub(r"[^\w.-]+", "-", text)
 
 
 def _cases(chosen: Chosen) -> list[TrainCase]:

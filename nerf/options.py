@@ -44,7 +44,7 @@ class TrainOptions:
     device: str = "auto"
     resolution: int | None = None
     smoothness: float = 1e-3
-    palette_weight: float = 0.01
+    palette_weight: float = 0.003
     missing_views: int | None = None
     field: FieldName = "triplane"
     carve: bool = True

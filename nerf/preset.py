@@ -29,5 +29,11 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
     drawings are taken as they are. A step takes 1,024 rays of 96 samples.
     """
     return TrainOptions(
-        steps=steps, carve=False, smoothness=0.0, register=False, unbend=False, symmetric=False
+        steps=steps,
+        palette_weight=0.01,
+        carve=False,
+        smoothness=0.0,
+        register=False,
+        unbend=False,
+        symmetric=False,
     )
