@@ -63,7 +63,7 @@ def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> 
     if len(colors) != len(trained.palette):
         raise PaletteError(
             f"--palette {palette}: {len(colors)} colours, the run has {len(trained.palette)}; "
-            "give as many in the same order, or pass --match nearest"
+            "give as many in the same order, or pass --nearest"
         )
     return replace(trained, palette=colors)
 
