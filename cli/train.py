@@ -66,6 +66,10 @@ def train(
     as_placed: Annotated[
         bool, typer.Option("--as-placed", help="Trust the cameras: do not register drawings.")
     ] = False,
+    as_turned: Annotated[
+        bool,
+        typer.Option("--as-turned", help="Trust calibration's yaws: do not turn its cameras."),
+    ] = False,
     as_bent: Annotated[
         bool, typer.Option("--as-bent", help="Trust the outlines: do not unbend drawings.")
     ] = False,
@@ -131,8 +135,8 @@ def train(
     _check_choice(field or FIELDS[0], FIELDS, "--field")
     _check_choice(ink, INKS, "--ink")
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
-    switches = {"fair": as_carved, "register": as_placed, "unbend": as_bent}
-    switches |= {"symmetric": one_sided}
+    switches = {"fair": as_carved, "register": as_placed, "turn": as_turned}
+    switches |= {"unbend": as_bent, "symmetric": one_sided}
     given |= {name: False for name, off in switches.items() if off}
     given |= {"ink": True} if ink == "redraw" else {}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle

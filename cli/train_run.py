@@ -30,6 +30,7 @@ RESUMED_AS = {"steps": "--steps", "budget_s": "--budget", "device": "--device", 
 RESUMED_AS |= {
     "fair": "--as-carved",
     "register": "--as-placed",
+    "turn": "--as-turned",
     "unbend": "--as-bent",
     "symmetric": "--one-sided",
     "ink": "--ink",

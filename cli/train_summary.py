@@ -29,13 +29,17 @@ def summary(run: Path, metrics: dict[str, Any]) -> str:
 def _drawings(found: dict[str, Any]) -> list[str]:
     """Return what was done to the drawings, and on what evidence."""
     lines = []
-    for name, done in (("registration", "moved and sized"), ("unbending", "bent back")):
+    for name, what, done in (
+        ("turning", "cameras", "turned"),
+        ("registration", "drawings", "moved and sized"),
+        ("unbending", "drawings", "bent back"),
+    ):
         step = found[name]
         if step is None:
             continue
         before, after = step["apart_px"]
-        moved = f"drawings {done}: outlines {before:.2f} px apart, {after:.2f} px after"
-        kept = f"drawings not {done}: outlines {before:.2f} px apart"
+        moved = f"{what} {done}: outlines {before:.2f} px apart, {after:.2f} px after"
+        kept = f"{what} not {done}: outlines {before:.2f} px apart"
         lines.append(f"{moved if step['applied'] else kept} ({step['gain_nats']:+.0f} nats)")
     if found["ink"]:
         ink = found["ink"]

@@ -161,7 +161,8 @@ def scene_digest(scene: Scene) -> str:
     digest = sha256()
     for frame in scene.frames:
         camera = frame.camera
-        numbers = (camera.scale, *camera.size_wh, camera.k, camera.pixel_aspect)
+        numbers = [camera.scale, *camera.size_wh, camera.k, camera.pixel_aspect]
+        numbers += [] if frame.yaw_sigma is None else [frame.yaw_sigma]
         for values in (camera.rotation, camera.target, camera.center, numbers):
             digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(frame.rgba).tobytes())

@@ -31,6 +31,7 @@ class TrainOptions:
             figure's box, at new places in every step, against pictures over any backdrop.
         fair: take the fairest surface inside the hull instead of the hull with its corners.
         register: let cameras follow drawings that were placed or sized off.
+        turn: let cameras that calibration estimated turn within its sigmas, where they may move.
         unbend: bend drawings back that disagree with the others' outlines.
         symmetric: where drawings show that the body is its own mirror image, flip them for the side
             that no drawing shows.
@@ -50,6 +51,7 @@ class TrainOptions:
     carve: bool = True
     fair: bool = True
     register: bool = True
+    turn: bool = True
     unbend: bool = True
     symmetric: bool = True
     ink: bool = False

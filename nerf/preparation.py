@@ -1,8 +1,9 @@
 """What happens to drawings before a field is fitted to them.
 
-Each only where the drawings ask for it: cameras follow drawings that were placed or sized off
-(`registration`), drawings that bend are unbent (`warp`), contour lines are taken off (`ink`). What
-was taken away is kept, to be given back to renderings.
+Each only where the drawings ask for it: cameras that were estimated turn (`azimuth`),
+they follow drawings that were placed or sized off (`registration`), drawings that bend are unbent
+(`warp`), contour lines are taken off (`ink`). What was taken away is kept, to be given back to
+renderings.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from toonset.dataset.scene import Scene
+from toonset.nerf.azimuth import Turning, turned
 from toonset.nerf.bounds import box_of_masks
 from toonset.nerf.ink import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
@@ -26,12 +28,14 @@ class Prepared:
 
     Attributes:
         scene: the drawings that a field is fitted to.
+        turning: how cameras turned; None: switched off, or they are known exactly.
         registration: how cameras moved; None: switched off.
         unbending: how drawings were bent; None: switched off.
         ink: the contour lines that were taken off; None: there are none, or switched off.
     """
 
     scene: Scene
+    turning: Turning | None
     registration: Registration | None
     unbending: Unbending | None
     ink: InkStyle | None
@@ -39,8 +43,9 @@ class Prepared:
     @property
     def apart_px(self) -> float:
         """Return by how much outlines still disagree, root mean square; 0: as exact as pixels."""
-        steps = [step for step in (self.registration, self.unbending) if step and step.applied]
-        return steps[-1].apart_px[1] if steps else 0.0
+        steps = (self.turning, self.registration, self.unbending)
+        applied = [step for step in steps if step and step.applied]
+        return applied[-1].apart_px[1] if applied else 0.0
 
     @property
     def keys(self) -> KeyWarps | None:
@@ -55,8 +60,9 @@ class Prepared:
 
     def to_json(self) -> dict[str, Any]:
         """Return what was found and done, for a report."""
-        registration, unbending = self.registration, self.unbending
+        turning, registration, unbending = self.turning, self.registration, self.unbending
         return {
+            "turning": None if turning is None else turning.to_json(),
             "registration": None if registration is None else registration.to_json(),
             "unbending": None if unbending is None else unbending.to_json(),
             "ink": None if self.ink is None else asdict(self.ink),
@@ -68,13 +74,35 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
 
     Args:
         scene: posed drawings; without labels the contour lines stay.
-        options: its `register`, `unbend` and `ink` switch the steps.
+        options: its `turn`, `register`, `unbend` and `ink` switch the steps.
     """
-    scene, registration, unbending = aligned(scene, options.register, options.unbend)
+    scene, turning, registration, unbending = _agreeing(scene, options)
     ink = None
     if options.ink and scene.palette is not None:
         scene, ink = without_ink(scene)
-    return Prepared(scene, registration, unbending, ink)
+    return Prepared(scene, turning, registration, unbending, ink)
+
+
+def _agreeing(
+    scene: Scene, options: TrainOptions
+) -> tuple[Scene, Turning | None, Registration | None, Unbending | None]:
+    """Return the scene with its cameras and drawings set right, and what was found of each kind.
+
+    Cameras turn only where that explains the outlines better than places and sizes or bends do:
+    where drawings bend, outlines say too little of yaws. (So bends are asked about even where they
+    are switched off.)
+    """
+    straight, registration, unbending = aligned(scene, options.register, options.unbend)
+    if not (options.turn and options.register):
+        return straight, None, registration, unbending
+    placed, turning = turned(scene)
+    if turning is None or not turning.applied:
+        return straight, turning, registration, unbending
+    rivals = (registration, unbending or unbent(scene)[1])
+    if turning.gain_nats <= max(rival.gain_nats for rival in rivals if rival):
+        return straight, replace(turning, applied=False), registration, unbending
+    rest, registration, unbending = aligned(placed, options.register, options.unbend)
+    return rest, turning, registration, unbending
 
 
 def aligned(

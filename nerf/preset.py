@@ -34,6 +34,7 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
         carve=False,
         smoothness=0.0,
         register=False,
+        turn=False,
         unbend=False,
         symmetric=False,
     )

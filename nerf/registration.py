@@ -34,6 +34,12 @@ class ViewMove:
     shift_px: tuple[float, float]
     scale: float
 
+    @classmethod
+    def of(cls, square: Square, own: Float[np.ndarray, " 3"]) -> ViewMove:
+        """Return the move of a drawing's numbers of `ShiftAndScale`."""
+        x, y = square.size * own[:2]
+        return cls((float(x), float(y)), float(1 + 2 * own[2]))
+
 
 @dataclass(frozen=True, eq=False)
 class Registration(Alignment):
@@ -64,17 +70,16 @@ def registered(scene: Scene) -> tuple[Scene, Registration]:
         BundleError: the cameras do not belong together (see `box_of_masks`).
     """
     found, numbers = alignment_of(scene, ShiftAndScale.expected(), ROUNDS)
-    moved = list(scene.frames)
-    views = [ViewMove((0.0, 0.0), 1.0)] * len(moved)
+    frames = list(scene.frames)
+    views = [ViewMove((0.0, 0.0), 1.0)] * len(frames)
     for i, (square, own) in numbers.items():
-        moved[i] = replace(moved[i], camera=_moved(moved[i].camera, square, own))
-        x, y = square.size * own[:2]
-        views[i] = ViewMove((float(x), float(y)), float(1 + 2 * own[2]))
+        frames[i] = replace(frames[i], camera=moved(frames[i].camera, square, own))
+        views[i] = ViewMove.of(square, own)
     registration = Registration(**vars(found), views=tuple(views))
-    return (replace(scene, frames=tuple(moved)) if found.applied else scene), registration
+    return (replace(scene, frames=tuple(frames)) if found.applied else scene), registration
 
 
-def _moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
+def moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
     """Return the camera whose pixel of a point is the moved one: u + d(u), exactly."""
     growth = 1 + 2 * own[2]
     middle = square.low + square.size / 2

@@ -4,7 +4,7 @@ Minimised over the numbers c_v of all drawings at once, by Gauss-Newton:
 
     sum over rim points and other views of rho(r / sigma)^2 / CORRELATED  +  c' K^-1 c / tau^2
 
-What all drawings share is the body's own place and size, and kept out (`_common`).
+What all drawings share is the body's own place and size, and kept out (`common`).
 tau, the size of the drawings' errors, comes from the sheet itself (expectation maximisation, as
 in MacKay 1992); whether there are errors at all is asked of the marginal likelihood against none,
 which charges every number that the data determine.
@@ -78,11 +78,11 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     if idle <= 0:  # even a perfect fit would not be worth its numbers
         return Fit(numbers, 0.0, float(idle / 2), (first.apart, first.apart))
     normal, flat = first, numbers.reshape(-1)
-    common, shares = _common(outlines, moves)
+    body, shares = common(outlines, moves)
     for round_ in range(1, rounds + 1):
         prior = precision / tau**2
         flat = flat - np.linalg.solve(normal.matrix + prior, normal.slope + prior @ flat)
-        flat = flat - common @ (shares @ flat)
+        flat = flat - body @ (shares @ flat)
         numbers = flat.reshape(views, count)
         normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
         if round_ >= SETTLED:
@@ -93,7 +93,7 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     return Fit(numbers, tau, float(gain), (first.apart, normal.apart))
 
 
-def _common(
+def common(
     outlines: Outlines, moves: Moves
 ) -> tuple[Float[np.ndarray, "m 4"], Float[np.ndarray, "4 m"]]:
     """Return what all numbers are where the body stands aside along an axis, or is larger.
@@ -115,8 +115,8 @@ def _common(
         own.append(moves.even(np.zeros(2), 1.0))
         columns.append(np.stack(own, axis=1))
         weighed.append(jacobian.T @ (jacobian @ columns[-1]) / max(1, len(jacobian)))
-    common, weights = np.concatenate(columns), np.concatenate(weighed).T
-    return common, np.linalg.pinv(weights @ common, rcond=1e-9) @ weights
+    body, weights = np.concatenate(columns), np.concatenate(weighed).T
+    return body, np.linalg.pinv(weights @ body, rcond=1e-9) @ weights
 
 
 def _linearised(

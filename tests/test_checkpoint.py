@@ -235,6 +235,7 @@ def test_a_checkpoint_goes_on_with_its_own_scene_only(
         replace(first, rgba=touched),
         replace(first, camera=replace(first.camera, scale=first.camera.scale * (1 + 1e-12))),
         replace(first, labels=None),
+        replace(first, yaw_sigma=0.01),
     ):
         changed = replace(SCENE, frames=(frame, *others))
         with pytest.raises(BundleError, match="other pictures, cameras or labels"):
