@@ -25,6 +25,7 @@ from toonset.bench.calib_figures import (
     ViewError,
     angle_between,
     error_records,
+    seconds_record,
     sheet_records,
     view_error,
 )
@@ -150,7 +151,7 @@ def _guessed(case: CalibCase) -> MeasuredSheet:
         rotation = rotation_from_angles(turn, NOMINAL_ELEVATION, 0.0)
         camera = Camera(rotation, np.zeros(3), 1.0, np.zeros(2), (1, 1))
         views.append(_measured(camera, truth, UNJUDGED, math.nan))
-    return MeasuredSheet(tuple(views), 0.0)
+    return MeasuredSheet(tuple(views), 0.0, case.name)
 
 
 def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
@@ -166,7 +167,7 @@ def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
         _measured(view.camera, truth, view.verdict, view.sigmas.yaw)
         for view, truth in zip(result.views, case.rotations, strict=True)
     )
-    return MeasuredSheet(views, seconds)
+    return MeasuredSheet(views, seconds, case.name)
 
 
 def _measured(
@@ -179,15 +180,16 @@ def _measured(
 def _sfm_records(
     cases: Sequence[CalibCase], results: Sequence[SfmResult], recorder: Recorder
 ) -> list[Record]:
-    errors: list[ViewError] = []
+    errors: list[tuple[str, list[ViewError]]] = []
     missing: list[bool] = []
     for case, found in zip(cases, results, strict=True):
-        raw, modulo_twin = aligned_errors(found.rotations, case.rotations)
-        errors += [ViewError(a, b, UNJUDGED) for a, b in zip(raw, modulo_twin, strict=True)]
+        off = zip(*aligned_errors(found.rotations, case.rotations), strict=True)
+        errors.append((case.name, [ViewError(raw, twin, UNJUDGED) for raw, twin in off]))
         missing += [i not in found.rotations for i in range(len(case.views))]
+    taken = [(case.name, found.seconds) for case, found in zip(cases, results, strict=True)]
     return [
         *error_records(errors, recorder),
-        recorder.samples("seconds", [found.seconds for found in results], "s"),
+        seconds_record(taken, recorder),
         recorder.total("views not placed", missing),
         recorder.total("failed runs", [bool(found.failed) for found in results], "sheets"),
     ]

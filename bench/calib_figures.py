@@ -8,7 +8,7 @@ reported sigma, root mean square, of views that are not far off) is 1 where sigm
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,10 +42,11 @@ class MeasuredView:
 
 @dataclass(frozen=True)
 class MeasuredSheet:
-    """One sheet's views, and the seconds that they took."""
+    """One sheet's views, the seconds that they took, and the sheet's name."""
 
     views: tuple[MeasuredView, ...]
     seconds: float
+    case: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ class Recorder:
         values: Sequence[float],
         unit: str = "deg",
         direction: Direction = "lower",
+        by_case: Mapping[str, float] | None = None,
     ) -> Record:
         """Return the record of at least one sample."""
         return summarise(
@@ -72,6 +74,7 @@ class Recorder:
             direction=direction,
             seed=self.seed,
             group=self.group,
+            by_case=by_case,
         )
 
     def total(self, metric: str, hits: Sequence[bool], unit: str = "views") -> Record:
@@ -113,16 +116,22 @@ def angle_between(a: float, b: float) -> float:
     return (a - b + math.pi) % (2 * math.pi) - math.pi
 
 
-def error_records(errors: Sequence[ViewError], recorder: Recorder) -> list[Record]:
-    """Return errors, successes, flips and, where views were judged, what verdicts are worth."""
-    if not errors:  # no view has a camera
+def error_records(
+    cases: Sequence[tuple[str, Sequence[ViewError]]], recorder: Recorder
+) -> list[Record]:
+    """Return errors, successes, flips and, where views were judged, what verdicts are worth.
+
+    Args:
+        cases: names of the sheets and their views that have a camera.
+        recorder: of the method.
+    """
+    errors = [error for _, own in cases for error in own]
+    if not errors:
         return []
     wrong = [e for e in errors if e.raw > WRONG]
     records = [
-        recorder.samples("rotation error", [math.degrees(e.raw) for e in errors]),
-        recorder.samples(
-            "rotation error modulo twin", [math.degrees(e.modulo_twin) for e in errors]
-        ),
+        _degrees("rotation error", cases, lambda e: e.raw, recorder),
+        _degrees("rotation error modulo twin", cases, lambda e: e.modulo_twin, recorder),
         *recorder.share("within 5 deg", [e.raw < SUCCESS for e in errors]),
         *recorder.share("within 5 deg modulo twin", [e.modulo_twin < SUCCESS for e in errors]),
         recorder.total("flipped views", [e.raw > WRONG > e.modulo_twin for e in errors]),
@@ -138,10 +147,27 @@ def sheet_records(sheets: Sequence[MeasuredSheet], recorder: Recorder) -> list[R
     """Return all records of the sheets that one method has calibrated."""
     views = [view for sheet in sheets for view in sheet.views]
     return [
-        *error_records([view.error for view in views], recorder),
+        *error_records([(s.case, [v.error for v in s.views]) for s in sheets], recorder),
         *_spread(views, recorder),
-        recorder.samples("seconds", [sheet.seconds for sheet in sheets], "s"),
+        seconds_record([(sheet.case, sheet.seconds) for sheet in sheets], recorder),
     ]
+
+
+def seconds_record(sheets: Sequence[tuple[str, float]], recorder: Recorder) -> Record:
+    """Return the record of the seconds that each sheet took, given with its name."""
+    return recorder.samples("seconds", [taken for _, taken in sheets], "s", by_case=dict(sheets))
+
+
+def _degrees(
+    metric: str,
+    cases: Sequence[tuple[str, Sequence[ViewError]]],
+    read: Callable[[ViewError], float],
+    recorder: Recorder,
+) -> Record:
+    """Return the record of an angle over all views, and its median in every sheet."""
+    found = [(name, [math.degrees(read(error)) for error in errors]) for name, errors in cases]
+    medians = {name: float(np.median(own)) for name, own in found if own}
+    return recorder.samples(metric, [angle for _, own in found for angle in own], by_case=medians)
 
 
 def _spread(views: Sequence[MeasuredView], recorder: Recorder) -> list[Record]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,12 +31,14 @@ class Score:
     """One character's colours under one method.
 
     Attributes:
+        case: the character's name.
         found: true colours of 5 % and more that were found.
         missing: those that were not.
         spurious: found colours that are not there.
         errors: distance in OKLab of every found colour to its true one.
     """
 
+    case: str
     found: int
     missing: int
     spurious: int
@@ -90,7 +92,8 @@ def score(found: Sequence[RGB], case: PaletteCase) -> Score:
             claimed[free[0]] = float(away[free[0]])
     wanted = set(np.flatnonzero(case.shares >= LEAST_SHARE).tolist())
     hit = len(wanted & set(claimed))
-    return Score(hit, len(wanted) - hit, len(found) - len(claimed), tuple(claimed.values()))
+    errors = tuple(claimed.values())
+    return Score(case.name, hit, len(wanted) - hit, len(found) - len(claimed), errors)
 
 
 def f1(scores: Sequence[Score]) -> float:
@@ -152,7 +155,10 @@ def _records(scores: Sequence[Score], method: str, group: str, seed: int) -> lis
 
     errors = [error for one in scores for error in one.errors]
     return [
-        record([f1([one]) for one in scores], "F1 of colours", "", higher=True),
+        replace(
+            record([f1([one]) for one in scores], "F1 of colours", "", higher=True),
+            by_case={one.case: f1([one]) for one in scores},
+        ),
         record([float(one.missing) for one in scores], "missing colours", ""),
         record([float(one.spurious) for one in scores], "spurious colours", ""),
         *([record(errors, "colour error", "OKLab")] if errors else []),

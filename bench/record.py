@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -30,6 +30,7 @@ class Record:
         seed: of everything random.
         machine: processor and cores.
         group: the condition, e.g. "exact".
+        by_case: where methods are to be paired, the figure in every case by the case's name.
     """
 
     method: str
@@ -43,6 +44,7 @@ class Record:
     seed: int
     machine: str
     group: str = "all"
+    by_case: Mapping[str, float] = field(default_factory=dict)
 
 
 def summarise(
@@ -54,6 +56,7 @@ def summarise(
     direction: Direction,
     seed: int,
     group: str = "all",
+    by_case: Mapping[str, float] | None = None,
 ) -> Record:
     """Return the record of samples; its value is their median."""
     values = np.asarray(samples, dtype=float)
@@ -71,6 +74,7 @@ def summarise(
         seed,
         machine(),
         group,
+        by_case or {},
     )
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.bench.calib import named_directions, own_cache
-from toonset.bench.calib_figures import Recorder, angle_between
+from toonset.bench.calib_figures import Recorder, angle_between, seconds_record
 from toonset.bench.record import Record
 from toonset.calib.bank import load_bank
 from toonset.calib.calibrate import calibrate
@@ -52,8 +52,9 @@ class SpriteCase:
 
 @dataclass(frozen=True)
 class MeasuredSprites:
-    """Yaw error (radians, not negative) and verdict of every view, and the seconds it took."""
+    """A character's name, its views' yaw errors (radians) and verdicts, and the seconds taken."""
 
+    case: str
     yaw_errors: tuple[float, ...]
     verdicts: tuple[str, ...]
     seconds: float
@@ -110,15 +111,16 @@ def _calibrated(case: SpriteCase, known: Known | None) -> MeasuredSprites:
         abs(angle_between(view.camera.angles[0], yaw))
         for view, yaw in zip(result.views, case.yaws, strict=True)
     )
-    return MeasuredSprites(errors, tuple(view.verdict for view in result.views), seconds)
+    return MeasuredSprites(case.name, errors, tuple(view.verdict for view in result.views), seconds)
 
 
 def _records(sheets: list[MeasuredSprites], recorder: Recorder) -> list[Record]:
     errors = [error for sheet in sheets for error in sheet.yaw_errors]
     verdicts = [verdict for sheet in sheets for verdict in sheet.verdicts]
     silent = [e > BIN and v == "ok" for e, v in zip(errors, verdicts, strict=True)]
+    medians = {s.case: math.degrees(float(np.median(s.yaw_errors))) for s in sheets}
     exact = [
-        recorder.samples("yaw error", [math.degrees(e) for e in errors]),
+        recorder.samples("yaw error", [math.degrees(e) for e in errors], by_case=medians),
         *recorder.share("within 3 deg", [e < EXACT for e in errors]),
     ]
     return [
@@ -126,7 +128,7 @@ def _records(sheets: list[MeasuredSprites], recorder: Recorder) -> list[Record]:
         *recorder.share("right 45 deg bin", [e < BIN for e in errors]),
         recorder.total("wrong but ok", silent),
         *recorder.verdicts(verdicts),
-        recorder.samples("seconds", [sheet.seconds for sheet in sheets], "s"),
+        seconds_record([(sheet.case, sheet.seconds) for sheet in sheets], recorder),
     ]
 
 

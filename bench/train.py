@@ -77,11 +77,13 @@ def records_of(runs: Sequence[RunResult], seed: int) -> list[Record]:
     records = []
     for (group, method), found in _grouped(runs):
         for column in COLUMNS:
-            values = [v for v in map(column.value, found) if v is not None]
+            figures = [(run.case, column.value(run)) for run in found]
+            values = [value for _, value in figures if value is not None]
             if values:
                 records.append(
                     summarise(
                         values,
+                        by_case=_means(figures),
                         method=method,
                         metric=column.metric,
                         unit=column.unit,
@@ -91,6 +93,15 @@ def records_of(runs: Sequence[RunResult], seed: int) -> list[Record]:
                     )
                 )
     return records
+
+
+def _means(figures: Sequence[tuple[str, float | None]]) -> dict[str, float]:
+    """Return the mean over the seeds of every case that has the figure."""
+    seen: dict[str, list[float]] = {}
+    for case, value in figures:
+        if value is not None:
+            seen.setdefault(case, []).append(value)
+    return {case: float(np.mean(values)) for case, values in seen.items()}
 
 
 def table_of(runs: Sequence[RunResult]) -> str:

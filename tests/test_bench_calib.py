@@ -82,6 +82,15 @@ def test_figures_count_what_they_say() -> None:
     assert (found["seconds"].n, found["seconds"].median) == (2, 2.0)
 
 
+def test_methods_can_be_paired_by_sheet() -> None:
+    first = replace(sheet((1, 1, "ok"), (3, 2, "ok"), (9, 9, "ok")), case="first")
+    second = replace(sheet((60, 2, "ok")), case="second", seconds=7.0)
+    found = by_metric(sheet_records([first, second], RECORDER))
+    assert found["rotation error"].by_case == pytest.approx({"first": 3, "second": 60})
+    assert found["rotation error modulo twin"].by_case == pytest.approx({"first": 2, "second": 2})
+    assert found["seconds"].by_case == {"first": 2, "second": 7}
+
+
 def test_right_sigmas_have_unit_spread_and_far_views_do_not_count() -> None:
     rng = np.random.default_rng(0)
     errors = rng.normal(scale=2.0, size=400)
