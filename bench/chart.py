@@ -1,81 +1,94 @@
-"""Time against accuracy: one point per method, the Pareto front drawn, the default marked."""
+"""What a chart of cost against merit shows: points, their front, and what to know of them."""
 
 from __future__ import annotations
 
+import csv
 import io
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-DEFAULT = "default"
+from toonset.bench.pareto import DEFAULT, Point, Standing, pareto_front, standing_of
+
+__all__ = ["COLORS", "DEFAULT", "SHOWN", "Chart"]
+
 SHOWN = ("o", "s", "^", "D", "v", "P", "X", "*")
 # Okabe and Ito's colours: distinguishable with colour-blind eyes
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+COLUMNS = "method cost merit spread n parameters on_front not_compared_because".split()
 
 
 @dataclass(frozen=True)
-class Point:
-    """One method in the chart: seconds (or another cost) against error (or quality)."""
+class Chart:
+    """What a chart shows.
 
-    method: str
-    cost: float
-    merit: float
-    spread: float  # p95 of the merit, drawn as a whisker
+    Attributes:
+        subject: what was measured, e.g. "train".
+        group: the condition.
+        points: a method each.
+        merit: name of the merit, e.g. "held-out PSNR".
+        unit: of the merit.
+        cost: name of the cost, e.g. "CPU seconds of training".
+        cost_unit: short.
+        statistic: what the merit is of its samples, "mean" or "median".
+        caption: n, seeds and machine.
+        lower_is_better: the merit is an error.
+    """
 
+    subject: str
+    group: str
+    points: tuple[Point, ...]
+    merit: str
+    unit: str
+    cost: str
+    cost_unit: str
+    statistic: str
+    caption: str
+    lower_is_better: bool
 
-def pareto_front(points: Sequence[Point], *, lower_is_better: bool) -> list[Point]:
-    """Return the points that no other point beats in both cost and merit, cheapest first."""
-    sign = 1 if lower_is_better else -1
-    front: list[Point] = []
-    for point in sorted(points, key=lambda p: (p.cost, sign * p.merit)):
-        if not front or sign * point.merit < sign * front[-1].merit:
-            front.append(point)
-    return front
+    @property
+    def front(self) -> list[Point]:
+        """Return the Pareto front, cheapest first."""
+        return pareto_front(self.points, lower_is_better=self.lower_is_better)
 
+    @property
+    def standing(self) -> Standing | None:
+        """Return where the default stands, if it is there."""
+        return standing_of(self.points, lower_is_better=self.lower_is_better)
 
-def draw_chart(
-    points: Sequence[Point],
-    *,
-    title: str,
-    cost_label: str,
-    merit_label: str,
-    caption: str,
-    lower_is_better: bool,
-) -> bytes:
-    """Return the chart as PNG; both axes logarithmic where the merit is an error."""
-    import matplotlib as mpl
+    @property
+    def headline(self) -> str:
+        """Return the message in a line."""
+        standing = self.standing
+        if standing is None:
+            return self.group
+        return standing.headline(self.merit, self.unit, self.cost_unit)
 
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
+    @property
+    def notes(self) -> list[str]:
+        """Return what must be known to read the chart, in sentences."""
+        tail = 95 if self.lower_is_better else 5
+        notes = [self.standing.sentence(self.unit)] if self.standing else []
+        marks = f"Each point is a {self.statistic}, whiskers go to the {tail}th percentile."
+        notes.append(f"Star: the default. Blue: the Pareto front. Grey: behind it. {marks}")
+        known = [p.parameters for p in self.points if p.parameters is not None]
+        if known:
+            least, most = (f"{value:,}" for value in (min(known), max(known)))
+            notes.append(f"Marker area: parameters, {least} to {most}. Cross: none, or unknown.")
+        reasons = dict.fromkeys(p.aside for p in self.points if p.aside)
+        aside = [
+            f"{', '.join(p.method for p in self.points if p.aside == reason)} ({reason})"
+            for reason in reasons
+        ]
+        if aside:
+            notes.append(f"Hollow, not compared: {'; '.join(aside)}.")
+        return [*notes, self.caption]
 
-    figure, axes = plt.subplots(figsize=(7.2, 4.6), dpi=110, layout="constrained")
-    front = pareto_front(points, lower_is_better=lower_is_better)
-    axes.plot([p.cost for p in front], [p.merit for p in front], color="#bbbbbb", lw=1.5, zorder=1)
-    for i, point in enumerate(points):
-        color, marker = COLORS[i % len(COLORS)], SHOWN[i % len(SHOWN)]
-        low, high = sorted((point.merit, point.spread))
-        axes.vlines(point.cost, low, high, color=color, lw=1, alpha=0.6)
-        size = 150 if point.method == DEFAULT else 60
-        label = f"{point.method} ({point.merit:.2f})"
-        axes.scatter(
-            point.cost,
-            point.merit,
-            s=size,
-            color=color,
-            marker=marker,
-            label=label,
-            zorder=3,
-            edgecolor="black" if point.method == DEFAULT else "none",
-        )
-    axes.set_xscale("log")
-    if lower_is_better:
-        axes.set_yscale("log")
-    axes.set_xlabel(cost_label)
-    axes.set_ylabel(merit_label)
-    axes.set_title(title, loc="left", fontsize=11)
-    axes.grid(True, which="both", alpha=0.25)
-    axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.supxlabel(caption, fontsize=7, color="#555555")
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
-    plt.close(figure)
-    return buffer.getvalue()
+    def csv(self) -> str:
+        """Return the points as CSV, cheapest first; unknown numbers are empty."""
+        front = [p.method for p in self.front]
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for p in sorted(self.points, key=lambda p: p.cost):
+            row = (p.method, p.cost, p.merit, p.spread, p.n, p.parameters)
+            writer.writerow((*row, p.method in front, p.aside))
+        return buffer.getvalue()

@@ -1,55 +1,72 @@
-"""Held-out PSNR against seconds of training: a panel per condition, a curve per method."""
+"""Held-out PSNR against CPU seconds of training: a panel per condition, a curve per field.
+
+Only methods whose trainings were followed have a curve; baselines are marks; what else was trained
+is in the charts of cost against merit.
+"""
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Sequence
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toonset.bench.chart import COLORS, DEFAULT, SHOWN
+from toonset.bench.figure import DARK, LIGHT, Form, figure_bytes, log_ticks, new_figure
 from toonset.bench.train import in_order
 from toonset.bench.train_plan import METHODS, NEAREST
 from toonset.bench.train_run import RunResult, Seen
 
-COLUMNS = 3
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+COLUMNS = 2
 POINTS = 64  # of a mean curve
 LEAST_S = 0.1  # left end of the time axis, for what takes none
+BASELINE = "coloured hull"
+VERMILION, GREY = COLORS[1], "#666666"
+*DISCS, STAR = SHOWN
+FOLLOWED = (DEFAULT, *(m for m in METHODS if METHODS[m].curve and m != DEFAULT), BASELINE)
 
 
-def draw_curves(runs: Sequence[RunResult], caption: str) -> bytes:
-    """Return the figure as PNG: mean curves over cases and seeds, and where each method ends.
+def draw_curves(runs: Sequence[RunResult], caption: str, form: Form = "png") -> bytes:
+    """Return the figure as a file: mean curves over n cases and the seeds, to where the last ends.
 
     At least one of the runs must have succeeded.
     """
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    panels = [list(found) for _, found in groupby(in_order(runs), key=lambda run: run.group)]
+    panels = _panels(in_order(runs))
     columns = min(COLUMNS, len(panels))
     lines = math.ceil(len(panels) / columns)
-    size = (4.4 * columns + 1.8, 3.4 * lines + 0.4)
-    figure, axes = plt.subplots(
-        lines, columns, figsize=size, dpi=110, layout="constrained", squeeze=False
-    )
-    for place, panel in zip(axes.ravel(), panels, strict=False):
+    figure = new_figure(4.6 * columns + 2.8, 3.6 * lines + 0.6)
+    places = figure.subplots(lines, columns, squeeze=False).ravel()
+    for place, panel in zip(places, panels, strict=False):
         _draw_panel(place, panel)
-    for place in axes.ravel()[len(panels) :]:
+    for place in places[len(panels) :]:
         place.set_axis_off()
-    shown = [name for name in METHODS if any(run.method == name for run in runs)]
-    handles = [_handle(name) for name in shown]
-    figure.legend(handles=handles, loc="outside right upper", fontsize=8, frameon=False)
-    figure.supxlabel(f"seconds of training, without imports\n{caption}", fontsize=8)
-    figure.supylabel("held-out PSNR, dB", fontsize=9)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
-    plt.close(figure)
-    return buffer.getvalue()
+    cases = {m: {r.case for p in panels for r in p if r.method == m} for m in (*FOLLOWED, NEAREST)}
+    figure.legend(
+        handles=[_handle(method, len(own)) for method, own in cases.items() if own],
+        loc="outside right upper",
+        fontsize=9,
+        frameon=False,
+    )
+    figure.supxlabel(
+        f"CPU seconds of training, without imports; logarithmic\n{caption}",
+        fontsize=8.5,
+        color=DARK,
+    )
+    figure.supylabel("held-out PSNR, dB (higher is better)", fontsize=9.5)
+    return figure_bytes(figure, form)
+
+
+def _panels(runs: Sequence[RunResult]) -> list[list[RunResult]]:
+    """Return the runs of each condition that has curves; of all conditions if none has any."""
+    panels = [list(found) for _, found in groupby(runs, key=lambda run: run.group)]
+    followed = [panel for panel in panels if any(len(run.curve) > 1 for run in panel)]
+    return followed or panels
 
 
 def mean_curve(curves: Sequence[Sequence[Seen]]) -> list[tuple[float, float]]:
@@ -57,51 +74,61 @@ def mean_curve(curves: Sequence[Sequence[Seen]]) -> list[tuple[float, float]]:
 
     Between its points a curve is straight over the logarithm of time; past its end it stays.
     """
-    first = max(max(curve[0].seconds, LEAST_S) for curve in curves)
-    last = max(max(curve[-1].seconds, LEAST_S) for curve in curves)
+    first = max(max(curve[0].cpu_seconds, LEAST_S) for curve in curves)
+    last = max(max(curve[-1].cpu_seconds, LEAST_S) for curve in curves)
     at = np.geomspace(first, last, POINTS) if last > first else np.array([first])
     each = []
     for curve in curves:
-        seconds = np.log([max(seen.seconds, LEAST_S) for seen in curve])
+        seconds = np.log([max(seen.cpu_seconds, LEAST_S) for seen in curve])
         each.append(np.interp(np.log(at), seconds, [seen.psnr for seen in curve]))
     return list(zip(at.tolist(), np.mean(each, axis=0).tolist(), strict=True))
 
 
-def _draw_panel(axes: Any, runs: Sequence[RunResult]) -> None:
-    from matplotlib.ticker import LogFormatter
-
-    for method, listed in groupby(runs, key=lambda run: run.method):
-        found = list(listed)
-        color, marker, width = _look(method)
+def _draw_panel(axes: Axes, runs: Sequence[RunResult]) -> None:
+    ends = [LEAST_S]
+    for method in (*FOLLOWED, NEAREST):
+        found = [run for run in runs if run.method == method]
+        if not found:
+            continue
         psnr = float(np.mean([run.curve[-1].psnr for run in found]))
+        color, marker, width = _look(method)
         if method == NEAREST:
-            axes.axhline(psnr, color=color, lw=1, ls=":")
+            axes.axhline(psnr, color=color, lw=1.2, ls=":")
             continue
         if all(len(run.curve) > 1 for run in found):
             at, values = zip(*mean_curve([run.curve for run in found]), strict=True)
-            axes.plot(at, values, color=color, lw=width, alpha=0.8)
-        end = max(float(np.median([run.seconds for run in found])), LEAST_S)
-        axes.scatter(end, psnr, color=color, marker=marker, s=30, zorder=3)
-    cases = len({run.case for run in runs})
-    seeds = len({run.seed for run in runs})
-    axes.set_title(f"{runs[0].group}; {cases} cases, {seeds} seeds", loc="left", fontsize=9)
+            axes.plot(at, values, color=color, lw=width, zorder=3 if method == DEFAULT else 2)
+            ends += [at[0], at[-1]]
+        else:
+            ends.append(max(float(np.median([run.cpu_seconds for run in found])), LEAST_S))
+        axes.scatter(ends[-1], psnr, color=color, marker=marker, s=40 * width, zorder=4)
+    axes.set_title(runs[0].group, loc="left", fontsize=10, fontweight="bold")
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter(LogFormatter(labelOnlyBase=False, minor_thresholds=(1, 0.4)))
-    axes.tick_params(labelsize=8, which="both")
-    axes.grid(True, which="both", alpha=0.25)
+    left, right = min(ends[1:], default=LEAST_S) / 1.3, max(ends) * 1.3
+    axes.set_xlim(left, right)
+    log_ticks(axes.xaxis, left, right)
+    axes.tick_params(labelsize=8.5)
+    axes.grid(True, color=LIGHT, lw=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
-def _handle(method: str) -> Any:
+def _handle(method: str, cases: int) -> Line2D:
     from matplotlib.lines import Line2D
 
     color, marker, width = _look(method)
     if method == NEAREST:
-        return Line2D([], [], color=color, lw=1, ls=":", label=method)
-    return Line2D([], [], color=color, marker=marker, lw=width, label=method)
+        return Line2D([], [], color=color, lw=1.2, ls=":", label=f"{method}, at no cost")
+    line, name = "none" if method == BASELINE else "-", f"{method} (n = {cases})"
+    return Line2D([], [], color=color, marker=marker, lw=width, ls=line, label=name)
 
 
 def _look(method: str) -> tuple[str, str, float]:
-    number = list(METHODS).index(method)
-    width = 2.4 if method == DEFAULT else 1.2
-    return COLORS[number % len(COLORS)], SHOWN[(number * 3 + number // 8) % len(SHOWN)], width
+    """Return colour, marker and line width; the default's are those of the charts."""
+    if method == DEFAULT:
+        return VERMILION, STAR, 2.6
+    if method in (NEAREST, BASELINE):
+        return GREY, "s", 1.2
+    number = FOLLOWED.index(method) - 1
+    others = [color for color in COLORS if color != VERMILION]
+    return others[number % len(others)], DISCS[(number + number // len(others)) % len(DISCS)], 1.3

@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from toonset.cli.bench_charts import REPORT, result_files
+from toonset.cli.bench_charts import WRITTEN as RESULTS
 from toonset.cli.bench_chosen import Baseline, Chosen, Subject
+from toonset.cli.bench_measure import WRONG_SPLITS, measure
 from toonset.cli.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -18,7 +21,7 @@ from toonset.cli.output import (
     check_output,
 )
 
-WRITTEN = ("records.json", "chart-*.png", "wrong.png")
+WRITTEN = (*RESULTS, WRONG_SPLITS)
 
 
 def bench(
@@ -64,14 +67,14 @@ def bench(
 ) -> None:
     """Measure one stage: seconds against accuracy, per setting, beside a baseline.
 
-    Prints a table and writes records.json and a chart per condition. `split` writes a picture of
-    the wrongly split sheets. `stability` sweeps errors of a sheet, to where calibration fails;
-    `train` draws held-out PSNR against seconds; `paper` makes the plain method's table and figure,
-    for hours. Of these three, the same command again continues a stopped run.
+    Prints a table and writes records.json, report.html and, for `calib`, `train` and `palette`, a
+    chart of seconds against accuracy per condition (PNG, SVG, CSV). `split` draws the wrongly
+    split sheets. `stability` sweeps errors of a sheet, to where calibration fails; `train` draws
+    held-out PSNR against seconds; `paper` makes the plain method's table and figure, for hours. Of
+    these three, the same command again continues a stopped run, or draws all that is there.
     """
     from toonset.bench.record import as_dicts, machine
-    from toonset.cli.bench_measure import measure
-    from toonset.files import new_folder, write_bytes, write_json
+    from toonset.files import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
     chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed)
@@ -84,12 +87,12 @@ def bench(
         return
     check_output(out, [cases, sprites], WRITTEN, force=force)
     measured = measure(chosen, printer)
+    files = result_files(subject.value, measured.records, f"seed {seed}")
     with new_folder(out, force=force) as folder:
-        write_json(folder / "records.json", as_dicts(measured.records))
-        for name, picture in measured.pictures.items():
-            write_bytes(folder / name, picture)
+        for name, content in (files | measured.pictures).items():
+            write_bytes(folder / name, content)
     printer.say(f"machine: {machine()}, seed {seed}")
-    printer.say(f"pictures in {out}" if measured.pictures else f"records in {out}")
+    printer.say(f"look at {out / REPORT}")
     printer.result({"records": as_dicts(measured.records)}, measured.text)
 
 

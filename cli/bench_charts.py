@@ -1,94 +1,53 @@
-"""The charts of `toonset bench`: accuracy against seconds, PNG by file name."""
+"""What `toonset bench` writes for every subject: records, charts in four forms, one page of all."""
 
 from __future__ import annotations
 
+import json
+import re
+import shlex
+import sys
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from toonset.cli.bench_chosen import Chosen
+from toonset import __version__
 
 if TYPE_CHECKING:
-    from toonset.bench.chart import Point
     from toonset.bench.record import Record
+    from toonset.bench.report import Picture
 
-CHARTED = ("rotation error modulo twin", "yaw error")
-COLORS_FOUND = "F1 of colours"
-LEAST_S = 1e-3  # a chart's time axis is logarithmic
-
-
-def charts_by_group(chosen: Chosen, records: list[Record]) -> dict[str, bytes]:
-    """Return a chart per condition whose records have both an accuracy and seconds."""
-    from toonset.bench.chart import Point
-
-    charts = {}
-    for group in dict.fromkeys(record.group for record in records):
-        own = [record for record in records if record.group == group]
-        seconds = {r.method: r.median for r in own if r.metric == "seconds"}
-        merits = [r for r in own if r.metric in CHARTED]
-        if not merits:
-            continue
-        points = [Point(r.method, max(seconds[r.method], LEAST_S), r.median, r.p95) for r in merits]
-        charts[_file_name(group)] = _chart(
-            chosen,
-            points,
-            title=f"{group}: median, whisker to p95",
-            labels=(
-                "seconds per sheet",
-                f"{merits[0].metric} ({merits[0].unit})",
-            ),
-            n=merits[0].n,
-            lower_is_better=merits[0].direction == "lower",
-        )
-    return charts
+RECORDS, REPORT = "records.json", "report.html"
+WRITTEN = (RECORDS, REPORT, "chart-*.png", "chart-*.svg", "chart-*.csv")
 
 
-def charts_of_colors(chosen: Chosen, records: list[Record]) -> dict[str, bytes]:
-    """Return a chart per sheet size: colours found under all conditions against seconds."""
-    from toonset.bench.chart import Point
+def result_files(
+    subject: str, records: list[Record], seeds: str, others: Sequence[Picture] = ()
+) -> dict[str, bytes]:
+    """Return records.json, a chart per group as PNG, SVG and CSV, and report.html, by name.
 
-    found: dict[str, list[Record]] = {}
-    for record in records:
-        if record.metric == COLORS_FOUND:
-            found.setdefault(record.method, []).append(record)
-    charts = {}
-    for size in dict.fromkeys(r.group for r in records if r.metric == "seconds"):
-        seconds = {r.method: r.value for r in records if r.metric == "seconds" and r.group == size}
-        points = []
-        for method, conditions in found.items():
-            values = [record.value for record in conditions]
-            mean = sum(values) / len(values)
-            points.append(Point(method, max(seconds[method], LEAST_S), mean, min(values)))
-        charts[_file_name(size)] = _chart(
-            chosen,
-            points,
-            title=f"{size}: mean of all conditions, whisker to the worst",
-            labels=("seconds per sheet", COLORS_FOUND),
-            n=sum(record.n for record in next(iter(found.values()))),
-            lower_is_better=False,
-        )
-    return charts
+    Args:
+        subject: what was measured; not all have charts.
+        records: what was found.
+        seeds: as captions have them, e.g. "seed 0".
+        others: further pictures for the page.
+    """
+    from toonset.bench.chart_drawing import draw_chart
+    from toonset.bench.chart_points import PLOTS, charts_of
+    from toonset.bench.record import as_dicts
+    from toonset.bench.report import Picture, report_html
 
-
-def _chart(
-    chosen: Chosen,
-    points: list[Point],
-    *,
-    title: str,
-    labels: tuple[str, str],
-    n: int,
-    lower_is_better: bool,
-) -> bytes:
-    from toonset.bench.chart import draw_chart
-    from toonset.bench.record import machine
-
-    return draw_chart(
-        points,
-        title=f"toonset bench {chosen.subject.value}, {title}",
-        cost_label=labels[0],
-        merit_label=labels[1],
-        caption=f"n = {n}, seed {chosen.seed}, {machine()}",
-        lower_is_better=lower_is_better,
-    )
+    files = {RECORDS: (json.dumps(as_dicts(records), indent=2, allow_nan=False) + "\n").encode()}
+    drawn = []
+    for chart in charts_of(subject, records, seeds) if subject in PLOTS else []:
+        name = f"chart-{file_name(chart.group)}"
+        drawing = draw_chart(chart, "svg")
+        files |= {f"{name}.png": draw_chart(chart), f"{name}.svg": drawing}
+        files[f"{name}.csv"] = chart.csv().encode()
+        drawn.append((chart, Picture(drawing, " ".join([chart.headline + ".", *chart.notes]))))
+    command = shlex.join(["toonset", *sys.argv[1:]])
+    files[REPORT] = report_html(command, __version__, drawn, others, records).encode()
+    return files
 
 
-def _file_name(group: str) -> str:
-    return f"chart-{group.replace(' ', '-').replace(',', '')}.png"
+def file_name(text: str) -> str:
+    """Return the text without what file names should not have."""
+    return re.sub(r"[^\w.-]+", "-", text)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from toonset.cli.bench_charts import charts_by_group, charts_of_colors
 from toonset.cli.bench_chosen import DEFAULT_COUNT, Baseline, Chosen, Subject
 from toonset.cli.output import Printer
 from toonset.errors import BundleError
@@ -40,7 +39,7 @@ def measure(chosen: Chosen, printer: Printer) -> Measured:
     if chosen.subject is Subject.labels:
         return _labels(chosen, printer)
     records, text = _cameras(chosen, printer)
-    return Measured(records, text, charts_by_group(chosen, records))
+    return Measured(records, text)
 
 
 def _cameras(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
@@ -101,7 +100,7 @@ def _palettes(chosen: Chosen, printer: Printer) -> Measured:
     records, text = bench_palette(
         chosen.cases, chosen.seed, quick=chosen.quick, progress=printer.progress
     )
-    return Measured(records, text, charts_of_colors(chosen, records))
+    return Measured(records, text)
 
 
 def _labels(chosen: Chosen, printer: Printer) -> Measured:

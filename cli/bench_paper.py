@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toonset.cli.bench_charts import file_name
 from toonset.cli.bench_chosen import Chosen
-from toonset.cli.bench_train import WRITTEN, file_name, jobs_of, run_into
+from toonset.cli.bench_train import WRITTEN, jobs_of, run_into
 from toonset.cli.output import Printer
 
 if TYPE_CHECKING:

@@ -8,12 +8,13 @@ picture show all that the folder has. Who has changed the code in between starts
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toonset import __version__
+from toonset.cli.bench_charts import WRITTEN as RESULTS
+from toonset.cli.bench_charts import file_name, result_files
 from toonset.cli.bench_chosen import DEFAULT_COUNT, Chosen
 from toonset.cli.output import Printer, check_output
 from toonset.errors import BundleError
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from toonset.nerf.evaluation import ScoredView
     from toonset.nerf.trained import TrainedField
 
-RUNS, RECORDS, CURVES, VIEWS = "runs.json", "records.json", "train.png", "views"
-WRITTEN = (RUNS, RECORDS, CURVES, VIEWS, "chart-*.png")
+RUNS, CURVES, VIEWS = "runs.json", "train", "views"
+WRITTEN = (RUNS, *RESULTS, f"{CURVES}.png", f"{CURVES}.svg", VIEWS)
 QUICK_COUNT = 1
 
 
@@ -89,7 +90,7 @@ def run_into(
             _keep(folder, done)
     finally:  # what a stopped run has found so far is worth a look, too
         runs = _of_jobs(done, jobs)
-        _write(folder, runs, chosen.seed)
+        _write(folder, runs, chosen)
     return runs
 
 
@@ -109,11 +110,6 @@ def _views_into(folder: Path) -> Look:
             write_bytes(folder / VIEWS / file_name(f"{job.name} {job.seed}.png"), picture)
 
     return look
-
-
-def file_name(text: str) -> str:
-    """Return the text without what file names should not have."""
-    return re.sub(r"[^\w.-]+", "-", text)
 
 
 def _cases(chosen: Chosen) -> list[TrainCase]:
@@ -159,13 +155,24 @@ def _keep(folder: Path, done: list[tuple[dict[str, Any], RunResult]]) -> None:
     write_json(folder / RUNS, as_plain(done, __version__))
 
 
-def _write(folder: Path, runs: list[RunResult], seed: int) -> None:
-    from toonset.bench.record import as_dicts, machine
+def _write(folder: Path, runs: list[RunResult], chosen: Chosen) -> None:
+    """Write all that is made of the runs: records, charts, curves, the page of them."""
+    from toonset.bench.figure import FORMS
+    from toonset.bench.record import machine
+    from toonset.bench.report import Picture
     from toonset.bench.train import in_order, records_of
     from toonset.bench.train_chart import draw_curves
-    from toonset.files import write_bytes, write_json
+    from toonset.files import write_bytes
 
-    caption = f"mean of 4 held-out views, seeds from {seed}, {machine()}"
-    write_json(folder / RECORDS, as_dicts(records_of(runs, seed)))
+    files, pictures = {}, []
+    numbers = sorted({run.seed for run in runs})
+    seeds = f"seed{'s' * (len(numbers) != 1)} {', '.join(map(str, numbers))}"
     if in_order(runs):
-        write_bytes(folder / CURVES, draw_curves(runs, caption))
+        caption = f"Mean of 4 held-out views; {seeds}; {machine()}."
+        files = {f"{CURVES}.{form}": draw_curves(runs, caption, form) for form in FORMS}
+        shows = "Held-out PSNR while the training goes on"
+        pictures = [Picture(files[f"{CURVES}.svg"], shows)]
+    records = records_of(runs, chosen.seed)
+    files |= result_files(chosen.subject.value, records, seeds, pictures)
+    for name, content in files.items():
+        write_bytes(folder / name, content)

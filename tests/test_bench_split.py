@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toonset.bench.record import Record, summarise
 from toonset.bench.split import bench_split
 from toonset.bench.split_cases import (
     MIXED,
@@ -251,7 +250,7 @@ def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
     done = toonset("bench", "split", "--cases", rendered, "-o", out, "--quiet")
     assert done.code == 0, done
     assert "rendered sheets" in done.out
-    assert {path.name for path in out.iterdir()} == {"records.json", "wrong.png"}
+    assert {path.name for path in out.iterdir()} == {"records.json", "report.html", "wrong.png"}
     records = json.loads((out / "records.json").read_text())
     assert {record["method"] for record in records} == set(METHODS)
     again = ("bench", "split", "--cases", rendered, "-o", out, "--force", "--only", "dog")
@@ -272,43 +271,3 @@ def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
 def test_options_of_other_subjects_are_refused(toonset, tmp_path, wrong):
     assert toonset("bench", *wrong, "-o", tmp_path / "out").code == 2
     assert not (tmp_path / "out").exists()
-
-
-def test_the_palette_chart_is_drawn_per_sheet_size(toonset, tmp_path, monkeypatch):
-    def record(metric: str, value: float, group: str, method: str) -> Record:
-        return summarise(
-            [value],
-            method=method,
-            metric=metric,
-            unit="",
-            direction="lower" if metric == "seconds" else "higher",
-            seed=0,
-            group=group,
-        )
-
-    def answer(*_: object, **__: object) -> tuple[list[Record], str]:
-        return [
-            record(metric, value, group, method)
-            for method in ("default", "extcolors")
-            for metric, value, group in (
-                ("F1 of colours", 0.9, "png"),
-                ("F1 of colours", 0.8, "jpeg"),
-                ("seconds", 0.1, "150 x 150"),
-                ("seconds", 0.4, "1200 x 600"),
-            )
-        ], "a table"
-
-    monkeypatch.setattr("toonset.bench.palette.bench_palette", answer)
-    drawn = []
-    monkeypatch.setattr(
-        "toonset.bench.chart.draw_chart", lambda points, **_: drawn.append(points) or b"png"
-    )
-    done = toonset("bench", "palette", "-o", tmp_path / "out", "--quiet")
-    assert done.code == 0, done
-    assert "a table" in done.out
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        "records.json",
-        "chart-150-x-150.png",
-        "chart-1200-x-600.png",
-    }
-    assert [(p.cost, p.merit, p.spread) for p in drawn[1]] == [(0.4, pytest.approx(0.85), 0.8)] * 2

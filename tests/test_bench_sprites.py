@@ -107,7 +107,8 @@ def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
     assert "right bin" in done.out
     assert {p.name for p in out.iterdir()} == {
         "records.json",
-        "chart-rendered-sprites-own-mesh.png",
+        "report.html",
+        *(f"chart-rendered-sprites-own-mesh.{form}" for form in ("png", "svg", "csv")),
     }
     assert {r["method"] for r in json.loads((out / "records.json").read_text())} == {
         "default",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import time
 from collections.abc import Iterator
@@ -12,12 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from PIL import Image
 
 from toonset.bench import train_run
 from toonset.bench.cases import TrainCase
 from toonset.bench.train import in_order, records_of, run_jobs, table_of
-from toonset.bench.train_chart import draw_curves, mean_curve
 from toonset.bench.train_files import as_plain, from_plain, missing
 from toonset.bench.train_plan import (
     METHODS,
@@ -241,17 +238,6 @@ def test_when_a_curve_comes_to_a_figure_for_good() -> None:
     assert reached(falling, 29.5) == falling[0]
 
 
-def test_mean_curves() -> None:
-    slow = [Seen(2, 2, 10.0), Seen(8, 8, 30.0)]
-    fast = [Seen(1, 1, 20.0), Seen(4, 4, 40.0)]
-    mean = mean_curve([slow, fast])
-    assert mean[0] == pytest.approx((2, (10 + 30) / 2))  # from where both have begun
-    assert mean[-1] == pytest.approx((8, (30 + 40) / 2))  # the faster one stays at its end
-    assert dict(mean_curve([[Seen(0, 0, 5.0)]])) == {0.1: 5.0}
-    rising = [psnr for _, psnr in mean]
-    assert rising == sorted(rising)
-
-
 def test_table_and_records() -> None:
     runs = [
         result(NEAREST, 18.0, Seen(0, 0, 18.0)),
@@ -269,25 +255,11 @@ def test_table_and_records() -> None:
     psnr = records["default", "held-out PSNR"]
     assert (psnr.n, psnr.median, psnr.seed, psnr.direction) == (2, 30.5, 3, "higher")
     assert psnr.p95 == pytest.approx(30.05)  # the bad end
+    assert psnr.by_case == {"a": 30, "b": 31}
     assert ("default", "held-out PSNR in mask") not in records
     near = records["default", "seconds to 0.5 dB below the end"]
     assert near.median == pytest.approx((1 + 3 * 9.5 / 10 + 1 + 5 * 10.5 / 11) / 2)
     assert (NEAREST, "seconds to 0.5 dB below the end") not in records
-
-
-def test_the_figure_has_a_panel_per_condition() -> None:
-    one = [
-        result(NEAREST, 18.0, Seen(0, 0, 18.0)),
-        result("default", 30.0, Seen(1, 1, 20), Seen(4, 4, 30)),
-    ]
-    others = [replace(run, group=f"drawn {n}") for n in range(3) for run in one]
-    small = Image.open(io.BytesIO(draw_curves(one, "n")))
-    large = Image.open(io.BytesIO(draw_curves([*one, *others], "n")))
-    assert large.width > small.width
-    assert large.height > 1.5 * small.height
-    line = np.asarray(small.convert("RGB")).reshape(-1, 3).astype(int)
-    blue = np.abs(line - (0x00, 0x72, 0xB2)).max(axis=1) < 60  # the default's curve
-    assert blue.sum() > 200
 
 
 def test_results_survive_the_disk() -> None:
@@ -332,7 +304,17 @@ def test_a_stopped_bench_goes_on(
     out = tmp_path / "bench"
     command = ("bench", "train", "--quick", "-o", out)
     assert toonset(*command).code != 0
-    assert {path.name for path in out.iterdir()} == {"runs.json", "records.json", "train.png"}
+    written = {path.name for path in out.iterdir()}
+    charts = {f"chart-exact-32-px-8-views.{form}" for form in ("png", "svg", "csv")}
+    assert written == {
+        "runs.json",
+        "records.json",
+        "report.html",
+        "train.png",
+        "train.svg",
+        "views",
+        *charts,
+    }
     stop = False
     again = toonset(*command, "--json")
     assert again.code == 0, again
@@ -340,6 +322,12 @@ def test_a_stopped_bench_goes_on(
     assert "1 trainings, 1 are there already" in again.err
     assert {r["method"] for r in again.json["records"]} == set(short_methods)
     assert json.loads((out / "records.json").read_text()) == again.json["records"]
+    drawn = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
+    for name in drawn.keys() - {"runs.json"}:
+        (out / name).unlink()
+    assert toonset(*command, "--json").json == again.json  # redrawn, not trained again
+    assert done == ["default", NEAREST]
+    assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == drawn
     assert toonset(*command, "--only", "hat").reason.startswith("no training's name contains 'hat'")
     (out / "drawing.png").write_bytes(b"mine")
     assert "holds 'drawing.png'" in toonset(*command, "--force").reason
