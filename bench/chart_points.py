@@ -53,6 +53,9 @@ TRAINING = Plot(
     *("CPU seconds", "CPU seconds of training", "CPU s"),
     *("trainings", "characters"),
     mean=True,
+    told={
+        f"paper, hand-picked palette, {steps} steps": "told the palette" for steps in (200, 2000)
+    },
 )
 PLOTS: dict[str, Plot] = {
     "calib": Plot(

@@ -11,6 +11,7 @@ from toonset.bench.chart import Chart
 from toonset.bench.pareto import Point, quantity
 from toonset.bench.record import Record
 
+WHOLE = 1e4  # from here on numbers are written without decimals
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 66rem; margin: 2rem auto;
   padding: 0 1rem; }
@@ -29,7 +30,7 @@ tr.default td { font-weight: 600; color: #b34700; } tr.front td:first-child { co
 @media print { body { font-size: 9pt; margin: 0; max-width: none; } figure { break-inside: avoid; }
   section { break-before: page; } section:first-of-type { break-before: auto; }
   section.all { page: wide; } .wide { overflow: visible; } tr { break-inside: avoid; }
-  .records { font-size: 5.5pt; } th, td { padding: .1rem .25rem; } }
+  .points { font-size: 7.5pt; } .records { font-size: 5.5pt; } th, td { padding: .1rem .25rem; } }
 """.strip()
 
 
@@ -97,7 +98,7 @@ def _points_table(chart: Chart) -> str:
     """Return the chart's figures, cheapest first."""
     tail = "p95" if chart.lower_is_better else "p5"
     merit = f"{chart.merit}, {chart.statistic}" + f" ({chart.unit})" * bool(chart.unit)
-    head = ("method", merit, tail, "n", f"{chart.cost} ({chart.cost_unit})", "parameters", "")
+    head = ("method", merit, tail, "n", chart.cost, "parameters", "")
     front = chart.front
     rows = []
     for p in sorted(chart.points, key=lambda p: p.cost):
@@ -140,7 +141,8 @@ def _record_tables(records: Sequence[Record]) -> list[str]:
 def _cell(record: Record | None) -> str:
     if record is None:
         return ""
-    return f"{record.value:.4g}<small>{record.p95:.4g}</small>"
+    value, tail = (f"{v:,.0f}" if v >= WHOLE else f"{v:.4g}" for v in (record.value, record.p95))
+    return f"{value}<small>{tail}</small>"
 
 
 def _table(kind: str, head: Iterable[str], rows: Iterable[tuple[str, Sequence[str]]]) -> str:

@@ -22,6 +22,7 @@ from toonset.bench.palette_methods import METHODS as PALETTE_METHODS
 from toonset.bench.pareto import Point, Standing, pareto_front, standing_of
 from toonset.bench.record import Record, summarise
 from toonset.bench.sfm import METHODS as SFM_METHODS
+from toonset.bench.train_plan import METHODS as TRAIN_METHODS
 
 
 def point(method: str, cost: float, merit: float, **given: float) -> Point:
@@ -245,6 +246,8 @@ def test_methods_that_are_told_more_are_there_and_set_aside() -> None:
     assert set(PLOTS["calib"].told) <= {*CALIB_METHODS, *SFM_METHODS}
     assert {name for name, m in CALIB_METHODS.items() if m.labels} <= set(PLOTS["calib"].told)
     assert set(SFM_METHODS) <= set(PLOTS["calib"].told)
+    given = {name for name, m in TRAIN_METHODS.items() if m.palette == "hand-picked palette"}
+    assert set(PLOTS["train"].told) == given
     assert set(PLOTS["palette"].told) == {m for m in PALETTE_METHODS if "true k" in m}
 
 
