@@ -88,9 +88,9 @@ def _agreeing(
 ) -> tuple[Scene, Turning | None, Registration | None, Unbending | None]:
     """Return the scene with its cameras and drawings set right, and what was found of each kind.
 
-    Cameras turn only where that explains the outlines better than places and sizes or bends do:
-    where drawings bend, outlines say too little of yaws. (So bends are asked about even where they
-    are switched off.)
+    Cameras turn only where that explains the outlines better than places and sizes or bends do, and
+    leaves nothing to bends: where drawings bend, outlines say too little of yaws. (So bends are
+    asked about even where they are switched off.)
     """
     straight, registration, unbending = aligned(scene, options.register, options.unbend)
     if not (options.turn and options.register):
@@ -98,11 +98,13 @@ def _agreeing(
     placed, turning = turned(scene)
     if turning is None or not turning.applied:
         return straight, turning, registration, unbending
-    rivals = (registration, unbending or unbent(scene)[1])
-    if turning.gain_nats <= max(rival.gain_nats for rival in rivals if rival):
+    rivals = (registration, unbending or unbent(straight)[1])
+    if turning.gain_nats <= sum(step.gain_nats for step in rivals if step and step.applied):
         return straight, replace(turning, applied=False), registration, unbending
-    rest, registration, unbending = aligned(placed, options.register, options.unbend)
-    return rest, turning, registration, unbending
+    rest, moved, left = aligned(placed, options.register, options.unbend)
+    if (left or unbent(placed)[1]).applied:
+        return straight, replace(turning, applied=False), registration, unbending
+    return rest, turning, moved, left
 
 
 def aligned(

@@ -11,7 +11,7 @@ import pytest
 
 from toonset.camera import rotation_from_angles
 from toonset.dataset.scene import Scene
-from toonset.nerf.azimuth import turned
+from toonset.nerf.azimuth import Turning, turned
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import prepared
 
@@ -114,6 +114,22 @@ def test_where_drawings_bend_cameras_do_not_turn(balls) -> None:
         assert ready.turning.gain_nats > 0  # bends pass for turns, but explain themselves better
         assert not ready.turning.applied
         assert np.abs(off_deg(ready.scene, drawn)).max() == 0
+
+
+def test_turns_that_leave_drawings_bent_are_not_believed(balls, monkeypatch) -> None:
+    """However much they explain: with five views bends can pass for turns."""
+    drawn = with_sigmas(balls.bent_sheet()[0], 2.0)
+
+    def sure(scene: Scene) -> tuple[Scene, Turning | None]:
+        result, found = turned(scene)
+        assert found is not None
+        return result, replace(found, gain_nats=1e6)
+
+    monkeypatch.setattr("toonset.nerf.preparation.turned", sure)
+    ready = prepared(drawn, TrainOptions())
+    assert ready.turning is not None
+    assert not ready.turning.applied
+    assert np.abs(off_deg(ready.scene, drawn)).max() == 0
 
 
 def test_turns_are_made_and_switched_off(balls) -> None:
