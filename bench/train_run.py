@@ -127,7 +127,7 @@ def acted_in(training: Training) -> tuple[Step, ...]:
     """Return the steps that found something to do: without the others, it is the same training."""
     ready, symmetry = training.prepared, training.symmetry
     found: list[Step] = []
-    if any(step and step.applied for step in (ready.registration, ready.unbending)):
+    if any(step and step.applied for step in (ready.turning, ready.registration, ready.unbending)):
         found.append("alignment")
     if symmetry and symmetry.mirrored:
         found.append("symmetry")

@@ -9,6 +9,7 @@ import typer
 
 from toonset.cli.bench_charts import REPORT, result_files
 from toonset.cli.bench_charts import WRITTEN as RESULTS
+from toonset.cli.bench_check import check
 from toonset.cli.bench_chosen import Baseline, Chosen, Subject
 from toonset.cli.bench_measure import WRONG_SPLITS, measure
 from toonset.cli.output import (
@@ -25,7 +26,7 @@ WRITTEN = (*RESULTS, WRONG_SPLITS)
 
 
 def bench(
-    subject: Annotated[Subject, typer.Argument(help="What to measure.")],
+    subject: Annotated[Subject | None, typer.Argument(help="What to measure.")] = None,
     cases: Annotated[
         Path | None,
         typer.Option("--cases", help="Folders with ground truth (default: synthetic ones)."),
@@ -57,6 +58,13 @@ def bench(
         typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer settings or cases.")] = False,
+    against_committed: Annotated[
+        bool,
+        typer.Option("--check", help="No subject: is anything worse than the committed figures?"),
+    ] = False,
+    renew: Annotated[
+        bool, typer.Option("--renew", help="No subject: commit to the figures of now.")
+    ] = False,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Output folder.", rich_help_panel=OUTPUT_PANEL)
     ] = Path("bench-results"),
@@ -72,11 +80,19 @@ def bench(
     split sheets. `stability` sweeps errors of a sheet, to where calibration fails; `train` draws
     held-out PSNR against seconds; `paper` makes the plain method's table and figure, for hours. Of
     these three, the same command again continues a stopped run, or draws all that is there.
+    `--check` runs a quick bench of every stage and ends with 3 where one has got worse.
     """
     from toonset.bench.record import as_dicts, machine
     from toonset.files import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
+    if against_committed or renew:
+        if subject is not None or (against_committed and renew):
+            raise typer.BadParameter("--check and --renew stand alone, without a subject")
+        check(seed, printer, renew=renew)
+        return
+    if subject is None:
+        raise typer.BadParameter(f"say what to measure: {', '.join(Subject)}; or --check")
     chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed)
     chosen.check()
     if subject is Subject.stability:
