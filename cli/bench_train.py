@@ -83,9 +83,10 @@ def run_into(
 
     done = _finished(folder, chosen, written, force=force)
     lacking = missing(jobs, done)
+    earlier = [found for _, found in done]
     printer.say(f"{len(lacking)} trainings, {len(jobs) - len(lacking)} are there already")
     try:
-        for job, found in run_jobs(lacking, printer.progress, look, _of_jobs(done, jobs)):
+        for job, found in run_jobs(lacking, printer.progress, look, earlier):
             done.append((job.identity, found))
             _keep(folder, done)
     finally:  # what a stopped run has found so far is worth a look, too
