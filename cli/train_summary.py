@@ -19,7 +19,7 @@ def summary(run: Path, metrics: dict[str, Any]) -> str:
             *_drawings(metrics["drawings"]),
             *_symmetry(metrics["symmetry"]),
             f"hull: filled where at most {hull['missing']} views say background{evidence}",
-            f"fit to the drawings: {_figures(fit)}",
+            f"fit to the drawings{_set_right(metrics['drawings'])}: {_figures(fit)}",
             *([f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []),
             f"{run}: preview.png shows it; next: toonset render {run} --turntable 36",
         ]
@@ -40,12 +40,20 @@ def _drawings(found: dict[str, Any]) -> list[str]:
         before, after = step["apart_px"]
         moved = f"{what} {done}: outlines {before:.2f} px apart, {after:.2f} px after"
         kept = f"{what} not {done}: outlines {before:.2f} px apart"
-        lines.append(f"{moved if step['applied'] else kept} ({step['gain_nats']:+.0f} nats)")
+        more = "" if step["applied"] or step["gain_nats"] <= 0 else ", what was done explains more"
+        gain = f"{step['gain_nats']:+.0f} nats{more}"
+        lines.append(f"{moved if step['applied'] else kept} ({gain})")
     if found["ink"]:
         ink = found["ink"]
         widths = f"{ink['outline_px']:.1f} px outside, {ink['inner_px']:.1f} px inside"
         lines.append(f"contour lines taken off, to be drawn again: {widths}")
     return lines
+
+
+def _set_right(found: dict[str, Any]) -> str:
+    """Return which drawings the fit is judged by, if not by those that were given."""
+    steps = [found[name] for name in ("turning", "registration", "unbending")]
+    return " as set right" if any(step and step["applied"] for step in steps) else ""
 
 
 def _symmetry(found: dict[str, Any] | None) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,9 @@ def write_run(
 ) -> dict[str, Any]:
     """Write all files of a run into an existing folder; return the content of metrics.json.
 
+    Its figures of training views are those of the drawings as they were fitted: set right, and
+    without the lines that were taken off.
+
     Args:
         folder: where to.
         training: what to write.
@@ -45,7 +48,7 @@ def write_run(
     """
     metrics = {
         **_course(training, held_out),
-        "train": compared(training.result, scene),
+        "train": compared(replace(training.result, ink=None), training.prepared.scene),
         "test": None if test is None else compared(training.result, test),
     }
     write_bytes(folder / "preview.png", encode_png(preview(training.result)))
