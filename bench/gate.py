@@ -96,7 +96,7 @@ def yardstick_s() -> float:
     found = []
     for _ in range(YARDSTICK_RUNS):
         began = time.process_time()
-        matrix @ matrix
+        np.matmul(matrix, matrix)
         cv2.GaussianBlur(picture, (0, 0), 3)
         cv2.distanceTransform(spots, cv2.DIST_L2, 5)
         np.sort(picture, axis=1)
