@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from toonset.bench.train_plan import STEPS, Job
+from toonset.bench.train_plan import PREPARATIONS, Job
 from toonset.bench.train_run import RunResult, Seen
 from toonset.errors import BundleError
 
@@ -63,7 +63,7 @@ def _result(data: Any) -> RunResult:
         render_seconds=float(data["render_seconds"]),
         parameters=int(data["parameters"]),
         curve=tuple(_seen(point) for point in data["curve"]),
-        acted=tuple(step for step in STEPS if step in data["acted"]),
+        acted=tuple(step for step in PREPARATIONS if step in data["acted"]),
         note=str(data["note"]),
     )
 

@@ -12,8 +12,8 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.preset import paper
 
 NEAREST = "nearest drawing"
-Step = Literal["alignment", "symmetry"]
-STEPS: tuple[Step, ...] = get_args(Step)
+Preparation = Literal["alignment", "symmetry"]
+PREPARATIONS: tuple[Preparation, ...] = get_args(Preparation)
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
 PALETTES: tuple[PaletteChoice, ...] = get_args(PaletteChoice)
 PAPER_STEPS = (200, 2000)
@@ -39,12 +39,12 @@ class Method:
     palette: PaletteChoice = "automatic palette"
     first_seed_only: bool = False
     most_views_only: bool = False
-    leaves_out: Step | None = None
+    leaves_out: Preparation | None = None
     curve: bool = False
 
 
 def _without(
-    step: Step | None = None, palette: PaletteChoice = "automatic palette", **changes: Any
+    step: Preparation | None = None, palette: PaletteChoice = "automatic palette", **changes: Any
 ) -> Method:
     return Method(TrainOptions(**changes), palette, first_seed_only=True, leaves_out=step)
 

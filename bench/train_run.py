@@ -13,7 +13,7 @@ from jaxtyping import UInt8
 from torch import Tensor
 
 from toonset.bench.cases import TrainCase
-from toonset.bench.train_plan import METHODS, Job, PaletteChoice, Step, subset
+from toonset.bench.train_plan import METHODS, Job, PaletteChoice, Preparation, subset
 from toonset.camera import rotation_distance
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import ToonsetError
@@ -76,7 +76,7 @@ class RunResult:
     render_seconds: float
     parameters: int
     curve: tuple[Seen, ...]
-    acted: tuple[Step, ...] = ()
+    acted: tuple[Preparation, ...] = ()
     note: str = ""
 
 
@@ -123,10 +123,10 @@ def _trained(
     )
 
 
-def acted_in(training: Training) -> tuple[Step, ...]:
+def acted_in(training: Training) -> tuple[Preparation, ...]:
     """Return the steps that found something to do: without the others, it is the same training."""
     ready, symmetry = training.prepared, training.symmetry
-    found: list[Step] = []
+    found: list[Preparation] = []
     if any(step and step.applied for step in (ready.turning, ready.registration, ready.unbending)):
         found.append("alignment")
     if symmetry and symmetry.mirrored:

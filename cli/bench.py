@@ -87,7 +87,8 @@ def bench(
 
     printer = Printer(as_json, quiet)
     if against_committed or renew:
-        if subject is not None or (against_committed and renew):
+        others = (subject, cases, sprites, only, count, half, baseline, quick, force)
+        if any(others) or (against_committed and renew):
             raise typer.BadParameter("--check and --renew stand alone, without a subject")
         check(seed, printer, renew=renew)
         return

@@ -9,6 +9,7 @@ import typer
 
 from toonset.cli.bench_chosen import Chosen, Subject
 from toonset.cli.output import Printer
+from toonset.errors import BundleError
 
 if TYPE_CHECKING:
     from toonset.bench.gate import Guard
@@ -41,6 +42,10 @@ def check(seed: int, printer: Printer, *, renew: bool) -> None:
     from toonset.files import write_json
 
     committed = [] if renew else from_plain(read_json(COMMITTED), str(COMMITTED))
+    if known := {guard.seed for guard in committed} - {seed}:
+        raise BundleError(
+            f"{COMMITTED}: figures of seed {known.pop()}, not {seed}; pass that --seed"
+        )
     now = measured(seed, printer)
     if renew:
         write_json(COMMITTED, as_plain(now))

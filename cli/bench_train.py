@@ -2,7 +2,7 @@
 
 runs.json in the output folder is rewritten after every training. A run of the same version takes
 finished trainings from it: the same case, views, method, options and seed; table, records and
-picture show all that the folder has. Who has changed the code in between starts afresh with
+pictures show those that were asked for. Who has changed the code in between starts afresh with
 --force.
 """
 

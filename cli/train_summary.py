@@ -40,7 +40,7 @@ def _drawings(found: dict[str, Any]) -> list[str]:
         before, after = step["apart_px"]
         moved = f"{what} {done}: outlines {before:.2f} px apart, {after:.2f} px after"
         kept = f"{what} not {done}: outlines {before:.2f} px apart"
-        more = "" if step["applied"] or step["gain_nats"] <= 0 else ", what was done explains more"
+        more = "" if step["applied"] or step["gain_nats"] <= 0 else ", not the best explanation"
         gain = f"{step['gain_nats']:+.0f} nats{more}"
         lines.append(f"{moved if step['applied'] else kept} ({gain})")
     if found["ink"]:

@@ -32,6 +32,7 @@ from toonset.nerf.warp_fit import (
     NOISE,
     NOISE_PX,
     SETTLED,
+    Fit,
     common,
 )
 from toonset.nerf.warp_moves import ShiftAndScale
@@ -44,23 +45,16 @@ _PLACES = ShiftAndScale.expected()
 
 
 @dataclass(frozen=True, eq=False)
-class TurnFit:
+class TurnFit(Fit):
     """Turned cameras and what speaks for turning them.
 
+    `numbers` are shift x and y and growth in units of the squares, and yaw in radians.
+
     Attributes:
-        numbers: (views, 4) shift x and y and growth in units of the squares, yaw in radians.
         log_k: by how much every camera's k grows.
-        tau: the size of wrong places that the sheet asks for, of the square.
-        gain_nats: log marginal likelihood above that of the cameras as they are.
-        apart_px: root mean square disagreement per rim point, before and after, in pixels of the
-            small pictures.
     """
 
-    numbers: Float[np.ndarray, "views 4"]
     log_k: float
-    tau: float
-    gain_nats: float
-    apart_px: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +90,8 @@ def fit_turns(
     deviation = _deviations(yaw_sigmas, k_sigma, tau)
     idle = first.cost - _log_volume(first.matrix, deviation)
     if idle <= 0:  # even a perfect fit would not be worth its numbers
-        return TurnFit(
-            flat[:-1].reshape(views, OWN), 0.0, 0.0, idle / 2, (first.apart, first.apart)
-        )
+        apart = (first.apart, first.apart)
+        return TurnFit(flat[:-1].reshape(views, OWN), 0.0, idle / 2, apart, log_k=0.0)
     body, shares = common(outlines, _PLACES)
     for round_ in range(1, rounds + 1):
         flat = _improved(normal, deviation, flat)
@@ -114,7 +107,7 @@ def fit_turns(
     spent = normal.cost + float(((flat[free] / deviation[free]) ** 2).sum())
     gain = (first.cost - spent - _log_volume(normal.matrix, deviation)) / 2
     apart = (first.apart, normal.apart)
-    return TurnFit(flat[:-1].reshape(views, OWN), float(flat[-1]), tau, gain, apart)
+    return TurnFit(flat[:-1].reshape(views, OWN), tau, gain, apart, log_k=float(flat[-1]))
 
 
 def camera_moved(

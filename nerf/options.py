@@ -31,7 +31,7 @@ class TrainOptions:
             figure's box, at new places in every step, against pictures over any backdrop.
         fair: take the fairest surface inside the hull instead of the hull with its corners.
         register: let cameras follow drawings that were placed or sized off.
-        turn: let cameras that calibration estimated turn within its sigmas, where they may move.
+        turn: let cameras that calibration estimated turn, by its sigmas; `register` off keeps them.
         unbend: bend drawings back that disagree with the others' outlines.
         symmetric: where drawings show that the body is its own mirror image, flip them for the side
             that no drawing shows.

@@ -35,6 +35,27 @@ def egg() -> Mesh:
     return Mesh(vertices, np.asarray(sphere.faces))
 
 
+def camera_at(
+    i: int,
+    count: int,
+    size_wh: tuple[int, int],
+    scale: float,
+    center: tuple[float, float],
+    k: float,
+) -> Camera:
+    """Return one of `count` cameras round TARGET, its elevation and roll unlike the others'."""
+    return Camera.looking_at(
+        TARGET,
+        yaw=2 * math.pi * i / count + 0.2,
+        elevation=0.1 * i - 0.2,
+        roll=0.05 * i,
+        scale=scale,
+        size_wh=size_wh,
+        center=np.array(center),
+        k=k,
+    )
+
+
 def views_all_round(
     count: int = 5, *, k: float = 0.0, aspect: float = 1.0
 ) -> tuple[ExportView, ...]:
@@ -42,16 +63,7 @@ def views_all_round(
     views = []
     for i in range(count):
         size = (90 + 3 * i, 120 - 2 * i)
-        camera = Camera.looking_at(
-            TARGET,
-            yaw=2 * math.pi * i / count + 0.2,
-            elevation=0.1 * i - 0.2,
-            roll=0.05 * i,
-            scale=SCALE + i,
-            size_wh=size,
-            center=np.array([44.3 + i, 61.7]),
-            k=k,
-        )
+        camera = camera_at(i, count, size, SCALE + i, (44.3 + i, 61.7), k)
         camera = replace(camera, pixel_aspect=aspect)
         shown = camera.project(np.array([[0.2, 1.0, 0.1]]))[0][0]
         distance = 100 * HEIGHT if k == 0 else 1 / k

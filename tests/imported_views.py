@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tests.exported_views import TARGET
-from toonset.camera import Camera
+from tests.exported_views import camera_at
 from toonset.dataset.colmap import write_colmap
 from toonset.dataset.export_blender_script import write_blender_script
 from toonset.dataset.export_blender_synthetic import write_blender_synthetic
@@ -44,16 +42,7 @@ def views_all_round(count: int = 4, *, k: float = 0.0) -> tuple[ExportView, ...]
     views = []
     for i in range(count):
         size = (60 + 3 * i, 80 - 2 * i)
-        camera = Camera.looking_at(
-            TARGET,
-            yaw=2 * math.pi * i / count + 0.2,
-            elevation=0.1 * i - 0.2,
-            roll=0.05 * i,
-            scale=37.0 + i,
-            size_wh=size,
-            center=np.array([31.3 + i, 38.7]),
-            k=k,
-        )
+        camera = camera_at(i, count, size, 37.0 + i, (31.3 + i, 38.7), k)
         rng = np.random.default_rng(i)
         rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
         rgba[..., 3] = np.where(np.add.outer(np.arange(size[1]), np.arange(size[0])) > 40, 255, 0)

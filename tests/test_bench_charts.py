@@ -13,6 +13,7 @@ import pytest
 from matplotlib.text import Text
 from PIL import Image
 
+from tests.bench_records import record
 from toonset.bench.calib import METHODS as CALIB_METHODS
 from toonset.bench.chart import Chart
 from toonset.bench.chart_drawing import chart_figure, draw_chart
@@ -20,7 +21,6 @@ from toonset.bench.chart_labels import Box, Label, place_labels
 from toonset.bench.chart_points import PLOTS, charts_of, points_of
 from toonset.bench.palette_methods import METHODS as PALETTE_METHODS
 from toonset.bench.pareto import Point, Standing, pareto_front, standing_of
-from toonset.bench.record import Record, summarise
 from toonset.bench.sfm import METHODS as SFM_METHODS
 from toonset.bench.train_plan import METHODS as TRAIN_METHODS
 
@@ -212,19 +212,6 @@ def test_the_csv_has_a_row_per_method_cheapest_first() -> None:
 
 
 # ---- from records
-
-
-def record(metric: str, method: str, by_case: dict[str, float], group: str = "exact") -> Record:
-    return summarise(
-        list(by_case.values()),
-        method=method,
-        metric=metric,
-        unit="s" if "seconds" in metric else "dB",
-        direction="lower" if "seconds" in metric else "higher",
-        seed=0,
-        group=group,
-        by_case=by_case,
-    )
 
 
 def test_fewer_cases_are_set_aside_where_the_default_says_that_they_would_be() -> None:

@@ -123,3 +123,12 @@ def test_check_ends_with_3_where_something_is_worse(
         bench_check.check(0, printer, renew=False)
     assert stop.value.exit_code == bench_check.WORSE
     assert "5 worse" in capsys.readouterr().out
+    with pytest.raises(BundleError, match="figures of seed 0, not 7"):
+        bench_check.check(7, printer, renew=False)
+
+
+@pytest.mark.parametrize("other", [["calib"], ["--quick"], ["--only", "exact"], ["--renew"]])
+def test_check_takes_no_other_option(toonset, other: list[str]) -> None:
+    found = toonset("bench", "--check", *other)
+    assert found.code == 2
+    assert "stand alone" in found.err

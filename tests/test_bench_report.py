@@ -8,24 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.bench_records import record
 from toonset.bench.chart import Chart
 from toonset.bench.chart_drawing import draw_chart
 from toonset.bench.pareto import Point
-from toonset.bench.record import Record, summarise
 from toonset.bench.report import Picture, inlined, report_html
-
-
-def record(metric: str, method: str, by_case: dict[str, float], group: str = "exact") -> Record:
-    return summarise(
-        list(by_case.values()),
-        method=method,
-        metric=metric,
-        unit="s" if "seconds" in metric else "dB",
-        direction="lower" if "seconds" in metric else "higher",
-        seed=0,
-        group=group,
-        by_case=by_case,
-    )
 
 
 class Page(HTMLParser):

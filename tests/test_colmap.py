@@ -12,6 +12,7 @@ import numpy as np
 import pycolmap
 import pytest
 
+from tests.exported_views import camera_at
 from toonset.camera import Camera
 from toonset.dataset.bodies import random_body
 from toonset.dataset.colmap import write_colmap
@@ -45,16 +46,7 @@ def posed(count: int, *, k: float = 0.0) -> list[Frame]:
     frames = []
     for i in range(count):
         size = (90 + 3 * i, 120 - 2 * i)
-        camera = Camera.looking_at(
-            np.array([0.1, 0.9, -0.05]),
-            yaw=2 * math.pi * i / count + 0.2,
-            elevation=0.1 * i - 0.2,
-            roll=0.05 * i,
-            scale=47.0 + i,
-            size_wh=size,
-            center=np.array([44.3 + i, 61.7]),
-            k=k,
-        )
+        camera = camera_at(i, count, size, 47.0 + i, (44.3 + i, 61.7), k)
         frames.append(Frame(f"{i:03d}.png", camera, painted(size, i)))
     return frames
 

@@ -1,0 +1,49 @@
+"""What `train` says at its end about drawings that were, or were not, set right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from toonset.cli.train_summary import summary
+
+
+def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
+    figures = {"psnr": 30.0, "psnr_mask": None}
+    return {
+        "train": figures,
+        "test": None,
+        "steps": 3,
+        "seconds": {"steps": 1.0},
+        "counts": {"views": 8, "rays": 9, "parameters": 7},
+        "hull": {"missing": 0, "left_out_iou": []},
+        "symmetry": None,
+        "drawings": dict.fromkeys(("turning", "registration", "unbending", "ink")) | drawings,
+    }
+
+
+def step(gain_nats: float, *, applied: bool) -> dict[str, Any]:
+    return {"applied": applied, "gain_nats": gain_nats, "apart_px": (1.0, 0.5)}
+
+
+def test_evidence_that_was_not_acted_on_is_called_so() -> None:
+    found = summary(
+        Path("run"),
+        metrics(
+            turning=step(70, applied=False),
+            registration=step(-5, applied=False),
+            unbending=step(90, applied=True),
+        ),
+    ).splitlines()
+    assert (
+        "cameras not turned: outlines 1.00 px apart (+70 nats, not the best explanation)" in found
+    )
+    assert "drawings not moved and sized: outlines 1.00 px apart (-5 nats)" in found
+    assert "drawings bent back: outlines 1.00 px apart, 0.50 px after (+90 nats)" in found
+    assert "fit to the drawings as set right: PSNR 30.00 dB" in found
+
+
+def test_drawings_that_agree_are_fitted_as_they_are() -> None:
+    assert "fit to the drawings: PSNR 30.00 dB" in summary(
+        Path("run"), metrics(registration=step(-5, applied=False))
+    )
