@@ -32,6 +32,7 @@ class Batch:
         rgb: (rays, 3) the drawing's straight colour in [0, 1].
         alpha: (rays,) the drawing's coverage in [0, 1].
         labels: (rays,) the drawing's palette label, 255 = none.
+        even: every ray has as many samples.
     """
 
     constants: Constants
@@ -40,17 +41,22 @@ class Batch:
     rgb: Float[Tensor, "rays 3"]
     alpha: Float[Tensor, " rays"]
     labels: Int[Tensor, " rays"]
+    even: bool = False
 
     def to(self, device: torch.device) -> Batch:
         """Return the batch on a device."""
         tensors = (self.ray, self.length, self.rgb, self.alpha, self.labels)
-        return Batch(self.constants.to(device), *(t.to(device) for t in tensors))
+        return Batch(self.constants.to(device), *(t.to(device) for t in tensors), self.even)
 
     def kept(self, samples: Bool[Tensor, " samples"]) -> Batch:
         """Return the batch with some of its samples; every ray must keep one."""
         constants = self.constants.kept(samples)
         return replace(
-            self, constants=constants, ray=self.ray[samples], length=self.length[samples]
+            self,
+            constants=constants,
+            ray=self.ray[samples],
+            length=self.length[samples],
+            even=False,
         )
 
 

@@ -93,15 +93,16 @@ class BoxRays:
         near, far = self._near[part, None], self._far[part, None]
         distance = near + (far - near) / BINS * (torch.arange(BINS) + shift)
         rays = self._rays.at(part)
-        points = rays.origins[:, None] + rays.directions[:, None] * distance[..., None]
-        length = torch.cat([distance, far], dim=1).diff(dim=1)
+        origins, directions = (a.T.contiguous() for a in (rays.origins, rays.directions))
+        points = origins[..., None] + directions[..., None] * distance  # axis by axis
         return Batch(
-            Places(points.reshape(-1, 3)),
+            Places(points.view(3, -1).T),
             torch.arange(len(part)).repeat_interleave(BINS),
-            length.reshape(-1),
+            torch.cat([distance, far], dim=1).diff(dim=1).view(-1),
             self._rgb[part],
             self._alpha[part],
             self._labels[part],
+            even=True,
         ).to(self._device)
 
     def after(self, step: int, model: Model) -> None:

@@ -11,7 +11,7 @@ from toonset.nerf import losses
 from toonset.nerf.batches import Batch
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.fields import Field
-from toonset.nerf.rendering import composite_packed
+from toonset.nerf.rendering import composite_even, composite_packed
 
 
 class Model(nn.Module):
@@ -64,4 +64,7 @@ def render_batch(
 ) -> tuple[Float[Tensor, "rays 3"], Float[Tensor, " rays"]]:
     """Return premultiplied colour and opacity of a batch's rays."""
     density, rgb = field.shade(batch.constants)
-    return composite_packed(density * batch.length, rgb, batch.ray, len(batch.rgb))
+    depth, rays = density * batch.length, len(batch.rgb)
+    if batch.even:
+        return composite_even(depth.view(rays, -1), rgb.T.reshape(3, rays, -1))
+    return composite_packed(depth, rgb, batch.ray, rays)

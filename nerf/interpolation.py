@@ -1,11 +1,12 @@
-"""Bilinear interpolation as a constant sparse matrix: fast when the same points come again.
+"""Bilinear interpolation as a sparse matrix.
 
-Rays and samples do not move while a field is fitted, so neither do the interpolation weights. The
-features of all planes lie in one table; a sample reads 12 of its rows (4 corners of 3 planes):
+The features of all planes lie in one table; a sample reads 12 of its rows (4 corners of 3 planes):
 
     features = W table,      d loss / d table = W^T (d loss / d features)
 
-Both products are one `embedding_bag` call, the second with the transposed matrix laid out once.
+Where rays and samples do not move while a field is fitted, neither does W: both products are one
+`embedding_bag` call, the second with the transposed matrix laid out once. Where every step has
+samples of its own, its W is used once: laying out the transpose would take longer than the product.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
 import torch
 import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int
@@ -98,3 +100,33 @@ class _Apply(torch.autograd.Function):
             include_last_offset=True,
         )
         return gradient, None
+
+
+def apply_once(
+    table: Float[Tensor, "entries channels"],
+    rows: Int[Tensor, "samples taps"],
+    weights: Float[Tensor, "samples taps"],
+) -> Float[Tensor, "samples channels"]:
+    """Return W table for a W that no other step has, differentiable in the table."""
+    if table.device.type == "cpu":
+        return _ApplyOnce.apply(table, rows, weights)
+    return F.embedding_bag(rows, table, per_sample_weights=weights, mode="sum")
+
+
+class _ApplyOnce(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, table: Tensor, rows: Tensor, weights: Tensor) -> Tensor:
+        ctx.save_for_backward(rows, weights)
+        ctx.entries = len(table)
+        return F.embedding_bag(rows, table.detach(), per_sample_weights=weights, mode="sum")
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None, None]:
+        from scipy import sparse  # here: most trainings do without
+
+        rows, weights = ctx.saved_tensors
+        samples, taps = rows.shape
+        ends = np.arange(0, samples * taps + 1, taps, dtype=np.int32)
+        parts = (weights.view(-1).numpy(), rows.view(-1).numpy(), ends)
+        transposed = sparse.csc_array(parts, shape=(ctx.entries, samples))  # W's rows, as columns
+        return torch.from_numpy(transposed @ gradients[0].contiguous().numpy()), None, None

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
+import torch.nn.functional as F
+from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.bounds import Box
+from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.field_box import (
     BINS,
     BoxRays,
@@ -20,13 +25,16 @@ from toonset.nerf.field_box import (
 )
 from toonset.nerf.field_hull import paint
 from toonset.nerf.field_kinds import build_field
+from toonset.nerf.field_loss import render_batch
 from toonset.nerf.field_voxel import VoxelField
 from toonset.nerf.fields import FieldSpec, Kind, Places
 from toonset.nerf.hull import Hull, carve
+from toonset.nerf.interpolation import apply_once
 from toonset.nerf.losses import photometric
 from toonset.nerf.march import march, rays_of
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preset import PRESETS, preset
+from toonset.nerf.rendering import composite_even, composite_packed
 
 SIDE = 24
 PALETTE = np.array([[250, 0, 0], [0, 0, 250]], dtype=np.uint8)
@@ -84,6 +92,75 @@ def test_batches_hold_every_ray_once_background_too() -> None:
     alphas = torch.cat([rays.batch(i, 0).alpha for i in range(len(rays))])
     assert int((alphas == 1).sum()) == 4 * 16 * 12
     assert int((alphas == 0).sum()) > 100
+
+
+def by_grid_sample(field: TriplaneField, points: Tensor) -> Tensor:
+    """Return the field's features as torch has them."""
+    at, total = (points - field.low) / field.cell, torch.zeros(())
+    for image, (a, b) in zip(field.plane_images(), PLANES, strict=True):
+        most = at.new_tensor([field.shape[b] - 1, field.shape[a] - 1])
+        places = at[:, [b, a]] * (2 / most) - 1  # grid_sample names the last axis first
+        found = F.grid_sample(
+            image.permute(2, 0, 1)[None],
+            places[None, None],
+            padding_mode="border",
+            align_corners=True,
+        )
+        total = total + found[0, :, 0].T
+    return total
+
+
+def test_a_step_renders_and_learns_what_torch_alone_would() -> None:
+    rays, hull = rays_in_box()
+    torch.manual_seed(1)
+    field = TriplaneField(hull.box, 20, 5, 6).double()
+    batch = rays.batch(0, 0)
+    assert isinstance(batch.constants, Places)
+    assert batch.even
+    points, length = batch.constants.points.double(), batch.length.double()
+    density, rgb = field.decode(by_grid_sample(field, points))
+    slow = composite_packed(density * length, rgb, batch.ray, len(batch.rgb))
+    fast = render_batch(field, replace(batch, constants=Places(points), length=length))
+    gradients = []
+    for color, opacity in (slow, fast):
+        field.zero_grad()
+        torch.autograd.backward((color * batch.rgb.double()).sum() + opacity.square().sum())
+        gradients.append([values.grad for values in field.parameters()])
+    torch.testing.assert_close(fast, slow)
+    torch.testing.assert_close(*gradients)
+    assert all(bool(g.abs().max() > 1e-3) for g in gradients[0] if g is not None)
+
+
+def test_gradients_of_a_product_taken_once_match_central_differences() -> None:
+    generator = torch.Generator().manual_seed(2)
+    rows = torch.randint(7, (9, 4), generator=generator, dtype=torch.int32)
+    rows[0] = rows[0, 0]  # a row that a sample reads four times; some that none reads
+    weights = torch.rand(9, 4, generator=generator, dtype=torch.float64)
+    table = torch.randn(8, 3, generator=generator, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda t: apply_once(t, rows, weights), table)
+    torch.testing.assert_close(
+        apply_once(table, rows, weights), (table[rows.long()] * weights[..., None]).sum(1)
+    )
+
+
+def test_even_compositing_equals_the_packed_one() -> None:
+    generator = torch.Generator().manual_seed(3)
+    depth = torch.rand(4, 6, generator=generator, dtype=torch.float64, requires_grad=True)
+    color = torch.rand(2, 4, 6, generator=generator, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(composite_even, (depth, color))
+    ray = torch.arange(4).repeat_interleave(6)
+    packed = composite_packed(depth.view(-1), color.view(2, -1).T, ray, 4)
+    torch.testing.assert_close(composite_even(depth, color), packed)
+
+
+def test_even_compositing_survives_extreme_depths() -> None:
+    depth = torch.tensor([[1e30, 1e30, 0.5], [0.0, 0.0, 0.5]], requires_grad=True)
+    color, opacity = composite_even(depth, torch.tensor([[[0.7, 0.2, 1.0], [1.0, 1.0, 0.4]]]))
+    torch.autograd.backward(color.sum() + opacity.sum())
+    assert color[0, 0].item() == pytest.approx(0.7)
+    assert opacity[1].item() == pytest.approx(1 - np.exp(-0.5))
+    assert depth.grad is not None
+    assert bool(torch.isfinite(depth.grad).all())
 
 
 def test_labels_are_the_nearest_colours_by_l2_of_the_figure_alone() -> None:
