@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -31,6 +31,7 @@ from toonset.cli.sheet_options import (
 )
 
 if TYPE_CHECKING:
+    from toonset.calib.enclosed import FilledHole
     from toonset.calib.known import Known
     from toonset.calib.landmarks import LandmarkFit
     from toonset.calib.result import Calibration
@@ -140,6 +141,8 @@ def calibrate(
     hints.check_usage()
     printer = Printer(as_json, quiet)
     check_output(out, [*sheets, mesh, landmarks, init, boxes], WRITTEN, force=force)
+    from toonset.calib.enclosed import without_false_holes
+
     body = load_body(mesh)
     given = load_sheets(sheets, hints, printer)
     views, hints = given.views, replace(hints, labels=given.labels)
@@ -147,7 +150,10 @@ def calibrate(
     marks = _landmark_fits(known, body.mesh)
     _say_inputs(views, body, marks, printer)
     found = _fit(views, body.mesh, known, printer, landmarks_only=landmarks_only)
-    report = _report(found, marks) | provenance(given.files, body, hints, seed)
+    views, filled = without_false_holes(views, found.views, given.papers, found.mannequin)
+    for hole in filled:
+        printer.say(str(hole))
+    report = _report(found, marks, filled) | provenance(given.files, body, hints, seed)
     _write(out, views, body.mesh, found, report, force=force)
     _say_result(found, out, printer)
     printer.result({"bundle": out, **report}, str(out))
@@ -196,10 +202,13 @@ def _fit(
     return fit(views, mesh, CalibrationOptions(), progress, known)
 
 
-def _report(found: Calibration, marks: Sequence[LandmarkFit]) -> dict[str, Any]:
+def _report(
+    found: Calibration, marks: Sequence[LandmarkFit], filled: Sequence[FilledHole]
+) -> dict[str, Any]:
     from toonset.calib.report import calibration_dict
 
     report = calibration_dict(found)
+    report["filled_holes"] = [asdict(hole) for hole in filled]
     if marks:
         report["landmarks"] = [
             {

@@ -125,11 +125,14 @@ class Sheets:
         views: named in order.
         labels: what each shows, as --views or a split folder says; empty for nothing.
         files: role and path of every file that the views depend on.
+        papers: per view the colour of the sheet behind it; None where it is transparent, or where
+            a person has had the chance to correct what was cut out (a split folder).
     """
 
     views: tuple[View, ...]
     labels: str
     files: tuple[tuple[str, Path], ...]
+    papers: tuple[tuple[int, int, int] | None, ...]
 
 
 def load_sheets(paths: Sequence[Path], hints: Hints, printer: Printer) -> Sheets:
@@ -143,7 +146,12 @@ def load_sheets(paths: Sequence[Path], hints: Hints, printer: Printer) -> Sheets
         printer.say(doubt)
     check_label_count(hints.labels, drawings)
     labels = hints.labels or drawings.split.label_text
-    return Sheets(drawings.split.views, labels, drawings.files)
+    cut_now = [picture is not None for picture in drawings.pictures]
+    papers = tuple(
+        drawings.split.sources[sheet].background if cut_now[sheet] else None
+        for sheet in drawings.split.source_of
+    )
+    return Sheets(drawings.split.views, labels, drawings.files, papers)
 
 
 def load_known(hints: Hints, views: Sequence[View], body: Body) -> Known:

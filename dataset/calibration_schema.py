@@ -161,6 +161,14 @@ class LandmarkFit(_Record):
     perspective_bic_gain: float
 
 
+class FilledHole(_Record):
+    """A hole in a drawing that another drawing, from the other side, shows to be paint."""
+
+    view: Annotated[str, Field(min_length=1, max_length=255)]
+    box: tuple[int, int, int, int]
+    by: Annotated[str, Field(min_length=1, max_length=255)]
+
+
 class CalibrationFile(_Record):
     """The whole file, except `schema`."""
 
@@ -172,6 +180,7 @@ class CalibrationFile(_Record):
     drawings_contradiction_of_height: Spread | None = None
     views: Annotated[list[ViewRecord], Field(min_length=1, max_length=MAX_FRAMES)]
     landmarks: Annotated[list[LandmarkFit], Field(max_length=MAX_FRAMES)] = []
+    filled_holes: Annotated[list[FilledHole], Field(max_length=100_000)] = []
     options: dict[str, Any] = {}
     seed: Annotated[int, Field(ge=0)] | None = None
     versions: dict[str, Text] = {}

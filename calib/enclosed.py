@@ -1,0 +1,191 @@
+"""Holes that the drawing from the other side contradicts: they are paint in the paper's colour.
+
+One drawing cannot always tell a gap between arm and body from a white buckle on white paper; the
+splitter assumes (`toonset.dataset.holes`). Once cameras are known, a second drawing can tell: what
+is open towards one side is open towards the other. A hole is filled if a drawing from about the
+opposite side shows paint there, in another colour than paper, and round that place no patch of
+paper that could be the same gap.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from toonset.calib.result import ViewCalibration
+from toonset.camera import Camera
+from toonset.view import Box, View
+
+Rgb = tuple[int, int, int]
+
+LEAST_HOLE_PX = 9  # smaller ones are specks of the edge
+OPPOSITE_DEG = 35.0  # from looking against each other: two views from 17 degrees above
+ROUND = 0.02  # of the figure's height: what is drawn off by less is still the same hole
+BESIDE = 0.05  # of the figure's height: the body is as deep here as it is behind the hole
+EDGE_PX = 3  # of a hole, mixed with paper
+CLEAR = 40  # levels from the paper: another colour
+MOST_PAPER = 0.1  # of what lies behind: lines and lights in the paper's colour
+MOST_PLACES = 400  # pixels of a hole that are looked along
+DEPTHS = 9  # places along each of their rays
+
+
+@dataclass(frozen=True)
+class FilledHole:
+    """A hole that is none.
+
+    Attributes:
+        view: the drawing that has it.
+        box: (x, y, width, height) in that drawing, pixels.
+        by: the drawing that contradicts it.
+    """
+
+    view: str
+    box: Box
+    by: str
+
+    def __str__(self) -> str:
+        """Return what was done, for people."""
+        x, y, width, height = self.box
+        return (
+            f"{self.view}: the hole at {x}, {y} ({width} x {height} px) is paint: {self.by}, drawn "
+            "from the other side, shows none; filled"
+        )
+
+
+def without_false_holes(
+    views: Sequence[View],
+    found: Sequence[ViewCalibration],
+    papers: Sequence[Rgb | None],
+    vertices: Float[np.ndarray, "vertices 3"],
+) -> tuple[tuple[View, ...], tuple[FilledHole, ...]]:
+    """Return the drawings with the holes filled that another one contradicts, and which those are.
+
+    Args:
+        views: the drawings, as cut out.
+        found: their cameras; drawings without a usable one have no say.
+        papers: per drawing the colour behind it; None where that is not known: nothing is filled,
+            and it cannot contradict.
+        vertices: of the mannequin: how deep the body is.
+    """
+    known = [
+        (view, fit.camera, paper)
+        for view, fit, paper in zip(views, found, papers, strict=True)
+        if paper is not None and fit.verdict != "failed"
+    ]
+    painted = {view.name: _painted(view, paper) for view, _, paper in known}
+    result, filled = {view.name: view for view in views}, []
+    for view, camera, paper in known:
+        others = [(v.name, c) for v, c, _ in known if _opposite(camera, c)]
+        for hole in _holes(view):
+            points = _behind(hole, camera, vertices, view.figure_box[3])
+            by = next((n for n, c in others if _is_closed(points, c, painted[n])), None)
+            if by is None:
+                continue
+            result[view.name] = _with_paper(result[view.name], hole, paper)
+            filled.append(FilledHole(view.name, _box(hole), by))
+    return tuple(result[view.name] for view in views), tuple(filled)
+
+
+def _holes(view: View) -> Iterator[Bool[np.ndarray, "height width"]]:
+    """Yield the see-through patches that the figure encloses."""
+    empty = np.pad(~view.mask, 1, constant_values=True)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(empty.view(np.uint8), connectivity=4)
+    for number in range(1, len(stats)):
+        if number != labels[0, 0] and stats[number, cv2.CC_STAT_AREA] >= LEAST_HOLE_PX:
+            yield labels[1:-1, 1:-1] == number
+
+
+def _opposite(camera: Camera, other: Camera) -> bool:
+    return float(camera.rotation[2] @ other.rotation[2]) <= -math.cos(math.radians(OPPOSITE_DEG))
+
+
+def _behind(
+    hole: Bool[np.ndarray, "height width"],
+    camera: Camera,
+    vertices: Float[np.ndarray, "vertices 3"],
+    height_px: int,
+) -> Float[np.ndarray, "places depths 3"]:
+    """Return the world points that a hole would leave empty, as deep as the body is beside it."""
+    rows, columns = np.nonzero(hole)
+    every = -(-len(rows) // MOST_PLACES)
+    pixels = np.stack([columns, rows], axis=1)[::every] + 0.5
+    at, depth, in_front = camera.project(vertices)
+    middle, reach = pixels.mean(axis=0), np.ptp(pixels, axis=0).max() / 2 + BESIDE * height_px
+    near = in_front & (np.linalg.norm(at - middle, axis=1) <= reach)
+    depth = depth[near] if near.any() else depth[in_front]
+    along = np.linspace(depth.min(), depth.max(), DEPTHS)
+    return camera.unproject(
+        np.broadcast_to(pixels[:, None], (len(pixels), DEPTHS, 2)),
+        np.broadcast_to(along, (len(pixels), DEPTHS)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Painted:
+    """What a drawing shows: paint at all, and paint in the paper's colour; a pixel each."""
+
+    solid: Bool[np.ndarray, "height width"]
+    paper: Bool[np.ndarray, "height width"]
+    reach_px: int
+
+
+def _painted(view: View, paper: Rgb) -> _Painted:
+    apart = np.abs(view.rgba[..., :3].astype(np.int16) - np.array(paper)).max(axis=2)
+    reach = max(1, round(ROUND * view.figure_box[3]))
+    return _Painted(view.mask, view.mask & (apart < CLEAR), reach)
+
+
+def _is_closed(
+    points: Float[np.ndarray, "places depths 3"], camera: Camera, painted: _Painted
+) -> bool:
+    """Return whether a drawing shows paint, and other colours than paper, where the points are."""
+    pixels, _, in_front = camera.project(points.reshape(-1, 3))
+    height, width = painted.solid.shape
+    if not in_front.all():
+        return False
+    at = np.floor(pixels).astype(int)
+    if (at < 0).any() or (at >= (width, height)).any():
+        return False
+    region = np.zeros((height, width), np.uint8)
+    region[at[:, 1], at[:, 0]] = 1
+    size = 2 * painted.reach_px + 1
+    shape = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    around = cv2.dilate(region, shape) > 0
+    if not painted.solid[around].all() or painted.paper[region > 0].mean() > MOST_PAPER:
+        return False
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(painted.paper.view(np.uint8))
+    areas = stats[:, cv2.CC_STAT_AREA]
+    inside = np.bincount(labels[around], minlength=len(areas))
+    gaps = (areas >= LEAST_HOLE_PX) & (inside >= areas / 2)
+    return not gaps[1:].any()  # the first is all that is not paper
+
+
+def _with_paper(view: View, hole: Bool[np.ndarray, "height width"], paper: Rgb) -> View:
+    """Return the view with paper's colour in a hole, and laid under its mixed edge."""
+    size = 2 * EDGE_PX + 1
+    grown = cv2.dilate(hole.view(np.uint8), np.ones((size, size), np.uint8)) > 0
+    share = view.rgba[..., 3:].astype(np.float64) / 255
+    under: UInt8[np.ndarray, "height width 3"] = np.rint(
+        share * view.rgba[..., :3] + (1 - share) * np.array(paper)
+    ).astype(np.uint8)
+    opaque = np.dstack([under, np.full(grown.shape, 255, np.uint8)])
+    beside = cv2.dilate(_outside(view).view(np.uint8), np.ones((size, size), np.uint8)) > 0
+    inside = hole | (grown & ~beside)
+    return replace(view, rgba=np.where(inside[..., None], opaque, view.rgba))
+
+
+def _outside(view: View) -> Bool[np.ndarray, "height width"]:
+    empty = np.pad(~view.mask, 1, constant_values=True)
+    labels = cv2.connectedComponents(empty.view(np.uint8), connectivity=4)[1]
+    return np.asarray(labels[1:-1, 1:-1] == labels[0, 0])
+
+
+def _box(hole: Bool[np.ndarray, "height width"]) -> Box:
+    rows, columns = (np.flatnonzero(hole.any(axis=axis)) for axis in (1, 0))
+    x, y = int(columns[0]), int(rows[0])
+    return x, y, int(columns[-1]) - x + 1, int(rows[-1]) - y + 1

@@ -1,0 +1,136 @@
+"""Holes in drawings: the drawing from the other side says which of them are paint."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from toonset.calib.enclosed import without_false_holes
+from toonset.camera import Camera
+from toonset.dataset.bodies import random_body
+from toonset.dataset.mesh_file import save_obj
+from toonset.dataset.picture import encode_png, load_rgba
+from toonset.dataset.sheet import split_sheet
+from toonset.dataset.synth_options import SynthOptions
+from toonset.dataset.synthetic import make_turnaround
+from toonset.files import write_bytes
+from toonset.view import View
+
+SIZE = (60, 100)
+WHITE, RED = (255, 255, 255), (200, 40, 30)
+HOLE = (slice(45, 55), slice(24, 34))
+
+
+def camera_at(yaw_deg: float, elevation: float = 0.0) -> Camera:
+    return Camera.looking_at(np.zeros(3), np.radians(yaw_deg), elevation, 45.0, SIZE)
+
+
+def slab() -> np.ndarray:
+    """Return the corners of a flat body, 0.2 deep."""
+    x, y, z = np.meshgrid((-0.4, 0.4), np.linspace(-1, 1, 9), (-0.1, 0.1))
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+
+
+def drawn(name: str, hole=None, patch=None, soft: bool = False) -> View:
+    """Return a red slab with a see-through hole or a painted patch of paper."""
+    rgba = np.zeros((*SIZE[::-1], 4), np.uint8)
+    rgba[5:95, 12:48] = (*RED, 255)
+    if patch is not None:
+        rgba[patch] = (*WHITE, 255)
+    if hole is not None:
+        rgba[hole] = 0
+        if soft:
+            rgba[hole[0], hole[1].start - 1] = (*RED, 120)
+    return View(rgba, (0, 0, *SIZE), 0.0, name)
+
+
+def filled(views, yaws, papers=None, verdict="ok", elevation: float = 0.0):
+    found = [SimpleNamespace(camera=camera_at(y, elevation), verdict=verdict) for y in yaws]
+    papers = papers or [WHITE] * len(views)
+    return without_false_holes(views, found, papers, slab())
+
+
+def test_a_hole_that_the_back_does_not_show_is_paint():
+    views, holes = filled([drawn("0", HOLE), drawn("1")], [0, 180])
+    assert [(h.view, h.box, h.by) for h in holes] == [("0", (24, 45, 10, 10), "1")]
+    assert views[0].mask[HOLE].all()
+    assert (views[0].rgba[HOLE][..., :3] == WHITE).all()
+    assert np.array_equal(views[1].rgba, drawn("1").rgba)
+    assert "0: the hole at 24, 45 (10 x 10 px) is paint: 1" in str(holes[0])
+
+
+def test_a_filled_hole_is_the_sheet_again_where_its_edge_was_mixed():
+    view = drawn("0", HOLE, soft=True)
+    (after, _), _ = filled([view, drawn("1")], [0, 180])
+    edge = after.rgba[50, HOLE[1].start - 1]
+    share = 120 / 255
+    assert edge[3] == 255
+    assert np.allclose(edge[:3], share * np.array(RED) + (1 - share) * 255, atol=1)
+    assert np.array_equal(after.rgba[..., 3] == 0, drawn("1").rgba[..., 3] == 0)  # nothing else
+
+
+@pytest.mark.parametrize(
+    ("other", "yaw"),
+    [
+        (drawn("1", (slice(45, 55), slice(26, 36))), 180),  # the same gap, seen from behind
+        (drawn("1", patch=(slice(46, 56), slice(27, 37))), 180),  # taken for paint there
+        (drawn("1"), 90),  # a side view sees no gap between arm and body
+        (drawn("1"), 0),  # the same side, drawn another time
+    ],
+)
+def test_a_hole_stays_unless_it_is_contradicted(other: View, yaw: float):
+    views, holes = filled([drawn("0", HOLE), other], [0, yaw])
+    assert holes == ()
+    assert views[0] is not None
+    assert not views[0].mask[HOLE].any()
+
+
+def test_a_hole_near_the_outline_stays():
+    beside = (slice(45, 55), slice(13, 17))
+    assert filled([drawn("0", beside), drawn("1")], [0, 180])[1] == ()
+
+
+def test_views_from_above_do_not_look_against_each_other():
+    pair = [drawn("0", HOLE), drawn("1")]
+    assert filled(pair, [0, 180], elevation=np.radians(15))[1]
+    assert filled(pair, [0, 180], elevation=np.radians(25))[1] == ()
+
+
+def test_drawings_without_camera_or_paper_have_no_say():
+    pair = [drawn("0", HOLE), drawn("1")]
+    assert filled(pair, [0, 180], verdict="failed")[1] == ()
+    assert filled(pair, [0, 180], papers=[WHITE, None])[1] == ()
+    assert filled(pair, [0, 180], papers=[None, WHITE])[1] == ()
+
+
+def test_paint_in_the_papers_colour_proves_nothing():
+    white = replace(drawn("1"), rgba=np.where(drawn("1").rgba > 0, 255, 0).astype(np.uint8))
+    assert filled([drawn("0", HOLE), white], [0, 180])[1] == ()
+
+
+def test_calibrate_fills_a_white_buckle_and_says_so(toonset, tmp_path):
+    options = SynthOptions(views=4, cell_px=200, outline_px=0, elevation_deg=8)
+    made = make_turnaround(random_body(11), options, 11)
+    sheet = made.sheet.copy()
+    front = split_sheet(sheet).views[0]
+    x, y, width, height = front.figure_box
+    row, column = y + round(0.38 * height), x + width // 2
+    sheet[row - 6 : row + 6, column - 6 : column + 6, :3] = 20
+    sheet[row - 4 : row + 4, column - 4 : column + 4, :3] = 255
+    cut = split_sheet(sheet).views[0]
+    assert not cut.mask[row - cut.box[1], column - cut.box[0]]  # taken for a hole
+    write_bytes(tmp_path / "sheet.png", encode_png(sheet))
+    write_bytes(tmp_path / "body.obj", save_obj(made.mesh))
+    given = (tmp_path / "sheet.png", "--mesh", tmp_path / "body.obj", "-o", tmp_path / "bundle")
+    outcome = toonset("calibrate", *given, "--json")
+    (hole,) = outcome.json["filled_holes"]
+    assert hole["view"] == "000.png"
+    assert "000.png: the hole at" in outcome.err
+    x, y, width, height = hole["box"]
+    picture = load_rgba(tmp_path / "bundle/images/000.png")
+    assert (picture[y : y + height, x : x + width, 3] == 255).all()
+    assert (picture[y + height // 2, x + width // 2] == 255).all()
+    toonset("split", tmp_path / "sheet.png", "-o", tmp_path / "views")
+    outcome = toonset("calibrate", tmp_path / "views", *given[1:], "--force", "--json")
+    assert outcome.json["filled_holes"] == []  # a split folder has been looked at
