@@ -112,10 +112,6 @@ SCOPES = {  # by subject and whether it must be quick
         first_case=SLOW,
     ),
     ("train", True): Scope((DEFAULT, NEAREST, "coloured hull", "75 steps"), one_case=True),
-    ("paper", False): Scope((DEFAULT, *PAPER)),
-    ("paper", True): Scope(
-        (DEFAULT, *(name for name in PAPER if name.endswith(" 200 steps"))), one_case=True
-    ),
 }
 
 
@@ -128,17 +124,21 @@ class Job:
         views: how many of the case's views are trained on.
         method: name in `METHODS`.
         seed: of everything random.
+        followed: held-out PSNR may be followed while it trains; what is found does not depend on
+            it.
     """
 
     case: TrainCase
     views: int
     method: str
     seed: int
+    followed: bool = True
 
     @property
     def curve(self) -> bool:
         """Return whether held-out PSNR is followed while it trains."""
-        return METHODS[self.method].curve and self.views == len(self.case.train.frames)
+        most_views = self.views == len(self.case.train.frames)
+        return self.followed and METHODS[self.method].curve and most_views
 
     @property
     def group(self) -> str:

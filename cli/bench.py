@@ -46,6 +46,7 @@ def bench(
             "--count",
             min=1,
             help="Synthetic cases per condition (without --cases); default 4. "
+            "Paper: characters; default 8, with --quick 3. "
             "Stability: sheets per step; default 8, with --quick 2. "
             "Split: sheets per difficulty, 15 times as many mixtures; with --quick 1.",
         ),
@@ -78,8 +79,9 @@ def bench(
     Prints a table and writes records.json, report.html and, for `calib`, `train` and `palette`, a
     chart of seconds against accuracy per condition (PNG, SVG, CSV). `split` draws the wrongly
     split sheets. `stability` sweeps errors of a sheet, to where calibration fails; `train` draws
-    held-out PSNR against seconds; `paper` makes the plain method's table and figure, for hours. Of
-    these three, the same command again continues a stopped run, or draws all that is there.
+    held-out PSNR against seconds; `paper` makes the plain method's table and figure, for hours, and
+    says whether palettes help it. Of these three, the same command again continues a stopped run,
+    or draws all that is there.
     `--check` runs a quick bench of every stage and ends with 3 where one has got worse.
     """
     from toonset.bench.record import as_dicts, machine

@@ -1,4 +1,4 @@
-"""`toonset bench paper`: the plain method's table and figure, beside the default.
+"""`toonset bench paper`: the plain method's table and figure, what palettes change, the default.
 
 Trainings are kept and continued as those of `bench train`. Pictures of each are kept in strips/,
 of which the figure is put together.
@@ -12,57 +12,92 @@ from typing import TYPE_CHECKING, Any
 
 from toonset.cli.bench_charts import file_name
 from toonset.cli.bench_chosen import Chosen
-from toonset.cli.bench_train import WRITTEN, jobs_of, run_into
+from toonset.cli.bench_train import WRITTEN, cases_of, run_into, some
 from toonset.cli.output import Printer
 
 if TYPE_CHECKING:
     from toonset.bench.cases import TrainCase
+    from toonset.bench.paper_difference import Difference
     from toonset.bench.train_plan import Job
     from toonset.bench.train_run import Look
     from toonset.nerf.evaluation import ScoredView
     from toonset.nerf.trained import TrainedField
 
-STRIPS, TABLE, FIGURE = "strips", "table1", "figure4"
-WRITTEN_HERE = (*WRITTEN, STRIPS, f"{TABLE}.*", f"{FIGURE}-*.png")
+STRIPS, TABLE, FIGURE, DIFFERENCES = "strips", "table1", "figure4", "differences"
+WRITTEN_HERE = (*WRITTEN, STRIPS, f"{TABLE}.*", f"{FIGURE}-*.png", f"{DIFFERENCES}*.*")
 
 
 def paper_into(
     folder: Path, chosen: Chosen, printer: Printer, *, force: bool
 ) -> tuple[str, dict[str, Any]]:
-    """Return the paper's Table 1 and how soon the default outdoes it; draw the paper's Figure 4.
+    """Return the paper's Table 1, what palettes change in it, and how soon the default outdoes it.
+
+    Its Figure 4 is drawn for every case.
 
     Raises:
         ToonsetError: as `train_into`.
     """
     from toonset.bench.paper import as_csv, as_text, outdone, outdone_text, paper_rows
+    from toonset.bench.paper_difference import as_rows, as_table, claim, differences_of
     from toonset.bench.record import machine
     from toonset.files import write_bytes, write_json
     from toonset.nerf.metrics_view import load_judges
 
-    jobs = jobs_of(chosen)
-    look = _strips_into(folder)
+    jobs = _jobs_of(chosen)
+    look = _strips_into(folder, chosen.seed)
     runs = run_into(folder, jobs, chosen, printer, WRITTEN_HERE, look, force=force)
-    rows, passed = paper_rows(runs), outdone(runs)
+    rows, passed, differences = paper_rows(runs), outdone(runs), differences_of(runs)
     absent = load_judges().absent
-    found = {"rows": rows, "outdone": passed, "absent": absent}
+    found = {
+        "rows": rows,
+        "differences": as_rows(differences),
+        "outdone": passed,
+        "absent": absent,
+    }
     write_json(folder / f"{TABLE}.json", found | {"seed": chosen.seed, "machine": machine()})
     if rows:
         write_bytes(folder / f"{TABLE}.csv", as_csv(rows).encode())
+    _compare_into(folder, differences)
     for case in dict.fromkeys(job.case for job in jobs):
         _draw(folder, case, [job for job in jobs if job.case is case])
+    compared = ["", as_table(differences), claim(differences), ""] if differences else []
     reasons = [f"no {name}: {reason}" for name, reason in absent.items()]
-    return "\n".join([as_text(rows), *map(outdone_text, passed), *reasons]), found
+    return "\n".join([as_text(rows), *compared, *map(outdone_text, passed), *reasons]), found
 
 
-def _strips_into(folder: Path) -> Look:
-    """Return what keeps pictures of a training's result, if it has a palette."""
+def _compare_into(folder: Path, differences: Sequence[Difference]) -> None:
+    """Write what the palettes change as CSV, and a figure of every condition."""
+    from toonset.bench.figure import FORMS
+    from toonset.bench.paper_chart import draw_differences
+    from toonset.bench.paper_difference import as_csv
+    from toonset.bench.record import machine
+    from toonset.files import write_bytes
+
+    if differences:
+        write_bytes(folder / f"{DIFFERENCES}.csv", as_csv(differences).encode())
+    for group in dict.fromkeys(d.group for d in differences):
+        own = [d for d in differences if d.group == group]
+        for form in FORMS:
+            drawing = draw_differences(own, f"{group}; {machine()}.", form)
+            write_bytes(folder / f"{DIFFERENCES}-{file_name(group)}.{form}", drawing)
+
+
+def _jobs_of(chosen: Chosen) -> list[Job]:
+    from toonset.bench.paper_plan import CASES, QUICK_CASES, paper_plan
+
+    cases = cases_of(chosen, QUICK_CASES if chosen.quick else CASES)
+    return some(paper_plan(cases, chosen.seed, chosen.only, quick=chosen.quick), chosen)
+
+
+def _strips_into(folder: Path, seed: int) -> Look:
+    """Return what keeps pictures of a result of this seed, if it has a palette."""
 
     def look(job: Job, case: TrainCase, trained: TrainedField, _: Sequence[ScoredView]) -> None:
         from toonset.bench.paper_picture import strip_of
         from toonset.dataset.picture import encode_png
         from toonset.files import write_bytes
 
-        if trained.palette is not None:
+        if trained.palette is not None and job.seed == seed:
             write_bytes(folder / _strip(job), encode_png(strip_of(trained, case)))
 
     return look

@@ -57,8 +57,17 @@ def jobs_of(chosen: Chosen) -> list[Job]:
     """
     from toonset.bench.train_plan import SCOPES, plan
 
+    count = QUICK_COUNT if chosen.quick else DEFAULT_COUNT
     scope = SCOPES[chosen.subject.value, chosen.quick]
-    jobs = plan(_cases(chosen), chosen.seed, chosen.only, scope)
+    return some(plan(cases_of(chosen, count), chosen.seed, chosen.only, scope), chosen)
+
+
+def some(jobs: list[Job], chosen: Chosen) -> list[Job]:
+    """Return the jobs.
+
+    Raises:
+        BundleError: there is none.
+    """
     if not jobs:
         raise BundleError(
             f"no training's name contains {chosen.only!r}; names are like "
@@ -113,11 +122,16 @@ def _views_into(folder: Path) -> Look:
     return look
 
 
-def _cases(chosen: Chosen) -> list[TrainCase]:
-    """Return the cases; a folder's in half size, then whole, unless half is asked for."""
+def cases_of(chosen: Chosen, count: int) -> list[TrainCase]:
+    """Return the cases; a folder's in half size, then whole, unless half is asked for.
+
+    Args:
+        chosen: what the command line asks for.
+        count: of synthetic cases, unless it says how many.
+    """
     from toonset.bench.cases import train_cases
 
-    count = chosen.count or (QUICK_COUNT if chosen.quick else DEFAULT_COUNT)
+    count = chosen.count or count
     if chosen.cases is None:
         return list(train_cases(None, chosen.seed, count))
     sizes = (True,) if chosen.half or chosen.quick else (True, False)

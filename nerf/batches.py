@@ -45,8 +45,15 @@ class Batch:
 
     def to(self, device: torch.device) -> Batch:
         """Return the batch on a device."""
-        tensors = (self.ray, self.length, self.rgb, self.alpha, self.labels)
-        return Batch(self.constants.to(device), *(t.to(device) for t in tensors), self.even)
+        return replace(
+            self,
+            constants=self.constants.to(device),
+            ray=self.ray.to(device),
+            length=self.length.to(device),
+            rgb=self.rgb.to(device),
+            alpha=self.alpha.to(device),
+            labels=self.labels.to(device),
+        )
 
     def kept(self, samples: Bool[Tensor, " samples"]) -> Batch:
         """Return the batch with some of its samples; every ray must keep one."""

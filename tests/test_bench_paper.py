@@ -16,7 +16,8 @@ from PIL import Image
 from toonset.bench.cases import TrainCase
 from toonset.bench.paper import as_csv, as_text, outdone, outdone_text, paper_rows
 from toonset.bench.paper_picture import drawn_strip, figure_of, shown_frames
-from toonset.bench.train_plan import METHODS, PAPER, SCOPES, Job, Method, plan
+from toonset.bench.paper_plan import CASES, QUICK_CASES, SEEDS, paper_plan
+from toonset.bench.train_plan import METHODS, PAPER, Job, Method
 from toonset.bench.train_run import RunResult, Seen, run_job
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
@@ -24,7 +25,8 @@ from toonset.nerf.evaluation_picture import TILE_PX
 from toonset.nerf.metrics_view import Judges
 from toonset.nerf.options import TrainOptions
 
-AUTOMATIC, LAST = "paper, automatic palette, 200 steps", "paper, automatic palette, 2000 steps"
+LAST = "paper, automatic palette, 2000 steps"
+QUICK = [name for name in PAPER if name.endswith(" 200 steps")]
 OWN = np.array([[200, 40, 40], [40, 60, 200]], dtype=np.uint8)
 
 
@@ -58,7 +60,9 @@ def runs() -> list[RunResult]:
 
 
 def test_the_table_has_a_row_per_palette_steps_and_layer() -> None:
-    rows = paper_rows([*runs(), replace(runs()[2], case="b", figures={"psnr": 26.5})])
+    other = replace(runs()[2], case="b")
+    more = [replace(other, seed=n, figures={"psnr": 26.0 + n}) for n in (0, 1)]  # 26.5 of case b
+    rows = paper_rows([*runs(), *more])
     keys = [(row["method"], row["palette"], row["iterations"], row["layer"]) for row in rows]
     assert keys == [
         ("paper", "no palette", 200, "field"),
@@ -69,11 +73,13 @@ def test_the_table_has_a_row_per_palette_steps_and_layer() -> None:
     ]
     assert [row["psnr"] for row in rows] == [20.0, 26.0, 24.0, 27.5, 27.2]
     assert rows[1]["lpips"] is None
-    assert (rows[1]["n"], rows[1]["cpu_seconds"]) == (2, 180)
+    assert (rows[1]["n"], rows[1]["trainings"], rows[1]["cpu_seconds"]) == (2, 3, 180)
     read = list(csv.DictReader(io.StringIO(as_csv(rows))))
     assert [float(row["psnr"]) for row in read] == [row["psnr"] for row in rows]
     assert read[0]["lpips"] == ""
-    assert len(as_text(rows).splitlines()) == 1 + len(rows)
+    assert len(as_text(rows).splitlines()) == 2 + len(rows)
+    both = paper_rows([*runs(), *(replace(run, group="drawn") for run in runs())])
+    assert [row["condition"] for row in both] == [rows[0]["condition"]] * 5 + ["drawn"] * 5
 
 
 def test_when_the_default_outdoes_the_paper() -> None:
@@ -82,19 +88,41 @@ def test_when_the_default_outdoes_the_paper() -> None:
     assert entry["passed_after_cpu_s"] == 6.0  # half way from 23 to 27 dB, from 2 to 10 s
     assert entry["share"] == pytest.approx(1 / 30)
     assert "passes that after 6.0 CPU s (1/30) and ends at 27.00 dB" in outdone_text(entry)
-    (behind,) = outdone([replace(fast, curve=(Seen(1, 1, 24.0),)), slow])
+    (behind,) = outdone([replace(fast, curve=(Seen(0, 0, 23.0), Seen(1, 1, 24.0))), slow])
     assert behind["share"] is None
     assert "does not get there (24.00 dB)" in outdone_text(behind)
     assert outdone([slow]) == []
+    assert outdone([replace(fast, curve=fast.curve[-1:]), slow]) == []  # nobody followed it
+    assert outdone([replace(fast, seed=1), slow]) == []
+
+
+def test_a_stopped_plan_has_all_palettes_of_what_it_has_come_to() -> None:
+    own = [
+        replace(case(), name=f"{i}", train=replace(case().train, palette=OWN)) for i in range(CASES)
+    ]
+    jobs = paper_plan(own, 5, "", quick=False)
+    assert len(jobs) == CASES * (len(PAPER) * SEEDS + 1)
+    steps = [options.steps for job in jobs if (options := METHODS[job.method].options)]
+    assert steps == sorted(steps)
+    few = jobs[: steps.count(200)]
+    keys = [(job.seed, job.case.name) for job in few]
+    assert keys == sorted(keys)
+    assert {keys.count(key) for key in keys} == {3}
+    assert {job.seed for job in jobs if job.method == "default"} == {5}
+    assert {job.method for job in jobs if job.curve} == {"default"}
+    quick = paper_plan(own, 5, "", quick=True)
+    assert len(quick) == QUICK_CASES * 4
+    assert {job.seed for job in quick} == {5}
+    drawn = [replace(one, group="drawn") for one in own]
+    assert len(paper_plan([*own, *drawn], 5, "", quick=True)) == 2 * len(quick)
+    assert {job.case.name for job in paper_plan(own, 5, "3 24 px", quick=False)} == {"3"}
 
 
 def test_hand_picked_palettes_are_those_that_cases_come_with() -> None:
     bare = case()
     own = replace(bare, train=replace(bare.train, palette=OWN))
-    assert not any(
-        "hand-picked" in job.method for job in plan([bare], 0, "", SCOPES["paper", False])
-    )
-    jobs = plan([own], 0, "", SCOPES["paper", False])
+    assert not any("hand-picked" in job.method for job in paper_plan([bare], 0, "", quick=False))
+    jobs = paper_plan([own], 0, "", quick=False)
     assert {job.method for job in jobs} == {"default", *PAPER}
     with_it = Method(TrainOptions(steps=1, field="voxel", device="cpu"), "hand-picked palette")
     seen = []
@@ -119,15 +147,13 @@ def test_the_figure_is_put_together_of_drawings_and_strips() -> None:
 
 @pytest.fixture
 def short_methods() -> Iterator[None]:
-    """Let the quick bench have two methods of few steps."""
-    known, scope = dict(METHODS), SCOPES["paper", True]
-    plain = TrainOptions(steps=2, carve=False, field="voxel", register=False, unbend=False)
-    METHODS[AUTOMATIC] = Method(replace(plain, device="cpu"), first_seed_only=True)
-    METHODS["default"] = Method(TrainOptions(steps=2, device="cpu", field="voxel"))
-    SCOPES["paper", True] = replace(scope, methods=("default", AUTOMATIC), views=(4,))
+    """Let the quick bench train for few steps."""
+    known = dict(METHODS)
+    for name in ("default", *QUICK):
+        options = TrainOptions(steps=2, field="voxel", register=False, unbend=False, device="cpu")
+        METHODS[name] = replace(METHODS[name], options=replace(options, carve=name == "default"))
     yield
     METHODS.update(known)
-    SCOPES["paper", True] = scope
 
 
 def test_the_command_writes_table_and_figure_and_goes_on(
@@ -135,19 +161,26 @@ def test_the_command_writes_table_and_figure_and_goes_on(
 ) -> None:
     import toonset.bench.cases as cases
 
-    monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter([case()]))
+    two = [replace(case(), name=name) for name in ("block-exact", "brick-exact")]
+    monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter(two))
     out = tmp_path / "paper"
     command = ("bench", "paper", "--quick", "-o", out)
     first = toonset(*command, "--json")
     assert first.code == 0, first
     written = json.loads((out / "table1.json").read_text())
     assert {name: written[name] for name in first.json} == first.json
-    assert [row["layer"] for row in first.json["rows"]] == ["field", "classifier"] * 2
-    assert len((out / "table1.csv").read_text().splitlines()) == 5
+    layers = [row["layer"] for row in first.json["rows"]]
+    assert layers == ["field", "field", "classifier", "field", "classifier"]
+    assert {row["n"] for row in first.json["rows"]} == {2}
+    assert len((out / "table1.csv").read_text().splitlines()) == 6
+    compared = first.json["differences"]
+    assert {(d["n"], d["palette"]) for d in compared} == {(2, "automatic palette")}
+    assert len((out / "differences.csv").read_text().splitlines()) == 1 + len(compared)
+    assert (out / "differences-exact-24-px-8-views.png").is_file()
     figure = Image.open(out / "figure4-block-exact-24px.png")
     assert figure.width > 5 * TILE_PX  # drawings, and two pairs
     again = toonset(*command)
-    assert "0 trainings, 2 are there already" in again.err
-    assert "paper" in again.out
+    assert "0 trainings, 6 are there already" in again.err
+    assert "Does a palette help?" in again.out
     (out / "mine.txt").write_text("mine")
     assert "holds 'mine.txt'" in toonset(*command, "--force").reason
