@@ -136,7 +136,7 @@ def claim(differences: Sequence[Difference]) -> str:
     for group in dict.fromkeys(d.group for d in differences):
         for layer in LAYERS:
             own = [d for d in differences if (d.group, d.layer) == (group, layer)]
-            found = {v: [d for d in own if d.verdict == v] for v in VERDICTS}
+            found = {str(v): [d for d in own if d.verdict == v] for v in VERDICTS}
             counts = ", ".join(f"{len(listed)} {verdict}" for verdict, listed in found.items())
             lines.append(f"{group}, {SAID[layer]}: {_answer(found)}; {counts}")
             decided = [v for v in VERDICTS if v != "undecided" and found[v]]
