@@ -17,9 +17,8 @@ from toonset.cli.output import Printer
 
 if TYPE_CHECKING:
     from toonset.bench.cases import TrainCase
-    from toonset.bench.paper_difference import Difference
     from toonset.bench.train_plan import Job
-    from toonset.bench.train_run import Look
+    from toonset.bench.train_run import Look, RunResult
     from toonset.nerf.evaluation import ScoredView
     from toonset.nerf.trained import TrainedField
 
@@ -37,49 +36,60 @@ def paper_into(
     Raises:
         ToonsetError: as `train_into`.
     """
-    from toonset.bench.paper import as_csv, as_text, outdone, outdone_text, paper_rows
-    from toonset.bench.paper_difference import as_rows, as_table, claim, differences_of
-    from toonset.bench.record import machine
-    from toonset.files import write_bytes, write_json
+    from toonset.bench.paper import as_text, outdone_text
+    from toonset.bench.paper_difference import as_table, claim, differences_of
     from toonset.nerf.metrics_view import load_judges
 
     jobs = _jobs_of(chosen)
+
+    def write(runs: list[RunResult]) -> None:
+        _write(folder, jobs, runs, chosen.seed)
+
     look = _strips_into(folder, chosen.seed)
-    runs = run_into(folder, jobs, chosen, printer, WRITTEN_HERE, look, force=force)
-    rows, passed, differences = paper_rows(runs), outdone(runs), differences_of(runs)
-    absent = load_judges().absent
-    found = {
-        "rows": rows,
-        "differences": as_rows(differences),
-        "outdone": passed,
-        "absent": absent,
-    }
-    write_json(folder / f"{TABLE}.json", found | {"seed": chosen.seed, "machine": machine()})
-    if rows:
-        write_bytes(folder / f"{TABLE}.csv", as_csv(rows).encode())
-    _compare_into(folder, differences)
-    for case in dict.fromkeys(job.case for job in jobs):
-        _draw(folder, case, [job for job in jobs if job.case is case])
+    runs = run_into(folder, jobs, chosen, printer, WRITTEN_HERE, look, write, force=force)
+    found, differences = _found(runs), differences_of(runs)
     compared = ["", as_table(differences), claim(differences), ""] if differences else []
-    reasons = [f"no {name}: {reason}" for name, reason in absent.items()]
-    return "\n".join([as_text(rows), *compared, *map(outdone_text, passed), *reasons]), found
+    passed = map(outdone_text, found["outdone"])
+    reasons = [f"no {name}: {reason}" for name, reason in load_judges().absent.items()]
+    return "\n".join([as_text(found["rows"]), *compared, *passed, *reasons]), found
 
 
-def _compare_into(folder: Path, differences: Sequence[Difference]) -> None:
-    """Write what the palettes change as CSV, and a figure of every condition."""
+def _found(runs: list[RunResult]) -> dict[str, Any]:
+    from toonset.bench.paper import outdone, paper_rows
+    from toonset.bench.paper_difference import as_rows, differences_of
+    from toonset.nerf.metrics_view import load_judges
+
+    return {
+        "rows": paper_rows(runs),
+        "differences": as_rows(differences_of(runs)),
+        "outdone": outdone(runs),
+        "absent": load_judges().absent,
+    }
+
+
+def _write(folder: Path, jobs: list[Job], runs: list[RunResult], seed: int) -> None:
+    """Write the table, what palettes change, and the figure of every case."""
     from toonset.bench.figure import FORMS
+    from toonset.bench.paper import as_csv
     from toonset.bench.paper_chart import draw_differences
-    from toonset.bench.paper_difference import as_csv
+    from toonset.bench.paper_difference import as_csv as differences_csv
+    from toonset.bench.paper_difference import differences_of
     from toonset.bench.record import machine
-    from toonset.files import write_bytes
+    from toonset.files import write_bytes, write_json
 
+    found, differences = _found(runs), differences_of(runs)
+    write_json(folder / f"{TABLE}.json", found | {"seed": seed, "machine": machine()})
+    if found["rows"]:
+        write_bytes(folder / f"{TABLE}.csv", as_csv(found["rows"]).encode())
     if differences:
-        write_bytes(folder / f"{DIFFERENCES}.csv", as_csv(differences).encode())
+        write_bytes(folder / f"{DIFFERENCES}.csv", differences_csv(differences).encode())
     for group in dict.fromkeys(d.group for d in differences):
         own = [d for d in differences if d.group == group]
         for form in FORMS:
             drawing = draw_differences(own, f"{group}; {machine()}.", form)
             write_bytes(folder / f"{DIFFERENCES}-{file_name(group)}.{form}", drawing)
+    for case in dict.fromkeys(job.case for job in jobs):
+        _draw(folder, case, [job for job in jobs if job.case is case])
 
 
 def _jobs_of(chosen: Chosen) -> list[Job]:

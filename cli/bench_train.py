@@ -8,7 +8,7 @@ pictures show those that were asked for. Who has changed the code in between sta
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,10 +83,22 @@ def run_into(
     printer: Printer,
     written: tuple[str, ...],
     look: Look = lambda *_: None,
+    write: Callable[[list[RunResult]], None] = lambda runs: None,
     *,
     force: bool,
 ) -> list[RunResult]:
-    """Return the jobs' results, after running those that the folder lacks."""
+    """Return the jobs' results, after running those that the folder lacks.
+
+    Args:
+        folder: of earlier results and these.
+        jobs: what is asked for.
+        chosen: the command line.
+        printer: told what is run.
+        written: what the folder may hold.
+        look: is shown the fields and their held-out views.
+        write: writes further files of the results, those of a stopped run too.
+        force: start afresh.
+    """
     from toonset.bench.train import run_jobs
     from toonset.bench.train_files import missing
 
@@ -101,6 +113,7 @@ def run_into(
     finally:  # what a stopped run has found so far is worth a look, too
         runs = _of_jobs(done, jobs)
         _write(folder, runs, chosen)
+        write(runs)
     return runs
 
 

@@ -179,8 +179,37 @@ def test_the_command_writes_table_and_figure_and_goes_on(
     assert (out / "differences-exact-24-px-8-views.png").is_file()
     figure = Image.open(out / "figure4-block-exact-24px.png")
     assert figure.width > 5 * TILE_PX  # drawings, and two pairs
+    names = {path.name for path in out.iterdir() if path.is_file()}
+    drawn = {name: (out / name).read_bytes() for name in names - {"report.html"}}  # has the command
+    for name in names - {"runs.json"}:
+        (out / name).unlink()
     again = toonset(*command)
+    assert {name: (out / name).read_bytes() for name in drawn} == drawn
     assert "0 trainings, 6 are there already" in again.err
     assert "Does a palette help?" in again.out
     (out / "mine.txt").write_text("mine")
     assert "holds 'mine.txt'" in toonset(*command, "--force").reason
+
+
+def test_a_stopped_run_has_the_table_of_what_it_has_found(
+    short_methods: None, toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import toonset.bench.cases as cases
+    import toonset.bench.train as bench
+
+    count = 0
+
+    def stopping(*given: object) -> RunResult:
+        nonlocal count
+        count += 1
+        if count == 3:
+            raise KeyboardInterrupt
+        return run_job(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter([case()]))
+    monkeypatch.setattr(bench, "run_job", stopping)
+    command = ("bench", "paper", "--quick", "-o", tmp_path / "paper")
+    assert toonset(*command).code != 0
+    rows = json.loads((tmp_path / "paper" / "table1.json").read_text())["rows"]
+    assert [row["palette"] for row in rows] == ["no palette"] + ["automatic palette"] * 2
+    assert "1 trainings, 2 are there already" in toonset(*command).err
