@@ -1,6 +1,6 @@
 """Stability of calibration: how far each error of a sheet may go, and whether the tool says so.
 
-Every step of a sweep draws its sheets, calibrates them and keeps each view's error and verdict. The
+Every sheet of a sweep is drawn and calibrated; each view's error, verdict and reason are kept. The
 sweep of start errors is about the contour alignment alone: it pulls in from a wrong start or not.
 """
 
@@ -8,23 +8,26 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import islice
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from toonset.bench.calib import ViewError, view_error
+from toonset.bench.calib_figures import WRONG
 from toonset.bench.stability_damage import Drawn
-from toonset.bench.stability_sweeps import DrawnSheet, Step, Sweep
-from toonset.bench.workers import in_order
+from toonset.bench.stability_picture import outlines_picture
+from toonset.bench.stability_sheet import DrawnSheet, Step
+from toonset.bench.stability_sweeps import Sweep
 from toonset.calib.align import align
 from toonset.calib.calibrate import calibrate
 from toonset.calib.contour import drawn_contour
 from toonset.calib.match import Drawing
 from toonset.calib.pose import Pose
+from toonset.calib.result import Calibration
 from toonset.calib.rim import Surface, prepare_surface
+from toonset.dataset.picture import encode_png
 from toonset.errors import ToonsetError
 
 NO_VERDICT = ""  # an alignment alone judges nothing
@@ -36,21 +39,20 @@ ALIGN_WIDTHS = np.geomspace(0.08, 0.015, 12)  # robust widths over the height, c
 
 
 @dataclass(frozen=True)
-class Job:
-    """One sheet of one step."""
-
-    sweep: Sweep
-    step: Step
-    seed: int
-
-
-@dataclass(frozen=True)
 class SheetResult:
-    """One sheet's views, the seconds of calibration and, if it was refused or crashed, why."""
+    """One sheet's views, the seconds of calibration and, if it was refused or crashed, why.
+
+    Attributes:
+        views: errors and verdicts.
+        seconds: of calibration.
+        note: why there are no cameras; "" where there are.
+        reasons: of the verdicts, one per view; "" of those that are ok.
+    """
 
     views: tuple[ViewError, ...]
     seconds: float
     note: str
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,44 +64,43 @@ class StepResult:
     sheets: tuple[SheetResult, ...]
 
 
-def run_steps(
-    plan: Sequence[tuple[Sweep, Step]],
-    seed: int,
-    count: int,
-    *,
-    workers: int = 1,
-    progress: Callable[[str], None] = lambda text: None,
-) -> Iterator[StepResult]:
-    """Yield one result per step, in order, each as soon as its sheets are done.
+def run_sheet(sweep: Sweep, step: Step, seed: int) -> tuple[SheetResult, bytes]:
+    """Return how calibration did on one sheet, and a PNG of its worst view.
 
-    Args:
-        plan: sweeps with the step to run.
-        seed: of the first sheet; the others' follow.
-        count: sheets per step.
-        workers: processes; the result does not depend on them.
-        progress: called with the step that is waited for.
+    A refusal and an exception are results, too: that is the test.
     """
-    jobs = [Job(sweep, step, seed + i) for sweep, step in plan for i in range(count)]
-    done = in_order(run_sheet, jobs, min(workers, len(jobs)))
-    for number, (sweep, step) in enumerate(plan, start=1):
-        progress(f"{number} of {len(plan)}: {sweep.name} {step}")
-        yield StepResult(sweep.name, str(step), tuple(islice(done, count)))
-
-
-def run_sheet(job: Job) -> SheetResult:
-    """Return how calibration did on one sheet; an exception is a result, too: that is the test."""
-    sheet = job.sweep.draw(job.step, job.seed)
-    start, note = time.perf_counter(), ""
     try:
-        if job.sweep.from_start:
-            views = align_from(sheet, math.radians(float(job.step)), job.seed)
+        sheet = sweep.draw(step, seed)
+    except ToonsetError as error:  # what is drawn cannot be cut out again
+        return SheetResult((REFUSED,), 0.0, str(error)), b""
+    start, note, found = time.perf_counter(), "", None
+    try:
+        if sweep.from_start:
+            views = align_from(sheet, math.radians(float(step)), seed)
         else:
-            views = _calibrated(sheet)
+            found = calibrate([view for view, _ in sheet.drawings], sheet.mesh)
+            views = _errors(found, sheet)
     except ToonsetError as error:
         views, note = (REFUSED,) * len(sheet.drawings), str(error)
     except Exception as error:
         views, note = (CRASHED,) * len(sheet.drawings), f"{type(error).__name__}: {error}"
-    return SheetResult(views, time.perf_counter() - start, note)
+    seconds = time.perf_counter() - start
+    worst = worst_view(views)
+    camera = None if found is None else found.views[worst].camera
+    body = sheet.mesh if found is None else replace(sheet.mesh, vertices=found.mannequin)
+    picture = encode_png(outlines_picture(*sheet.drawings[worst], sheet.mesh, camera, body))
+    reasons = () if found is None else tuple(view.reason for view in found.views)
+    return SheetResult(views, seconds, note, reasons), picture
+
+
+def worst_view(views: Sequence[ViewError]) -> int:
+    """Return the number of the view to look at: wrong but ok before the largest error."""
+    return max(range(len(views)), key=lambda i: badness(views[i]))
+
+
+def badness(view: ViewError) -> tuple[bool, float]:
+    """Return what sorts views by how bad they are."""
+    return view.raw > WRONG and view.verdict == "ok", view.raw
 
 
 def align_from(sheet: DrawnSheet, error: float, seed: int) -> tuple[ViewError, ...]:
@@ -126,9 +127,8 @@ def _aligned(drawn: Drawn, surface: Surface, turn: np.ndarray) -> ViewError:
     return view_error(found, camera.rotation, NO_VERDICT)
 
 
-def _calibrated(sheet: DrawnSheet) -> tuple[ViewError, ...]:
-    result = calibrate([view for view, _ in sheet.drawings], sheet.mesh)
+def _errors(found: Calibration, sheet: DrawnSheet) -> tuple[ViewError, ...]:
     return tuple(
-        view_error(found.camera, truth.rotation, found.verdict)
-        for found, (_, truth) in zip(result.views, sheet.drawings, strict=True)
+        view_error(view.camera, truth.rotation, view.verdict)
+        for view, (_, truth) in zip(found.views, sheet.drawings, strict=True)
     )

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import cast
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
+from scipy.ndimage import distance_transform_edt
 
 from toonset.camera import Camera
 from toonset.view import View
 
 Drawn = tuple[View, Camera]
+Nearest = tuple[Float[np.ndarray, "height width"], Int[np.ndarray, "2 height width"]]
 
 MIRROR = np.diag([-1.0, 1.0, 1.0])  # left and right swapped, in the world or in the image
 HOLE_OF_HEIGHT = 0.04  # radius of a missing piece: about as wide as an arm
@@ -91,6 +94,47 @@ def without_pieces(
     rgba = view.rgba.copy()
     rgba[..., 3] = np.round(rgba[..., 3] * left)
     return replace(view, rgba=rgba), camera
+
+
+def stretched(view: View, camera: Camera, growth: float) -> Drawn:
+    """Return the drawing taller by the factor 1 + `growth` and narrower by it; < 0: squashed."""
+    tall = 1 + growth
+    height, width = view.rgba.shape[:2]
+    size_wh = (max(1, round(width / tall)), max(1, round(height * tall)))
+    across, down = size_wh[0] / width, size_wh[1] / height
+    rgba = _straight(cv2.resize(_premultiplied(view.rgba), size_wh, interpolation=cv2.INTER_AREA))
+    shown = replace(
+        camera,
+        scale=camera.scale * across,
+        pixel_aspect=camera.pixel_aspect * down / across,
+        center=camera.center * (across, down),
+        size_wh=size_wh,
+    )
+    x, y, _, _ = view.box
+    return replace(view, rgba=rgba, box=(x, y, *size_wh)), shown
+
+
+def with_gaps_closed(view: View, camera: Camera, share: float) -> Drawn:
+    """Return the drawing with gaps between limbs painted shut that are narrower than `share`.
+
+    Args:
+        view: the drawing; what is closed gets the nearest pixel's colour.
+        camera: true of it.
+        share: width of a gap over the figure's height.
+    """
+    top, bottom = _rows(view.mask)
+    reach = round(share * (bottom - top) / 2)
+    if not reach:
+        return view, camera
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    room = np.pad(view.rgba[..., 3], reach)  # a border of its own, or the rim counts as figure
+    inner = (slice(reach, -reach), slice(reach, -reach))
+    alpha = cv2.morphologyEx(room, cv2.MORPH_CLOSE, disc)[inner]
+    _, nearest = cast(Nearest, distance_transform_edt(~view.mask, return_indices=True))
+    closed = (alpha > view.rgba[..., 3])[..., None]
+    painted = np.where(closed, view.rgba[nearest[0], nearest[1]], view.rgba)
+    painted[..., 3] = alpha
+    return replace(view, rgba=painted), camera
 
 
 def with_capsule(

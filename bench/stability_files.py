@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from toonset.bench.atlas_run import Counts, Result, TriedStepResult, all_pages
+from toonset.bench.atlas_training import Tried
 from toonset.bench.calib import ViewError
 from toonset.bench.stability import SheetResult, StepResult
-from toonset.bench.stability_sweeps import SWEEPS
 from toonset.errors import BundleError
 
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -20,15 +21,15 @@ class RunKey:
 
     version: str
     seed: int
-    count: int
+    counts: Counts
 
 
-def as_plain(key: RunKey, steps: Sequence[StepResult]) -> dict[str, Any]:
+def as_plain(key: RunKey, steps: Sequence[Result]) -> dict[str, Any]:
     """Return the steps as data for JSON; errors in radians, seconds as measured."""
     return {"format": FORMAT, **asdict(key), "steps": [asdict(step) for step in steps]}
 
 
-def from_plain(data: Any, key: RunKey, place: str) -> list[StepResult]:
+def from_plain(data: Any, key: RunKey, place: str) -> list[Result]:
     """Return the finished steps.
 
     Args:
@@ -40,29 +41,37 @@ def from_plain(data: Any, key: RunKey, place: str) -> list[StepResult]:
         BundleError: the data belong to a run with another key, or are no steps at all.
     """
     try:
-        found = RunKey(data["version"], data["seed"], data["count"])
-        steps = [_step(step) for step in data["steps"]]
         known = data["format"] == FORMAT
+        found = RunKey(data["version"], data["seed"], Counts(**data["counts"])) if known else None
+        steps = [_step(step) for step in data["steps"]] if known else []
     except (KeyError, TypeError, ValueError) as error:
         raise BundleError(
             f"{place}: holds no steps of a stability run; pass --force to start afresh"
         ) from error
-    if not known or found != key:
+    if found != key:
         raise BundleError(
-            f"{place}: steps of {found}, this run is {key}; pass --force to start afresh, or "
-            "choose another -o"
+            f"{place}: steps of {found or 'an older toonset'}, this run is {key}; pass --force to "
+            "start afresh, or choose another -o"
         )
     return steps
 
 
-def in_table_order(steps: Sequence[StepResult]) -> list[StepResult]:
-    """Return the steps sorted as the sweeps and their steps are listed; unknown ones left out."""
-    listed = [(sweep.name, str(step)) for sweep in SWEEPS for step in sweep.steps]
-    found = {(step.sweep, step.step): step for step in steps}
+def name_of(step: Result) -> tuple[str, str]:
+    """Return a step's page and step."""
+    return (step.sweep if isinstance(step, StepResult) else step.page), step.step
+
+
+def in_table_order(steps: Sequence[Result]) -> list[Result]:
+    """Return the steps sorted as the pages and their steps are listed; unknown ones left out."""
+    listed = [(page.name, str(step)) for page in all_pages() for step in page.steps]
+    found = {name_of(step): step for step in steps}
     return [found[name] for name in listed if name in found]
 
 
-def _step(data: Any) -> StepResult:
+def _step(data: Any) -> Result:
+    if "page" in data:
+        tried = tuple(_tried(one) for one in data["tried"])
+        return TriedStepResult(str(data["page"]), str(data["step"]), tried)
     sheets = tuple(
         SheetResult(
             tuple(
@@ -71,7 +80,19 @@ def _step(data: Any) -> StepResult:
             ),
             float(sheet["seconds"]),
             str(sheet["note"]),
+            tuple(map(str, sheet["reasons"])),
         )
         for sheet in data["sheets"]
     )
     return StepResult(str(data["sweep"]), str(data["step"]), sheets)
+
+
+def _tried(data: Any) -> Tried:
+    return Tried(
+        int(data["seed"]),
+        float(data["figure"]),
+        str(data["voice"]),
+        str(data["words"]),
+        {str(name): float(value) for name, value in data["evidence"].items()},
+        float(data["seconds"]),
+    )

@@ -1,4 +1,4 @@
-"""Figures of the stability sweeps: one row per step, as text, CSV and records."""
+"""Figures of the calibration sweeps: one row per step, as CSV and records."""
 
 from __future__ import annotations
 
@@ -11,13 +11,11 @@ from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
-from toonset.bench.record import Record, aligned, summarise
+from toonset.bench.record import Record, summarise
 from toonset.bench.stability import NO_VERDICT, StepResult
 
 SOLVED_DEG = 5.0
 WRONG_DEG = 15.0
-HEAD = ("sweep", "step", "views", "solved", "not twin", "median", "p95")
-COUNTS = ("ok", "weak", "ambiguous", "failed", "crashed", "wrong", "silent_wrong", "false_alarms")
 
 
 @dataclass(frozen=True)
@@ -108,17 +106,6 @@ def as_csv(rows: Sequence[Row], seed: int) -> bytes:
     for item in rows:
         writer.writerow([*map(_cell, astuple(item)), seed])
     return text.getvalue().encode()
-
-
-def as_text(rows: Sequence[Row]) -> str:
-    """Return the rows as an aligned table for people; errors modulo twin in degrees."""
-    lines = [[*HEAD, *(name.replace("_", " ") for name in COUNTS)]]
-    for item in rows:
-        shares = (f"{100 * item.solved_modulo_twin:.0f}%", f"{100 * item.solved:.0f}%")
-        errors = (f"{item.median_deg:.2f}", f"{item.p95_deg:.2f}")
-        counts = (str(getattr(item, name)) for name in COUNTS)
-        lines.append([item.sweep, item.step, str(item.views), *shares, *errors, *counts])
-    return "\n".join(aligned(lines, words=len(lines[0])))
 
 
 def as_records(results: Sequence[StepResult], seed: int) -> list[Record]:

@@ -47,7 +47,7 @@ def bench(
             min=1,
             help="Synthetic cases per condition (without --cases); default 4. "
             "Paper: characters; default 8, with --quick 3. "
-            "Stability: sheets per step; default 8, with --quick 2. "
+            "Stability: sheets per step; default 8 (training: 3), with --quick 2 (1). "
             "Split: sheets per difficulty, 15 times as many mixtures; with --quick 1.",
         ),
     ] = None,
@@ -78,7 +78,7 @@ def bench(
 
     Prints a table and writes records.json, report.html and, for `calib`, `train` and `palette`, a
     chart of seconds against accuracy per condition (PNG, SVG, CSV). `split` draws the wrongly
-    split sheets. `stability` sweeps errors of a sheet, to where calibration fails; `train` draws
+    split sheets. `stability` sweeps what a sheet may have wrong, to where it fails; `train` draws
     held-out PSNR against seconds; `paper` makes the plain method's table and figure, for hours, and
     says whether palettes help it. Of these three, the same command again continues a stopped run,
     or draws all that is there.
@@ -131,10 +131,11 @@ def _stability(
 ) -> None:
     from dataclasses import asdict
 
-    from toonset.bench.stability_table import as_text
+    from toonset.bench.atlas_figures import as_plain, summary_text
     from toonset.cli.bench_stability import sweep_into
 
     progress = printer.progress
-    rows = sweep_into(out, only, seed, count, quick=quick, force=force, progress=progress)
-    printer.say(f"seed {seed}; picture in {out / 'stability.png'}")
-    printer.result({"folder": out, "rows": [asdict(row) for row in rows]}, as_text(rows))
+    rows, pages = sweep_into(out, only, seed, count, quick=quick, force=force, progress=progress)
+    printer.say(f"seed {seed}; look at {out / REPORT}")
+    plain = {"rows": [asdict(row) for row in rows], "pages": as_plain(pages)}
+    printer.result({"folder": out, **plain}, summary_text(pages))

@@ -1,28 +1,34 @@
-"""`toonset bench stability`: sweeps in a folder that a later run continues.
+"""`toonset bench stability`: an atlas of failures in a folder that a later run continues.
 
-steps.json in the output folder is rewritten after every step. A run with the same seed, count and
-version takes finished steps from it; table, records and picture show all steps of the folder. Who
-has changed the code in between starts afresh with --force.
+steps.json in the output folder is rewritten after every step, with a picture of the step's worst
+case in pictures/. A run with the same seed, counts and version takes finished steps from it; tables
+and pictures show all steps of the folder. Who has changed the code in between starts afresh with
+--force.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shlex
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toonset import __version__
+from toonset.cli.bench_charts import REPORT, file_name
 from toonset.cli.output import check_output
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:
-    from toonset.bench.stability import StepResult
+    from toonset.bench.atlas_figures import TriedPage
+    from toonset.bench.atlas_run import Result
     from toonset.bench.stability_files import RunKey
     from toonset.bench.stability_table import Row
 
-STEPS = "steps.json"
-WRITTEN = (STEPS, "stability.csv", "stability.png", "records.json")
-SHEETS, QUICK_SHEETS = 8, 2  # per step
+STEPS, PICTURES, SUMMARY = "steps.json", "pictures", "pages.csv"
+WRITTEN = (STEPS, PICTURES, SUMMARY, "stability.csv", "stability.png", "records.json", REPORT)
+SHEETS, QUICK_SHEETS = 8, 2  # per step of calibration
+BODIES, QUICK_BODIES = 3, 1  # per step of training and palettes
 
 
 def sweep_into(
@@ -34,33 +40,38 @@ def sweep_into(
     quick: bool,
     force: bool,
     progress: Callable[[str], None],
-) -> list[Row]:
-    """Return one row per step in the folder, after running the steps that it lacks.
+) -> tuple[list[Row], list[TriedPage]]:
+    """Return a row per step of calibration and all pages, after running the steps that lack.
 
     Raises:
-        ToonsetError: no sweep of that name, or a folder that may not be written or continued.
+        ToonsetError: no page of that name, or a folder that may not be written or continued.
     """
-    from toonset.bench.stability import run_steps
-    from toonset.bench.stability_files import RunKey
-    from toonset.bench.stability_sweeps import SWEEPS, chosen
+    from toonset.bench.atlas_run import Counts, all_pages, run_steps
+    from toonset.bench.stability_files import RunKey, name_of
+    from toonset.bench.stability_sweeps import chosen
     from toonset.bench.workers import usable_workers
+    from toonset.files import write_bytes
 
-    plan = chosen(only, quick=quick)
+    pages = all_pages()
+    plan = chosen(only, pages, quick=quick)
     if not plan:
-        names = ", ".join(sweep.name for sweep in SWEEPS)
-        raise BundleError(f"no sweep's name contains {only!r}; --only takes one of {names}")
-    key = RunKey(__version__, seed, count or (QUICK_SHEETS if quick else SHEETS))
+        names = ", ".join(page.name for page in pages)
+        raise BundleError(f"no page's name contains {only!r}; --only takes one of {names}")
+    usual = Counts(QUICK_SHEETS, QUICK_BODIES) if quick else Counts(SHEETS, BODIES)
+    key = RunKey(__version__, seed, usual if count is None else Counts(count, count))
     done = _finished_steps(folder, key, force=force)
-    known = {(step.sweep, step.step) for step in done}
-    missing = [(sweep, step) for sweep, step in plan if (sweep.name, str(step)) not in known]
-    results = run_steps(missing, seed, key.count, workers=usable_workers(), progress=progress)
-    for result in results:
+    known = {name_of(step) for step in done}
+    missing = [(page, step) for page, step in plan if (page.name, str(step)) not in known]
+    found = run_steps(missing, seed, key.counts, workers=usable_workers(), progress=progress)
+    for result, picture in found:
+        if picture:
+            write_bytes(_picture_of(folder, *name_of(result)), picture)
         done.append(result)
         _keep_steps(folder, key, done)
     return _write_results(folder, done, key)
 
 
-def _finished_steps(folder: Path, key: RunKey, *, force: bool) -> list[StepResult]:
+def _finished_steps(folder: Path, key: RunKey, *, force: bool) -> list[Result]:
     """Return the steps of an earlier run in `folder`; none if it is new or to be replaced."""
     from toonset.bench.stability_files import from_plain
     from toonset.dataset.json_file import read_json
@@ -73,24 +84,45 @@ def _finished_steps(folder: Path, key: RunKey, *, force: bool) -> list[StepResul
     return []
 
 
-def _keep_steps(folder: Path, key: RunKey, steps: list[StepResult]) -> None:
+def _keep_steps(folder: Path, key: RunKey, steps: Sequence[Result]) -> None:
     from toonset.bench.stability_files import as_plain
     from toonset.files import write_json
 
     write_json(folder / STEPS, as_plain(key, steps))
 
 
-def _write_results(folder: Path, steps: list[StepResult], key: RunKey) -> list[Row]:
+def _picture_of(folder: Path, page: str, step: str) -> Path:
+    return folder / PICTURES / f"{file_name(f'{page} {step}')}.png"
+
+
+def _write_results(
+    folder: Path, steps: Sequence[Result], key: RunKey
+) -> tuple[list[Row], list[TriedPage]]:
+    from toonset.bench.atlas_figures import summary_csv
+    from toonset.bench.atlas_report import atlas_html
+    from toonset.bench.atlas_results import tried_pages
     from toonset.bench.record import as_dicts, machine
+    from toonset.bench.stability import StepResult
     from toonset.bench.stability_chart import draw_stability
-    from toonset.bench.stability_files import in_table_order
+    from toonset.bench.stability_files import in_table_order, name_of
     from toonset.bench.stability_table import as_csv, as_records, row
     from toonset.files import write_bytes, write_json
 
     ordered = in_table_order(steps)
-    rows = [row(step) for step in ordered]
-    caption = f"n = {key.count} sheets per step, seed {key.seed}, {machine()}"
+    pages = tried_pages(ordered)
+    sheets = [step for step in ordered if isinstance(step, StepResult)]
+    rows = [row(step) for step in sheets]
+    counts = f"{key.counts.sheets} sheets, {key.counts.bodies} trainings or palettes per step"
+    about = f"first seed {key.seed}; {counts}; {machine()}"
+    places = {name_of(step): _picture_of(folder, *name_of(step)) for step in ordered}
+    pictures = {name: path.read_bytes() for name, path in places.items() if path.is_file()}
+    command = shlex.join(["toonset", *sys.argv[1:]])
+    page = atlas_html(command, __version__, about, pages, pictures)
+    write_bytes(folder / REPORT, page.encode())
+    write_bytes(folder / SUMMARY, summary_csv(pages))
     write_bytes(folder / "stability.csv", as_csv(rows, key.seed))
-    write_json(folder / "records.json", as_dicts(as_records(ordered, key.seed)))
-    write_bytes(folder / "stability.png", draw_stability(rows, caption))
-    return rows
+    write_json(folder / "records.json", as_dicts(as_records(sheets, key.seed)))
+    if rows:
+        caption = f"n = {key.counts.sheets} sheets per step, seed {key.seed}, {machine()}"
+        write_bytes(folder / "stability.png", draw_stability(rows, caption))
+    return rows, pages

@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from toonset.bench import stability
+from toonset.bench.atlas_run import Counts, TriedStepResult, all_pages, run_steps
+from toonset.bench.atlas_training import Tried
 from toonset.bench.calib import ViewError
-from toonset.bench.stability import Job, SheetResult, StepResult, align_from, run_sheet, run_steps
+from toonset.bench.stability import SheetResult, StepResult, align_from, run_sheet
+from toonset.bench.stability_bodies import vase
 from toonset.bench.stability_chart import draw_stability
 from toonset.bench.stability_damage import (
     MIRROR,
@@ -24,9 +27,10 @@ from toonset.bench.stability_damage import (
     without_feet,
     without_pieces,
 )
-from toonset.bench.stability_files import RunKey, as_plain, from_plain, in_table_order
-from toonset.bench.stability_sweeps import BASE, SWEEPS, DrawnSheet, Sweep, chosen, draw_sheet, vase
-from toonset.bench.stability_table import as_csv, as_records, as_text, row
+from toonset.bench.stability_files import RunKey, as_plain, from_plain, in_table_order, name_of
+from toonset.bench.stability_sheet import BASE, DrawnSheet, draw_sheet
+from toonset.bench.stability_sweeps import SWEEPS, Sweep, chosen
+from toonset.bench.stability_table import as_csv, as_records, row
 from toonset.bench.workers import THREADS, in_order
 from toonset.calib.rim import silhouette_mask
 from toonset.dataset.bodies import random_body
@@ -34,7 +38,7 @@ from toonset.errors import BundleError, SheetError
 from toonset.mesh import Mesh
 
 PLAIN = replace(BASE, outline_px=0, cell_px=120, views=3)
-KEY = RunKey("1", 0, 1)
+KEY = RunKey("1", 0, Counts(1, 1))
 
 
 @pytest.fixture(scope="module")
@@ -138,16 +142,18 @@ def test_no_radius_is_no_ball(sheet):
 
 
 def test_every_quick_step_is_one_of_the_full_run():
-    assert len({sweep.name for sweep in SWEEPS}) == len(SWEEPS)
-    for sweep in SWEEPS:
-        assert set(sweep.quick) <= set(sweep.steps), sweep.name
-        assert len(set(sweep.steps)) == len(sweep.steps)
+    pages = all_pages()
+    assert len({page.name for page in pages}) == len(pages)
+    for page in pages:
+        assert set(page.quick) <= set(page.steps), page.name
+        assert len(set(map(str, page.steps))) == len(page.steps)
 
 
 @pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
 def test_the_worst_step_can_be_drawn_twice_alike(sweep, monkeypatch):
     small = replace(BASE, cell_px=80, views=2, supersample=1)
-    monkeypatch.setattr("toonset.bench.stability_sweeps.BASE", small)
+    for place in ("stability_sheet", "stability_draws"):
+        monkeypatch.setattr(f"toonset.bench.{place}.BASE", small)
     first, second = (sweep.draw(sweep.steps[-1], 5) for _ in range(2))
     for (view, camera), (again, same) in zip(first.drawings, second.drawings, strict=True):
         np.testing.assert_array_equal(view.rgba, again.rgba)
@@ -176,14 +182,15 @@ def test_alignment_from_the_truth_stays_and_from_behind_is_lost(sheet):
 
 
 def test_a_refused_and_a_crashed_sheet_are_results(sheet, monkeypatch):
-    sweep = Sweep("x", "x", (0,), (0,), lambda step, seed: sheet)
+    sweep = Sweep("x", "x", (0,), (0,), "", lambda step, seed: sheet)
     for error, verdict in ((SheetError("too faint"), "failed"), (KeyError("k"), "crashed")):
 
         def broken(*_arguments, error=error):
             raise error
 
         monkeypatch.setattr(stability, "calibrate", broken)
-        result = run_sheet(Job(sweep, 0, 0))
+        result, picture = run_sheet(sweep, 0, 0)
+        assert picture.startswith(b"\x89PNG")
         assert [view.verdict for view in result.views] == [verdict] * 3
         assert "too faint" in result.note or result.note == "KeyError: 'k'"
 
@@ -193,11 +200,12 @@ def tiny(step, seed):
 
 
 def test_the_same_seed_gives_the_same_table_and_another_seed_another():
-    sweep = Sweep("start", "x", (10, 20), (10,), tiny, from_start=True)
+    sweep = Sweep("start", "x", (10, 20), (10,), "", tiny, from_start=True)
     plan = [(sweep, step) for step in sweep.steps]
 
     def table(seed):
-        return as_csv([row(result) for result in run_steps(plan, seed, 2)], seed)
+        results = [result for result, _ in run_steps(plan, seed, Counts(2, 1))]
+        return as_csv([row(r) for r in results if isinstance(r, StepResult)], seed)
 
     once = table(0)
     assert once == table(0)
@@ -252,7 +260,6 @@ def test_csv_does_not_know_the_seconds():
     slow = replace(one, sheets=(replace(one.sheets[0], seconds=99.0),))
     assert as_csv([row(one)], 4) == as_csv([row(slow)], 4)
     assert as_csv([row(one)], 4).endswith(b",4\n")
-    assert "warp" in as_text([row(one)])
     metrics = {record.metric: record.value for record in as_records([slow], 4)}
     assert metrics["seconds"] == 99.0
 
@@ -262,17 +269,24 @@ def test_steps_survive_the_way_through_json_and_sort_as_listed():
         result_of((1 / 3, 0.1, "ok"), step="2"),
         result_of((2, 2, ""), step="5", sweep="start"),
         result_of((9, 9, "weak"), step="0.5"),
+        TriedStepResult(
+            "train jpeg", "60", (Tried(3, 30.5, "silent", "", {"apart_px": 0.5}, 2.0),)
+        ),
     ]
     text = json.dumps(as_plain(KEY, steps))
     assert from_plain(json.loads(text), KEY, "x") == steps
-    assert [(s.sweep, s.step) for s in in_table_order([*steps, result_of(sweep="gone")])] == [
+    assert [name_of(s) for s in in_table_order([*steps, result_of(sweep="gone")])] == [
         ("start", "5"),
         ("warp", "0.5"),
         ("warp", "2"),
+        ("train jpeg", "60"),
     ]
 
 
-@pytest.mark.parametrize("broken", [[], {}, {"format": 1}, None, {**asdict(KEY), "steps": [3]}])
+@pytest.mark.parametrize(
+    "broken",
+    [[], {}, {"format": 1}, {"format": 2}, None, {**asdict(KEY), "format": 2, "steps": [3]}],
+)
 def test_foreign_steps_are_refused(broken):
     with pytest.raises(BundleError, match="--force"):
         from_plain(broken, KEY, "steps.json")
@@ -293,13 +307,13 @@ def test_a_picture_is_drawn_of_one_sweep_and_of_many():
 
 
 def test_a_second_run_takes_the_first_ones_steps(toonset, tmp_path, monkeypatch):
-    sweep = Sweep("start", "x", (0, 5), (0,), tiny, from_start=True)
-    for place in ("stability_sweeps", "stability_files", "stability_chart"):
-        monkeypatch.setattr(f"toonset.bench.{place}.SWEEPS", (sweep,))
+    sweep = Sweep("start", "x", (0, 5), (0,), "", tiny, from_start=True)
+    for place in ("atlas_run.SWEEPS", "stability_chart.SWEEPS"):
+        monkeypatch.setattr(f"toonset.bench.{place}", (sweep,))
     monkeypatch.setattr("toonset.bench.workers.usable_workers", lambda: 1)
     out = tmp_path / "out"
     command = ("bench", "stability", "-o", out, "--count", 1, "--json", "--quiet")
-    first = toonset(*command, "--quick")
+    first = toonset(*command, "--quick", "--only", "start")
     assert first.code == 0, first
     assert [found["step"] for found in first.json["rows"]] == ["0"]
     assert {path.name for path in out.iterdir()} == {
@@ -307,19 +321,26 @@ def test_a_second_run_takes_the_first_ones_steps(toonset, tmp_path, monkeypatch)
         "stability.csv",
         "stability.png",
         "records.json",
+        "pages.csv",
+        "pictures",
+        "report.html",
     }
     kept = json.loads((out / "steps.json").read_text())["steps"][0]
-    more = toonset(*command)
+    more = toonset(*command, "--only", "start")
     assert [found["step"] for found in more.json["rows"]] == ["0", "5"]
+    assert {path.name for path in (out / "pictures").iterdir()} == {"start-0.png", "start-5.png"}
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 3  # two steps, and the worst of them again
+    assert page.count('<section id="') == 1
     assert json.loads((out / "steps.json").read_text())["steps"][0] == kept  # seconds, too
     assert "seed=0" in toonset(*command, "--seed", 1).reason
-    afresh = toonset(*command, "--seed", 1, "--quick", "--force")
+    afresh = toonset(*command, "--seed", 1, "--quick", "--only", "start", "--force")
     assert [found["step"] for found in afresh.json["rows"]] == ["0"]
 
 
 def test_mistakes_are_refused_before_any_work(toonset, tmp_path):
     wrong = toonset("bench", "stability", "--only", "hat", "-o", tmp_path / "out")
-    assert "takes one of start, warp" in wrong.reason
+    assert "takes one of start, views" in wrong.reason
     (tmp_path / "drawing.png").write_bytes(b"x")
     assert "--force" in toonset("bench", "stability", "-o", tmp_path).reason
     assert "drawing.png" in toonset("bench", "stability", "-o", tmp_path, "--force").reason
@@ -328,4 +349,4 @@ def test_mistakes_are_refused_before_any_work(toonset, tmp_path):
 
 def test_a_body_of_a_seed_is_the_sheets_body():
     np.testing.assert_array_equal(draw_sheet(3, PLAIN).mesh.vertices, random_body(3).vertices)
-    assert [step for _, step in chosen("mirror", quick=True)] == [0, 1, 2]
+    assert [step for _, step in chosen("mirror", SWEEPS, quick=True)] == [0, 1, 2]

@@ -1,0 +1,184 @@
+"""Trying a training: how near held-out views come, and what `toonset train` says of the drawings.
+
+What it says: that no drawing looks from a wide turn; that cameras had to be turned, drawings moved,
+sized or bent back, since outlines disagreed; or a refusal. `toonset consistency` names drawings
+that no such step reconciles.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from toonset.bench.atlas_scenes import DrawnScene, draw_scene
+from toonset.bench.stability_sheet import Step
+from toonset.bench.stability_sweeps import Page
+from toonset.dataset.picture import encode_png
+from toonset.dataset.scene import Frame, Scene
+from toonset.errors import ToonsetError
+from toonset.nerf.consistency import consistency_of
+from toonset.nerf.evaluation_picture import tile_of
+from toonset.nerf.gaps import wide_gaps
+from toonset.nerf.labelling import labelled
+from toonset.nerf.layers import color_picture
+from toonset.nerf.metrics import over_white, psnr_of
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.report import compared
+from toonset.nerf.threads import use_threads
+from toonset.nerf.trained import Training
+from toonset.nerf.training import train
+from toonset.nerf.views import render
+from toonset.nerf.views_bake import Baked
+
+STEPS = 100  # of the optimiser: half a dB under the default's 300 at this size, in half the time
+SILENT, REPAIRED, WARNED, REFUSED, CRASHED = "silent", "repaired", "warned", "refused", "crashed"
+
+
+@dataclass(frozen=True)
+class TrainPage(Page):
+    """A page about training.
+
+    Attributes:
+        draw: step and seed to a scene.
+        of_base: its reference is the base scene, which need not be tried again for every page.
+        clean: the step that others are compared with; None: the first.
+    """
+
+    draw: Callable[[Step, int], DrawnScene]
+    of_base: bool = True
+    clean: Step | None = None
+
+    @property
+    def reference(self) -> Step:
+        """Return the step that others are compared with."""
+        return self.steps[0] if self.clean is None else self.clean
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What became of one scene.
+
+    Attributes:
+        seed: of the body.
+        figure: the larger the better: dB of the held-out views, or a share of what was to be found.
+        voice: the loudest of what was said.
+        words: what was said, most important first.
+        evidence: further numbers that training writes into its report.
+        seconds: of all of it.
+    """
+
+    seed: int
+    figure: float
+    voice: str
+    words: str
+    evidence: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+def try_training(page: TrainPage, step: Step, seed: int) -> tuple[Tried, bytes]:
+    """Return how a training did and a PNG of its worst held-out view, with truth and error."""
+    if page.of_base and step == page.reference:
+        return _base_tried(seed)
+    return _tried(lambda: page.draw(step, seed), seed)
+
+
+@cache
+def _base_tried(seed: int) -> tuple[Tried, bytes]:
+    return _tried(lambda: draw_scene(seed), seed)
+
+
+def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
+    began = time.perf_counter()
+    use_threads(1)  # figures must not depend on the machine's cores
+    scene: DrawnScene | None = None
+    try:
+        scene = draw()
+        ready, _ = labelled(scene.train)
+        training = train(ready, TrainOptions(steps=STEPS, seed=seed))
+        views = _rendered(training, scene.test)
+        voice, words = _said(scene.train, training)
+        evidence = _evidence(scene.train, training)
+    except ToonsetError as error:
+        views, voice, words, evidence = [], REFUSED, str(error), {}
+    except Exception as error:
+        views, voice, words, evidence = [], CRASHED, f"{type(error).__name__}: {error}", {}
+    if scene is None:
+        return Tried(seed, 0.0, voice, words), b""
+    views = views or [np.zeros_like(frame.rgba) for frame in scene.test.frames]  # nothing is shown
+    figures = [_psnr(scene, i, view) for i, view in enumerate(views)]
+    worst = int(np.nanargmin(figures))
+    picture = _side_by_side(scene.test.frames[worst], views[worst])
+    seconds = time.perf_counter() - began
+    return Tried(seed, float(np.nanmean(figures)), voice, words, evidence, seconds), picture
+
+
+def _rendered(training: Training, test: Scene) -> list[UInt8[np.ndarray, "height width 4"]]:
+    baked = Baked.of(training.result)
+    views = (render(baked, frame.camera) for frame in test.frames)
+    return [color_picture(view.rgb, view.alpha) for view in views]
+
+
+def _psnr(scene: DrawnScene, index: int, view: UInt8[np.ndarray, "height width 4"]) -> float:
+    """Return a view's PSNR in dB; nan where no pixel counts."""
+    drawn = scene.test.frames[index].rgba
+    error = ((over_white(view) - over_white(drawn)) ** 2).mean(axis=-1)
+    counted: Bool[np.ndarray, "height width"] = np.ones(error.shape, dtype=bool)
+    if scene.where is not None:
+        counted = scene.where[index]
+    return psnr_of(float(error[counted].mean())) if counted.any() else math.nan
+
+
+def _said(scene: Scene, training: Training) -> tuple[str, str]:
+    """Return what `toonset train` said of the drawings."""
+    warnings = [
+        f"no drawing in the {math.degrees(gap.radians):.0f} deg from {gap.after} to {gap.before}"
+        for gap in wide_gaps(scene)
+    ]
+    ready = training.prepared
+    repairs = [
+        f"{what}: outlines {step.apart_px[0]:.2f} px apart, {step.apart_px[1]:.2f} px after"
+        for step, what in (
+            (ready.turning, "cameras turned"),
+            (ready.registration, "drawings moved and sized"),
+            (ready.unbending, "drawings bent back"),
+        )
+        if step is not None and step.applied
+    ]
+    voice = WARNED if warnings else REPAIRED if repairs else SILENT
+    return voice, "; ".join([*warnings, *repairs])
+
+
+def _evidence(scene: Scene, training: Training) -> dict[str, float]:
+    """Return what the report holds besides, and what `toonset consistency` finds."""
+    ready, ious = training.prepared, training.evidence.left_out_iou
+    fit = compared(training.result, ready.scene)
+    found = {"fit_psnr": fit["psnr"] or 0.0, "fit_psnr_mask": fit["psnr_mask"] or 0.0}
+    found |= {"left_out_iou": max(ious)} if ious else {}
+    step = ready.unbending
+    if step is not None:
+        found["apart_px"] = step.apart_px[0]
+    found["apart_after_px"] = ready.apart_px
+    try:
+        report = consistency_of(scene)
+    except ToonsetError:  # fewer than three drawings
+        return {name: float(value) for name, value in found.items()}
+    found["odd_views"] = float(len(report.odd))
+    found["unexplained"] = float(np.mean([view.unexplained[0] for view in report.views]))
+    found["unexplained_after"] = float(np.mean([view.unexplained[1] for view in report.views]))
+    return {name: float(value) for name, value in found.items()}
+
+
+def _side_by_side(frame: Frame, view: UInt8[np.ndarray, "height width 4"]) -> bytes:
+    """Return the truth, the rendering and their difference in a row, as PNG."""
+    from matplotlib import colormaps
+
+    truth, shown = over_white(frame.rgba), over_white(view)
+    heat = colormaps["magma"](np.abs(truth - shown).max(axis=-1))[..., :3]
+    tiles: Sequence[np.ndarray] = [tile_of(picture) for picture in (truth, shown, heat)]
+    return encode_png(np.concatenate(tiles, axis=1))
