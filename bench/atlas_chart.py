@@ -44,20 +44,10 @@ def _draw_values(axes: Any, page: TriedPage) -> None:
     kind, at = page.kind, np.arange(len(page.steps))
     values = [_shown([t.value for t in step.trials], kind) for step in page.steps]
     axes.axhspan(*_failed_range(values, kind), color=VERMILION, alpha=0.08, lw=0)
-    for bound, words in ((kind.failed, "failed above"), (kind.fine, "fine below")):
+    for bound, words, side in ((kind.failed, "failed", "bottom"), (kind.fine, "fine", "top")):
         if bound == kind.failed or kind.fine < kind.failed:
             axes.axhline(bound, color=DARK, lw=0.9, ls=(0, (2, 3)))
-            axes.annotate(
-                words,
-                (1, bound),
-                (-2, 2 if bound == kind.failed else -2),
-                xycoords=axes.get_yaxis_transform(),
-                textcoords="offset points",
-                ha="right",
-                va="bottom" if bound == kind.failed else "top",
-                fontsize=8.5,
-                color=DARK,
-            )
+            _write_beside(axes, bound, words, side)
     axes.vlines(
         at, [np.median(v) for v in values], [np.percentile(v, 95) for v in values], color=GREY, lw=4
     )
@@ -75,6 +65,21 @@ def _draw_values(axes: Any, page: TriedPage) -> None:
     axes.set_ylabel(f"{kind.value}, {kind.unit}", fontsize=10)
     axes.grid(axis="y", color=LIGHT, lw=0.6)
     axes.set_axisbelow(True)
+
+
+def _write_beside(axes: Any, height: float, words: str, side: str) -> None:
+    """Write words to the right of the axes, on one side of a height."""
+    axes.annotate(
+        words,
+        (1, height),
+        (4, 0),
+        xycoords=axes.get_yaxis_transform(),
+        textcoords="offset points",
+        va=side,
+        fontsize=9,
+        color=DARK,
+        annotation_clip=False,
+    )
 
 
 def _failed_range(values: list[np.ndarray], kind: Kind) -> tuple[float, float]:

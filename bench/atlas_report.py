@@ -35,7 +35,8 @@ figcaption { font-size: .85rem; color: #444; }
 .strip { display: flex; flex-wrap: wrap; gap: .8rem; } .strip figure { margin: 0; width: 9rem; }
 .strip img { max-width: 100%; max-height: 8rem; border: 1px solid #ddd; }
 .summary tr.sum td { font-weight: 600; border-top: 2px solid #444; }
-.summary td:nth-child(2), .steps td:last-child { text-align: left; }
+.summary td:nth-child(2), .steps td:last-child, .steps th:last-child { text-align: left; }
+.steps { margin-top: 1rem; } .steps td:nth-child(-n+8) { white-space: nowrap; }
 nav { columns: 3; font-size: .9rem; }
 """.strip()
 KEYS = {
@@ -105,7 +106,8 @@ def _summary(pages: Sequence[TriedPage]) -> str:
 
 
 def _section(number: int, page: TriedPage, pictures: Pictures) -> str:
-    name = escape(page.page.name)
+    lead = "" if page.page.name.startswith(page.kind.subject[:5]) else f"{page.kind.subject}: "
+    name = escape(lead + page.page.name)
     curve = Picture(draw_page(page), f"{page.page.name}: {page.kind.value} by {page.page.axis}")
     shown = [step for step in page.steps if pictures.get((page.page.name, step.step))]
     parts = [

@@ -37,7 +37,7 @@ def outlines_picture(
     over_white = (view.rgba[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
     way = cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR
     picture = cv2.resize(over_white, size_wh, interpolation=way)
-    cameras = [(truth, mannequin, TRUE, 4)]
+    cameras = [(truth, mannequin, TRUE, 3)]
     if found is not None:
         cameras.append((found, bent, FOUND, 2))
     for camera, body, color, width in cameras:

@@ -16,7 +16,6 @@ from toonset.bench.atlas_run import Counts, TriedStepResult, all_pages, run_step
 from toonset.bench.atlas_training import Tried
 from toonset.bench.calib import ViewError
 from toonset.bench.stability import SheetResult, StepResult, align_from, run_sheet
-from toonset.bench.stability_bodies import vase
 from toonset.bench.stability_chart import draw_stability
 from toonset.bench.stability_damage import (
     MIRROR,
@@ -160,16 +159,6 @@ def test_the_worst_step_can_be_drawn_twice_alike(sweep, monkeypatch):
         np.testing.assert_array_equal(camera.rotation, same.rotation)
 
 
-def test_a_vase_looks_the_same_from_all_round():
-    mesh = vase()
-    turn = 2 * math.pi / 96 * 7
-    c, s = math.cos(turn), math.sin(turn)
-    turned = mesh.vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    gaps = np.linalg.norm(mesh.vertices[:, None] - turned[None], axis=-1)
-    assert gaps.min(axis=1).max() < 1e-6
-    assert mesh.height == pytest.approx(1.8)
-
-
 # ---- runs
 
 
@@ -255,7 +244,6 @@ def test_an_alignment_without_verdict_is_neither_silent_nor_an_alarm():
 
 
 def test_csv_does_not_know_the_seconds():
-    slow = replace(result_of((1, 1, "ok")), sheets=())
     one = result_of((1, 1, "ok"))
     slow = replace(one, sheets=(replace(one.sheets[0], seconds=99.0),))
     assert as_csv([row(one)], 4) == as_csv([row(slow)], 4)
