@@ -8,7 +8,7 @@ their difference for other merits.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,6 +36,8 @@ class Plot:
         cases: what methods are paired by.
         mean: the merit is the mean over the cases, not the median of the samples.
         told: methods that know more than the default, and what; they are set aside.
+        of: what else than the group names the chart; "" = nothing.
+        only: methods that are shown; empty = all.
     """
 
     merits: tuple[str, ...]
@@ -46,6 +48,8 @@ class Plot:
     cases: str
     mean: bool
     told: Mapping[str, str] = field(default_factory=dict)
+    of: str = ""
+    only: tuple[str, ...] = ()
 
 
 TRAINING = Plot(
@@ -56,6 +60,17 @@ TRAINING = Plot(
     told={
         f"paper, hand-picked palette, {steps} steps": "told the palette" for steps in (200, 2000)
     },
+)
+MODELS = replace(
+    TRAINING,
+    cost="model size",
+    cost_name="size of the saved model, kB",
+    cost_unit="kB",
+    of=", model size",
+    only=(
+        *(DEFAULT, "finest planes", "planes of 2/3", "planes of 1/2"),
+        *("voxel", "mlp", "coloured hull", "paper, automatic palette, 2000 steps"),
+    ),
 )
 PLOTS: dict[str, Plot] = {
     "calib": Plot(
@@ -81,6 +96,7 @@ PLOTS: dict[str, Plot] = {
         },
     ),
 }
+SECOND = {"train": MODELS}  # subjects with another chart per group
 
 
 def charts_of(subject: str, records: Sequence[Record], seeds: str) -> list[Chart]:
@@ -89,35 +105,39 @@ def charts_of(subject: str, records: Sequence[Record], seeds: str) -> list[Chart
     Args:
         subject: a key of `PLOTS`.
         records: of all groups; those of colours are pooled over the conditions.
-        seeds: for the caption.
+        seeds: for the captions.
     """
-    plot = PLOTS[subject]
     records = [*records, *_pooled(records)]
-    charts = []
-    for group in dict.fromkeys(record.group for record in records):
-        own = [record for record in records if record.group == group]
-        merits = {r.method: r for r in own if r.metric in plot.merits}
-        points = points_of(own, plot)
-        if not points:
-            continue
-        first = merits.get(DEFAULT) or next(iter(merits.values()))
-        cases = f"{len(first.by_case)} {plot.cases}"
-        n = f"n = {first.n} {plot.samples} of {cases}" if plot.samples else f"n = {cases}"
-        charts.append(
-            Chart(
-                subject=subject,
-                group=group,
-                points=tuple(points),
-                merit=first.metric,
-                unit=first.unit,
-                cost=plot.cost_name,
-                cost_unit=plot.cost_unit,
-                statistic="mean" if plot.mean else "median",
-                caption=f"{n}; {seeds}; {first.machine}.",
-                lower_is_better=first.direction == "lower",
-            )
-        )
-    return charts
+    plots = [PLOTS[subject], *([SECOND[subject]] if subject in SECOND else [])]
+    found = (
+        _chart(subject, group, [r for r in records if r.group == group], plot, seeds)
+        for plot in plots
+        for group in dict.fromkeys(record.group for record in records)
+    )
+    return [chart for chart in found if chart]
+
+
+def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: str) -> Chart | None:
+    own = [r for r in own if not plot.only or r.method in plot.only]
+    merits = {r.method: r for r in own if r.metric in plot.merits}
+    points = points_of(own, plot)
+    if not points:
+        return None
+    first = merits.get(DEFAULT) or next(iter(merits.values()))
+    cases = f"{len(first.by_case)} {plot.cases}"
+    n = f"n = {first.n} {plot.samples} of {cases}" if plot.samples else f"n = {cases}"
+    return Chart(
+        subject=subject,
+        group=f"{group}{plot.of}",
+        points=tuple(points),
+        merit=first.metric,
+        unit=first.unit,
+        cost=plot.cost_name,
+        cost_unit=plot.cost_unit,
+        statistic="mean" if plot.mean else "median",
+        caption=f"{n}; {seeds}; {first.machine}.",
+        lower_is_better=first.direction == "lower",
+    )
 
 
 def points_of(records: Sequence[Record], plot: Plot) -> list[Point]:

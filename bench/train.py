@@ -194,4 +194,8 @@ COLUMNS = (
         *("parameters", "1", "lower", "", ""),
         lambda run: run.parameters or None,
     ),
+    Column(
+        *("model size", "kB", "lower", "model kB", "{:.0f}"),
+        lambda run: run.model_bytes / 1000 or None,
+    ),
 )

@@ -65,6 +65,7 @@ def _result(data: Any) -> RunResult:
         curve=tuple(_seen(point) for point in data["curve"]),
         acted=tuple(step for step in PREPARATIONS if step in data["acted"]),
         note=str(data["note"]),
+        model_bytes=int(data["model_bytes"]),
     )
 
 

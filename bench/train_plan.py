@@ -17,6 +17,7 @@ PREPARATIONS: tuple[Preparation, ...] = get_args(Preparation)
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
 PALETTES: tuple[PaletteChoice, ...] = get_args(PaletteChoice)
 PAPER_STEPS = (200, 2000)
+PLANES = {"finest planes": 1.0, "planes of 2/3": 2 / 3, "planes of 1/2": 1 / 2}  # of its cells
 TURN, HALF_TURN = 8, " half turn"  # views of a whole one; ends the groups of the others
 
 
@@ -33,6 +34,7 @@ class Method:
         leaves_out: the step that it goes without, if any. Where that had nothing to do in
             "default", this is the same training, and is not run a second time.
         curve: held-out PSNR is followed while it trains, with the most views.
+        share: cells of the planes, of the finest that the scene could have; None: as `options` say.
     """
 
     options: TrainOptions | None
@@ -41,6 +43,7 @@ class Method:
     most_views_only: bool = False
     leaves_out: Preparation | None = None
     curve: bool = False
+    share: float | None = None
 
 
 def _without(
@@ -62,6 +65,10 @@ METHODS: dict[str, Method] = {
     "coloured hull": Method(TrainOptions(field="hull"), "no palette", first_seed_only=True),
     "75 steps": Method(TrainOptions(steps=75), first_seed_only=True, most_views_only=True),
     "600 steps": Method(TrainOptions(steps=600), first_seed_only=True, most_views_only=True),
+    **{
+        name: Method(TrainOptions(field="triplane"), first_seed_only=True, share=share)
+        for name, share in PLANES.items()
+    },
     "without palette": _without(palette="no palette"),
     "without smoothing": _without(smoothness=0.0),
     "without fairing": _without(fair=False),
@@ -156,7 +163,13 @@ class Job:
         """Return all that a result depends on, as plain data; the code aside."""
         method = METHODS[self.method]
         options = None if method.options is None else asdict(method.options)
-        return {"name": self.name, "seed": self.seed, "options": options, "palette": method.palette}
+        found = {
+            "name": self.name,
+            "seed": self.seed,
+            "options": options,
+            "palette": method.palette,
+        }
+        return found if method.share is None else found | {"share": method.share}
 
 
 def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list[Job]:

@@ -27,8 +27,9 @@ from toonset.nerf.layers import color_picture
 from toonset.nerf.metrics import Figures, means, over_white, psnr_of
 from toonset.nerf.metrics_view import Judges, figures_of
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.run_folder import model_of
 from toonset.nerf.trained import TrainedField, Training
-from toonset.nerf.training import train
+from toonset.nerf.training import finest_cells, train
 from toonset.nerf.views import render
 
 CURVE_VIEWS = 4  # held-out views that every point of the curves is the mean of
@@ -63,6 +64,7 @@ class RunResult:
         curve: PSNR in dB of some held-out views while the training went on, where the job asks for
             it, and at its end; empty where it failed.
         acted: the steps that found something to do.
+        model_bytes: of the saved model; 0: nothing is saved.
         note: why it failed, or nothing.
     """
 
@@ -78,6 +80,7 @@ class RunResult:
     curve: tuple[Seen, ...]
     acted: tuple[Preparation, ...] = ()
     note: str = ""
+    model_bytes: int = 0
 
 
 def run_job(job: Job, judges: Judges, look: Look = lambda *_: None) -> RunResult:
@@ -99,6 +102,9 @@ def _trained(
         time.perf_counter(), time.process_time(), first_look_s=first_look_s, carved=options.carve
     )
     scene = _with_palette(case.train, METHODS[job.method].palette)
+    share = METHODS[job.method].share
+    if share is not None:
+        options = replace(options, resolution=round(share * finest_cells(scene)))
     training = train(scene, options, watch=watch)
     seconds, cpu_seconds = watch.spent()
     sample = curve_frames(case.test)
@@ -120,6 +126,7 @@ def _trained(
         training.counts["parameters"],
         tuple(curve),
         acted_in(training),
+        model_bytes=len(model_of(training.result)),
     )
 
 

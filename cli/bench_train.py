@@ -9,6 +9,7 @@ pictures show those that were asked for. Who has changed the code in between sta
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,10 +44,16 @@ def train_into(
     """
     from toonset.bench.record import as_dicts
     from toonset.bench.train import records_of, table_of
+    from toonset.bench.train_choice import choices_of, choices_text
 
     jobs = jobs_of(chosen)
     runs = run_into(folder, jobs, chosen, printer, WRITTEN, _views_into(folder), force=force)
-    return table_of(runs), {"records": as_dicts(records_of(runs, chosen.seed))}
+    choices = choices_of(runs)
+    parts = [table_of(runs), choices_text(choices)]
+    return "\n\n".join(part for part in parts if part), {
+        "records": as_dicts(records_of(runs, chosen.seed)),
+        "planes": [asdict(choice) for choice in choices],
+    }
 
 
 def jobs_of(chosen: Chosen) -> list[Job]:

@@ -52,7 +52,9 @@ def train(
     field: Annotated[
         str | None,
         typer.Option(
-            "--field", help="triplane (default); to compare with: mlp, voxel, hull (no training)."
+            "--field",
+            help="auto (default): planes as coarse as the drawings allow; triplane: the finest; to "
+            "compare with: mlp, voxel, hull (no training).",
         ),
     ] = None,
     ink: Annotated[

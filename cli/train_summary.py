@@ -19,6 +19,7 @@ def summary(run: Path, metrics: dict[str, Any]) -> str:
             *_drawings(metrics["drawings"]),
             *_symmetry(metrics["symmetry"]),
             f"hull: filled where at most {hull['missing']} views say background{evidence}",
+            *_planes(metrics["planes"]),
             f"fit to the drawings{_set_right(metrics['drawings'])}: {_figures(fit)}",
             *([f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []),
             f"{run}: preview.png shows it; next: toonset render {run} --turntable 36",
@@ -48,6 +49,20 @@ def _drawings(found: dict[str, Any]) -> list[str]:
         widths = f"{ink['outline_px']:.1f} px outside, {ink['inner_px']:.1f} px inside"
         lines.append(f"contour lines taken off, to be drawn again: {widths}")
     return lines
+
+
+def _planes(found: dict[str, Any] | None) -> list[str]:
+    """Return how fine the planes are, and what finer and coarser ones predict."""
+    if found is None:
+        return []
+    if not found["candidates"]:
+        return [f"planes: {found['cells']} cells, the finest: too few drawings to leave one out"]
+    tried = ", ".join(f"{c['cells']}: {c['left_out_psnr']:.2f} dB" for c in found["candidates"])
+    return [
+        f"planes: {found['cells']} cells along the longest side, the fewest within "
+        f"{found['tolerance_db']:g} dB of the best (predicted {' and '.join(found['left_out'])}; "
+        f"{tried})"
+    ]
 
 
 def _set_right(found: dict[str, Any]) -> str:

@@ -74,10 +74,11 @@ def make_batches(
     step: float,
     most: int,
     generator: torch.Generator,
+    most_rays: int = MOST_RAYS,
 ) -> list[Batch]:
     """Return the scene's rays on and just beside the figure, shuffled and cut into batches."""
     rays, drawn = _near_figure(scene, hull)
-    chosen = torch.randperm(len(drawn.alpha), generator=generator)[:MOST_RAYS]
+    chosen = torch.randperm(len(drawn.alpha), generator=generator)[:most_rays]
     rays, drawn = rays.at(chosen), drawn.at(chosen)
     count = max(1, round(len(chosen) / RAYS_PER_BATCH))
     cuts = np.linspace(0, len(chosen), count + 1).astype(int).tolist()

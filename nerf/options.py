@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-FieldName = Literal["triplane", "mlp", "voxel", "hull"]
+FieldName = Literal["auto", "triplane", "mlp", "voxel", "hull"]
 FIELDS: tuple[FieldName, ...] = get_args(FieldName)
 
 
@@ -20,13 +20,15 @@ class TrainOptions:
         device: "auto" (a GPU where there is one), "cpu" or "cuda".
         resolution: cells of the planes along the character's longest side; None: one cell per
             pixel of the tallest figure, 48 to 256 (finer planes fit each drawing's own pixels and
-            predict new views worse).
+            predict new views worse), or fewer (see `field`).
         smoothness: weight of the planes' total variation at eight views that agree; fewer views,
             and drawings that had to be aligned, get more.
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
-        field: what is fitted: planes with a small decoder; or, to compare with, a network alone, a
-            grid of voxels, or the hull with the drawings' colours (nothing is fitted then).
+        field: what is fitted: "auto", planes with a small decoder, as coarse as predicts left-out
+            drawings well (`nerf.field_choice`); "triplane", the finest of them; or, to compare
+            with, a network alone, a grid of voxels, or the hull with the drawings' colours (nothing
+            is fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over any backdrop.
         fair: take the fairest surface inside the hull instead of the hull with its corners.
@@ -47,7 +49,7 @@ class TrainOptions:
     smoothness: float = 1e-3
     palette_weight: float = 0.003
     missing_views: int | None = None
-    field: FieldName = "triplane"
+    field: FieldName = "auto"
     carve: bool = True
     fair: bool = True
     register: bool = True

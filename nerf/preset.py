@@ -31,6 +31,7 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
     return TrainOptions(
         steps=steps,
         palette_weight=0.01,
+        field="triplane",
         carve=False,
         smoothness=0.0,
         register=False,

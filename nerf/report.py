@@ -83,6 +83,7 @@ def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
         "drawings": training.prepared.to_json(),
         "symmetry": None if training.symmetry is None else training.symmetry.to_json(),
         "hull": asdict(training.evidence),
+        "planes": None if training.choice is None else training.choice.to_json(),
         "counts": training.counts,
         "seconds": {k: round(v, 3) for k, v in training.seconds.items()},
     }

@@ -101,8 +101,13 @@ def write_field(folder: Path, trained: TrainedField, about: dict[str, Any]) -> d
         about: further entries of config.json (options, versions).
     """
     record = FieldRecord.of(trained)
-    write_bytes(folder / MODEL, save(packed(trained)))
+    write_bytes(folder / MODEL, model_of(trained))
     return {"format": FORMAT, "field": record.model_dump(mode="json"), **about}
+
+
+def model_of(trained: TrainedField) -> bytes:
+    """Return the content of model.safetensors."""
+    return save(packed(trained))
 
 
 def read_field(folder: Path) -> TrainedField:

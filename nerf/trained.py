@@ -9,6 +9,7 @@ from jaxtyping import UInt8
 
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.evidence import HullEvidence
+from toonset.nerf.field_choice import FieldChoice
 from toonset.nerf.fields import Field
 from toonset.nerf.hull import Hull
 from toonset.nerf.ink import InkStyle
@@ -90,6 +91,7 @@ class Training:
         seconds: of every part.
         counts: views, rays, samples, parameters.
         symmetry: what the drawings say of left and right, if that was asked; see there.
+        choice: of the planes; None: it was not asked.
     """
 
     result: TrainedField
@@ -101,3 +103,4 @@ class Training:
     seconds: dict[str, float]
     counts: dict[str, int]
     symmetry: Symmetry | None = None
+    choice: FieldChoice | None = None

@@ -29,12 +29,14 @@ from toonset.nerf.field_box import (
     open_box,
     without_empty_space,
 )
+from toonset.nerf.field_choice import FieldChoice
 from toonset.nerf.field_hull import paint
 from toonset.nerf.field_kinds import build_field
 from toonset.nerf.field_loss import Model, Weights
 from toonset.nerf.field_rays import FixedRays, TrainingRays
+from toonset.nerf.field_trials import Ground, asked_for, choose_cells
 from toonset.nerf.field_voxel import VoxelField
-from toonset.nerf.fields import FieldSpec
+from toonset.nerf.fields import Field, FieldSpec
 from toonset.nerf.fitting import Progress, Watch, fit
 from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
@@ -48,6 +50,7 @@ CELLS_PER_PX, CELLS = 1.0, (48, 256)
 STEPS_ALONG = 160  # samples that the longest side of the hull would take
 MOST_SAMPLES = 24  # per ray, from its first inside the hull; 48: +.2 dB, but surfaces turn to mist
 MLP_LAYERS, MLP_WIDTH = 4, 64
+PARTS = ("drawings", "hull", "planes", "rays")  # before the steps, in order
 NO_EVIDENCE = HullEvidence(0, ())
 
 
@@ -87,28 +90,52 @@ def train(
     if options.carve:
         hull, evidence = hull_of(scene, options, ready.apart_px)
     clock.append(time.perf_counter())
+    weights = _weights(options, len(scene.frames), agree=ready.apart_px == 0)
+    choice = None
+    if asked_for(options):
+        tell("choosing the planes")
+        choice = _choice(ready.scene, hull, weights, options, device)
+        torch.manual_seed(options.seed)
+    cells = choice.cells if choice else None
+    clock.append(time.perf_counter())
     tell("laying out the rays")
-    start = replace(_untrained(scene, hull, options), ink=ready.ink, keys=ready.keys)
+    start = replace(_untrained(scene, hull, options, cells), ink=ready.ink, keys=ready.keys)
     rays, counts = _rays(scene, start, options, generator, device)
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)
     begin = watch.begin(start) if watch else None
-    weights = _weights(options, len(scene.frames), agree=ready.apart_px == 0)
     history, stopped = fit(model, rays, weights, options, generator, watch, begin)
     model.to("cpu")
-    drawings_s, hull_s, rays_s = np.diff(clock).tolist()
-    steps_s = history[-1].seconds if history else 0.0  # without what the watch has taken
-    seconds = {"drawings": drawings_s, "hull": hull_s, "rays": rays_s, "steps": steps_s}
+    seconds = dict(zip(PARTS, np.diff(clock).tolist(), strict=True))
+    seconds["steps"] = history[-1].seconds if history else 0.0  # without what the watch has taken
     counts |= {"views": len(scene.frames), "parameters": sum(p.numel() for p in model.parameters())}
     result = _finished(start, options)
     return Training(
-        result, options, tuple(history), stopped, ready, evidence, seconds, counts, symmetry
+        result, options, tuple(history), stopped, ready, evidence, seconds, counts, symmetry, choice
     )
 
 
 def _resolved(options: TrainOptions) -> TrainOptions:
     """Return the options without contradictions: a painted hull is carved, nothing is fitted."""
     return replace(options, steps=0, carve=True) if options.field == "hull" else options
+
+
+def _choice(
+    scene: Scene, hull: Hull, weights: Weights, options: TrainOptions, device: torch.device
+) -> FieldChoice:
+    """Return how fine the planes are that this scene needs."""
+    step = float(hull.box.size.max()) / STEPS_ALONG
+    ground = Ground(scene, hull, step, MOST_SAMPLES, weights, options, device)
+
+    def build(cells: int) -> Field:
+        return build_field(FieldSpec("triplane", cells, CHANNELS, HIDDEN), hull.box)
+
+    return choose_cells(ground, finest_cells(scene), build)
+
+
+def finest_cells(scene: Scene) -> int:
+    """Return the cells along the longest side of the finest planes that a scene is given."""
+    return per_px(scene, CELLS_PER_PX, CELLS)
 
 
 def _rays(
@@ -139,8 +166,8 @@ def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:
     return any_backdrop(options.palette_weight, smoothness)
 
 
-def _untrained(scene: Scene, hull: Hull, options: TrainOptions) -> TrainedField:
-    field = build_field(_spec(scene, options), hull.box)
+def _untrained(scene: Scene, hull: Hull, options: TrainOptions, cells: int | None) -> TrainedField:
+    field = build_field(_spec(scene, options, cells), hull.box)
     if not options.carve:
         field = clear(field)
     colors = scene.palette
@@ -162,11 +189,11 @@ def _finished(trained: TrainedField, options: TrainOptions) -> TrainedField:
     return replace(trained, hull=without_empty_space(trained.hull, trained.field))
 
 
-def _spec(scene: Scene, options: TrainOptions) -> FieldSpec:
-    cells = options.resolution or per_px(scene, CELLS_PER_PX, CELLS)
+def _spec(scene: Scene, options: TrainOptions, cells: int | None) -> FieldSpec:
+    cells = cells or options.resolution or finest_cells(scene)
     if options.field == "mlp":
         return FieldSpec("mlp", 1, MLP_LAYERS, MLP_WIDTH)
-    if options.field == "triplane":
+    if options.field in ("auto", "triplane"):
         return FieldSpec("triplane", cells, CHANNELS, HIDDEN)
     if options.field == "voxel":  # whose cost grows with the cube of it
         return FieldSpec("voxel", max(1, cells * 3 // 4), 4, 0)

@@ -18,7 +18,7 @@ from toonset.bench.calib import METHODS as CALIB_METHODS
 from toonset.bench.chart import Chart
 from toonset.bench.chart_drawing import chart_figure, draw_chart
 from toonset.bench.chart_labels import Box, Label, place_labels
-from toonset.bench.chart_points import PLOTS, charts_of, points_of
+from toonset.bench.chart_points import PLOTS, SECOND, charts_of, points_of
 from toonset.bench.palette_methods import METHODS as PALETTE_METHODS
 from toonset.bench.pareto import Point, Standing, pareto_front, standing_of
 from toonset.bench.sfm import METHODS as SFM_METHODS
@@ -251,3 +251,24 @@ def test_colours_are_pooled_over_conditions_per_size_of_sheet() -> None:
     assert (only.cost, only.n) == (0.4, 4)
     assert only.merit == pytest.approx(0.8)
     assert "n = 4 drawn characters; seed 0" in large.caption
+
+
+def test_a_second_chart_has_quality_against_model_size() -> None:
+    of = {
+        "default": (30.0, 600.0),
+        "finest planes": (30.1, 900.0),
+        "without palette": (29.0, 600.0),
+    }
+    records = [
+        record(metric, method, {"a": value})
+        for method, values in of.items()
+        for metric, value in zip(("held-out PSNR", "model size"), values, strict=True)
+    ]
+    records += [record("CPU seconds", "default", {"a": 9.0})]
+    first, second = charts_of("train", records, "seed 0")
+    assert (first.group, second.group) == ("exact", "exact, model size")
+    assert {p.method: (p.merit, p.cost) for p in second.points} == {
+        name: of[name] for name in ("default", "finest planes")
+    }
+    assert second.cost_unit == "kB"
+    assert set(SECOND["train"].only) <= set(TRAIN_METHODS)

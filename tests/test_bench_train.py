@@ -305,7 +305,8 @@ def test_a_stopped_bench_goes_on(
     command = ("bench", "train", "--quick", "-o", out)
     assert toonset(*command).code != 0
     written = {path.name for path in out.iterdir()}
-    charts = {f"chart-exact-32-px-8-views.{form}" for form in ("png", "svg", "csv")}
+    names = ("chart-exact-32-px-8-views", "chart-exact-32-px-8-views-model-size")
+    charts = {f"{name}.{form}" for name in names for form in ("png", "svg", "csv")}
     assert written == {
         "runs.json",
         "records.json",

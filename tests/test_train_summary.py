@@ -18,6 +18,7 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
         "counts": {"views": 8, "rays": 9, "parameters": 7},
         "hull": {"missing": 0, "left_out_iou": []},
         "symmetry": None,
+        "planes": None,
         "drawings": dict.fromkeys(("turning", "registration", "unbending", "ink")) | drawings,
     }
 

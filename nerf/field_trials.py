@@ -1,0 +1,124 @@
+"""Short trainings that say how fine the planes need to be.
+
+For every candidate a field is fitted for a few steps to all drawings but one or two, inside the
+hull of all of them, and compared with what was left out (see `toonset.nerf.field_choice`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import torch
+
+from toonset.dataset.scene import Frame, Scene
+from toonset.nerf.batches import Batch, make_batches
+from toonset.nerf.field_choice import Candidate, FieldChoice, chosen
+from toonset.nerf.field_loss import Model, Weights, render_batch
+from toonset.nerf.field_rays import FixedRays
+from toonset.nerf.fields import Field
+from toonset.nerf.fitting import fit
+from toonset.nerf.hull import Hull
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.silhouette import figure_px
+
+SHARES = (1.0, 2 / 3, 1 / 2)  # of the finest planes' cells
+MOST_RAYS = 32_000  # drawn by lot: a trial takes fewer than two of them a step
+STEPS = 60  # by then the order of the candidates shows
+WORTH_STEPS = len(SHARES) * STEPS  # of a training; choosing costs no more than a shorter one
+FEWEST_VIEWS = 3  # with fewer nothing can be left out
+TWO_FROM = 6  # views from which two drawings are left out, half a turn apart
+
+Build = Callable[[int], Field]
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What all candidates are fitted to, and how.
+
+    Attributes:
+        scene: drawings as they are fitted, without mirror images.
+        hull: of all of them.
+        step: distance of samples along rays, world units.
+        samples: most per ray.
+        weights: of the loss's terms.
+        options: of the training.
+        device: where fields are fitted.
+    """
+
+    scene: Scene
+    hull: Hull
+    step: float
+    samples: int
+    weights: Weights
+    options: TrainOptions
+    device: torch.device
+
+    def batches(
+        self, frames: Sequence[Frame], field: Field, generator: torch.Generator
+    ) -> list[Batch]:
+        """Return the rays of some drawings."""
+        part = replace(self.scene, frames=tuple(frames))
+        sampling = (self.step, self.samples)
+        found = make_batches(part, self.hull, field, *sampling, generator, MOST_RAYS)
+        return [batch.to(self.device) for batch in found]
+
+
+def asked_for(options: TrainOptions) -> bool:
+    """Return whether a training begins with trials: not if it is told its planes, short or hurried.
+
+    Without a hull samples lie elsewhere in every step, and short trainings show nothing yet.
+    """
+    free = options.field == "auto" and options.resolution is None and options.carve
+    return free and options.budget_s is None and options.steps >= WORTH_STEPS
+
+
+def choose_cells(ground: Ground, finest: int, build: Build) -> FieldChoice:
+    """Return how many cells the planes get, and on what evidence.
+
+    Args:
+        ground: what candidates are fitted to.
+        finest: cells of the finest one.
+        build: returns an untrained field of so many cells.
+    """
+    frames = ground.scene.frames
+    shown = [frame for frame in frames if figure_px(frame)]
+    if len(shown) < FEWEST_VIEWS:
+        return FieldChoice(finest, (), ())
+    left = left_out(shown)
+    kept = [frame for frame in frames if frame not in left]
+    cells = sorted({max(1, round(share * finest)) for share in SHARES}, reverse=True)
+    candidates = tuple(_tried(ground, kept, left, count, build) for count in cells)
+    return FieldChoice(chosen(candidates), candidates, tuple(frame.name for frame in left))
+
+
+def left_out(frames: Sequence[Frame]) -> list[Frame]:
+    """Return the drawings that are predicted: the second, and the one half a turn from it."""
+    second = [1, 1 + len(frames) // 2] if len(frames) >= TWO_FROM else [1]
+    return [frames[number] for number in second]
+
+
+def _tried(
+    ground: Ground, kept: Sequence[Frame], left: Sequence[Frame], cells: int, build: Build
+) -> Candidate:
+    torch.manual_seed(ground.options.seed)
+    generator = torch.Generator().manual_seed(ground.options.seed)
+    field = build(cells)
+    seen, unseen = (ground.batches(frames, field, generator) for frames in (kept, left))
+    model = Model(field, None).to(ground.device)
+    few = replace(ground.options, steps=STEPS, budget_s=None)
+    fit(model, FixedRays(seen), ground.weights, few, generator)
+    parameters = sum(values.numel() for values in field.parameters())
+    return Candidate(cells, parameters, _psnr(field, unseen))
+
+
+@torch.no_grad()
+def _psnr(field: Field, batches: Sequence[Batch]) -> float:
+    error, rays = 0.0, 0
+    for batch in batches:
+        color, opacity = render_batch(field, batch)
+        drawn = batch.rgb * batch.alpha[:, None] + 1 - batch.alpha[:, None]
+        error += float(((color + 1 - opacity[:, None] - drawn) ** 2).mean(dim=1).sum())
+        rays += len(drawn)
+    return -10 * math.log10(max(error / max(rays, 1), 1e-10))
