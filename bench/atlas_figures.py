@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from toonset.bench.record import aligned
-from toonset.bench.stability_sweeps import Page
+from toonset.bench.stability_page import Page
 
 OFTEN = 0.1  # share of a step's trials from which the step fails
 UNJUDGED = ""  # the voice of what says nothing by design

@@ -14,6 +14,7 @@ PALETTE_PAGES = (
         (20, 10, 6, 4, 3, 2, 1),
         (20, 4, 2),
         "Near-equal colours: hair ever more like skin; both are to be found.",
+        None,
         near_equal,
     ),
     PalettePage(
@@ -22,6 +23,7 @@ PALETTE_PAGES = (
         (8, 6, 4, 3, 2, 1, 0.5),
         (8, 4, 1),
         "Tiny features: eyes in a colour of their own, which is to be found.",
+        None,
         tiny_feature,
     ),
 )
@@ -32,14 +34,16 @@ TRAIN_PAGES = (
         (8, 6, 5, 4, 3, 2, 1),
         (8, 4, 2),
         "Fewer drawings, evenly round the character.",
+        8,
         scenes.numbered,
     ),
     TrainPage(
         "train angles",
         "turned off even steps by up to, degrees",
         (0, 10, 20, 40, 80, 180),
-        (0, 40, 180),
+        (0, 180),
         "Eight drawings turned unequally, cameras known.",
+        0,
         scenes.uneven,
     ),
     TrainPage(
@@ -48,6 +52,7 @@ TRAIN_PAGES = (
         (0, 2, 5, 10, 15, 20),
         (0, 5, 15),
         "Cameras turned wrongly, each with a sigma as large as its error.",
+        0,
         scenes.misturned,
     ),
     TrainPage(
@@ -56,6 +61,7 @@ TRAIN_PAGES = (
         (0, 1, 2, 5, 10, 20),
         (0, 2, 10),
         "Cameras of a wrong scale.",
+        0,
         scenes.misscaled,
     ),
     TrainPage(
@@ -64,6 +70,7 @@ TRAIN_PAGES = (
         (0, 0.5, 1, 2, 4, 8),
         (0, 1, 4),
         "Cameras shifted in their pictures.",
+        0,
         scenes.shifted,
     ),
     TrainPage(
@@ -72,6 +79,7 @@ TRAIN_PAGES = (
         (0, 0.5, 1, 2, 4),
         (0, 1, 4),
         "Drawing error: every view smoothly bent; careful hands are within 0.5 to 1.5 %.",
+        0,
         scenes.warped,
     ),
     TrainPage(
@@ -80,6 +88,7 @@ TRAIN_PAGES = (
         (0, 2, 5, 10, 20),
         (0, 5, 20),
         "Exaggeration: views taller and narrower, or lower and wider.",
+        0,
         scenes.squashed,
     ),
     TrainPage(
@@ -88,6 +97,7 @@ TRAIN_PAGES = (
         (0, 3, 5, 8, 12),
         (0, 5, 12),
         "Parts that follow the viewer: round ears that face us from everywhere.",
+        0,
         scenes.with_following_ears,
     ),
     TrainPage(
@@ -96,6 +106,7 @@ TRAIN_PAGES = (
         (0, 2, 4, 8, 16),
         (0, 4, 16),
         "Holes between limbs that are painted shut.",
+        0,
         scenes.with_gaps_painted,
     ),
     TrainPage(
@@ -104,6 +115,7 @@ TRAIN_PAGES = (
         (0, 0.5, 1, 2, 4),
         (0, 1, 4),
         "Contour lines, which move with the viewer; the held-out views have them, too.",
+        0,
         scenes.outlined,
     ),
     TrainPage(
@@ -112,6 +124,7 @@ TRAIN_PAGES = (
         (100, 50, 20, 10, 0),
         (100, 20, 0),
         "Colours ever more alike, at last a single flat one without texture.",
+        100,
         scenes.paler,
     ),
     TrainPage(
@@ -120,8 +133,8 @@ TRAIN_PAGES = (
         (8, 4, 3, 2, 1),
         (8, 3, 1),
         "Tiny features: only the eyes' pixels are compared.",
+        None,
         scenes.with_tiny_eyes,
-        of_base=False,
     ),
     TrainPage(
         "train edges",
@@ -129,8 +142,8 @@ TRAIN_PAGES = (
         (0, HARD, 0.5, 1, 2),
         (0, HARD, 2),
         "Without anti-aliasing, and blurred; cut out of a white sheet.",
+        None,
         scenes.blurred,
-        of_base=False,
     ),
     TrainPage(
         "train jpeg",
@@ -138,16 +151,16 @@ TRAIN_PAGES = (
         (LOSSLESS, 90, 60, 30, 10, 5),
         (LOSSLESS, 60, 10),
         "Saved as JPEG, and cut out of the white sheet.",
+        None,
         scenes.compressed,
-        of_base=False,
     ),
     TrainPage(
         "train resolution",
         "drawings, px",
         (160, 120, 80, 60, 40),
-        (120, 80, 40),
+        (80, 40),
         "Small drawings; the held-out views stay at 80 px.",
+        80,
         scenes.sized,
-        clean=80,
     ),
 )

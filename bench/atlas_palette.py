@@ -11,8 +11,8 @@ from jaxtyping import Float, UInt8
 
 from toonset.bench.atlas_training import REFUSED, Tried
 from toonset.bench.stability_bodies import recolored, with_eyes
+from toonset.bench.stability_page import Page
 from toonset.bench.stability_sheet import Step
-from toonset.bench.stability_sweeps import Page
 from toonset.dataset.bodies import HAIR, SKIN, random_body
 from toonset.dataset.picture import encode_png
 from toonset.dataset.synth_options import SynthOptions

@@ -17,8 +17,8 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.bench.atlas_scenes import DrawnScene, draw_scene
+from toonset.bench.stability_page import Page
 from toonset.bench.stability_sheet import Step
-from toonset.bench.stability_sweeps import Page
 from toonset.dataset.picture import encode_png
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import ToonsetError
@@ -46,18 +46,14 @@ class TrainPage(Page):
 
     Attributes:
         draw: step and seed to a scene.
-        of_base: its reference is the base scene, which need not be tried again for every page.
-        clean: the step that others are compared with; None: the first.
     """
 
     draw: Callable[[Step, int], DrawnScene]
-    of_base: bool = True
-    clean: Step | None = None
 
     @property
     def reference(self) -> Step:
         """Return the step that others are compared with."""
-        return self.steps[0] if self.clean is None else self.clean
+        return self.steps[0] if self.base is None else self.base
 
 
 @dataclass(frozen=True)
@@ -83,7 +79,7 @@ class Tried:
 
 def try_training(page: TrainPage, step: Step, seed: int) -> tuple[Tried, bytes]:
     """Return how a training did and a PNG of its worst held-out view, with truth and error."""
-    if page.of_base and step == page.reference:
+    if step == page.base:
         return _base_tried(seed)
     return _tried(lambda: page.draw(step, seed), seed)
 

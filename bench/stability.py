@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,7 +19,7 @@ from toonset.bench.calib import ViewError, view_error
 from toonset.bench.calib_figures import WRONG
 from toonset.bench.stability_damage import Drawn
 from toonset.bench.stability_picture import outlines_picture
-from toonset.bench.stability_sheet import DrawnSheet, Step
+from toonset.bench.stability_sheet import DrawnSheet, Step, draw_sheet
 from toonset.bench.stability_sweeps import Sweep
 from toonset.calib.align import align
 from toonset.calib.calibrate import calibrate
@@ -69,6 +70,16 @@ def run_sheet(sweep: Sweep, step: Step, seed: int) -> tuple[SheetResult, bytes]:
 
     A refusal and an exception are results, too: that is the test.
     """
+    return _base_tried(seed) if step == sweep.base else _tried(sweep, step, seed)
+
+
+@cache
+def _base_tried(seed: int) -> tuple[SheetResult, bytes]:
+    about = "The sheet that others are compared with."
+    return _tried(Sweep("base", "", (0,), (0,), about, None, lambda _, s: draw_sheet(s)), 0, seed)
+
+
+def _tried(sweep: Sweep, step: Step, seed: int) -> tuple[SheetResult, bytes]:
     try:
         sheet = sweep.draw(step, seed)
     except ToonsetError as error:  # what is drawn cannot be cut out again

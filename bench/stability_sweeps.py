@@ -7,31 +7,12 @@ px cells, turned wrongly by up to 8 degrees, seen from 10 degrees above, drawn w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 from toonset.bench import stability_draws as draws
+from toonset.bench.stability_page import Page
 from toonset.bench.stability_sheet import DrawnSheet, Step
-
-
-@dataclass(frozen=True)
-class Page:
-    """One way of failing: a property and its steps.
-
-    Attributes:
-        name: for --only and the tables.
-        axis: what the steps are, with unit, for the picture.
-        steps: from harmless to extreme.
-        quick: those of a quick run.
-        about: in a sentence for the report.
-    """
-
-    name: str
-    axis: str
-    steps: tuple[Step, ...]
-    quick: tuple[Step, ...]
-    about: str
 
 
 @dataclass(frozen=True)
@@ -47,22 +28,14 @@ class Sweep(Page):
     from_start: bool = False
 
 
-Chosen = TypeVar("Chosen", bound=Page)
-
-
-def chosen(only: str, pages: Iterable[Chosen], *, quick: bool) -> list[tuple[Chosen, Step]]:
-    """Return the steps to run of the pages whose name contains `only`."""
-    picked = (page for page in pages if only in page.name)
-    return [(page, step) for page in picked for step in (page.quick if quick else page.steps)]
-
-
 SWEEPS = (
     Sweep(
         "start",
         "start error, degrees",
         (0, 5, 10, 15, 20, 30, 45, 60),
-        (0, 10, 20, 30, 45, 60),
+        (0, 20, 45, 60),
         "The contour alignment alone, from cameras turned wrongly; it gives no verdict.",
+        None,
         draws.without_lines,
         from_start=True,
     ),
@@ -72,6 +45,7 @@ SWEEPS = (
         (8, 7, 6, 5, 4, 3, 2, 1),
         (8, 4, 2, 1),
         "Fewer drawings on the sheet, from all directions over the seeds.",
+        None,
         draws.numbered,
     ),
     Sweep(
@@ -80,6 +54,7 @@ SWEEPS = (
         (0, 10, 20, 36, 72, 180),
         (0, 20, 72, 180),
         "Five views turned unequally; 180 degrees is any direction at all.",
+        None,
         draws.uneven,
     ),
     Sweep(
@@ -88,6 +63,7 @@ SWEEPS = (
         (0, 2.5, 5, 7.5, 10),
         (0, 5, 10),
         "Views drawn too large or too small.",
+        0,
         draws.misscaled,
     ),
     Sweep(
@@ -96,6 +72,7 @@ SWEEPS = (
         (0, 2.5, 5, 7.5, 10),
         (0, 5, 10),
         "Figures that lean to the left or right.",
+        None,
         draws.turned_over,
     ),
     Sweep(
@@ -104,6 +81,7 @@ SWEEPS = (
         (0, 0.5, 1, 2, 4),
         (0, 1, 2, 4),
         "Drawing error: every view smoothly bent; careful hands are within 0.5 to 1.5 %.",
+        0,
         draws.warped,
     ),
     Sweep(
@@ -112,6 +90,7 @@ SWEEPS = (
         (0, 5, 10, 15, 20, 30),
         (0, 10, 30),
         "Exaggeration: views taller and narrower, or lower and wider.",
+        0,
         draws.squashed,
     ),
     Sweep(
@@ -120,6 +99,7 @@ SWEEPS = (
         (0, 3, 5, 8, 12, 15),
         (0, 5, 15),
         "Parts that follow the viewer: round ears always face us; the mannequin's face the front.",
+        0,
         draws.with_following_ears,
     ),
     Sweep(
@@ -128,6 +108,7 @@ SWEEPS = (
         (0, 1, 2, 4, 6, 8),
         (0, 4, 8),
         "No contour, a thin one, thick ones.",
+        2,
         draws.outlined,
     ),
     Sweep(
@@ -136,6 +117,7 @@ SWEEPS = (
         (100, 50, 20, 10, 5, 0),
         (100, 10, 0),
         "Colours ever more alike, at last a single flat one.",
+        100,
         draws.paler,
     ),
     Sweep(
@@ -144,6 +126,7 @@ SWEEPS = (
         ("asymmetric", "symmetric", "vase"),
         ("asymmetric", "symmetric", "vase"),
         "A body that tells left from right, one that does not, one without any direction.",
+        "asymmetric",
         draws.of_body,
     ),
     Sweep(
@@ -152,6 +135,7 @@ SWEEPS = (
         (0, 10, 20, 30, 45, 60),
         (0, 20, 60),
         "The wrong pose: the drawn figure raises its arms, the mannequin does not.",
+        0,
         draws.with_arms_up,
     ),
     Sweep(
@@ -160,14 +144,16 @@ SWEEPS = (
         (0, 10, 20, 40, 60),
         (0, 20, 60),
         "Wrong proportions: the drawn head is larger than the mannequin's.",
+        0,
         draws.with_large_head,
     ),
     Sweep(
         "hair",
         "hair ball, radius % of height",
         (0, 10, 15, 20, 25, 30),
-        (0, 10, 20, 30),
+        (0, 20, 30),
         "A ball of hair that the mannequin lacks.",
+        0,
         draws.with_hair,
     ),
     Sweep(
@@ -176,6 +162,7 @@ SWEEPS = (
         (0, 30, 60, 100, 150),
         (0, 60, 150),
         "An asymmetric prop: a staff in the right hand that the mannequin lacks.",
+        0,
         draws.with_staff,
     ),
     Sweep(
@@ -184,22 +171,25 @@ SWEEPS = (
         (0, 2, 4, 8, 12, 16),
         (0, 4, 16),
         "Holes between limbs that are painted shut, as a hasty cut-out does.",
+        0,
         draws.with_gaps_painted,
     ),
     Sweep(
         "fragments",
         "missing, % of area",
         (0, 2, 5, 10, 20, 40),
-        (0, 5, 20, 40),
+        (0, 10, 40),
         "Figures with round pieces missing.",
+        0,
         draws.fragmented,
     ),
     Sweep(
         "feet",
         "feet cropped, % of height",
         (0, 5, 10, 15, 20, 30),
-        (0, 5, 10, 30),
+        (0, 10, 30),
         "Figures cut off at the bottom.",
+        0,
         draws.cropped,
     ),
     Sweep(
@@ -208,14 +198,16 @@ SWEEPS = (
         (0, 1, 2),
         (0, 1, 2),
         "Drawings that were flipped left to right by mistake.",
+        0,
         draws.with_mirrored,
     ),
     Sweep(
         "distance",
         "camera distance, heights",
         (20, 10, 5, 3, 2.5, 2),
-        (20, 5, 3, 2),
+        (20, 5, 2),
         "Drawn in perspective, from ever nearer.",
+        None,
         draws.near,
     ),
     Sweep(
@@ -224,6 +216,7 @@ SWEEPS = (
         (0, draws.HARD, 0.5, 1, 2, 3),
         (0, draws.HARD, 1, 3),
         "Without anti-aliasing, and blurred; cut out of a white sheet.",
+        None,
         draws.blurred,
     ),
     Sweep(
@@ -232,14 +225,16 @@ SWEEPS = (
         (draws.LOSSLESS, 95, 80, 60, 40, 20, 10, 5),
         (draws.LOSSLESS, 80, 40, 10),
         "Saved as JPEG, and cut out of the white sheet.",
+        None,
         draws.compressed,
     ),
     Sweep(
         "resolution",
         "cell, px",
         (1000, 600, 400, 200, 120, 80, 60, 40),
-        (600, 120, 60, 40),
+        (200, 80, 40),
         "Large and small drawings.",
+        200,
         draws.sized,
     ),
 )

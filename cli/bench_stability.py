@@ -48,7 +48,7 @@ def sweep_into(
     """
     from toonset.bench.atlas_run import Counts, all_pages, run_steps
     from toonset.bench.stability_files import RunKey, name_of
-    from toonset.bench.stability_sweeps import chosen
+    from toonset.bench.stability_page import chosen
     from toonset.bench.workers import usable_workers
     from toonset.files import write_bytes
 

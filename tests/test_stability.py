@@ -7,7 +7,6 @@ import math
 import os
 from dataclasses import asdict, replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -17,24 +16,14 @@ from toonset.bench.atlas_training import Tried
 from toonset.bench.calib import ViewError
 from toonset.bench.stability import SheetResult, StepResult, align_from, run_sheet
 from toonset.bench.stability_chart import draw_stability
-from toonset.bench.stability_damage import (
-    MIRROR,
-    mirrored,
-    padded,
-    rolled,
-    with_capsule,
-    without_feet,
-    without_pieces,
-)
 from toonset.bench.stability_files import RunKey, as_plain, from_plain, in_table_order, name_of
-from toonset.bench.stability_sheet import BASE, DrawnSheet, draw_sheet
-from toonset.bench.stability_sweeps import SWEEPS, Sweep, chosen
+from toonset.bench.stability_page import chosen
+from toonset.bench.stability_sheet import BASE, draw_sheet
+from toonset.bench.stability_sweeps import SWEEPS, Sweep
 from toonset.bench.stability_table import as_csv, as_records, row
 from toonset.bench.workers import THREADS, in_order
-from toonset.calib.rim import silhouette_mask
 from toonset.dataset.bodies import random_body
 from toonset.errors import BundleError, SheetError
-from toonset.mesh import Mesh
 
 PLAIN = replace(BASE, outline_px=0, cell_px=120, views=3)
 KEY = RunKey("1", 0, Counts(1, 1))
@@ -43,98 +32,6 @@ KEY = RunKey("1", 0, Counts(1, 1))
 @pytest.fixture(scope="module")
 def sheet():
     return draw_sheet(3, PLAIN)
-
-
-def overlap(view, camera, mesh: Mesh) -> float:
-    """Return intersection over union of the drawing and the mesh seen by the camera."""
-    pixels, _, _ = camera.project(mesh.vertices)
-    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-    seen = silhouette_mask(pixels, faces, camera.size_wh) > 0
-    assert seen.shape == view.mask.shape
-    return float((seen & view.mask).sum() / (seen | view.mask).sum())
-
-
-# ---- damage
-
-
-def test_padding_and_rolling_keep_the_camera_true(sheet: DrawnSheet):
-    for drawn in sheet.drawings:
-        plain = overlap(*drawn, sheet.mesh)
-        assert plain > 0.97
-        assert overlap(*padded(*drawn, 17), sheet.mesh) == plain
-        for roll in (-0.3, 0.5):
-            turned = rolled(*drawn, roll)
-            assert overlap(*turned, sheet.mesh) > 0.96
-            _, elevation, angle = turned[1].angles
-            np.testing.assert_allclose([elevation, angle], [drawn[1].angles[1], roll], atol=1e-9)
-
-
-def test_rolling_there_and_back_returns_the_camera(sheet):
-    view, camera = sheet.drawings[0]
-    back_view, back = rolled(*rolled(view, camera, 0.2), -0.2)
-    np.testing.assert_allclose(back.rotation, camera.rotation, atol=1e-12)
-    grown = (np.array(back.size_wh) - camera.size_wh) / 2
-    np.testing.assert_allclose(back.center - grown, camera.center, atol=1e-9)
-    dx, dy = grown.astype(int)
-    inner = back_view.mask[dy : dy + camera.size_wh[1], dx : dx + camera.size_wh[0]]
-    assert (inner == view.mask).mean() > 0.99
-
-
-def test_a_mirrored_drawing_is_the_mirrored_body(sheet: DrawnSheet):
-    other = replace(sheet.mesh, vertices=sheet.mesh.vertices @ MIRROR, faces=sheet.mesh.faces)
-    for drawn in sheet.drawings:
-        view, camera = mirrored(*drawn)
-        assert overlap(view, camera, other) > 0.97
-        assert np.linalg.det(camera.rotation) == pytest.approx(1)
-        again, back = mirrored(view, camera)
-        np.testing.assert_array_equal(again.rgba, drawn[0].rgba)
-        np.testing.assert_allclose(back.rotation, drawn[1].rotation)
-
-
-def test_cropping_takes_the_lowest_rows_and_nothing_else(sheet):
-    view, camera = sheet.drawings[1]
-    cut, cropped = without_feet(view, camera, 0.25)
-    rows, left = (np.flatnonzero(v.mask.any(axis=1)) for v in (view, cut))
-    assert cropped.size_wh == cut.rgba.shape[1::-1]
-    points = np.random.default_rng(0).normal(size=(5, 3))
-    np.testing.assert_array_equal(cropped.project(points)[0], camera.project(points)[0])
-    assert left[-1] == len(cut.rgba) - 1  # the picture's edge cuts the figure
-    assert len(left) == pytest.approx(0.75 * len(rows), abs=1)
-    np.testing.assert_array_equal(cut.rgba[: left[-1] + 1], view.rgba[: left[-1] + 1])
-    assert without_feet(view, camera, 0)[0] is view
-
-
-def test_missing_pieces_reach_their_share_and_grow_from_step_to_step(sheet):
-    view, camera = sheet.drawings[0]
-    before, kept = view.mask.sum(), [view.mask]
-    for share in (0.0, 0.1, 0.4, 0.9):
-        less, _ = without_pieces(view, camera, share, np.random.default_rng(1))
-        gone = 1 - less.mask.sum() / before
-        assert share <= gone < share + 0.1
-        assert not (less.mask & ~kept[-1]).any()
-        kept.append(less.mask)
-    parts, _ = cv2.connectedComponents(kept[-1].astype(np.uint8))
-    assert parts > 2  # background and at least two fragments
-
-
-def test_a_ball_covers_its_disc_where_the_camera_sees_it(sheet):
-    view, camera = sheet.drawings[0]
-    top = sheet.mesh.vertices[sheet.mesh.vertices[:, 1].argmax()]
-    radius = 0.3
-    hairy, shown = with_capsule(view, camera, np.stack([top, top]), radius, (10, 20, 30))
-    at, _, _ = shown.project(top[None])
-    away = np.linalg.norm(shown.pixel_grid() - at[0], axis=-1)
-    assert hairy.mask[away < radius * camera.scale - 0.5].all()
-    own, _ = padded(view, camera, (hairy.mask.shape[0] - view.mask.shape[0]) // 2)
-    outside = away > radius * camera.scale + 0.5
-    np.testing.assert_array_equal(hairy.mask[outside], own.mask[outside])
-    assert (hairy.rgba[away < 3, :3] == (10, 20, 30)).all()
-
-
-def test_no_radius_is_no_ball(sheet):
-    view, camera = sheet.drawings[0]
-    same, _ = with_capsule(view, camera, np.zeros((2, 3)), 0.0, (0, 0, 0))
-    assert same is view
 
 
 # ---- sweeps
@@ -146,6 +43,19 @@ def test_every_quick_step_is_one_of_the_full_run():
     for page in pages:
         assert set(page.quick) <= set(page.steps), page.name
         assert len(set(map(str, page.steps))) == len(page.steps)
+
+
+@pytest.mark.parametrize("sweep", [s for s in SWEEPS if s.base is not None], ids=lambda s: s.name)
+def test_the_base_step_is_the_base_sheet(sweep, monkeypatch):
+    small = replace(BASE, cell_px=60, views=1, supersample=1)
+    for place in ("stability_sheet", "stability_draws"):
+        monkeypatch.setattr(f"toonset.bench.{place}.BASE", small)
+    step = 60 if sweep.name == "resolution" else sweep.base
+    for (view, camera), (plain, same) in zip(
+        sweep.draw(step, 5).drawings, draw_sheet(5, small).drawings, strict=True
+    ):
+        np.testing.assert_array_equal(view.rgba, plain.rgba)
+        np.testing.assert_array_equal(camera.center, same.center)
 
 
 @pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
@@ -171,7 +81,7 @@ def test_alignment_from_the_truth_stays_and_from_behind_is_lost(sheet):
 
 
 def test_a_refused_and_a_crashed_sheet_are_results(sheet, monkeypatch):
-    sweep = Sweep("x", "x", (0,), (0,), "", lambda step, seed: sheet)
+    sweep = Sweep("x", "x", (0,), (0,), "", None, lambda step, seed: sheet)
     for error, verdict in ((SheetError("too faint"), "failed"), (KeyError("k"), "crashed")):
 
         def broken(*_arguments, error=error):
@@ -189,7 +99,7 @@ def tiny(step, seed):
 
 
 def test_the_same_seed_gives_the_same_table_and_another_seed_another():
-    sweep = Sweep("start", "x", (10, 20), (10,), "", tiny, from_start=True)
+    sweep = Sweep("start", "x", (10, 20), (10,), "", None, tiny, from_start=True)
     plan = [(sweep, step) for step in sweep.steps]
 
     def table(seed):
@@ -295,7 +205,7 @@ def test_a_picture_is_drawn_of_one_sweep_and_of_many():
 
 
 def test_a_second_run_takes_the_first_ones_steps(toonset, tmp_path, monkeypatch):
-    sweep = Sweep("start", "x", (0, 5), (0,), "", tiny, from_start=True)
+    sweep = Sweep("start", "x", (0, 5), (0,), "", None, tiny, from_start=True)
     for place in ("atlas_run.SWEEPS", "stability_chart.SWEEPS"):
         monkeypatch.setattr(f"toonset.bench.{place}", (sweep,))
     monkeypatch.setattr("toonset.bench.workers.usable_workers", lambda: 1)
