@@ -126,7 +126,8 @@ def cameras(scene):
     return [frame.camera for frame in scene.train.frames]
 
 
-def test_errors_of_cameras_are_as_large_as_said_and_none_of_the_body():
+def test_errors_of_cameras_are_as_large_as_said_and_none_of_the_body(monkeypatch):
+    monkeypatch.setattr(atlas_scenes, "HELD_OUT", 2)
     true = cameras(draw_scene(5))
     turned = misturned(10, 5).train.frames
     yaws = [(a.camera.angles[0], b.angles[0]) for a, b in zip(turned, true, strict=True)]
@@ -148,6 +149,7 @@ def test_errors_of_cameras_are_as_large_as_said_and_none_of_the_body():
 def test_the_base_step_of_a_page_is_the_base_scene(monkeypatch):
     small = replace(atlas_scenes.SCENE, cell_px=32, supersample=1)
     monkeypatch.setattr(atlas_scenes, "SCENE", small)
+    monkeypatch.setattr(atlas_scenes, "HELD_OUT", 2)
     base = draw_scene(1)
     for page in TRAIN_PAGES:
         if page.base is not None:
@@ -158,7 +160,8 @@ def test_the_base_step_of_a_page_is_the_base_scene(monkeypatch):
                 np.testing.assert_allclose(a.camera.center, b.camera.center)
 
 
-def test_a_squashed_drawing_is_believed_to_have_square_pixels():
+def test_a_squashed_drawing_is_believed_to_have_square_pixels(monkeypatch):
+    monkeypatch.setattr(atlas_scenes, "HELD_OUT", 2)
     scene = squashed(20, 1)
     assert {camera.pixel_aspect for camera in cameras(scene)} == {1.0}
     heights = [frame.rgba.shape[0] for frame in scene.train.frames]
@@ -172,6 +175,7 @@ def test_a_squashed_drawing_is_believed_to_have_square_pixels():
 def test_a_single_drawing_is_refused_and_a_training_says_nothing_of_a_clean_scene(monkeypatch):
     monkeypatch.setattr(atlas_training, "STEPS", 2)
     monkeypatch.setattr(atlas_scenes, "SCENE", replace(atlas_scenes.SCENE, cell_px=40))
+    monkeypatch.setattr(atlas_scenes, "HELD_OUT", 4)
     atlas_training._base_tried.cache_clear()
     page = TRAIN_PAGES[0]
     tried, picture = try_training(page, 1, 0)
