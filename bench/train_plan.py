@@ -17,7 +17,7 @@ PREPARATIONS: tuple[Preparation, ...] = get_args(Preparation)
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
 PALETTES: tuple[PaletteChoice, ...] = get_args(PaletteChoice)
 PAPER_STEPS = (200, 2000)
-PLANES = {"finest planes": 1.0, "planes of 2/3": 2 / 3, "planes of 1/2": 1 / 2}  # of its cells
+PLANES = {"finest planes": 1.0, "planes of 2/3": 2 / 3, "planes of 1/3": 1 / 3}  # of its cells
 TURN, HALF_TURN = 8, " half turn"  # views of a whole one; ends the groups of the others
 
 

@@ -23,7 +23,7 @@ from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import figure_px
 
-SHARES = (1.0, 2 / 3, 1 / 2)  # of the finest planes' cells
+SHARES = (1.0, 2 / 3, 1 / 3)  # of the finest planes' cells
 MOST_RAYS = 32_000  # drawn by lot: a trial takes fewer than two of them a step
 STEPS = 60  # by then the order of the candidates shows
 WORTH_STEPS = len(SHARES) * STEPS  # of a training; choosing costs no more than a shorter one
