@@ -128,7 +128,7 @@ def test_two_drawings_say_nothing_of_planes(scene: Scene, quick: None) -> None:
 def test_the_summary_has_the_evidence() -> None:
     choice = FieldChoice(60, tuple(candidates(20.1, 20.0, 19.0)), ("001.png", "005.png"))
     text = summary_of(choice)
-    assert "planes: 60 cells along the longest side, the fewest within 0.2 dB of the best" in text
+    assert "planes: 60 cells along the longest side, the fewest within 0.15 dB of the best" in text
     assert "(predicted 001.png and 005.png; 90: 20.10 dB, 60: 20.00 dB, 30: 19.00 dB)" in text
     assert "too few drawings to leave one out" in summary_of(FieldChoice(90, (), ()))
 
