@@ -44,10 +44,10 @@ def _draw_values(axes: Any, page: TriedPage) -> None:
     kind, at = page.kind, np.arange(len(page.steps))
     values = [_shown([t.value for t in step.trials], kind) for step in page.steps]
     axes.axhspan(*_failed_range(values, kind), color=VERMILION, alpha=0.08, lw=0)
-    for bound, words, side in ((kind.failed, "failed", "bottom"), (kind.fine, "fine", "top")):
-        if bound == kind.failed or kind.fine < kind.failed:
-            axes.axhline(bound, color=DARK, lw=0.9, ls=(0, (2, 3)))
-            _write_beside(axes, bound, words, side)
+    bounds = [(kind.failed, "failed", "bottom"), (kind.fine, "fine", "top")]
+    for bound, words, side in bounds if kind.fine < kind.failed else bounds[:1]:
+        axes.axhline(bound, color=DARK, lw=0.9, ls=(0, (2, 3)))
+        _write_beside(axes, bound, words, side)
     axes.vlines(
         at, [np.median(v) for v in values], [np.percentile(v, 95) for v in values], color=GREY, lw=4
     )

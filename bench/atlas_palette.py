@@ -68,7 +68,7 @@ def color_away(start: Rgb, towards: Rgb, distance: float) -> Rgb:
 
 
 def try_palette(page: PalettePage, step: Step, seed: int) -> tuple[Tried, bytes]:
-    """Return which share of the wanted colours was found, and a PNG: the figure, both palettes."""
+    """Return the percentage of wanted colours that was found, and a PNG: drawing, both palettes."""
     began = time.perf_counter()
     body, wanted = page.draw(step, seed)
     made = make_turnaround(body, PICTURES, seed)
@@ -79,7 +79,7 @@ def try_palette(page: PalettePage, step: Step, seed: int) -> tuple[Tried, bytes]
         return Tried(seed, 0.0, REFUSED, str(error)), b""
     missed = [color for color in wanted if not _has(palette.rgb, color, wanted)]
     voice, words = _said(palette, missed or wanted)
-    found = 1 - len(missed) / len(wanted)
+    found = 100 * (1 - len(missed) / len(wanted))
     evidence = {"colors": float(len(palette.colors))}
     if palette.evidence is not None:
         evidence |= {

@@ -141,18 +141,12 @@ def _figure(kind: str, page: TriedPage, step: TriedStep, pictures: Pictures, lea
     trial = worst_trial(step, page.kind)
     said = f"; {trial.voice}" if trial.voice != UNJUDGED else ""
     words = f': "{trial.words}"' if trial.words and lead else ""
-    axis = f"{page.page.axis}: " if lead else ""
-    caption = f"{lead}{axis}{step.step}; {_quantity(trial.value, page.kind)}{said}{words}"
+    axis, what = (f"{page.page.axis}: ", f"{page.kind.value} ") if lead else ("", "")
+    caption = f"{lead}{axis}{step.step}; {what}{trial.value:.1f} {page.kind.unit}{said}{words}"
     return (
         f'<figure class="{kind}"><img alt="" src="data:image/png;base64,{data}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
-
-
-def _quantity(value: float, kind: Kind) -> str:
-    if kind.unit == "share":
-        return f"{100 * value:.0f} % missed"
-    return f"{value:.1f} {kind.unit}"
 
 
 def _verdict(page: TriedPage) -> str:
@@ -168,7 +162,7 @@ def _verdict(page: TriedPage) -> str:
 
 def _steps_table(page: TriedPage) -> str:
     kind = page.kind
-    unit = "" if kind.unit == "share" else f", {kind.unit}"
+    unit = f", {kind.unit}"
     head = (
         *(page.page.axis, "n", "failed", f"median{unit}", "95th percentile", "sheets' medians"),
         *("announced", "false alarms", "said", "most often"),

@@ -29,6 +29,8 @@ from toonset.bench.stability_table import SOLVED_DEG, WRONG_DEG
 
 BLUE, VERMILION, GREEN, _, ORANGE, SKY, BLACK, GREY = COLORS
 LOST_FINE_DB, LOST_FAILED_DB = 1.0, 3.0
+NONE_MISSED = 0.1  # %
+HUNDRED = 100.0
 CALIBRATION = Kind(
     *("calibration", "views", "rotation error", "degrees", SOLVED_DEG, WRONG_DEG),
     {"ok": GREEN, "weak": ORANGE, "ambiguous": SKY, "failed": VERMILION, "crashed": BLACK},
@@ -39,7 +41,7 @@ TRAINING = Kind(
     {SILENT: GREEN, REPAIRED: ORANGE, WARNED: SKY, REFUSED: VERMILION, CRASHED: BLACK},
 )
 PALETTE = Kind(
-    *("palette", "palettes", "colours missed", "share", 1e-3, 1e-3),
+    *("palette", "palettes", "colours missed", "%", NONE_MISSED, NONE_MISSED),
     {SILENT: GREEN, CLOSE: ORANGE, LISTED: SKY, PALETTE_WARNED: VERMILION, REFUSED: BLACK},
 )
 
@@ -73,7 +75,7 @@ def _steps(page: AnyPage, results: Sequence[Result]) -> tuple[TriedStep, ...]:
     if sheets:
         return tuple(TriedStep(result.step, _views(result.sheets)) for result in sheets)
     tried = [result for result in results if isinstance(result, TriedStepResult)]
-    best = dict.fromkeys((one.seed for result in tried for one in result.tried), 1.0)
+    best = dict.fromkeys((one.seed for result in tried for one in result.tried), HUNDRED)
     if isinstance(page, TrainPage):
         clean = [result for result in tried if result.step == str(page.reference)]
         best = {one.seed: one.figure for result in clean for one in result.tried}

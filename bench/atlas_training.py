@@ -62,7 +62,7 @@ class Tried:
 
     Attributes:
         seed: of the body.
-        figure: the larger the better: dB of the held-out views, or a share of what was to be found.
+        figure: the larger the better: dB of the held-out views, or percent of what was to be found.
         voice: the loudest of what was said.
         words: what was said, most important first.
         evidence: further numbers that training writes into its report.

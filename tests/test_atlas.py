@@ -206,7 +206,7 @@ def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monke
     assert tiny.draw is tiny_feature
     apart, _ = try_palette(near, 20, 0)
     alike, _ = try_palette(near, 0.5, 0)
-    assert (apart.figure, alike.figure) == (1.0, 0.5)
+    assert (apart.figure, alike.figure) == (100, 50)
     eye, picture = try_palette(tiny, 5, 0)
     assert eye.figure == 0
     assert picture.startswith(b"\x89PNG")
@@ -297,7 +297,8 @@ def test_a_report_names_the_worst_case_and_needs_nothing_else():
     page = page_of([FINE, ALARM], [SAID, SAID], [UNSAID])
     pictures = {("warp", str(step)): b"\x89PNG" for step in PAGE.steps[:3]}
     html = atlas_html("toonset bench stability", "1", "seed 0", [page], pictures)
-    assert "Worst case: outline warp, % of cell: 1; 20.0 degrees; ok" in html  # unsaid: the worst
+    worst = "Worst case: outline warp, % of cell: 1; rotation error 20.0 degrees; ok"
+    assert worst in html  # failed in silence: worse than what is farther off
     assert "Fails from 0.5 on: there 2 of 2 views fail, 2 of them announced." in html
     assert "67 % (2 of 3)" in html
     assert html.count("data:image/png") == 4
