@@ -12,7 +12,7 @@ CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 
 def borders(
-    values: Float[np.ndarray, "height width channels"],
+    values: Float[np.ndarray, "channels height width"],
     labels: Int[np.ndarray, "height width"],
 ) -> Bool[np.ndarray, "height width"]:
     """Return the pixels that differ from one of their four neighbours.
@@ -21,11 +21,14 @@ def borders(
         values: what is seen at the pixels' centres, in [0, 1]: colour, opacity.
         labels: differ or not.
     """
-    found = np.zeros(labels.shape, dtype=bool)
-    for picture, tolerance in ((values, TOLERANCE), (labels.astype(np.float32), 0)):
-        apart = cv2.dilate(picture, CROSS) - cv2.erode(picture, CROSS) > tolerance
-        found |= apart.any(axis=-1) if apart.ndim == 3 else apart
+    found = _range(labels.astype(np.float32)) > 0
+    for channel in values:
+        found |= _range(channel) > TOLERANCE
     return found
+
+
+def _range(values: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    return cv2.dilate(values, CROSS) - cv2.erode(values, CROSS)
 
 
 def places_within(

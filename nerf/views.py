@@ -16,12 +16,13 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.nerf.ink import InkStyle
 from toonset.nerf.ink_redraw import draw_ink, ink_scale, inked
-from toonset.nerf.march import pixels_near, rays_of
 from toonset.nerf.supersample import borders, places_within
+from toonset.nerf.threads import one_thread
 from toonset.nerf.trained import TrainedField
 from toonset.nerf.views_bake import Baked
 from toonset.nerf.views_cast import cast
 from toonset.nerf.views_labels import NONE, labels_of, palette_shares
+from toonset.nerf.views_rays import Sight
 from toonset.palette.labels import UNLABELLED
 
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
@@ -55,6 +56,7 @@ class Rendering:
 
 
 @torch.no_grad()
+@one_thread()
 def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     """Return the view of `camera`, orthographic or pinhole, of any size.
 
@@ -67,20 +69,27 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     baked = source if isinstance(source, Baked) else Baked.of(source)
     trained = baked.trained
     width, height = camera.size_wh
-    near = torch.as_tensor(pixels_near(camera, trained.hull))
-    seen, labels = torch.zeros(height, width, 5), torch.full((height, width), NONE)
-    seen[near] = _cast(baked, camera, camera.pixel_grid()[near.numpy()])
-    if trained.classifier is not None:
-        labels[near] = labels_of(trained.classifier, seen[near][:, :3], seen[near][:, 3])
-    border = borders(seen[..., :4].numpy(), labels.numpy())
+    sight = Sight.of(baked, camera)
+    seen = cast(sight, _grid(height, width)).view(5, height, width)
+    labels, shares = torch.full((height, width), NONE), None
+    if baked.labels is not None:
+        labels = labels_of(baked.labels, seen[:3], seen[3])
+    border = borders(seen[:4].numpy(), labels.numpy())
     places = places_within(border)
-    more = _cast(baked, camera, places.reshape(-1, 2)).view(*places.shape[:2], 5)
-    chosen, shares = torch.as_tensor(border), None
-    if trained.classifier is not None:
-        shares = palette_shares(trained.classifier, baked.paints, seen, labels, chosen, more)
-    seen[chosen] = more.mean(dim=1)
+    rays = torch.as_tensor(places.reshape(-1, 2).T, dtype=torch.float32)
+    more = cast(sight, rays).view(5, *places.shape[:2])
+    chosen = torch.as_tensor(border)
+    if baked.labels is not None:
+        shares = palette_shares(baked.labels, baked.paints, seen[3], labels, chosen, more)
+    seen[:, chosen] = more.mean(dim=2)
     view = _rendering(seen.numpy(), None if shares is None else shares.numpy())
     return _with_lines(view, trained.ink, camera)
+
+
+def _grid(height: int, width: int) -> Float[Tensor, "2 pixels"]:
+    """Return the centre of every pixel."""
+    v, u = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
+    return torch.stack([u, v]).view(2, -1)
 
 
 def _with_lines(view: Rendering, style: InkStyle | None, camera: Camera) -> Rendering:
@@ -92,26 +101,16 @@ def _with_lines(view: Rendering, style: InkStyle | None, camera: Camera) -> Rend
     )
 
 
-def _cast(baked: Baked, camera: Camera, pixels: Float[np.ndarray, "n 2"]) -> Float[Tensor, "n 5"]:
-    """Return rays' premultiplied colour, opacity, and depth times opacity."""
-    rays = rays_of(camera, pixels, baked.trained.hull)
-    seen = cast(baked, rays)
-    forward = torch.as_tensor(np.array(camera.rotation[2]), dtype=torch.float32)
-    offset = float(np.array(camera.rotation[2]) @ camera.target)
-    # distance is opacity-weighted, hence the opacity before the constant parts
-    seen[:, 4] *= rays.directions @ forward
-    seen[:, 4] += seen[:, 3] * (rays.origins @ forward - offset)
-    return seen
-
-
 def _rendering(
-    mean: Float[np.ndarray, "height width 5"],
+    mean: Float[np.ndarray, "5 height width"],
     shares: Float[np.ndarray, "height width colors"] | None,
 ) -> Rendering:
-    alpha = mean[..., 3].clip(0, 1)
+    alpha = mean[3].clip(0, 1)
     seen = alpha >= SEEN_FROM
-    depth = np.where(seen, mean[..., 4] / np.where(seen, alpha, 1), np.nan)
+    depth = np.where(seen, mean[4] / np.where(seen, alpha, 1), np.nan)
     labels = None
     if shares is not None:
         labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
-    return Rendering(mean[..., :3], alpha, depth, labels, shares)
+    return Rendering(
+        np.ascontiguousarray(np.moveaxis(mean[:3], 0, -1)), alpha, depth, labels, shares
+    )

@@ -12,23 +12,21 @@ costs 0.03 dB on new views.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, Shaped, UInt8
 from torch import Tensor
 
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.hull import EDGE, Hull, grown, occupancy
 from toonset.nerf.trained import TrainedField
+from toonset.nerf.views_labels import label_table
 
 POINTS_PER_CHUNK = 1 << 13
-WIDTH = 512  # of the pictures that hold a list of places; OpenCV's sides end at 32,767
 FAINTEST, STEEPEST = 1e-6, 15.0  # optical depths between which softplus has an exact inverse
 MOST_CLEAR = 24  # voxels: farther ones count as so far
 
@@ -37,28 +35,28 @@ MOST_CLEAR = 24  # voxels: farther ones count as so far
 class Baked:
     """A field at the voxels of its hull.
 
-    Places are in voxels from half a voxel before the hull's lowest corner, one list per axis:
-    lists of single numbers are what processors are fast at.
+    Places are in voxels from half a voxel before the hull's lowest corner, axis by axis: lists of
+    single numbers are what processors are fast at.
 
     Attributes:
         trained: where it comes from.
-        density: slices of constant x side by side, one voxel round each: what softplus makes a
-            step's optical depth from.
-        support: the hull's support, in the same places.
-        color: RGB and a constant 1, in the same places.
-        corners: (2, slices) column and row of each slice.
-        clear: (x, y, z) voxels from here to the nearest that may hold a sample, along the axis on
-            which they are most; 0: this one may.
+        matter: slices of constant x, one voxel round each: what softplus makes a step's optical
+            depth from, and the hull's support, here and in the next slice.
+        color: RGB in the same places; a fourth channel is read faster than none.
+        leaps: (x, y, z) steps, in any direction, from anywhere in this voxel over what certainly
+            holds no sample.
+        shell: (3, n) places of voxels that may hold a sample beside voxels that may not.
+        labels: a palette label for every colour; None without palette.
         paints: (colors, 3) what the surface shows for each palette label, nan for one that it shows
             nowhere; no rows without palette.
     """
 
     trained: TrainedField
-    density: Float[np.ndarray, "height width"]
-    support: Float[np.ndarray, "height width"]
-    color: Float[np.ndarray, "height width 4"]
-    corners: Float[Tensor, "2 slices"]
-    clear: UInt8[Tensor, "x y z"]
+    matter: Slices
+    color: Slices
+    leaps: UInt8[Tensor, "x y z"]
+    shell: Float[Tensor, "3 n"]
+    labels: UInt8[Tensor, "red green blue"] | None
     paints: Float[Tensor, "colors 3"]
 
     @classmethod
@@ -71,95 +69,104 @@ class Baked:
         for chunk in read.reshape(-1).nonzero()[:, 0].split(POINTS_PER_CHUNK):
             per_unit, color[chunk, :3] = trained.field(_middles(hull, chunk))
             density[chunk] = _unsoftened(per_unit * trained.step)
-        tiles, corners = _side_by_side(density.view(*read.shape, 1).numpy(), "edge")
-        support, _ = _side_by_side(hull.support[..., None].numpy(), "constant")
-        colors, _ = _side_by_side(color.view(*read.shape, 4).numpy(), "edge")
-        clear = _away_from(hull.near)
         shown = color[(hull.inside & grown(~hull.inside, 1)).reshape(-1), :3]
         paints = _paints(trained.classifier, shown)
-        return cls(trained, tiles[..., 0], support[..., 0], colors, corners, clear, paints)
-
-    def place(self, points_world: Float[Tensor, "n 3"]) -> Float[Tensor, "3 n"]:
-        """Return world points in voxels."""
-        hull = self.trained.hull
-        low = torch.as_tensor(hull.low - hull.voxel / 2, dtype=torch.float32)
-        return ((points_world - low) * (1 / hull.voxel)).T.contiguous()
-
-    def clearance(self, place: Sequence[Float[Tensor, "n steps"]]) -> UInt8[Tensor, "n steps"]:
-        """Return `clear` at places inside the hull's box, given by axis."""
-        sizes = self.clear.shape
-        x, y, z = (
-            (at - 0.5).clamp_(0, size - 1).int() for at, size in zip(place, sizes, strict=True)
+        here = np.stack(
+            [np.pad(density.view(read.shape), 1, mode="edge"), np.pad(hull.support, 1)], axis=-1
         )
-        index = x.mul_(sizes[1]).add_(y).mul_(sizes[2]).add_(z)
-        return self.clear.view(-1)[index]
+        matter = Slices.of(np.concatenate([here, np.roll(here, -1, axis=0)], axis=-1))
+        levels = color.mul_(255).round_().byte().view(*read.shape, 4)
+        colors = Slices.of(np.pad(levels, [(1, 1)] * 3 + [(0, 0)], mode="edge"))
+        leaps = _leaps(hull, trained.step)
+        labels = None if trained.classifier is None else label_table(trained.classifier)
+        return cls(trained, matter, colors, leaps, _shell(hull.near), labels, paints)
 
-    def at(self, place: Sequence[Float[Tensor, "n steps"]]) -> Looked:
-        """Return what is found at places, given by axis; they are clamped to the hull in place."""
-        x, y, z = (
-            at.clamp_(0, size + (1 - 1e-3))
-            for at, size in zip(place, self.clear.shape, strict=True)
-        )
-        number = x.int()
-        part = x - number
-        here, there = self._maps(number, y, z), self._maps(number + 1, y, z)
-        density, support = (
-            _found(tiles, here, part.shape).lerp_(_found(tiles, there, part.shape), part)
-            for tiles in (self.density, self.support)
-        )
-        occupied = occupancy(support).mul_(support >= EDGE)
-        colors = [_found(self.color, at, (*part.shape, 4)) for at in (here, there)]
-        return Looked(F.softplus(density).mul_(occupied), colors[0], colors[1], part)
+    def leap(self, place: Float[Tensor, "3 n"]) -> Float[Tensor, " n"]:
+        """Return `leaps` at places; outside of the hull's box, of the nearest voxel."""
+        most = torch.tensor(self.leaps.shape)[:, None] - 1.0
+        cell = torch.minimum((place - 0.5).clamp_min_(0), most).int()
+        strides = torch.tensor(self.leaps.stride(), dtype=torch.int32)[:, None]
+        index = (cell * strides).sum(dim=0, dtype=torch.int32)
+        return self.leaps.view(-1).index_select(0, index).float()
 
-    def _maps(
-        self, number: Int[Tensor, "n steps"], y: Tensor, z: Tensor
-    ) -> Float[np.ndarray, "2 rows width"]:
-        """Return columns and rows of places in the slices of these numbers."""
-        maps = torch.zeros(2, -(-number.numel() // WIDTH) * WIDTH)
-        for corner, at, found in zip(self.corners, (z, y), maps, strict=True):
-            first = corner.index_select(0, number.view(-1))
-            torch.add(first, at.reshape(-1), out=found[: len(first)])
-        return maps.view(2, -1, WIDTH).numpy()
+    def optical_depth(self, place: Float[Tensor, "3 steps n"]) -> Float[Tensor, "steps n"]:
+        """Return a step's optical depth at places, which are clamped to the hull in place."""
+        number, part, y, z = self._split(place)
+        found = self.matter.at(number, y, z)
+        density = torch.lerp(found[..., 0], found[..., 2], part)
+        support = torch.lerp(found[..., 1], found[..., 3], part)
+        occupied = occupancy(F.threshold(support, EDGE, 0.0, inplace=True))
+        return F.softplus(density).mul_(occupied)
+
+    def rgb(self, place: Float[Tensor, "3 steps n"]) -> Float[Tensor, "3 steps n"]:
+        """Return colour in [0, 1] at places, which are clamped to the hull in place."""
+        number, part, y, z = self._split(place)
+        here, there = (
+            torch.empty_like(place).copy_(self.color.at(number + i, y, z).permute(2, 0, 1)[:3])
+            for i in (0, 1)
+        )
+        return here.lerp_(there, part).mul_(1 / 255)
+
+    def _split(self, place: Float[Tensor, "3 steps n"]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return the slice before each place, how far it is towards the next, and y, z there."""
+        most = torch.tensor(self.leaps.shape)[:, None, None] + (1 - 1e-3)
+        x, y, z = torch.minimum(place, most, out=place.clamp_min_(0))
+        number = x.floor()
+        return number, x.sub_(number), y, z
 
 
 @dataclass(frozen=True, eq=False)
-class Looked:
-    """What is found at some places along rays.
+class Slices:
+    """A volume's slices of constant x in one picture, and how to read in it.
 
     Attributes:
-        depth: optical depth of a step, the hull's part included.
-        here, there: RGB and 1 in the slices before and behind each place.
-        part: how far each place is towards the latter.
+        picture: the slices below and beside each other.
+        rows: slices below each other.
+        size: (height, width) of a slice.
     """
 
-    depth: Float[Tensor, "n steps"]
-    here: Float[Tensor, "n steps 4"]
-    there: Float[Tensor, "n steps 4"]
-    part: Float[Tensor, "n steps"]
+    picture: Shaped[np.ndarray, "height width 4"]
+    rows: int
+    size: tuple[int, int]
 
-    def color(self, weights: Float[Tensor, "n steps"]) -> Float[Tensor, "n 4"]:
-        """Return the weighted sums of RGB, and of the weights."""
-        there = weights * self.part
-        sums = torch.bmm((weights - there)[:, None], self.here)
-        return sums.baddbmm_(there[:, None], self.there)[:, 0]
+    @classmethod
+    def of(cls, volume: Shaped[np.ndarray, "x y z 4"]) -> Slices:
+        """Return the slices in a picture that is about a square."""
+        x, y, z = volume.shape[:3]
+        rows = min(x, max(1, round(math.sqrt(x * z / y))))
+        columns = -(-x // rows)
+        tiles = np.zeros((columns * rows, y, z, 4), dtype=volume.dtype)
+        tiles[:x] = volume
+        picture = tiles.reshape(columns, rows * y, z, 4).swapaxes(0, 1)
+        return cls(np.ascontiguousarray(picture.reshape(rows * y, columns * z, 4)), rows, (y, z))
+
+    def at(
+        self, number: Float[Tensor, "h w"], y: Float[Tensor, "h w"], z: Float[Tensor, "h w"]
+    ) -> Shaped[Tensor, "h w 4"]:
+        """Return what is at y, z in the slices of these whole numbers, bilinear."""
+        column = ((number + 0.5) * (1 / self.rows)).floor_()
+        row = torch.sub(number, column, alpha=self.rows)
+        u = torch.add(z, column, alpha=self.size[1])
+        v = torch.add(y, row, alpha=self.size[0])
+        return torch.from_numpy(cv2.remap(self.picture, u.numpy(), v.numpy(), cv2.INTER_LINEAR))
 
 
-def _found(
-    tiles: Float[np.ndarray, "height width *channels"],
-    maps: Float[np.ndarray, "2 rows width"],
-    shape: tuple[int, ...],
-) -> Float[Tensor, "n steps *channels"]:
-    values = torch.from_numpy(cv2.remap(tiles, maps[0], maps[1], cv2.INTER_LINEAR))
-    return values.view(-1)[: math.prod(shape)].view(shape)
+def _leaps(hull: Hull, step: float) -> UInt8[Tensor, "x y z"]:
+    """Return the steps from every voxel to where the next sample may be.
 
-
-def _away_from(cells: Bool[Tensor, "x y z"]) -> UInt8[Tensor, "x y z"]:
-    """Return every cell's distance to the nearest one that is set, the largest of the axes'."""
-    away = torch.zeros(cells.shape, dtype=torch.uint8)
+    A voxel whose nearest neighbour that may hold one is n voxels away, along the axis on which it
+    is most, has n - 1 voxels without any round it.
+    """
+    away, cells = torch.zeros(hull.near.shape), hull.near
     for _ in range(MOST_CLEAR):
         away += ~cells
         cells = grown(cells, 1)
-    return away
+    return ((away - 1) * (hull.voxel / step)).floor_().add_(1).clamp_(0, 255).byte()
+
+
+def _shell(near: Bool[Tensor, "x y z"]) -> Float[Tensor, "3 n"]:
+    beyond = grown(F.pad(~near, (1,) * 6, value=True), 1)[1:-1, 1:-1, 1:-1]
+    return (near & beyond).nonzero().T + 1.0
 
 
 def _paints(
@@ -184,24 +191,3 @@ def _middles(hull: Hull, cells: Int[Tensor, " n"]) -> Float[Tensor, "n 3"]:
     _, y, z = hull.support.shape
     number = torch.stack([cells // (y * z), cells // z % y, cells % z], dim=1)
     return torch.as_tensor(hull.low, dtype=torch.float32) + hull.voxel * (number + 0.5)
-
-
-def _side_by_side(
-    volume: Float[np.ndarray, "x y z channels"], beyond: Literal["edge", "constant"]
-) -> tuple[Float[np.ndarray, "height width channels"], Float[Tensor, "2 slices"]]:
-    """Return the slices of a volume in one picture, a voxel round each, and where each begins.
-
-    Args:
-        volume: values at voxels.
-        beyond: the voxel round a slice repeats its edge, or is zero.
-    """
-    volume = np.pad(volume, [(1, 1)] * 3 + [(0, 0)], mode=beyond)
-    x, y, z = volume.shape[:3]
-    columns = max(1, round(np.sqrt(x * y / z)))
-    rows = -(-x // columns)
-    tiles = np.zeros((rows * columns, y, z, volume.shape[3]), dtype=np.float32)
-    tiles[:x] = volume
-    grid = tiles.reshape(rows, columns, y, z, -1).swapaxes(1, 2).reshape(rows * y, columns * z, -1)
-    number = torch.arange(x)
-    corners = torch.stack([number % columns * z, number // columns * y]).float()
-    return np.ascontiguousarray(grid), corners

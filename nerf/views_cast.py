@@ -1,8 +1,8 @@
 """Rays through a baked field, for a picture: no work in empty space or behind what is opaque.
 
 The samples are those of `toonset.nerf.march`, so a view shows what was trained. But a picture needs
-only the front of what a ray meets: a ray leaps over the steps that its voxel says are empty, looks
-at a few where it says nothing, and ends where it is opaque.
+only the front of what a ray meets: a ray begins where the hull may begin, goes on a few steps at a
+time, leaps over those that its voxel says are empty, and ends where it is opaque.
 
 Source: leaps by the distance to the nearest surface: Zuiderveld, Koning, Viergever, "Acceleration
 of ray-casting using 3-D distance transforms", 1992.
@@ -11,112 +11,116 @@ of ray-casting using 3-D distance transforms", 1992.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from toonset.nerf.march import Rays, clip
 from toonset.nerf.views_bake import Baked
+from toonset.nerf.views_rays import Paths, Sight
 
 RAYS_PER_CHUNK = 1 << 14  # a chunk's arrays stay in a core's cache
-FEWEST_STEPS, MOST_STEPS = 8, 32  # of a ray that are looked up together: more as rays get fewer
-STEPS_PER_ROUND = 1 << 15  # in all, where rays are few enough
-SHORT = 0.25  # of these steps: less empty space is not worth a leap
+FEWEST_STEPS, MOST_STEPS = 12, 32  # of a ray that are looked up together: more as rays get fewer
+STEPS_PER_ROUND = 1 << 14  # in all, where rays are few enough
+STEPS_PER_COLOR = 4  # that share one, read at their mean place
 OPAQUE_FROM = 0.98  # opacity at which a ray ends; the colour seen until then stands for the rest
+FAINTEST = 1e-12  # weight of steps whose mean place is asked for
 
 
-def cast(baked: Baked, rays: Rays) -> Float[Tensor, "rays 5"]:
-    """Return premultiplied colour, opacity, and distance weighted with opacity, of every ray.
+def cast(sight: Sight, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays"]:
+    """Return premultiplied colour, opacity, and depth times opacity of rays through pixels.
 
     A ray that reaches OPAQUE_FROM ends and counts as opaque.
     """
-    starts = range(0, max(len(rays.origins), 1), RAYS_PER_CHUNK)
-    return torch.cat([_cast(baked, rays.at(slice(i, i + RAYS_PER_CHUNK))) for i in starts])
-
-
-def _cast(baked: Baked, rays: Rays) -> Float[Tensor, "rays 5"]:
-    paths = _Paths.of(rays, baked)
-    result = torch.zeros(len(rays.origins), 5)
-    ray = (paths.count > 0).nonzero()[:, 0]
-    number = torch.zeros(len(ray))
-    while len(ray):
-        steps = min(max(STEPS_PER_ROUND // len(ray), FEWEST_STEPS), MOST_STEPS)
-        empty = paths.empty_steps(baked, ray, number)
-        meets = (empty <= SHORT * steps).nonzero()[:, 0]
-        if len(meets):
-            seen = ray.index_select(0, meets)
-            first = number.index_select(0, meets)
-            front = result.index_select(0, seen)
-            result.index_copy_(
-                0, seen, front + _seen(baked, paths, seen, first, steps, front[:, 3])
-            )
-            empty.index_fill_(0, meets, steps)
-        number += empty
-        inside = number < paths.count.index_select(0, ray)
-        on = (inside & (result[:, 3].index_select(0, ray) < OPAQUE_FROM)).nonzero()[:, 0]
-        ray, number = ray.index_select(0, on), number.index_select(0, on)
-    full = result[:, 3:4] >= OPAQUE_FROM
-    return torch.where(full, result / result[:, 3:4].clamp_min(OPAQUE_FROM), result)
-
-
-def _seen(
-    baked: Baked,
-    paths: _Paths,
-    ray: Int[Tensor, " n"],
-    first: Float[Tensor, " n"],
-    steps: int,
-    before: Float[Tensor, " n"],
-) -> Float[Tensor, "n 5"]:
-    """Return what some steps of some rays add, `before` being the opacity in front of them."""
-    number = first[:, None] + torch.arange(steps)
-    found = baked.at(paths.places(ray, number))
-    left = torch.exp(-found.depth.cumsum(dim=1)) * (1 - before)[:, None]
-    weights = torch.cat([(1 - before)[:, None], left], dim=1).diff(dim=1).neg_()
-    distance = (weights * number).sum(dim=1) + 0.5 * weights.sum(dim=1)
-    color = found.color(weights)
-    away = paths.near.index_select(0, ray) * color[:, 3] + paths.step * distance
-    return torch.cat([color, away[:, None]], dim=1)
+    between = sight.between(pixels)
+    result = torch.zeros(5, pixels.shape[1])
+    for part in (between[0] <= between[1]).nonzero()[:, 0].split(RAYS_PER_CHUNK):
+        paths = sight.paths(pixels.index_select(1, part), between.index_select(1, part))
+        result.scatter_(1, part.expand(5, -1), _cast(sight.baked, paths))
+    return result
 
 
 @dataclass(frozen=True, eq=False)
-class _Paths:
-    """The steps of some rays.
+class _Rays:
+    """How far some rays have come.
 
     Attributes:
-        near: (rays,) where they enter the hull's box.
-        count: (rays,) steps until they leave it.
-        step: distance of samples.
-        first: (3, rays) a ray's first sample, in voxels.
-        ahead: (3, rays) from a sample to the next, in voxels.
-        leap: steps in a voxel's edge.
+        ray: (n,) which they are.
+        place: (3, n) of their next step.
+        ahead: (3, n) from a step to the next.
+        number: (n,) of their next step.
+        last: (n,) number from which on nothing is met.
+        left: (n,) light that reaches the next step.
+        seen: (4, n) premultiplied colour, and numbers of steps weighted with their opacity.
     """
 
-    near: Float[Tensor, " rays"]
-    count: Float[Tensor, " rays"]
-    step: float
-    first: Float[Tensor, "3 rays"]
-    ahead: Float[Tensor, "3 rays"]
-    leap: float
+    ray: Int[Tensor, " n"]
+    place: Float[Tensor, "3 n"]
+    ahead: Float[Tensor, "3 n"]
+    number: Float[Tensor, " n"]
+    last: Float[Tensor, " n"]
+    left: Float[Tensor, " n"]
+    seen: Float[Tensor, "4 n"]
 
-    @classmethod
-    def of(cls, rays: Rays, baked: Baked) -> _Paths:
-        hull, step = baked.trained.hull, baked.trained.step
-        near, far = clip(rays, hull)
-        middle = rays.origins + rays.directions * (near + step / 2)[:, None]
-        ahead = (rays.directions * (step / hull.voxel)).T.contiguous()
-        return cls(near, (far - near) / step, step, baked.place(middle), ahead, hull.voxel / step)
+    def at(self, index: Int[Tensor, " n"]) -> _Rays:
+        """Return some of them."""
+        return _Rays(*(part.index_select(-1, index) for part in vars(self).values()))
 
-    def places(
-        self, ray: Int[Tensor, " n"], number: Float[Tensor, "n steps"]
-    ) -> list[Float[Tensor, "n steps"]]:
-        """Return the coordinates, axis by axis, of steps of some rays."""
-        first, ahead = (at.index_select(1, ray)[..., None] for at in (self.first, self.ahead))
-        return [torch.addcmul(first[i], ahead[i], number) for i in range(3)]
+    def advanced(self, baked: Baked, steps: int) -> _Rays:
+        """Return them some steps on, and over what is empty behind these."""
+        number = torch.arange(steps, dtype=torch.float32)[:, None]
+        place, ahead = self.place[:, None], self.ahead[:, None]
+        depth = baked.optical_depth(torch.addcmul(place, ahead, number))
+        left = torch.zeros(steps + 1, len(self.ray))
+        torch.cumsum(depth, dim=0, out=left[1:])
+        left.neg_().exp_().mul_(self.left)
+        weights, moments = (_sums(steps) @ left).view(2, -1, len(self.ray))
+        mean = moments / weights.clamp_min(FAINTEST)
+        rgb = baked.rgb(torch.addcmul(place, ahead, mean)).mul_(weights).sum(dim=1)
+        away = moments.sum(dim=0).addcmul_(weights.sum(dim=0), self.number)
+        seen = self.seen + torch.cat([rgb, away[None]])
+        passed = torch.full_like(self.left, steps)
+        lost = (left[-1] == self.left).nonzero()[:, 0]  # nothing was met: look how far that goes
+        ended = torch.add(self.place, self.ahead, alpha=steps).index_select(1, lost)
+        passed.index_add_(0, lost, baked.leap(ended))
+        return _Rays(
+            self.ray,
+            torch.addcmul(self.place, self.ahead, passed),
+            self.ahead,
+            self.number + passed,
+            self.last,
+            left[-1],
+            seen,
+        )
 
-    def empty_steps(
-        self, baked: Baked, ray: Int[Tensor, " n"], number: Float[Tensor, " n"]
-    ) -> Float[Tensor, " n"]:
-        """Return how many steps, from these numbers on, certainly hold nothing."""
-        clear = baked.clearance(self.places(ray, number[:, None]))[:, 0].float()
-        return torch.where(clear > 0, ((clear - 1) * self.leap).floor() + 1, 0.0)
+
+def _cast(baked: Baked, paths: Paths) -> Float[Tensor, "5 rays"]:
+    count = len(paths.entry)
+    place = torch.addcmul(paths.first, paths.ahead, paths.entry)
+    nothing, light = torch.zeros(4, count), torch.ones(count)
+    rays = _Rays(torch.arange(count), place, paths.ahead, paths.entry, paths.exit, light, nothing)
+    result = torch.zeros(5, count)
+    while len(rays.ray):
+        steps = min(max(STEPS_PER_ROUND // len(rays.ray), FEWEST_STEPS), MOST_STEPS)
+        rays = rays.advanced(baked, steps // STEPS_PER_COLOR * STEPS_PER_COLOR)
+        on = (rays.number < rays.last) & (rays.left > 1 - OPAQUE_FROM)
+        ended = rays.at((~on).nonzero()[:, 0])
+        result.scatter_(1, ended.ray.expand(5, -1), torch.cat([ended.seen, ended.left[None]]))
+        rays = rays.at(on.nonzero()[:, 0])
+    opacity = 1 - result[4]
+    away = result[3] * paths.step + opacity * paths.depth
+    seen = torch.cat([result[:3], opacity[None], away[None]])
+    return torch.where(opacity >= OPAQUE_FROM, seen / opacity.clamp_min(OPAQUE_FROM), seen)
+
+
+@cache
+def _sums(steps: int) -> Float[Tensor, "sums steps+1"]:
+    """Return what makes sums over every STEPS_PER_COLOR steps from the light between steps.
+
+    Of their weights, which are differences of that light, and then of these times the numbers.
+    """
+    weights = torch.eye(steps, steps + 1) - torch.eye(steps, steps + 1).roll(1, dims=1)
+    number = torch.arange(steps, dtype=torch.float32)[:, None]
+    both = torch.stack([weights, weights * number])
+    return both.view(2, -1, STEPS_PER_COLOR, steps + 1).sum(dim=2).view(-1, steps + 1)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import torch
 from torch import Tensor, nn
 
-from toonset.nerf.views_labels import NONE, labels_of, palette_shares
+from toonset.nerf.views_labels import LEVELS, NONE, label_table, labels_of, palette_shares
 
 GREEN, BROWN, SKIN = PAINTS = torch.tensor(
     [[0.0, 0.55, 0.34], [0.6, 0.55, 0.4], [0.96, 0.72, 0.58]]
@@ -22,6 +24,19 @@ class Nearest(nn.Module):
         return -torch.cdist(rgb, PAINTS)
 
 
+TABLE = label_table(Nearest())  # type: ignore[arg-type]
+
+
+def test_a_table_gives_the_classifiers_labels_but_next_to_its_borders() -> None:
+    color = torch.rand(3, 500, generator=torch.Generator().manual_seed(0))
+    opacity = torch.linspace(0.1, 1, 500)
+    found = labels_of(TABLE, color * opacity, opacity)
+    away = torch.cdist(color.T, PAINTS).sort(dim=1).values
+    sure = away[:, 1] - away[:, 0] > 2 * math.sqrt(3) / LEVELS
+    assert sure.sum() > 400
+    assert (found == Nearest()(color.T).argmax(dim=1))[sure].all()
+
+
 def picture(left: Tensor, right: Tensor, blend: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Return rays of two paints side by side, with a column between whose rays see a blend."""
     seen = torch.zeros(SIDE, SIDE, 5)
@@ -33,8 +48,12 @@ def picture(left: Tensor, right: Tensor, blend: Tensor) -> tuple[Tensor, Tensor,
 
 
 def shares(seen: Tensor, border: Tensor, more: Tensor, paints: Tensor = PAINTS) -> np.ndarray:
-    labels = labels_of(Nearest(), seen[..., :3], seen[..., 3])  # type: ignore[arg-type]
-    return palette_shares(Nearest(), paints, seen, labels, border, more).numpy()  # type: ignore[arg-type]
+    rays, opacity = more.permute(2, 0, 1), seen[..., 3]
+    return palette_shares(TABLE, paints, opacity, labelled(seen), border, rays).numpy()
+
+
+def labelled(seen: Tensor) -> Tensor:
+    return labels_of(TABLE, seen[..., :3].movedim(-1, 0), seen[..., 3])
 
 
 @pytest.mark.parametrize("part", [0.3, 0.5, 0.8])
@@ -67,6 +86,6 @@ def test_shares_keep_opacity_and_nothing_has_no_label() -> None:
     found = shares(seen, border, more)
     assert not found[:3].any()
     np.testing.assert_allclose(found[3:, 6].sum(axis=1), 0.75, atol=1e-5)
-    labels = labels_of(Nearest(), seen[..., :3], seen[..., 3])  # type: ignore[arg-type]
+    labels = labelled(seen)
     assert (labels[:3] == NONE).all()
     assert (labels[3:] != NONE).all()

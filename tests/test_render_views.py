@@ -14,7 +14,7 @@ from toonset.bench.views_speed import compare, plain
 from toonset.camera import Camera
 from toonset.errors import PaletteError
 from toonset.nerf.hull import EDGE, Hull, occupancy
-from toonset.nerf.march import Rays, clip, rays_of
+from toonset.nerf.march import clip, rays_of
 from toonset.nerf.normals import normal_picture, normals_of
 from toonset.nerf.recolor import repainted
 from toonset.nerf.supersample import borders, places_within
@@ -22,6 +22,7 @@ from toonset.nerf.trained import TrainedField
 from toonset.nerf.views import render
 from toonset.nerf.views_bake import Baked
 from toonset.nerf.views_cast import OPAQUE_FROM, cast
+from toonset.nerf.views_rays import Sight
 
 SHAPE, VOXEL = (20, 28, 16), 0.1
 LOW = np.array([-1.0, -1.4, -0.8])
@@ -49,8 +50,19 @@ def ball(density: float = 1.0) -> TrainedField:
     return TrainedField(Field(), Hull(LOW, VOXEL, support), 0.07, 24, None, None, 0.2, 40)  # type: ignore[arg-type]
 
 
-def slow(trained: TrainedField, rays: Rays) -> np.ndarray:
-    """Return colour, opacity and weighted distance, one ray and one sample at a time."""
+def fast(trained: TrainedField, camera: Camera) -> np.ndarray:
+    """Return what is cast through every pixel."""
+    pixels = torch.as_tensor(camera.pixel_grid().reshape(-1, 2).T, dtype=torch.float32)
+    return cast(Sight.of(Baked.of(trained), camera), pixels).T.numpy()
+
+
+def slow(
+    trained: TrainedField, camera: Camera, pixels: Float[np.ndarray, "n 2"] | None = None
+) -> np.ndarray:
+    """Return colour, opacity and weighted depth, one ray and one sample at a time."""
+    rays = rays_of(
+        camera, camera.pixel_grid().reshape(-1, 2) if pixels is None else pixels, trained.hull
+    )
     near, far = clip(rays, trained.hull)
     rows = []
     for i in range(len(near)):
@@ -61,7 +73,8 @@ def slow(trained: TrainedField, rays: Rays) -> np.ndarray:
             support = trained.hull.support_at(point)
             counted = float(occupancy(support)) if float(support) >= EDGE else 0.0
             alpha = 1 - np.exp(-float(density) * counted * trained.step)
-            row += left * alpha * np.array([*rgb[0].tolist(), 1, at])
+            depth = float((point[0].numpy() - camera.target) @ camera.rotation[2])
+            row += left * alpha * np.array([*rgb[0].tolist(), 1, depth])
             left *= 1 - alpha
             at += trained.step
         rows.append(row)
@@ -73,23 +86,21 @@ def slow(trained: TrainedField, rays: Rays) -> np.ndarray:
 def test_cast_rays_are_those_of_a_slow_loop(k: float, yaw: float, elevation: float) -> None:
     trained = ball()
     camera = Camera.looking_at(np.zeros(3), yaw, elevation, 9.0, (18, 18), k=k)
-    rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2), trained.hull)
-    fast, truth = cast(Baked.of(trained), rays).numpy(), slow(trained, rays)
+    found, truth = fast(trained, camera), slow(trained, camera)
     assert (truth[:, 3] > 0.3).sum() > 80
     # a ray that ends early counts as opaque; else voxels are interpolated
-    assert np.abs(fast[:, :4] - truth[:, :4]).max() < 1 - OPAQUE_FROM + 0.002
-    assert np.abs(fast - truth).mean() < 0.002
+    assert np.abs(found[:, :4] - truth[:, :4]).max() < 1 - OPAQUE_FROM + 0.002
+    assert np.abs(found - truth).mean() < 0.002
 
 
 def test_a_ray_that_is_opaque_ends_and_counts_as_opaque() -> None:
     trained = ball(density=8)
     camera = Camera.looking_at(np.zeros(3), 0.3, 0.1, 9.0, (18, 18))
-    rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2), trained.hull)
-    fast, truth = cast(Baked.of(trained), rays).numpy(), slow(trained, rays)
+    found, truth = fast(trained, camera), slow(trained, camera)
     opaque = truth[:, 3] > 0.999
     assert opaque.sum() > 60
-    np.testing.assert_allclose(fast[opaque, 3], 1, atol=1e-6)
-    assert np.abs(fast[opaque, :3] - truth[opaque, :3]).max() < 1.5 * (1 - OPAQUE_FROM)
+    np.testing.assert_allclose(found[opaque, 3], 1, atol=1e-6)
+    assert np.abs(found[opaque, :3] - truth[opaque, :3]).max() < 1.5 * (1 - OPAQUE_FROM)
 
 
 def test_a_view_away_from_the_figure_is_empty_and_nothing_breaks() -> None:
@@ -116,16 +127,16 @@ def test_outlines_are_as_soft_as_pictures_of_many_rays() -> None:
     found = render(trained, camera).alpha
     soft = (truth > 0.1) & (truth < 0.9)
     assert soft.sum() > 20
-    one = cast(Baked.of(trained), rays_of(camera, camera.pixel_grid().reshape(-1, 2), trained.hull))
+    one = fast(trained, camera)
     error = np.abs(found - truth)[soft].mean()
     assert error < 0.06
-    assert error < 0.7 * np.abs(one[:, 3].view(20, 20).numpy() - truth)[soft].mean()
+    assert error < 0.7 * np.abs(one[:, 3].reshape(20, 20) - truth)[soft].mean()
 
 
 def test_borders_are_where_neighbours_differ() -> None:
-    values, labels = np.zeros((6, 9, 2), dtype=np.float32), np.zeros((6, 9), dtype=int)
-    values[2, 3, 1] = 0.5
-    values[5, 6, 0] = 0.01
+    values, labels = np.zeros((2, 6, 9), dtype=np.float32), np.zeros((6, 9), dtype=int)
+    values[1, 2, 3] = 0.5
+    values[0, 5, 6] = 0.01
     labels[4, 8] = 1
     expected = np.zeros((6, 9), dtype=bool)
     expected[1:4, 3] = expected[2, 2:5] = expected[3:6, 8] = expected[4, 7] = True
@@ -137,11 +148,10 @@ def test_rays_leap_over_what_lies_between_two_balls_and_miss_none() -> None:
     support = torch.cat([trained.hull.support, torch.zeros(20, 28, 30), trained.hull.support], 2)
     trained = replace(trained, hull=Hull(LOW, VOXEL, support))
     camera = Camera.looking_at(np.array([0, 0, 1.5]), 0.05, 0.03, 9.0, (18, 18))
-    rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2), trained.hull)
-    fast, truth = cast(Baked.of(trained), rays).numpy(), slow(trained, rays)
+    found, truth = fast(trained, camera), slow(trained, camera)
     away = truth[:, 4] / np.maximum(truth[:, 3], 1e-6)
     assert (np.abs(away[truth[:, 3] > 0.5]) < 1.5).sum() > 20  # rays that meet both
-    np.testing.assert_allclose(fast, truth, atol=0.02)
+    np.testing.assert_allclose(found, truth, atol=0.02)
 
 
 def test_places_share_a_pixel_evenly() -> None:
@@ -189,9 +199,7 @@ def test_the_plain_renderer_of_the_bench_is_the_slow_loop_and_views_come_near_it
     chosen = np.zeros((18, 18), dtype=bool)
     chosen[9, 4:14:3] = True
     places = places_within(chosen).reshape(-1, 2)
-    truth = (
-        slow(trained, rays_of(camera, places, trained.hull))[:, :4].reshape(-1, 4, 4).mean(axis=1)
-    )
+    truth = slow(trained, camera, places)[:, :4].reshape(-1, 4, 4).mean(axis=1)
     np.testing.assert_allclose(plain(trained, camera, chosen), truth, atol=1e-4)
     row = compare(trained, 16)
     assert row.psnr > 35
