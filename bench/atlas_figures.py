@@ -131,8 +131,16 @@ def tally(trials: Iterable[Trial], kind: Kind) -> Tally:
 
 
 def all_trials(pages: Iterable[TriedPage]) -> list[Trial]:
-    """Return the trials of all steps of some pages."""
-    return [trial for page in pages for step in page.steps for trial in step.trials]
+    """Return the trials of all steps of some pages; those of their common base sheet only once."""
+    trials: list[Trial] = []
+    with_base = False
+    for page in pages:
+        for step in page.steps:
+            is_base = step.step == str(page.page.base)
+            if not (is_base and with_base):
+                trials += step.trials
+            with_base |= is_base
+    return trials
 
 
 def fails_from(page: TriedPage) -> TriedStep | None:

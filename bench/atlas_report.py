@@ -81,7 +81,8 @@ def atlas_html(
         f"toonset {escape(version)}; {escape(about)}</p>",
         f"<section>\n<nav>{links}</nav>",
         *(f"<p>{escape(RULES[kind])}</p>" for kind in _subjects(pages)),
-        "<p>A page fails from the first step at which more than a tenth of the trials fail.</p>",
+        "<p>A page fails from the first step at which more than a tenth of the trials fail. "
+        "The clean sheet that pages share counts once for all of them.</p>",
         _summary(pages),
         "</section>",
         *(_section(number, page, pictures) for number, page in enumerate(pages)),

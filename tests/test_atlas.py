@@ -264,6 +264,14 @@ def test_a_page_fails_from_where_more_than_a_tenth_fail():
     assert summary_rows([page])[-1][:2] == ("all pages: calibration", "")
 
 
+def test_the_sheet_that_pages_share_counts_once_for_all_of_them():
+    page = page_of([FINE], [SAID])
+    other = replace(page, page=next(page for page in SWEEPS if page.name == "squash"))
+    assert page.page.base == other.page.base == 0
+    rows = summary_rows([page, other])
+    assert [row[2] for row in rows] == ["2", "2", "3"]
+
+
 def test_reasons_that_differ_in_numbers_are_the_same():
     assert commonest_words([ALARM, SAID, FINE]) == ("21 % of the outlines", 2)
     assert commonest_words([FINE]) == ("", 0)
