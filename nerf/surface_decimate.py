@@ -36,7 +36,8 @@ def decimated(
 
     Args:
         vertices: places.
-        faces: triangles of a closed surface.
+        faces: triangles of a closed surface; of any, where there is but one label. Edges of a
+            single face stay.
         labels: of every face; faces keep theirs.
         wanted: number of faces to stop at.
     """
@@ -64,6 +65,8 @@ def _quadrics(
     plane = _plane(normal, a) * (double / 2)[:, None]
     for corner in range(3):
         np.add.at(total, faces[:, corner], plane)
+    if (labels == labels[0]).all():
+        return total
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     face = np.repeat(np.arange(len(faces)), 3)
     edge = np.sort(np.stack([start, end], axis=1), axis=1)
