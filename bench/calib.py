@@ -1,8 +1,9 @@
-"""Calibration: seconds against rotation error, per method, with the nominal angles as baseline.
+"""Calibration: seconds against rotation error, per method, beside baselines.
 
 A method is a setting of the search, or something that a person says beforehand. Seconds are those
 of `calibrate` alone, in this process, after imports; with the mannequin's templates in the cache
-as from its second sheet on, except where a method is about just that.
+as from its second sheet on, except where a method is about just that. Baselines start at the
+nominal angles, or are told landmarks; see `toonset.bench.calib_baselines` and `calib_soft`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from toonset.bench.calib_baselines import (
+    BASELINES,
+    Baseline,
+    Placed,
+    nominal_rotations,
+)
 from toonset.bench.calib_figures import (
+    NOT_PLACED,
     MeasuredSheet,
     MeasuredView,
     Recorder,
@@ -38,12 +46,12 @@ from toonset.calib.calibrate import CalibrationOptions, calibrate
 from toonset.calib.known import Known
 from toonset.calib.labels import Label
 from toonset.calib.rim import prepare_surface
-from toonset.camera import Camera, angles_from_rotation, rotation_from_angles
+from toonset.camera import Camera, angles_from_rotation
 
 __all__ = ["ViewError", "bench_calibration", "bench_colmap", "view_error"]
 
 NOMINAL = "nominal angles"
-NOMINAL_ELEVATION = math.radians(5.0)
+SOFT = "Adam, soft silhouette"
 NAMED = math.radians(45.0)  # people name directions in steps of this
 UNJUDGED = ""
 
@@ -87,6 +95,10 @@ def bench_calibration(
     sheets: dict[tuple[str, str], list[MeasuredSheet]] = {}
     for case in cases:
         sheets.setdefault((case.group, NOMINAL), []).append(_guessed(case))
+        for method, place in _baselines(quick=quick).items():
+            progress(f"{case.name}: {method}")
+            found = measured_baseline(case, place(case, seed))
+            sheets.setdefault((case.group, method), []).append(found)
         with own_cache():
             load_bank(prepare_surface(case.mesh))  # fills the cache
             for method in QUICK if quick else METHODS:
@@ -143,15 +155,28 @@ def own_cache() -> Iterator[None]:
                 os.environ["TOONSET_CACHE"] = before
 
 
-def _guessed(case: CalibCase) -> MeasuredSheet:
-    """Return the errors of who takes the drawings for even turns, a little from above."""
-    turns = np.arange(len(case.views)) * 2 * math.pi / len(case.views)
+def measured_baseline(case: CalibCase, placed: Placed) -> MeasuredSheet:
+    """Return the errors of rotations that nothing judges; views without one are counted."""
     views = []
-    for turn, truth in zip(turns, case.rotations, strict=True):
-        rotation = rotation_from_angles(turn, NOMINAL_ELEVATION, 0.0)
-        camera = Camera(rotation, np.zeros(3), 1.0, np.zeros(2), (1, 1))
-        views.append(_measured(camera, truth, UNJUDGED, math.nan))
-    return MeasuredSheet(tuple(views), 0.0, case.name)
+    for rotation, truth in zip(placed.rotations, case.rotations, strict=True):
+        if rotation is not None:
+            camera = Camera(rotation, np.zeros(3), 1.0, np.zeros(2), (1, 1))
+            views.append(_measured(camera, truth, UNJUDGED, math.nan))
+    missing = len(placed.rotations) - len(views)
+    return MeasuredSheet(tuple(views), placed.seconds, case.name, placed.cpu_seconds, missing)
+
+
+def _guessed(case: CalibCase) -> MeasuredSheet:
+    rotations = tuple(nominal_rotations(len(case.views)))
+    return measured_baseline(case, Placed(rotations, 0.0, 0.0))
+
+
+def _baselines(*, quick: bool) -> dict[str, Baseline]:
+    if quick:
+        return dict(BASELINES)
+    from toonset.bench.calib_soft import by_soft_silhouette  # imports torch
+
+    return {**BASELINES, SOFT: by_soft_silhouette}
 
 
 def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
@@ -160,14 +185,14 @@ def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
             return _calibrated(case, replace(method, cached=True))
     yaws = [angles_from_rotation(rotation)[0] for rotation in case.rotations]
     known = Known(labels=named_directions(yaws)) if method.labels else None
-    start = time.perf_counter()
+    wall, cpu = time.perf_counter(), time.process_time()
     result = calibrate(case.views, case.mesh, method.options, known=known)
-    seconds = time.perf_counter() - start
+    seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
     views = tuple(
         _measured(view.camera, truth, view.verdict, view.sigmas.yaw)
         for view, truth in zip(result.views, case.rotations, strict=True)
     )
-    return MeasuredSheet(views, seconds, case.name)
+    return MeasuredSheet(views, seconds, case.name, cpu_seconds)
 
 
 def _measured(
@@ -190,6 +215,6 @@ def _sfm_records(
     return [
         *error_records(errors, recorder),
         seconds_record(taken, recorder),
-        recorder.total("views not placed", missing),
+        recorder.total(NOT_PLACED, missing),
         recorder.total("failed runs", [bool(found.failed) for found in results], "sheets"),
     ]

@@ -20,6 +20,8 @@ from toonset.camera import Camera, rotation_distance
 
 WRONG = math.radians(15.0)
 SUCCESS = math.radians(5.0)
+CPU_SECONDS = "CPU seconds"
+NOT_PLACED = "views not placed"
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,21 @@ class MeasuredView:
 
 @dataclass(frozen=True)
 class MeasuredSheet:
-    """One sheet's views, the seconds that they took, and the sheet's name."""
+    """One sheet's views that have a camera, and what they took.
+
+    Attributes:
+        views: with a camera.
+        seconds: wall time.
+        case: the sheet's name.
+        cpu_seconds: of this process; None: not measured.
+        not_placed: number of views without a camera.
+    """
 
     views: tuple[MeasuredView, ...]
     seconds: float
     case: str = ""
+    cpu_seconds: float | None = None
+    not_placed: int = 0
 
 
 @dataclass(frozen=True)
@@ -146,11 +158,19 @@ def error_records(
 def sheet_records(sheets: Sequence[MeasuredSheet], recorder: Recorder) -> list[Record]:
     """Return all records of the sheets that one method has calibrated."""
     views = [view for sheet in sheets for view in sheet.views]
-    return [
+    cpu = {sheet.case: sheet.cpu_seconds for sheet in sheets if sheet.cpu_seconds is not None}
+    missing = sum(sheet.not_placed for sheet in sheets)
+    records = [
         *error_records([(s.case, [v.error for v in s.views]) for s in sheets], recorder),
         *_spread(views, recorder),
         seconds_record([(sheet.case, sheet.seconds) for sheet in sheets], recorder),
     ]
+    if cpu:
+        records.append(recorder.samples(CPU_SECONDS, list(cpu.values()), "s", by_case=cpu))
+    if missing:
+        placed = [False] * len(views) + [True] * missing
+        records.append(recorder.total(NOT_PLACED, placed))
+    return records
 
 
 def seconds_record(sheets: Sequence[tuple[str, float]], recorder: Recorder) -> Record:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from toonset.bench.calib_figures import CPU_SECONDS, NOT_PLACED
 from toonset.bench.record import Record
 from toonset.calib.result import SEVERITY
 
 MISSING = "-"
-NOT_IN_COLUMNS = ("views not placed", "failed runs")
+NOT_IN_COLUMNS = (NOT_PLACED, "failed runs")
+TIMES = ("seconds", CPU_SECONDS)
 
 Figures = Mapping[str, Record]  # by metric
 
@@ -52,7 +54,7 @@ def _table(records: Sequence[Record], columns: Sequence[Column]) -> list[str]:
 
 
 def _size(figures: Figures) -> str:
-    views = next(r.n for r in figures.values() if r.metric != "seconds")
+    views = next(r.n for r in figures.values() if r.metric not in TIMES)
     return f"{views} views, {figures['seconds'].n} sheets"
 
 
@@ -60,7 +62,7 @@ def _notes(records: Sequence[Record]) -> list[str]:
     return [
         f"{r.group}, {r.method}: {r.metric} {r.value:.0f} of {r.n}"
         for r in records
-        if r.metric in NOT_IN_COLUMNS
+        if r.metric in NOT_IN_COLUMNS and r.value > 0
     ]
 
 
@@ -117,8 +119,8 @@ SHEET_COLUMNS = (
     Column(("wrong", "said"), _part("wrong and announced")),
     Column(("yaw", "z"), _value("yaw z-score")),
     Column(("ok/weak/", "amb/fail %"), _verdicts),
-    Column(("sec.", "median"), _median("seconds")),
-    Column(("", "p95"), _p95("seconds")),
+    Column(("sec.", "wall"), _median("seconds")),
+    Column(("", "CPU"), _median(CPU_SECONDS)),
 )
 SHEET_LEGEND = (
     "twin: modulo the mirror twin. flips: views more than 15 deg off whose twin is less.",

@@ -60,13 +60,24 @@ CONDITIONS: dict[str, Condition] = {
 
 @dataclass(frozen=True, eq=False)
 class CalibCase:
-    """A sheet with its true camera_from_world rotations, (views, 3, 3)."""
+    """A sheet with its truth.
+
+    Attributes:
+        name: of the sheet.
+        group: condition.
+        views: drawings.
+        mesh: what calibration gets: the mannequin.
+        rotations: true camera_from_world, (views, 3, 3).
+        drawn: the body that was drawn, its first vertices those of the mannequin, one by one;
+            None: not known.
+    """
 
     name: str
     group: str
     views: tuple[View, ...]
     mesh: Mesh
     rotations: Float[np.ndarray, "views 3 3"]
+    drawn: Mesh | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +183,7 @@ def _synthetic_calib(name: str, group: str, condition: Condition, seed: int) -> 
     if len(views) != len(rotations):
         raise BundleError(f"synthetic {name}: split into {len(views)} views")
     other = random_body(seed + STRANGER, symmetric=True) if condition.other_body else body
-    return CalibCase(name, group, views, other, rotations)
+    return CalibCase(name, group, views, other, rotations, body)
 
 
 def _folders(folder: Path, needed: str) -> list[Path]:

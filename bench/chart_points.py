@@ -82,7 +82,7 @@ PLOTS: dict[str, Plot] = {
         told={
             "labels": "told the directions",
             **dict.fromkeys(STRUCTURE_FROM_MOTION, "its placed views alone, turned to the truth"),
-            **dict.fromkeys(CLICKED, "told 12 points a view; nobody's time to click them"),
+            **dict.fromkeys(CLICKED, "told 12 clicked points a view; clicking is not timed"),
         },
     ),
     "train": TRAINING,

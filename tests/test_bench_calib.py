@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from toonset.bench import calib, cases
-from toonset.bench.calib import METHODS, bench_calibration, named_directions, own_cache
+from toonset.bench.calib import METHODS, SOFT, bench_calibration, named_directions, own_cache
+from toonset.bench.calib_baselines import BASELINES
 from toonset.bench.calib_figures import (
     MeasuredSheet,
     MeasuredView,
@@ -217,6 +218,8 @@ def test_another_body_has_the_drawn_sheet_and_a_mannequin_without_its_bag() -> N
     for mesh in (other.mesh, plain.mesh):
         assert "bag" not in mesh.part_names
     assert other.mesh.height != drawn.mesh.height
+    assert other.drawn is not None
+    np.testing.assert_array_equal(other.drawn.vertices, drawn.mesh.vertices)
     assert next(calib_cases(None, 3, 1, "other")).mesh.height == other.mesh.height
 
 
@@ -232,11 +235,12 @@ def test_only_the_asked_cases_are_drawn() -> None:
 def worst_case(method: str) -> list[Record]:
     bad = sheet(*[(179.0, 88.0, v) for v in SEVERITY for _ in range(30)])
     good = sheet((0.01, 0.01, "ok"))
-    return sheet_records([replace(bad, seconds=1234.5), good], Recorder(method, "another body", 0))
+    slow = replace(bad, seconds=1234.5, cpu_seconds=1234.5)
+    return sheet_records([slow, good], Recorder(method, "another body", 0))
 
 
 def test_the_table_has_a_row_per_method_and_fits_a_terminal() -> None:
-    methods = ["nominal angles", *METHODS, "COLMAP 1000 px, global"]
+    methods = ["nominal angles", *BASELINES, SOFT, *METHODS, "COLMAP 1000 px, global"]
     lines = sheets_table([r for m in methods for r in worst_case(m)]).splitlines()
     assert max(map(len, lines)) <= 120
     for method in methods:
@@ -256,8 +260,9 @@ def test_what_is_missing_is_a_dash_and_failed_runs_are_told() -> None:
     ]
     text = sheets_table(records)
     (row,) = [line for line in text.splitlines() if line.startswith("  COLMAP")]
-    assert row.split()[1:] == ["-"] * 11 + ["3.00", "3.00"]
+    assert row.split()[1:] == ["-"] * 11 + ["3.00", "-"]
     assert "photo, COLMAP: views not placed 2 of 3" in text
+    assert "failed runs" not in text  # there were none
 
 
 # ---- the command

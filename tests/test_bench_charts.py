@@ -15,6 +15,7 @@ from PIL import Image
 
 from tests.bench_records import record
 from toonset.bench.calib import METHODS as CALIB_METHODS
+from toonset.bench.calib_baselines import BASELINES
 from toonset.bench.chart import Chart
 from toonset.bench.chart_drawing import chart_figure, draw_chart
 from toonset.bench.chart_labels import Box, Label, place_labels
@@ -230,7 +231,7 @@ def test_fewer_cases_are_set_aside_where_the_default_says_that_they_would_be() -
 
 
 def test_methods_that_are_told_more_are_there_and_set_aside() -> None:
-    assert set(PLOTS["calib"].told) <= {*CALIB_METHODS, *SFM_METHODS}
+    assert set(PLOTS["calib"].told) <= {*CALIB_METHODS, *SFM_METHODS, *BASELINES}
     assert {name for name, m in CALIB_METHODS.items() if m.labels} <= set(PLOTS["calib"].told)
     assert set(SFM_METHODS) <= set(PLOTS["calib"].told)
     given = {name for name, m in TRAIN_METHODS.items() if m.palette == "hand-picked palette"}
