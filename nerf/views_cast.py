@@ -23,7 +23,7 @@ from toonset.nerf.views_rays import Paths, Sight
 RAYS_PER_CHUNK = 1 << 14  # a chunk's arrays stay in a core's cache
 FEWEST_STEPS, MOST_STEPS = 12, 32  # of a ray that are looked up together: more as rays get fewer
 STEPS_PER_ROUND = 1 << 14  # in all, where rays are few enough
-STEPS_PER_COLOR = 4  # that share one, read at their mean place
+STEPS_PER_COLOR = 3  # that share one, read at their mean place
 OPAQUE_FROM = 0.98  # opacity at which a ray ends; the colour seen until then stands for the rest
 FAINTEST = 1e-12  # weight of steps whose mean place is asked for
 
