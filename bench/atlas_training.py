@@ -24,7 +24,7 @@ from toonset.dataset.scene import Frame, Scene
 from toonset.errors import ToonsetError
 from toonset.nerf.consistency import consistency_of
 from toonset.nerf.evaluation_picture import tile_of
-from toonset.nerf.gaps import wide_gaps
+from toonset.nerf.gaps import guesses
 from toonset.nerf.labelling import labelled
 from toonset.nerf.layers import color_picture
 from toonset.nerf.metrics import over_white, psnr_of
@@ -132,10 +132,7 @@ def _psnr(scene: DrawnScene, index: int, view: UInt8[np.ndarray, "height width 4
 
 def _said(scene: Scene, training: Training) -> tuple[str, str]:
     """Return what `toonset train` said of the drawings."""
-    warnings = [
-        f"no drawing in the {math.degrees(gap.radians):.0f} deg from {gap.after} to {gap.before}"
-        for gap in wide_gaps(scene)
-    ]
+    warnings = guesses(scene)
     ready = training.prepared
     repairs = [
         f"{what}: outlines {step.apart_px[0]:.2f} px apart, {step.apart_px[1]:.2f} px after"

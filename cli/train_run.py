@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -128,7 +127,7 @@ def _prepared(
     printer: Printer,
 ) -> Scene:
     """Set torch up and return the scene with what is trained."""
-    from toonset.nerf.gaps import wide_gaps
+    from toonset.nerf.gaps import guesses
     from toonset.nerf.memory import check_memory
     from toonset.nerf.threads import use_threads
     from toonset.nerf.training import device_of
@@ -140,9 +139,8 @@ def _prepared(
     printer.say(f"{check_memory(scene, options, device)}; {count} CPU thread{'s' * (count > 1)}")
     palette = request.palette if checkpoint is None else checkpoint.record.with_palette
     scene = _with_palette(scene, palette, printer)
-    for gap in wide_gaps(scene) if len(scene.frames) > 1 else ():
-        turn = f"the {math.degrees(gap.radians):.0f} deg from {gap.after} to {gap.before}"
-        printer.say(f"no drawing in {turn}: shape and colours seen from there are a guess")
+    for guess in guesses(scene):
+        printer.say(guess)
     return scene
 
 

@@ -1,4 +1,8 @@
-"""Which sides of a character no drawing shows: shape and colours there are a guess."""
+"""Which sides of a character no drawing shows: shape and colours there are a guess.
+
+Drawings from opposite sides share an outline, so that for the shape half a turn is all there is:
+four even views have but two outlines, five have five.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,8 @@ from toonset.camera import Camera
 from toonset.dataset.scene import Scene
 
 WIDE = math.radians(100)  # between neighbouring drawings: more than a quarter of the turn
+
+FEW_OUTLINES = math.radians(75)  # of half a turn without one: four even views lose 5 dB by that
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,24 @@ class Gap:
     radians: float
 
 
+def guesses(scene: Scene) -> list[str]:
+    """Return what must be guessed of a character, a line each, for people."""
+    if len(scene.frames) < 2:
+        return []
+    said = [
+        f"no drawing in the {math.degrees(gap.radians):.0f} deg from {gap.after} to {gap.before}: "
+        "shape and colours seen from there are a guess"
+        for gap in wide_gaps(scene)
+    ]
+    gap = outline_gap(scene)
+    if gap > FEW_OUTLINES:
+        said.append(
+            f"opposite drawings share an outline, which leaves {math.degrees(gap):.0f} deg of half "
+            "a turn without one: the shape between is a guess; a drawing in between tells most"
+        )
+    return said
+
+
 def wide_gaps(scene: Scene) -> list[Gap]:
     """Return the turns of more than WIDE that no drawing looks from, about the upright axis."""
     turns = sorted((_yaw(frame.camera), frame.name) for frame in scene.frames)
@@ -35,6 +59,13 @@ def wide_gaps(scene: Scene) -> list[Gap]:
         for (begin, after), (end, before) in zip(turns, following, strict=True)
     ]
     return [gap for gap in gaps if gap.radians > WIDE]
+
+
+def outline_gap(scene: Scene) -> float:
+    """Return the largest turn, of half a turn, in which there is no outline; radians."""
+    turns = sorted(_yaw(frame.camera) % math.pi for frame in scene.frames)
+    following = [*turns[1:], turns[0] + math.pi]
+    return max(end - begin for begin, end in zip(turns, following, strict=True))
 
 
 def _yaw(camera: Camera) -> float:

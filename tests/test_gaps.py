@@ -9,7 +9,7 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.gaps import wide_gaps
+from toonset.nerf.gaps import FEW_OUTLINES, outline_gap, wide_gaps
 
 NOTHING = np.zeros((8, 8, 4), dtype=np.uint8)
 
@@ -40,3 +40,20 @@ def test_turns_without_a_drawing(
 ) -> None:
     found = wide_gaps(scene(*yaws))
     assert {(gap.after, gap.before, round(math.degrees(gap.radians))) for gap in found} == set(gaps)
+
+
+@pytest.mark.parametrize(
+    ("yaws", "gap"),
+    [
+        ((0, 180), 180),
+        ((10, 100, 190, 280), 90),
+        ((0, 90, 180), 90),
+        ((0, 60, 120, 180, 240, 300), 60),
+        ((0, 72, 144, 216, 288), 36),
+        ((0, 45, 90, 135, 180, 225, 270, 315), 45),
+        ((359.9, 0.1), 179.8),
+    ],
+)
+def test_opposite_drawings_share_an_outline(yaws: tuple[float, ...], gap: float) -> None:
+    assert math.degrees(outline_gap(scene(*yaws))) == pytest.approx(gap, abs=1e-6)
+    assert (outline_gap(scene(*yaws)) > FEW_OUTLINES) == (gap > 75)
