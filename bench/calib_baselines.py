@@ -1,8 +1,8 @@
 """What else gives cameras: clicked landmarks with PnP, and a contour tracker.
 
-Both are given their best chance. The landmarks are spread well, none is hidden, and the camera
-that they are seen by is told; its truth but for the pose. The tracker sees clean masks, not the
-drawn lines. Nothing here judges its own result.
+Both are given their best chance: the landmarks are spread well, none is hidden, and the lens that
+they are seen through is known; the tracker sees clean masks instead of drawn lines. Nothing here
+judges its own result.
 
 Source: Terzakis and Lourakis, "A consistently fast and globally optimal solution to the
 Perspective-n-Point problem", 2020 (SQPnP); Harris and Stennett, "RAPID, a video rate object

@@ -53,8 +53,8 @@ def train(
         str | None,
         typer.Option(
             "--field",
-            help="auto (default): planes as coarse as the drawings allow; triplane: the finest; to "
-            "compare with: mlp, voxel, hull (no training).",
+            help="auto (default): planes as coarse as the drawings allow; triplane: one cell per "
+            "pixel; to compare with: mlp, voxel, hull (no training).",
         ),
     ] = None,
     ink: Annotated[

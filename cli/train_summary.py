@@ -55,13 +55,13 @@ def _planes(found: dict[str, Any] | None) -> list[str]:
     """Return how fine the planes are, and what finer and coarser ones predict."""
     if found is None:
         return []
-    if not found["candidates"]:
-        return [f"planes: {found['cells']} cells, the finest: too few drawings to leave one out"]
+    cells = f"planes: {found['cells']} cells along the longest side"
+    if found["untried"]:
+        return [f"{cells}, the usual two thirds of a pixel's ({found['untried']})"]
     tried = ", ".join(f"{c['cells']}: {c['left_out_psnr']:.2f} dB" for c in found["candidates"])
     return [
-        f"planes: {found['cells']} cells along the longest side, the fewest within "
-        f"{found['tolerance_db']:g} dB of the best (predicted {' and '.join(found['left_out'])}; "
-        f"{tried})"
+        f"{cells}, the fewest within {found['tolerance_db']:g} dB of the best (predicted "
+        f"{' and '.join(found['left_out'])} from the others; {tried})"
     ]
 
 

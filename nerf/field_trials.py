@@ -14,7 +14,14 @@ import torch
 
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.batches import Batch, make_batches
-from toonset.nerf.field_choice import Candidate, FieldChoice, chosen
+from toonset.nerf.field_choice import (
+    COARSE,
+    USUAL,
+    Candidate,
+    FieldChoice,
+    chosen,
+    why_untried,
+)
 from toonset.nerf.field_loss import Model, Weights, render_batch
 from toonset.nerf.field_rays import FixedRays
 from toonset.nerf.fields import Field
@@ -23,11 +30,8 @@ from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import figure_px
 
-SHARES = (1.0, 2 / 3, 1 / 3)  # of the finest planes' cells
-MOST_RAYS = 32_000  # drawn by lot: a trial takes fewer than two of them a step
-STEPS = 60  # by then the order of the candidates shows
-WORTH_STEPS = len(SHARES) * STEPS  # of a training; choosing costs no more than a shorter one
-FEWEST_VIEWS = 3  # with fewer nothing can be left out
+MOST_RAYS = 32_000  # drawn by lot: a trial takes fewer than three of them a step
+STEPS = 40  # by then the order of the candidates shows
 TWO_FROM = 6  # views from which two drawings are left out, half a turn apart
 
 Build = Callable[[int], Field]
@@ -65,32 +69,27 @@ class Ground:
         return [batch.to(self.device) for batch in found]
 
 
-def asked_for(options: TrainOptions) -> bool:
-    """Return whether a training begins with trials: not if it is told its planes, short or hurried.
-
-    Without a hull samples lie elsewhere in every step, and short trainings show nothing yet.
-    """
-    free = options.field == "auto" and options.resolution is None and options.carve
-    return free and options.budget_s is None and options.steps >= WORTH_STEPS
-
-
-def choose_cells(ground: Ground, finest: int, build: Build) -> FieldChoice:
+def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> FieldChoice:
     """Return how many cells the planes get, and on what evidence.
 
     Args:
         ground: what candidates are fitted to.
-        finest: cells of the finest one.
+        finest: cells of one per pixel.
         build: returns an untrained field of so many cells.
+        agree: the drawings' outlines do, to the pixel.
     """
-    frames = ground.scene.frames
+    frames, options = ground.scene.frames, ground.options
     shown = [frame for frame in frames if figure_px(frame)]
-    if len(shown) < FEWEST_VIEWS:
-        return FieldChoice(finest, (), ())
+    cells = [max(1, round(share * finest)) for share in (USUAL, COARSE)]
+    short = not options.carve or options.budget_s is not None or options.steps < 2 * STEPS
+    untried = why_untried(len(shown), agree=agree, short=short)
+    if untried:
+        return FieldChoice(cells[0], untried)
     left = left_out(shown)
     kept = [frame for frame in frames if frame not in left]
-    cells = sorted({max(1, round(share * finest)) for share in SHARES}, reverse=True)
     candidates = tuple(_tried(ground, kept, left, count, build) for count in cells)
-    return FieldChoice(chosen(candidates), candidates, tuple(frame.name for frame in left))
+    names = tuple(frame.name for frame in left)
+    return FieldChoice(chosen(candidates), "", candidates, names)
 
 
 def left_out(frames: Sequence[Frame]) -> list[Frame]:

@@ -19,16 +19,15 @@ class TrainOptions:
         seed: of initial weights and ray order. Same seed, same result, bit for bit, on a CPU.
         device: "auto" (a GPU where there is one), "cpu" or "cuda".
         resolution: cells of the planes along the character's longest side; None: one cell per
-            pixel of the tallest figure, 48 to 256 (finer planes fit each drawing's own pixels and
-            predict new views worse), or fewer (see `field`).
+            pixel of the tallest figure, 48 to 256, or fewer (see `field`).
         smoothness: weight of the planes' total variation at eight views that agree; fewer views,
             and drawings that had to be aligned, get more.
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
-        field: what is fitted: "auto", planes with a small decoder, as coarse as predicts left-out
-            drawings well (`nerf.field_choice`); "triplane", the finest of them; or, to compare
-            with, a network alone, a grid of voxels, or the hull with the drawings' colours (nothing
-            is fitted then).
+        field: what is fitted: "auto", planes with a small decoder, 2/3 of a cell per pixel or half
+            of that (`nerf.field_choice`); "triplane", one cell per pixel; or, to compare with, a
+            network alone, a grid of voxels, or the hull with the drawings' colours (nothing is
+            fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over any backdrop.
         fair: take the fairest surface inside the hull instead of the hull with its corners.

@@ -34,7 +34,7 @@ from toonset.nerf.field_hull import paint
 from toonset.nerf.field_kinds import build_field
 from toonset.nerf.field_loss import Model, Weights
 from toonset.nerf.field_rays import FixedRays, TrainingRays
-from toonset.nerf.field_trials import Ground, asked_for, choose_cells
+from toonset.nerf.field_trials import Ground, choose_cells
 from toonset.nerf.field_voxel import VoxelField
 from toonset.nerf.fields import Field, FieldSpec
 from toonset.nerf.fitting import Progress, Watch, fit
@@ -92,9 +92,10 @@ def train(
     clock.append(time.perf_counter())
     weights = _weights(options, len(scene.frames), agree=ready.apart_px == 0)
     choice = None
-    if asked_for(options):
+    if options.field == "auto" and options.resolution is None:
         tell("choosing the planes")
-        choice = _choice(ready.scene, hull, weights, options, device)
+        agree = ready.apart_px == 0
+        choice = _choice(ready.scene, hull, weights, options, device, agree=agree)
         torch.manual_seed(options.seed)
     cells = choice.cells if choice else None
     clock.append(time.perf_counter())
@@ -121,7 +122,13 @@ def _resolved(options: TrainOptions) -> TrainOptions:
 
 
 def _choice(
-    scene: Scene, hull: Hull, weights: Weights, options: TrainOptions, device: torch.device
+    scene: Scene,
+    hull: Hull,
+    weights: Weights,
+    options: TrainOptions,
+    device: torch.device,
+    *,
+    agree: bool,
 ) -> FieldChoice:
     """Return how fine the planes are that this scene needs."""
     step = float(hull.box.size.max()) / STEPS_ALONG
@@ -130,7 +137,7 @@ def _choice(
     def build(cells: int) -> Field:
         return build_field(FieldSpec("triplane", cells, CHANNELS, HIDDEN), hull.box)
 
-    return choose_cells(ground, finest_cells(scene), build)
+    return choose_cells(ground, finest_cells(scene), build, agree=agree)
 
 
 def finest_cells(scene: Scene) -> int:

@@ -12,17 +12,17 @@ from tests.test_train_summary import metrics
 from toonset.bench.cases import train_cases
 from toonset.cli.train_summary import summary
 from toonset.dataset.scene import Scene
-from toonset.nerf import field_trials, training
-from toonset.nerf.field_choice import Candidate, FieldChoice, chosen
-from toonset.nerf.field_trials import asked_for, left_out
+from toonset.nerf import field_trials
+from toonset.nerf.field_choice import Candidate, FieldChoice, chosen, why_untried
+from toonset.nerf.field_trials import left_out
 from toonset.nerf.labelling import without_palette
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.report import write_run
 from toonset.nerf.run_folder import read_field
-from toonset.nerf.training import train
+from toonset.nerf.training import finest_cells, train
 
 FEW = 4  # steps of a trial
-SHORT = TrainOptions(steps=3 * FEW, device="cpu", missing_views=0)
+SHORT = TrainOptions(steps=2 * FEW, device="cpu", missing_views=0)
 
 
 @pytest.fixture(scope="module")
@@ -31,11 +31,16 @@ def scene() -> Scene:
     return without_palette(next(iter(train_cases(None, 0, 1, px=60))).train)
 
 
+@pytest.fixture(scope="module")
+def few(scene: Scene) -> Scene:
+    """Return four of them, so that trials are asked for."""
+    return replace(scene, frames=scene.frames[::2])
+
+
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let trials take a few steps only."""
     monkeypatch.setattr(field_trials, "STEPS", FEW)
-    monkeypatch.setattr(field_trials, "WORTH_STEPS", 3 * FEW)
 
 
 def candidates(*psnr: float) -> list[Candidate]:
@@ -43,10 +48,9 @@ def candidates(*psnr: float) -> list[Candidate]:
 
 
 def test_the_coarsest_of_about_equals_is_chosen() -> None:
-    assert chosen(candidates(20.0, 20.1, 20.05)) == 30
-    assert chosen(candidates(20.5, 20.4, 20.0)) == 60
-    assert chosen(candidates(20.5, 20.1, 20.0)) == 90
-    assert chosen(candidates(20.0, 20.5, 20.1)) == 60
+    assert chosen(candidates(20.0, 19.95)) == 60
+    assert chosen(candidates(20.0, 19.85)) == 90
+    assert chosen(candidates(20.0, 21.0)) == 60
 
 
 def test_drawings_left_out_lie_half_a_turn_apart(scene: Scene) -> None:
@@ -56,22 +60,35 @@ def test_drawings_left_out_lie_half_a_turn_apart(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize(
-    "told",
+    ("views", "agree", "short", "why"),
     [
-        {"field": "triplane"},
-        {"resolution": 40},
-        {"budget_s": 9.0},
-        {"steps": 100},
-        {"carve": False},
+        (8, True, False, "8 drawings agree"),
+        (6, True, True, "6 drawings agree"),
+        (8, False, False, ""),
+        (5, True, False, ""),
+        (3, True, False, ""),
+        (2, True, False, "too few drawings to leave one out"),
+        (4, True, True, "too short a training for trials"),
     ],
 )
-def test_trials_are_for_trainings_that_leave_the_planes_open(told: dict[str, object]) -> None:
-    assert asked_for(TrainOptions())
-    assert not asked_for(replace(TrainOptions(), **told))
+def test_trials_are_for_drawings_that_are_few_or_disagree(
+    views: int, agree: bool, short: bool, why: str
+) -> None:
+    assert why_untried(views, agree=agree, short=short) == why
+
+
+@pytest.mark.parametrize(
+    "hurried",
+    [replace(SHORT, steps=2 * FEW - 1), replace(SHORT, budget_s=60.0), replace(SHORT, carve=False)],
+)
+def test_short_trainings_try_nothing(few: Scene, quick: None, hurried: TrainOptions) -> None:
+    choice = train(few, hurried).choice
+    assert choice is not None
+    assert choice.untried == "too short a training for trials"
 
 
 def test_trials_see_the_other_drawings_only(
-    scene: Scene, quick: None, monkeypatch: pytest.MonkeyPatch
+    few: Scene, quick: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[set[str]] = []
     real = field_trials.make_batches
@@ -81,56 +98,50 @@ def test_trials_see_the_other_drawings_only(
         return real(part, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr(field_trials, "make_batches", noted)
-    choice = train(scene, SHORT).choice
+    choice = train(few, SHORT).choice
     assert choice is not None
-    every, left = {frame.name for frame in scene.frames}, set(choice.left_out)
-    assert len(left) == 2
-    assert seen == [every - left, left] * len(choice.candidates)
+    every, left = {frame.name for frame in few.frames}, set(choice.left_out)
+    assert len(left) == 1
+    assert seen == [every - left, left] * 2
 
 
-def test_the_choice_is_all_that_trials_change(scene: Scene, quick: None, tmp_path: Path) -> None:
-    auto = train(scene, SHORT)
+def test_the_choice_is_all_that_trials_change(few: Scene, quick: None, tmp_path: Path) -> None:
+    auto = train(few, SHORT)
     assert auto.choice is not None
     sizes = [(c.cells, c.parameters) for c in auto.choice.candidates]
-    assert len(sizes) == 3
+    assert len(sizes) == 2
     assert sizes == sorted(sizes, reverse=True)
     assert auto.counts["parameters"] == dict(sizes)[auto.choice.cells]
-    again = train(scene, SHORT)
-    assert again.choice == auto.choice
-    told = train(scene, replace(SHORT, resolution=auto.choice.cells))
+    assert train(few, SHORT).choice == auto.choice
+    told = train(few, replace(SHORT, resolution=auto.choice.cells))
     assert told.choice is None
     for name, values in auto.result.field.state_dict().items():
         assert torch.equal(values, told.result.field.state_dict()[name]), name
-    written = write_run(tmp_path, auto, scene)
+    written = write_run(tmp_path, auto, few)
     assert written["planes"]["cells"] == auto.choice.cells
     assert read_field(tmp_path).field.spec.resolution == auto.choice.cells
 
 
-def test_the_finest_planes_are_one_cell_per_pixel(scene: Scene, quick: None) -> None:
-    choice = train(scene, SHORT).choice
+def test_many_drawings_that_agree_get_two_thirds_of_a_cell_per_pixel(
+    scene: Scene, quick: None
+) -> None:
+    training = train(scene, SHORT)
     finest = train(scene, replace(SHORT, field="triplane"))
-    assert choice is not None
-    assert choice.candidates[0].parameters == finest.counts["parameters"]
-    assert finest.result.field.spec.resolution == choice.candidates[0].cells
-    assert training.CELLS[0] <= choice.candidates[0].cells <= training.CELLS[1]
-
-
-def test_two_drawings_say_nothing_of_planes(scene: Scene, quick: None) -> None:
-    pair = replace(scene, frames=scene.frames[:3:2])
-    choice = train(pair, SHORT).choice
-    assert choice is not None
-    assert choice.candidates == ()
-    assert (
-        choice.cells == train(pair, replace(SHORT, field="triplane")).result.field.spec.resolution
-    )
+    assert training.choice is not None
+    assert (training.choice.untried, training.choice.candidates) == ("8 drawings agree", ())
+    assert finest.choice is None
+    assert finest.result.field.spec.resolution == finest_cells(scene)
+    assert training.result.field.spec.resolution == round(2 / 3 * finest_cells(scene))
 
 
 def test_the_summary_has_the_evidence() -> None:
-    choice = FieldChoice(60, tuple(candidates(20.1, 20.0, 19.0)), ("001.png", "005.png"))
+    choice = FieldChoice(60, "", tuple(candidates(20.1, 20.05)), ("001.png", "005.png"))
     text = summary_of(choice)
-    assert "planes: 60 cells along the longest side, the fewest within 0.15 dB of the best" in text
-    assert "(predicted 001.png and 005.png; 90: 20.10 dB, 60: 20.00 dB, 30: 19.00 dB)" in text
-    assert "too few drawings to leave one out" in summary_of(FieldChoice(90, (), ()))
+    assert "planes: 60 cells along the longest side, the fewest within 0.1 dB of the best" in text
+    assert "(predicted 001.png and 005.png from the others; 90: 20.10 dB, 60: 20.05 dB)" in text
+    said = summary_of(FieldChoice(90, "8 drawings agree"))
+    assert "90 cells along the longest side, the usual two thirds" in said
+    assert "(8 drawings agree)" in said
 
 
 def summary_of(choice: FieldChoice) -> str:
