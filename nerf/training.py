@@ -50,7 +50,7 @@ CELLS_PER_PX, CELLS = 1.0, (48, 256)
 STEPS_ALONG = 160  # samples that the longest side of the hull would take
 MOST_SAMPLES = 24  # per ray, from its first inside the hull; 48: +.2 dB, but surfaces turn to mist
 MLP_LAYERS, MLP_WIDTH = 4, 64
-PARTS = ("drawings", "hull", "planes", "rays")  # before the steps, in order
+PARTS: tuple[str, ...] = ("drawings", "hull", "planes", "rays")  # before the steps, in order
 NO_EVIDENCE = HullEvidence(0, ())
 
 

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from toonset.calib.enclosed import without_false_holes
+from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.bodies import random_body
 from toonset.dataset.mesh_file import save_obj
@@ -46,7 +48,8 @@ def drawn(name: str, hole=None, patch=None, soft: bool = False) -> View:
 
 
 def filled(views, yaws, papers=None, verdict="ok", elevation: float = 0.0):
-    found = [SimpleNamespace(camera=camera_at(y, elevation), verdict=verdict) for y in yaws]
+    looks = [SimpleNamespace(camera=camera_at(y, elevation), verdict=verdict) for y in yaws]
+    found = cast("list[ViewCalibration]", looks)
     papers = papers or [WHITE] * len(views)
     return without_false_holes(views, found, papers, slab())
 

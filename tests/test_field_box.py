@@ -195,7 +195,7 @@ def test_the_painted_hull_has_the_drawings_colours_where_they_see_it(side: float
     density, rgb = field(samples.points[2:3])
     assert float(density.detach()) * hull.voxel > 0.2
     wanted = [1.0, 0, 0] if side > 0 else [0, 0, 1.0]
-    assert float((rgb[0] - torch.tensor(wanted)).abs().max()) < 0.1
+    assert float((rgb[0].detach() - torch.tensor(wanted)).abs().max()) < 0.1
 
 
 def test_the_loss_is_the_mean_over_backdrops_of_all_colours() -> None:
