@@ -31,6 +31,7 @@ class Chart:
         statistic: what the merit is of its samples, "mean" or "median".
         caption: n, seeds and machine.
         lower_is_better: the merit is an error.
+        same: methods that left out what had nothing to do: the default's own runs, not drawn.
     """
 
     subject: str
@@ -43,6 +44,7 @@ class Chart:
     statistic: str
     caption: str
     lower_is_better: bool
+    same: tuple[str, ...] = ()
 
     @property
     def front(self) -> list[Point]:
@@ -80,6 +82,10 @@ class Chart:
         ]
         if aside:
             notes.append(f"Hollow, not compared: {'; '.join(aside)}.")
+        if self.same:
+            notes.append(
+                f"The same runs as the default, with nothing to leave out: {', '.join(self.same)}."
+            )
         return [*notes, self.caption]
 
     def csv(self) -> str:

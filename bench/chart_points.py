@@ -125,13 +125,15 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
     points = points_of(own, plot)
     if not points:
         return None
+    same = _same_as_default(points)
     first = merits.get(DEFAULT) or next(iter(merits.values()))
     cases = f"{len(first.by_case)} {plot.cases}"
     n = f"n = {first.n} {plot.samples} of {cases}" if plot.samples else f"n = {cases}"
     return Chart(
         subject=subject,
         group=f"{group}{plot.of}",
-        points=tuple(points),
+        points=tuple(p for p in points if p.method not in same),
+        same=same,
         merit=first.metric,
         unit=first.unit,
         cost=plot.cost_name,
@@ -139,6 +141,19 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
         statistic="mean" if plot.mean else "median",
         caption=f"{n}; {seeds}; {first.machine}.",
         lower_is_better=first.direction == "lower",
+    )
+
+
+def _same_as_default(points: Sequence[Point]) -> tuple[str, ...]:
+    """Return the methods that leave something out and whose runs are the default's to the bit."""
+    default = next((p for p in points if p.method == DEFAULT), None)
+    if default is None:
+        return ()
+    return tuple(
+        p.method
+        for p in points
+        if p.method.startswith("without")
+        and (p.cost, p.merit, p.by_case) == (default.cost, default.merit, default.by_case)
     )
 
 

@@ -57,7 +57,7 @@ def _planes(found: dict[str, Any] | None) -> list[str]:
         return []
     cells = f"planes: {found['cells']} cells along the longest side"
     if found["untried"]:
-        return [f"{cells}, the usual two thirds of a pixel's ({found['untried']})"]
+        return [f"{cells}, the usual two thirds of one per pixel (not tried: {found['untried']})"]
     tried = ", ".join(f"{c['cells']}: {c['left_out_psnr']:.2f} dB" for c in found["candidates"])
     return [
         f"{cells}, the fewest within {found['tolerance_db']:g} dB of the best (predicted "

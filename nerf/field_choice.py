@@ -1,9 +1,9 @@
-"""How fine the planes are: two thirds of a cell per pixel, or half of that where it does as well.
+"""How fine the planes are: from one cell per pixel down to a third, by what drawings predict.
 
-Finer planes fit each drawing's own pixels; coarser ones hold what drawings share. Where several
-drawings agree, nothing coarser than two thirds does as well. Where they are few or disagree, short
-trainings on some of them predict the others, and the coarser planes count if they do not predict
-worse, within a tolerance.
+Finer planes fit each drawing's own pixels, and thin limbs; coarser ones hold what drawings share.
+Short trainings on some drawings predict the others with finer and with coarser planes; the coarser
+count if they predict as well, within a tolerance. Where several drawings agree, it is between one
+and two thirds of a cell per pixel; where they are few or disagree, between two thirds and a third.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-USUAL, COARSE = 2 / 3, 1 / 3  # cells per pixel
-MANY_VIEWS = 6  # that agree: nothing coarser is tried
+FINE, USUAL, COARSE = 1.0, 2 / 3, 1 / 3  # cells per pixel
+MANY_VIEWS = 6  # that agree: a third was never as good
 FEWEST_VIEWS = 3  # with fewer nothing can be left out
 TOLERANCE_DB = 0.1
 
@@ -56,19 +56,14 @@ class FieldChoice:
         return asdict(self)
 
 
-def why_untried(views: int, *, agree: bool, short: bool) -> str:
-    """Return why trials would tell nothing of so many drawings, or not be worth it; else nothing.
+def shares_for(views: int, *, agree: bool) -> tuple[float, float]:
+    """Return the cells per pixel that are tried, finer ones first.
 
     Args:
         views: that show a figure.
         agree: their outlines do, to the pixel.
-        short: the training takes hardly longer than trials would.
     """
-    if agree and views >= MANY_VIEWS:
-        return f"{views} drawings agree"
-    if views < FEWEST_VIEWS:
-        return "too few drawings to leave one out"
-    return "too short a training for trials" if short else ""
+    return (FINE, USUAL) if agree and views >= MANY_VIEWS else (USUAL, COARSE)
 
 
 def chosen(candidates: Sequence[Candidate]) -> int:

@@ -15,12 +15,12 @@ import torch
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.batches import Batch, make_batches
 from toonset.nerf.field_choice import (
-    COARSE,
+    FEWEST_VIEWS,
     USUAL,
     Candidate,
     FieldChoice,
     chosen,
-    why_untried,
+    shares_for,
 )
 from toonset.nerf.field_loss import Model, Weights, render_batch
 from toonset.nerf.field_rays import FixedRays
@@ -30,8 +30,8 @@ from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import figure_px
 
-MOST_RAYS = 32_000  # drawn by lot: a trial takes fewer than three of them a step
-STEPS = 40  # by then the order of the candidates shows
+MOST_RAYS = 32_000  # drawn by lot; a trial goes through them four times
+STEPS = 60  # by then the order of the candidates shows
 TWO_FROM = 6  # views from which two drawings are left out, half a turn apart
 
 Build = Callable[[int], Field]
@@ -80,11 +80,13 @@ def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> F
     """
     frames, options = ground.scene.frames, ground.options
     shown = [frame for frame in frames if figure_px(frame)]
-    cells = [max(1, round(share * finest)) for share in (USUAL, COARSE)]
-    short = not options.carve or options.budget_s is not None or options.steps < 2 * STEPS
-    untried = why_untried(len(shown), agree=agree, short=short)
+    untried = "too few drawings to leave one out" if len(shown) < FEWEST_VIEWS else ""
+    if not options.carve or options.budget_s is not None or options.steps < 2 * STEPS:
+        untried = "too short a training for trials" if options.carve else "no hull to try them in"
     if untried:
-        return FieldChoice(cells[0], untried)
+        return FieldChoice(max(1, round(USUAL * finest)), untried)
+    shares = shares_for(len(shown), agree=agree)
+    cells = [max(1, round(share * finest)) for share in shares]
     left = left_out(shown)
     kept = [frame for frame in frames if frame not in left]
     candidates = tuple(_tried(ground, kept, left, count, build) for count in cells)

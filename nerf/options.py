@@ -24,10 +24,10 @@ class TrainOptions:
             and drawings that had to be aligned, get more.
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
-        field: what is fitted: "auto", planes with a small decoder, 2/3 of a cell per pixel or half
-            of that (`nerf.field_choice`); "triplane", one cell per pixel; or, to compare with, a
-            network alone, a grid of voxels, or the hull with the drawings' colours (nothing is
-            fitted then).
+        field: what is fitted: "auto", planes with a small decoder, as coarse as predicts left-out
+            drawings well (`nerf.field_choice`); "triplane", one cell per pixel; or, to compare
+            with, a network alone, a grid of voxels, or the hull with the drawings' colours (nothing
+            is fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over any backdrop.
         fair: take the fairest surface inside the hull instead of the hull with its corners.

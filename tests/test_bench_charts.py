@@ -273,3 +273,14 @@ def test_a_second_chart_has_quality_against_model_size() -> None:
     }
     assert second.cost_unit == "kB"
     assert set(SECOND["train"].only) <= set(TRAIN_METHODS)
+
+
+def test_what_left_out_nothing_is_named_and_not_drawn() -> None:
+    figures = {"default": 30.0, "without symmetry": 30.0, "without fairing": 29.0, "voxel": 30.0}
+    records = [record("held-out PSNR", name, {"a": psnr}) for name, psnr in figures.items()]
+    records += [record("CPU seconds", name, {"a": 9.0}) for name in figures]
+    chart = charts_of("train", records, "seed 0")[0]
+    assert [p.method for p in chart.points] == ["default", "without fairing", "voxel"]
+    assert (
+        "The same runs as the default, with nothing to leave out: without symmetry." in chart.notes
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from toonset.bench.train_choice import choices_of, choices_text
 from toonset.bench.train_plan import METHODS, PLANES
 from toonset.bench.train_run import RunResult
-from toonset.nerf.field_choice import COARSE, USUAL
+from toonset.nerf.field_choice import COARSE, FINE, USUAL
 
 
 def run(method: str, psnr: float, parameters: int, case: str = "a", seed: int = 0) -> RunResult:
@@ -41,5 +41,5 @@ def test_nothing_is_said_without_fixed_fields() -> None:
 
 
 def test_fixed_fields_are_all_that_a_training_may_choose() -> None:
-    assert {USUAL, COARSE} <= set(PLANES.values())
+    assert {FINE, USUAL, COARSE} == set(PLANES.values())
     assert all(METHODS[name].share == share for name, share in PLANES.items())

@@ -13,7 +13,7 @@ from toonset.bench.cases import train_cases
 from toonset.cli.train_summary import summary
 from toonset.dataset.scene import Scene
 from toonset.nerf import field_trials
-from toonset.nerf.field_choice import Candidate, FieldChoice, chosen, why_untried
+from toonset.nerf.field_choice import Candidate, FieldChoice, chosen, shares_for
 from toonset.nerf.field_trials import left_out
 from toonset.nerf.labelling import without_palette
 from toonset.nerf.options import TrainOptions
@@ -60,31 +60,38 @@ def test_drawings_left_out_lie_half_a_turn_apart(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize(
-    ("views", "agree", "short", "why"),
-    [
-        (8, True, False, "8 drawings agree"),
-        (6, True, True, "6 drawings agree"),
-        (8, False, False, ""),
-        (5, True, False, ""),
-        (3, True, False, ""),
-        (2, True, False, "too few drawings to leave one out"),
-        (4, True, True, "too short a training for trials"),
-    ],
+    ("views", "agree", "finer"),
+    [(8, True, 1.0), (6, True, 1.0), (8, False, 2 / 3), (5, True, 2 / 3), (3, True, 2 / 3)],
 )
-def test_trials_are_for_drawings_that_are_few_or_disagree(
-    views: int, agree: bool, short: bool, why: str
+def test_few_drawings_and_those_that_disagree_are_tried_on_coarser_planes(
+    views: int, agree: bool, finer: float
 ) -> None:
-    assert why_untried(views, agree=agree, short=short) == why
+    shares = shares_for(views, agree=agree)
+    assert shares[0] == finer
+    assert shares[1] < finer
 
 
 @pytest.mark.parametrize(
-    "hurried",
-    [replace(SHORT, steps=2 * FEW - 1), replace(SHORT, budget_s=60.0), replace(SHORT, carve=False)],
+    ("options", "why"),
+    [
+        (replace(SHORT, steps=2 * FEW - 1), "too short a training for trials"),
+        (replace(SHORT, budget_s=60.0), "too short a training for trials"),
+        (replace(SHORT, carve=False), "no hull to try them in"),
+    ],
 )
-def test_short_trainings_try_nothing(few: Scene, quick: None, hurried: TrainOptions) -> None:
-    choice = train(few, hurried).choice
+def test_some_trainings_try_nothing(
+    few: Scene, quick: None, options: TrainOptions, why: str
+) -> None:
+    choice = train(few, options).choice
     assert choice is not None
-    assert choice.untried == "too short a training for trials"
+    assert (choice.untried, choice.candidates) == (why, ())
+    assert choice.cells == round(2 / 3 * finest_cells(few))
+
+
+def test_two_drawings_say_nothing_of_planes(few: Scene, quick: None) -> None:
+    choice = train(replace(few, frames=few.frames[:2]), SHORT).choice
+    assert choice is not None
+    assert choice.untried == "too few drawings to leave one out"
 
 
 def test_trials_see_the_other_drawings_only(
@@ -122,16 +129,14 @@ def test_the_choice_is_all_that_trials_change(few: Scene, quick: None, tmp_path:
     assert read_field(tmp_path).field.spec.resolution == auto.choice.cells
 
 
-def test_many_drawings_that_agree_get_two_thirds_of_a_cell_per_pixel(
-    scene: Scene, quick: None
-) -> None:
+def test_many_drawings_that_agree_may_have_a_cell_per_pixel(scene: Scene, quick: None) -> None:
     training = train(scene, SHORT)
     finest = train(scene, replace(SHORT, field="triplane"))
     assert training.choice is not None
-    assert (training.choice.untried, training.choice.candidates) == ("8 drawings agree", ())
+    cells = [candidate.cells for candidate in training.choice.candidates]
+    assert cells == [finest_cells(scene), round(2 / 3 * finest_cells(scene))]
     assert finest.choice is None
-    assert finest.result.field.spec.resolution == finest_cells(scene)
-    assert training.result.field.spec.resolution == round(2 / 3 * finest_cells(scene))
+    assert finest.result.field.spec.resolution == cells[0]
 
 
 def test_the_summary_has_the_evidence() -> None:
@@ -139,9 +144,9 @@ def test_the_summary_has_the_evidence() -> None:
     text = summary_of(choice)
     assert "planes: 60 cells along the longest side, the fewest within 0.1 dB of the best" in text
     assert "(predicted 001.png and 005.png from the others; 90: 20.10 dB, 60: 20.05 dB)" in text
-    said = summary_of(FieldChoice(90, "8 drawings agree"))
+    said = summary_of(FieldChoice(90, "no hull to try them in"))
     assert "90 cells along the longest side, the usual two thirds" in said
-    assert "(8 drawings agree)" in said
+    assert "(not tried: no hull to try them in)" in said
 
 
 def summary_of(choice: FieldChoice) -> str:
