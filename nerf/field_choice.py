@@ -2,8 +2,9 @@
 
 Finer planes fit each drawing's own pixels, and thin limbs; coarser ones hold what drawings share.
 Short trainings on some drawings predict the others with finer and with coarser planes; the coarser
-count if they predict as well, within a tolerance. Where several drawings agree, it is between one
-and two thirds of a cell per pixel; where they are few or disagree, between two thirds and a third.
+count if they predict as well, within a tolerance. It is between one and two thirds of a cell per
+pixel; where drawings agree but are few, between two thirds and a third. (Where they disagree, that
+predicts as well, but eyes and mouths are lost.)
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 FINE, USUAL, COARSE = 1.0, 2 / 3, 1 / 3  # cells per pixel
-MANY_VIEWS = 6  # that agree: a third was never as good
+MANY_VIEWS = 6  # from which on a third was never as good
 FEWEST_VIEWS = 3  # with fewer nothing can be left out
 TOLERANCE_DB = 0.1
 
@@ -63,7 +64,7 @@ def shares_for(views: int, *, agree: bool) -> tuple[float, float]:
         views: that show a figure.
         agree: their outlines do, to the pixel.
     """
-    return (FINE, USUAL) if agree and views >= MANY_VIEWS else (USUAL, COARSE)
+    return (USUAL, COARSE) if agree and views < MANY_VIEWS else (FINE, USUAL)
 
 
 def chosen(candidates: Sequence[Candidate]) -> int:
