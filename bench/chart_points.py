@@ -15,6 +15,7 @@ import numpy as np
 from toonset.bench.chart import Chart
 from toonset.bench.pareto import DEFAULT, Point
 from toonset.bench.record import Record, summarise
+from toonset.bench.train_plan import METHODS
 
 PARAMETERS = "parameters"
 COLORS_FOUND = "F1 of colours"
@@ -39,6 +40,8 @@ class Plot:
         told: methods that know more than the default, and what; they are set aside.
         of: what else than the group names the chart; "" = nothing.
         only: methods that are shown; empty = all.
+        switches: methods that leave a step out, and share the default's runs where it had nothing
+            to do.
     """
 
     merits: tuple[str, ...]
@@ -51,6 +54,7 @@ class Plot:
     told: Mapping[str, str] = field(default_factory=dict)
     of: str = ""
     only: tuple[str, ...] = ()
+    switches: tuple[str, ...] = ()
 
 
 TRAINING = Plot(
@@ -58,6 +62,7 @@ TRAINING = Plot(
     *("CPU seconds", "CPU seconds of training", "CPU s"),
     *("trainings", "characters"),
     mean=True,
+    switches=tuple(name for name, method in METHODS.items() if method.leaves_out),
     told={
         f"paper, hand-picked palette, {steps} steps": "told the palette" for steps in (200, 2000)
     },
@@ -125,7 +130,7 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
     points = points_of(own, plot)
     if not points:
         return None
-    same = _same_as_default(points)
+    same = _same_as_default(points, plot.switches)
     first = merits.get(DEFAULT) or next(iter(merits.values()))
     cases = f"{len(first.by_case)} {plot.cases}"
     n = f"n = {first.n} {plot.samples} of {cases}" if plot.samples else f"n = {cases}"
@@ -144,15 +149,15 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
     )
 
 
-def _same_as_default(points: Sequence[Point]) -> tuple[str, ...]:
-    """Return the methods that leave something out and whose runs are the default's to the bit."""
+def _same_as_default(points: Sequence[Point], switches: Sequence[str]) -> tuple[str, ...]:
+    """Return the switches whose runs are the default's to the bit."""
     default = next((p for p in points if p.method == DEFAULT), None)
     if default is None:
         return ()
     return tuple(
         p.method
         for p in points
-        if p.method.startswith("without")
+        if p.method in switches
         and (p.cost, p.merit, p.by_case) == (default.cost, default.merit, default.by_case)
     )
 

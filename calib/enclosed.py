@@ -19,16 +19,16 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
+from toonset.dataset.background import difference
+from toonset.dataset.holes import CLEAR, LEAST_HOLE_PX
 from toonset.view import Box, View
 
 Rgb = tuple[int, int, int]
 
-LEAST_HOLE_PX = 9  # smaller ones are specks of the edge
 OPPOSITE_DEG = 35.0  # from looking against each other: two views from 17 degrees above
 ROUND = 0.02  # of the figure's height: what is drawn off by less is still the same hole
 BESIDE = 0.05  # of the figure's height: the body is as deep here as it is behind the hole
 EDGE_PX = 3  # of a hole, mixed with paper
-CLEAR = 40  # levels from the paper: another colour
 MOST_PAPER = 0.1  # of what lies behind: lines and lights in the paper's colour
 MOST_PLACES = 400  # pixels of a hole that are looked along
 DEPTHS = 9  # places along each of their rays
@@ -93,11 +93,12 @@ def without_false_holes(
 
 def _holes(view: View) -> Iterator[Bool[np.ndarray, "height width"]]:
     """Yield the see-through patches that the figure encloses."""
-    empty = np.pad(~view.mask, 1, constant_values=True)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(empty.view(np.uint8), connectivity=4)
-    for number in range(1, len(stats)):
-        if number != labels[0, 0] and stats[number, cv2.CC_STAT_AREA] >= LEAST_HOLE_PX:
-            yield labels[1:-1, 1:-1] == number
+    enclosed = ~view.mask & ~_outside(view)
+    count, labels = cv2.connectedComponents(enclosed.view(np.uint8), connectivity=4)
+    for number in range(1, count):
+        patch = labels == number
+        if patch.sum() >= LEAST_HOLE_PX:
+            yield patch
 
 
 def _opposite(camera: Camera, other: Camera) -> bool:
@@ -135,7 +136,8 @@ class _Painted:
 
 
 def _painted(view: View, paper: Rgb) -> _Painted:
-    apart = np.abs(view.rgba[..., :3].astype(np.int16) - np.array(paper)).max(axis=2)
+    rgb = view.rgba[..., :3]
+    apart = difference(rgb, np.broadcast_to(np.array(paper, np.uint8), rgb.shape))
     reach = max(1, round(ROUND * view.figure_box[3]))
     return _Painted(view.mask, view.mask & (apart < CLEAR), reach)
 

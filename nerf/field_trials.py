@@ -78,12 +78,9 @@ def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> F
         build: returns an untrained field of so many cells.
         agree: the drawings' outlines do, to the pixel.
     """
-    frames, options = ground.scene.frames, ground.options
+    frames = ground.scene.frames
     shown = [frame for frame in frames if figure_px(frame)]
-    untried = "too few drawings to leave one out" if len(shown) < FEWEST_VIEWS else ""
-    if not options.carve or options.budget_s is not None or options.steps < 2 * STEPS:
-        untried = "too short a training for trials" if options.carve else "no hull to try them in"
-    if untried:
+    if untried := _why_untried(len(shown), ground.options):
         return FieldChoice(max(1, round(USUAL * finest)), untried)
     shares = shares_for(len(shown), agree=agree)
     cells = [max(1, round(share * finest)) for share in shares]
@@ -94,10 +91,18 @@ def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> F
     return FieldChoice(chosen(candidates), "", candidates, names)
 
 
+def _why_untried(views: int, options: TrainOptions) -> str:
+    if not options.carve:
+        return "no hull to try them in"
+    if options.budget_s is not None or options.steps < 2 * STEPS:
+        return "too short a training for trials"
+    return "too few drawings to leave one out" if views < FEWEST_VIEWS else ""
+
+
 def left_out(frames: Sequence[Frame]) -> list[Frame]:
     """Return the drawings that are predicted: the second, and the one half a turn from it."""
-    second = [1, 1 + len(frames) // 2] if len(frames) >= TWO_FROM else [1]
-    return [frames[number] for number in second]
+    numbers = [1, 1 + len(frames) // 2] if len(frames) >= TWO_FROM else [1]
+    return [frames[number] for number in numbers]
 
 
 def _tried(

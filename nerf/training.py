@@ -90,11 +90,10 @@ def train(
     if options.carve:
         hull, evidence = hull_of(scene, options, ready.apart_px)
     clock.append(time.perf_counter())
-    weights = _weights(options, len(scene.frames), agree=ready.apart_px == 0)
-    choice = None
+    agree, choice = ready.apart_px == 0, None
+    weights = _weights(options, len(scene.frames), agree=agree)
     if options.field == "auto" and options.resolution is None:
         tell("choosing the planes")
-        agree = ready.apart_px == 0
         choice = _choice(ready.scene, hull, weights, options, device, agree=agree)
         torch.manual_seed(options.seed)
     cells = choice.cells if choice else None
