@@ -7,6 +7,7 @@ two sides of a thin limb are not confused.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,8 +75,21 @@ class Drawing:
         self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
         self.subpixels = max(1, round(height_px / SUBPIXEL_HEIGHT))
         self.direction_px = DIRECTION_OF_HEIGHT * height
+        self._lay()
+
+    def _lay(self) -> None:
         self.features = np.hstack([self.points, self.direction_px * self.normals])
         self.table = Table(self.features)
+
+    def inset(self, offset: float) -> Drawing:
+        """Return the drawing with its outline moved inwards by `offset` heights.
+
+        A drawn line lies outside of the body: what a sheet's views share of that is no misfit.
+        """
+        other = copy.copy(self)
+        other.points = self.points - offset * self.height * self.normals
+        other._lay()
+        return other
 
     def pose_in(self, pose: Pose) -> Pose:
         """Return a full-size pose in working pixels."""

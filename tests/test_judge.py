@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 
 from toonset.calib.judge import (
+    CONFIRMING,
+    TELLING_VIEWS,
+    SheetState,
+    judge_sheet,
     with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
@@ -49,14 +53,33 @@ def test_views_that_turn_without_their_lock_are_not_ok():
     assert verdicts(with_locks_in_mind(views, np.radians([9, 2, 9]))) == ["weak"] * 3
 
 
-@pytest.mark.parametrize("how", ["bent", "faces", "uncertain", "shape"])
+def state(views: int = 3, contradiction: float = 0.0) -> SheetState:
+    return SheetState(True, contradiction, None, views)
+
+
+@pytest.mark.parametrize("how", ["bent", "faces", "uncertain", "shape", "failed"])
 def test_no_view_is_ok_where_the_sheet_is_not(how):
     views = [seen_from() for _ in range(3)]
     if how == "uncertain":
         views[:2] = [replace(view, verdict="ambiguous") for view in views[:2]]
     if how == "shape":
         views[:2] = [replace(view, coverage=0.9) for view in views[:2]]
-    judged = with_sheet_in_mind(views, 0.9 if how == "faces" else 0.0, bent=how == "bent")
+    if how == "failed":
+        views[0] = replace(views[0], verdict="failed")
+    faces = 0.9 if how == "faces" else 0.0
+    judged = with_sheet_in_mind(views, state(), faces, bent=how == "bent")
     assert judged[2].verdict == "weak"
     assert judged[2].reason
-    assert verdicts(with_sheet_in_mind([seen_from()] * 3)) == ["ok"] * 3
+    assert verdicts(with_sheet_in_mind([seen_from()] * 3, state())) == ["ok"] * 3
+
+
+@pytest.mark.parametrize("bent", [True, False])
+def test_another_shape_is_no_reason_to_doubt_where_many_drawings_agree(bent):
+    views = [replace(seen_from(), coverage=0.85) for _ in range(TELLING_VIEWS)]
+    agreeing = state(TELLING_VIEWS)
+    assert verdicts(with_sheet_in_mind(views, agreeing, bent=bent)) == ["ok"] * len(views)
+    verdict, said = judge_sheet(views, agreeing)
+    assert verdict == "ok"
+    assert "15 %" in said
+    for other in (state(TELLING_VIEWS - 1), state(TELLING_VIEWS, 1.01 * CONFIRMING)):
+        assert verdicts(with_sheet_in_mind(views, other, bent=bent)) == ["weak"] * len(views)

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
-from toonset.calib.align import align, align_all
+from toonset.calib.align import align, align_all, measure
 from toonset.calib.contour import drawn_contour
 from toonset.calib.match import Drawing, Table, match, nearest
 from toonset.calib.pose import Pose, project
@@ -120,6 +120,17 @@ def test_matches_of_a_drawing_with_itself_are_close_on_both_sides():
 
 
 WIDTHS = np.geomspace(0.06, 0.01, 8)
+
+
+def test_an_outline_drawn_outside_meets_the_body_once_it_is_moved_in():
+    surface, pose = prepare_surface(ball()), pose_at(3)
+    drawing = drawing_of(ball(), pose)
+    outside = drawing.inset(-0.03)
+    off = [measure(d, surface, d.pose_in(pose)).error for d in (drawing, outside)]
+    assert off[1] == pytest.approx(0.03, abs=0.004)
+    back = outside.inset(0.03)
+    np.testing.assert_allclose(back.points, drawing.points)
+    assert measure(back, surface, back.pose_in(pose)).error == pytest.approx(off[0], rel=1e-3)
 
 
 def test_starts_that_meet_end_as_one_where_each_would_alone():
