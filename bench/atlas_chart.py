@@ -105,7 +105,7 @@ def _draw_fates(axes: Any, page: TriedPage) -> None:
 def _fates(trials: tuple[Trial, ...], kind: Kind) -> list[int]:
     counts = [0] * len(FATES)
     for trial in trials:
-        said = trial.voice not in (kind.quiet, UNJUDGED)
+        said = trial.voice != UNJUDGED and not kind.is_calm(trial.voice)
         if trial.value > kind.failed:
             counts[3 if said else 4] += 1
         elif trial.value < kind.fine:

@@ -1,8 +1,8 @@
 """What an atlas of failures counts: trials, which of them failed, and what the tool said of them.
 
 A page's trials all have one value, the larger the worse. Above one bound a trial has failed, below
-another it is fine; what lies between counts as neither. A failure is announced if the tool said
-anything but its quietest word; saying more of a fine trial is a false alarm.
+another it is fine; what lies between counts as neither. A failure is announced if the tool raised
+an alarm: said anything but its calm words. Raised over a fine trial, it is a false one.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ class Kind:
         failed: the value above which it is not.
         voices: what the tool may say, with its colour; the first says that all is well.
         logarithmic: whether the value spans powers of ten.
+        informs: voices besides the first that are no alarm.
     """
 
     subject: str
@@ -48,11 +49,11 @@ class Kind:
     failed: float
     voices: Mapping[str, str]
     logarithmic: bool = False
+    informs: tuple[str, ...] = ()
 
-    @property
-    def quiet(self) -> str:
-        """Return the voice that says that all is well."""
-        return next(iter(self.voices))
+    def is_calm(self, voice: str) -> bool:
+        """Return whether a voice raises no alarm."""
+        return voice in (next(iter(self.voices)), *self.informs)
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,9 @@ class Tally:
         n: all.
         failed: beyond the kind's bound.
         judged: of these, those that the tool gives a verdict on.
-        announced: of these, those that it said something about.
+        announced: of these, those that it raised an alarm over.
         fine: within the kind's bound, with a verdict.
-        alarms: of these, those that it said something about.
+        alarms: of these, those that it raised an alarm over.
     """
 
     n: int
@@ -126,7 +127,7 @@ def tally(trials: Iterable[Trial], kind: Kind) -> Tally:
     failed = [t for t in trials if t.value > kind.failed]
     judged = [t for t in failed if t.voice != UNJUDGED]
     fine = [t for t in trials if t.value < kind.fine and t.voice != UNJUDGED]
-    loud = [[t for t in some if t.voice != kind.quiet] for some in (judged, fine)]
+    loud = [[t for t in some if not kind.is_calm(t.voice)] for some in (judged, fine)]
     return Tally(len(trials), len(failed), len(judged), len(loud[0]), len(fine), len(loud[1]))
 
 

@@ -51,7 +51,7 @@ RULES = {
     "announced if its verdict is not ok.",
     "training": "A training is fine if held-out views lose less than 1 dB against the same body's "
     "clean scene, and has failed beyond 3 dB, twice the error's power; it is announced if train "
-    "warned, refused, or had to set cameras or drawings right.",
+    "refused or called the run weak. What it set right it says, too, but that is no alarm.",
     "palette": "A palette has failed that lacks one of the colours; it is announced if that colour "
     "is listed as left out, the number of colours is called a close call, or there is a warning.",
 }
@@ -129,7 +129,7 @@ def _section(number: int, page: TriedPage, pictures: Pictures) -> str:
 
 def badness(trial: Trial, kind: Kind) -> tuple[bool, float]:
     """Return what sorts trials by how bad they are: failed in silence before anything else."""
-    return trial.value > kind.failed and trial.voice == kind.quiet, trial.value
+    return trial.value > kind.failed and kind.is_calm(trial.voice), trial.value
 
 
 def worst_trial(step: TriedStep, kind: Kind) -> Trial:

@@ -19,13 +19,13 @@ from toonset.bench.atlas_training import (
     REFUSED,
     REPAIRED,
     SILENT,
-    WARNED,
     TrainPage,
     Tried,
 )
 from toonset.bench.chart import COLORS
 from toonset.bench.stability import SheetResult, StepResult
 from toonset.bench.stability_table import SOLVED_DEG, WRONG_DEG
+from toonset.nerf.verdict import WEAK
 
 BLUE, VERMILION, GREEN, _, ORANGE, SKY, BLACK, GREY = COLORS
 LOST_FINE_DB, LOST_FAILED_DB = 1.0, 3.0
@@ -38,7 +38,8 @@ CALIBRATION = Kind(
 )
 TRAINING = Kind(
     *("training", "trainings", "loss of held-out PSNR", "dB", LOST_FINE_DB, LOST_FAILED_DB),
-    {SILENT: GREEN, REPAIRED: ORANGE, WARNED: SKY, REFUSED: VERMILION, CRASHED: BLACK},
+    {SILENT: GREEN, REPAIRED: SKY, WEAK: ORANGE, REFUSED: VERMILION, CRASHED: BLACK},
+    informs=(REPAIRED,),
 )
 PALETTE = Kind(
     *("palette", "palettes", "colours missed", "%", NONE_MISSED, NONE_MISSED),

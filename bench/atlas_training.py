@@ -1,8 +1,8 @@
-"""Trying a training: how near held-out views come, and what `toonset train` says of the drawings.
+"""Trying a training: how near held-out views come, and what `toonset train` says of the run.
 
-What it says: that no drawing looks from a wide turn; that cameras had to be turned, drawings moved,
-sized or bent back, since outlines disagreed; or a refusal. `toonset consistency` names drawings
-that no such step reconciles.
+It refuses, or calls the run weak; or it says what it did to drawings that disagreed: cameras
+turned, drawings moved, sized or bent back. That a repair was needed is no alarm: whether it was
+enough, the verdict says.
 """
 
 from __future__ import annotations
@@ -24,20 +24,17 @@ from toonset.dataset.scene import Frame, Scene
 from toonset.errors import ToonsetError
 from toonset.nerf.consistency import consistency_of
 from toonset.nerf.evaluation_picture import tile_of
-from toonset.nerf.gaps import guesses
 from toonset.nerf.labelling import labelled
-from toonset.nerf.layers import color_picture
 from toonset.nerf.metrics import over_white, psnr_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.report import compared
+from toonset.nerf.report import figures_of, pictures_of
 from toonset.nerf.threads import use_threads
 from toonset.nerf.trained import Training
 from toonset.nerf.training import train
-from toonset.nerf.views import render
-from toonset.nerf.views_bake import Baked
+from toonset.nerf.verdict import WEAK, Picture, Verdict, verdict_of
 
-STEPS = 100  # of the optimiser: half a dB under the default's 300 at this size, in half the time
-SILENT, REPAIRED, WARNED, REFUSED, CRASHED = "silent", "repaired", "warned", "refused", "crashed"
+STEPS = TrainOptions().steps  # of the optimiser: the verdict is on what users get
+SILENT, REPAIRED, REFUSED, CRASHED = "silent", "repaired", "refused", "crashed"
 
 
 @dataclass(frozen=True)
@@ -97,9 +94,11 @@ def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
         scene = draw()
         ready, _ = labelled(scene.train)
         training = train(ready, TrainOptions(steps=STEPS, seed=seed))
-        views = _rendered(training, scene.test)
-        voice, words = _said(scene.train, training)
-        evidence = _evidence(scene.train, training)
+        views = pictures_of(training.result, scene.test)
+        fitted = pictures_of(training.result, training.prepared.scene)
+        verdict = verdict_of(training, fitted)
+        voice, words = _said(training, verdict)
+        evidence = _evidence(scene.train, training, fitted) | _shares(verdict)
     except ToonsetError as error:
         views, voice, words, evidence = [], REFUSED, str(error), {}
     except Exception as error:
@@ -114,12 +113,6 @@ def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
     return Tried(seed, float(np.nanmean(figures)), voice, words, evidence, seconds), picture
 
 
-def _rendered(training: Training, test: Scene) -> list[UInt8[np.ndarray, "height width 4"]]:
-    baked = Baked.of(training.result)
-    views = (render(baked, frame.camera) for frame in test.frames)
-    return [color_picture(view.rgb, view.alpha) for view in views]
-
-
 def _psnr(scene: DrawnScene, index: int, view: UInt8[np.ndarray, "height width 4"]) -> float:
     """Return a view's PSNR in dB; nan where no pixel counts."""
     drawn = scene.test.frames[index].rgba
@@ -130,9 +123,8 @@ def _psnr(scene: DrawnScene, index: int, view: UInt8[np.ndarray, "height width 4
     return psnr_of(float(error[counted].mean())) if counted.any() else math.nan
 
 
-def _said(scene: Scene, training: Training) -> tuple[str, str]:
-    """Return what `toonset train` said of the drawings."""
-    warnings = guesses(scene)
+def _said(training: Training, verdict: Verdict) -> tuple[str, str]:
+    """Return what `toonset train` said: why the run is weak, then what was set right."""
     ready = training.prepared
     repairs = [
         f"{what}: outlines {step.apart_px[0]:.2f} px apart, {step.apart_px[1]:.2f} px after"
@@ -143,14 +135,20 @@ def _said(scene: Scene, training: Training) -> tuple[str, str]:
         )
         if step is not None and step.applied
     ]
-    voice = WARNED if warnings else REPAIRED if repairs else SILENT
-    return voice, "; ".join([*warnings, *repairs])
+    calm = REPAIRED if repairs else SILENT
+    return WEAK if verdict.verdict == WEAK else calm, "; ".join([*verdict.reasons, *repairs])
 
 
-def _evidence(scene: Scene, training: Training) -> dict[str, float]:
+def _shares(verdict: Verdict) -> dict[str, float]:
+    """Return what the verdict rests on."""
+    off = verdict.off
+    return {"off": off.both, "off_outlines": off.outlines, "off_pictures": off.pictures}
+
+
+def _evidence(scene: Scene, training: Training, fitted: Sequence[Picture]) -> dict[str, float]:
     """Return what the report holds besides, and what `toonset consistency` finds."""
     ready, ious = training.prepared, training.evidence.left_out_iou
-    fit = compared(training.result, ready.scene)
+    fit = figures_of(fitted, ready.scene)
     found = {"fit_psnr": fit["psnr"] or 0.0, "fit_psnr_mask": fit["psnr_mask"] or 0.0}
     found |= {"left_out_iou": max(ious)} if ious else {}
     step = ready.unbending

@@ -12,7 +12,7 @@ from toonset.bench.calib import ViewError
 from toonset.bench.stability import SheetResult, StepResult
 from toonset.errors import BundleError
 
-FORMAT = 2
+FORMAT = 3
 
 
 @dataclass(frozen=True)

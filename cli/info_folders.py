@@ -20,12 +20,15 @@ def summarise_run(folder: Path) -> dict[str, Any]:
     config = _table(read_json(folder / "config.json"))
     metrics = _table(read_json(folder / "metrics.json"))
     field, scene = _table(config.get("field")), _table(config.get("scene"))
+    verdict = _table(metrics.get("verdict"))
     return {
         "kind": "run",
         "path": str(folder),
         "steps": metrics.get("steps"),
         "stopped": metrics.get("stopped"),
         "fit": {k: v for k, v in _table(metrics.get("train")).items() if k in SHOWN_METRICS},
+        "verdict": verdict.get("verdict"),
+        "reasons": verdict.get("reasons", []),
         "views": scene.get("views"),
         "palette": field.get("palette"),
         "options": config.get("options"),
@@ -41,6 +44,7 @@ def run_line(found: dict[str, Any]) -> str:
     views, colors = found["views"], found["palette"]
     parts += [f"{len(views)} views"] if isinstance(views, list) else []
     parts += [f"{len(colors)} colours"] if isinstance(colors, list) else ["no palette"]
+    parts += [found["verdict"]] if isinstance(found["verdict"], str) else []
     return ", ".join(parts)
 
 
@@ -48,7 +52,9 @@ def run_text(found: dict[str, Any]) -> str:
     """Return a run for people."""
     from toonset.cli.info_text import fact_lines, size_line
 
+    reasons = found["reasons"]
     facts = [
+        *[("weak", str(reason)) for reason in (reasons if isinstance(reasons, list) else [])],
         ("stopped", str(found["stopped"] or "")),
         ("options", _pairs(found["options"])),
         ("made by", _pairs(found["versions"])),

@@ -126,7 +126,9 @@ def train(
 ) -> None:
     """Train a triplane radiance field and a palette classifier on the drawings of a bundle.
 
-    Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says how to go on.
+    Says at the end whether the run is ok or weak, and why; exit code 3 when it is weak, the files
+    are written then too. Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says
+    how to go on.
     """
     from toonset.nerf.options import FIELDS
     from toonset.nerf.preset import PRESETS

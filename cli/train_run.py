@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from toonset.nerf.progress_watch import Onlooker
     from toonset.nerf.trained import Training
 
-DOUBTFUL = 3  # exit code: written, but training went wrong and was cut short
+DOUBTFUL = 3  # exit code: written, but weak, or training went wrong and was cut short
 FINE = ("steps", "budget")  # why a training may end
 RESUMED_AS = {"steps": "--steps", "budget_s": "--budget", "device": "--device", "seed": "--seed"}
 RESUMED_AS |= {
@@ -91,10 +91,12 @@ def run(request: Request, printer: Printer) -> int:
         return stopper.exit_code
     metrics = _write(place, training, onlooker)
     printer.result({"run": place.run, **metrics}, summary(place.run, metrics))
-    if training.stopped in FINE:
-        return 0
-    printer.doubt(f"{place.run}: training stopped early: {training.stopped}")
-    return DOUBTFUL
+    doubts = [f"weak: {reason}" for reason in metrics["verdict"]["reasons"]]
+    if training.stopped not in FINE:
+        doubts.append(f"training stopped early: {training.stopped}")
+    for doubt in doubts:
+        printer.doubt(f"{place.run}: {doubt}")
+    return DOUBTFUL if doubts else 0
 
 
 def _options(request: Request, checkpoint: Checkpoint | None) -> TrainOptions:
@@ -127,7 +129,6 @@ def _prepared(
     printer: Printer,
 ) -> Scene:
     """Set torch up and return the scene with what is trained."""
-    from toonset.nerf.gaps import guesses
     from toonset.nerf.memory import check_memory
     from toonset.nerf.threads import use_threads
     from toonset.nerf.training import device_of
@@ -138,10 +139,7 @@ def _prepared(
     use_threads(count)
     printer.say(f"{check_memory(scene, options, device)}; {count} CPU thread{'s' * (count > 1)}")
     palette = request.palette if checkpoint is None else checkpoint.record.with_palette
-    scene = _with_palette(scene, palette, printer)
-    for guess in guesses(scene):
-        printer.say(guess)
-    return scene
+    return _with_palette(scene, palette, printer)
 
 
 def _with_palette(scene: Scene, palette: bool, printer: Printer) -> Scene:

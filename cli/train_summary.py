@@ -22,9 +22,22 @@ def summary(run: Path, metrics: dict[str, Any]) -> str:
             *_planes(metrics["planes"]),
             f"fit to the drawings{_set_right(metrics['drawings'])}: {_figures(fit)}",
             *([f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []),
+            _verdict(metrics["verdict"]),
             f"{run}: preview.png shows it; next: toonset render {run} --turntable 36",
         ]
     )
+
+
+def _verdict(found: dict[str, Any]) -> str:
+    """Return what the run is worth, and by what."""
+    off = found["off_height"]
+    parts = f"outlines {_percent(off['outlines'])}, pictures {_percent(off['pictures'])}"
+    apart = f"drawings and field are {_percent(off['both'])} of the height apart ({parts})"
+    return f"verdict: {found['verdict']}; {apart}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f} %"
 
 
 def _drawings(found: dict[str, Any]) -> list[str]:

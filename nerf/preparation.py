@@ -48,6 +48,12 @@ class Prepared:
         return applied[-1].apart_px[1] if applied else 0.0
 
     @property
+    def outlines_px(self) -> float:
+        """Return by how much outlines disagree now, even where nothing was mended for that."""
+        steps = [step for step in (self.turning, self.registration, self.unbending) if step]
+        return self.apart_px or (steps[-1].apart_px[0] if steps else 0.0)
+
+    @property
     def keys(self) -> KeyWarps | None:
         """Return the drawings' bends, to be given back to renderings; None: they did not bend."""
         if self.unbending is None or not self.unbending.applied:

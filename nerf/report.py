@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from jaxtyping import UInt8
 
 from toonset import __version__
 from toonset.dataset.picture import encode_png
@@ -21,6 +22,7 @@ from toonset.nerf.metrics import compare, means, over_white
 from toonset.nerf.run_folder import write_field
 from toonset.nerf.trained import HeldOut, Step, TrainedField, Training
 from toonset.nerf.turntable import turntable
+from toonset.nerf.verdict import verdict_of
 from toonset.nerf.views import render
 from toonset.nerf.views_bake import Baked
 
@@ -46,10 +48,13 @@ def write_run(
         test: held-out views, compared whole; None: none.
         held_out: what was seen of them on the way.
     """
+    drawn = training.prepared.scene
+    shown = pictures_of(replace(training.result, ink=None), drawn)
     metrics = {
         **_course(training, held_out),
-        "train": compared(replace(training.result, ink=None), training.prepared.scene),
+        "train": figures_of(shown, drawn),
         "test": None if test is None else compared(training.result, test),
+        "verdict": verdict_of(training, shown).to_json(),
     }
     write_bytes(folder / "preview.png", encode_png(preview(training.result)))
     _write_files(folder, training, scene, metrics)
@@ -65,11 +70,22 @@ def write_unfinished(
 
 def compared(trained: TrainedField, scene: Scene) -> dict[str, float | None]:
     """Return the mean figures of the field's renderings beside a scene's pictures."""
-    baked, rows = Baked.of(trained), []
-    for frame in scene.frames:
-        view = render(baked, frame.camera)
-        rows.append(compare(color_picture(view.rgb, view.alpha), frame.rgba))
-    return means(rows)
+    return figures_of(pictures_of(trained, scene), scene)
+
+
+def pictures_of(trained: TrainedField, scene: Scene) -> list[UInt8[np.ndarray, "height width 4"]]:
+    """Return the field's pictures, straight alpha, seen by a scene's cameras."""
+    baked = Baked.of(trained)
+    views = (render(baked, frame.camera) for frame in scene.frames)
+    return [color_picture(view.rgb, view.alpha) for view in views]
+
+
+def figures_of(
+    pictures: Sequence[UInt8[np.ndarray, "height width 4"]], scene: Scene
+) -> dict[str, float | None]:
+    """Return the mean figures of pictures beside a scene's."""
+    pairs = zip(pictures, scene.frames, strict=True)
+    return means([compare(picture, frame.rgba) for picture, frame in pairs])
 
 
 def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:

@@ -65,9 +65,17 @@ def completed(scene: Scene) -> tuple[Scene, Symmetry | None]:
     plane_x = float(np.mean([_plane_x(frame.camera, middle) for frame, middle in pairs]))
     if min(alike) < ALIKE:
         return scene, Symmetry(alike, plane_x, ())
-    frames = scene.frames + tuple(mirrored(frame, plane_x) for frame in new)
-    names = tuple(frame.name for frame in new)
-    return replace(scene, frames=frames), Symmetry(alike, plane_x, names)
+    found = Symmetry(alike, plane_x, tuple(frame.name for frame in new))
+    return with_mirrored(scene, found), found
+
+
+def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
+    """Return the scene with the mirror images that were found to be drawings of it."""
+    if found is None or not found.mirrored:
+        return scene
+    sources = (frame for frame in scene.frames if frame.name in found.mirrored)
+    more = (mirrored(frame, found.plane_x) for frame in sources)
+    return replace(scene, frames=(*scene.frames, *more))
 
 
 def mirrored(frame: Frame, plane_x: float) -> Frame:

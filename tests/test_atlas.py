@@ -34,7 +34,7 @@ from toonset.bench.atlas_report import atlas_html
 from toonset.bench.atlas_results import CALIBRATION, TRAINING, tried_pages
 from toonset.bench.atlas_run import TriedStepResult
 from toonset.bench.atlas_scenes import draw_scene, misscaled, misturned, shifted, squashed
-from toonset.bench.atlas_training import REFUSED, SILENT, Tried, try_training
+from toonset.bench.atlas_training import REFUSED, REPAIRED, SILENT, Tried, try_training
 from toonset.bench.stability_bodies import (
     EARS,
     vase,
@@ -47,6 +47,8 @@ from toonset.bench.stability_bodies import (
 from toonset.bench.stability_draws import squashed as squashed_sheet
 from toonset.bench.stability_sweeps import SWEEPS
 from toonset.dataset.bodies import random_body
+from toonset.nerf import verdict
+from toonset.nerf.verdict import MOST_OFF, WEAK
 from toonset.palette.names import hex_of
 from toonset.palette.oklab import oklab_from_rgb
 
@@ -172,7 +174,7 @@ def test_a_squashed_drawing_is_believed_to_have_square_pixels(monkeypatch):
 # ---- trials
 
 
-def test_a_single_drawing_is_refused_and_a_training_says_nothing_of_a_clean_scene(monkeypatch):
+def test_a_single_drawing_is_refused_and_a_weak_run_says_why(monkeypatch):
     monkeypatch.setattr(atlas_training, "STEPS", 2)
     monkeypatch.setattr(atlas_scenes, "SCENE", replace(atlas_scenes.SCENE, cell_px=40))
     monkeypatch.setattr(atlas_scenes, "HELD_OUT", 4)
@@ -184,10 +186,15 @@ def test_a_single_drawing_is_refused_and_a_training_says_nothing_of_a_clean_scen
     assert 5 < tried.figure < 20  # white pictures
     assert picture.startswith(b"\x89PNG")
     clean, _ = try_training(page, page.reference, 0)
-    assert clean.voice == SILENT
+    assert clean.voice == WEAK
+    assert "2 of the usual 300 steps" in clean.words
+    assert clean.evidence["off"] > MOST_OFF
     assert clean.figure > tried.figure + 3
     assert clean.evidence["odd_views"] == 0
     assert try_training(TRAIN_PAGES[1], 0, 0)[0] is clean  # the same scene, tried once
+    atlas_training._base_tried.cache_clear()
+    monkeypatch.setattr(verdict, "MOST_OFF", 1.0)
+    assert try_training(page, page.reference, 0)[0].voice == SILENT
     atlas_training._base_tried.cache_clear()
 
 
@@ -283,13 +290,15 @@ def test_a_training_loses_against_its_own_bodys_clean_scene():
 
     steps = [
         TriedStepResult("train warp", "0", (tried(0, 30.0), tried(1, 20.0))),
-        TriedStepResult("train warp", "4", (tried(0, 29.5), tried(1, 16.0, "repaired"))),
+        TriedStepResult("train warp", "2", (tried(0, 29.5, REPAIRED), tried(1, 16.0, REPAIRED))),
+        TriedStepResult("train warp", "4", (tried(0, 29.5, WEAK), tried(1, 16.0, WEAK))),
         TriedStepResult("train jpeg", "60", (tried(0, 29.5),)),  # without its clean step
     ]
     (page,) = tried_pages(steps)
     assert [trial.value for trial in page.steps[1].trials] == [0.5, 4.0]
-    found = tally(page.steps[1].trials, TRAINING)
-    assert (found.fine, found.failed, found.announced) == (1, 1, 1)
+    counts = [tally(step.trials, TRAINING) for step in page.steps[1:]]
+    assert [(found.fine, found.failed) for found in counts] == [(1, 1)] * 2
+    assert [(found.alarms, found.announced) for found in counts] == [(0, 0), (1, 1)]
 
 
 # ---- the report

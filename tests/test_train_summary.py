@@ -19,6 +19,10 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
         "hull": {"missing": 0, "left_out_iou": []},
         "symmetry": None,
         "planes": None,
+        "verdict": {
+            "verdict": "weak",
+            "off_height": {"both": 0.0027, "outlines": 0.0012, "pictures": 0.0015},
+        },
         "drawings": dict.fromkeys(("turning", "registration", "unbending", "ink")) | drawings,
     }
 
@@ -42,6 +46,11 @@ def test_evidence_that_was_not_acted_on_is_called_so() -> None:
     assert "drawings not moved and sized: outlines 1.00 px apart (-5 nats)" in found
     assert "drawings bent back: outlines 1.00 px apart, 0.50 px after (+90 nats)" in found
     assert "fit to the drawings as set right: PSNR 30.00 dB" in found
+
+
+def test_the_verdict_is_there_with_what_it_rests_on() -> None:
+    apart = "drawings and field are 0.27 % of the height apart (outlines 0.12 %, pictures 0.15 %)"
+    assert f"verdict: weak; {apart}" in summary(Path("run"), metrics()).splitlines()
 
 
 def test_drawings_that_agree_are_fitted_as_they_are() -> None:
