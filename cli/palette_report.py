@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 HUNDRED = 100.0
 PIXELS = 4096  # for which the evidence counts bits
 LEAST_BITS = 1.0  # less decides nothing
+LEAST_SHARE = 0.0005  # what rounds to 0.1 %
 
 
 def palette_lines(found: Palette) -> list[str]:
@@ -19,7 +20,7 @@ def palette_lines(found: Palette) -> list[str]:
     lines += _contour_lines(found)
     if found.dropped:
         lines.append("left out (with the mean OKLab error that this costs, and the largest patch):")
-        lines += [_dropped_line(color) for color in found.dropped]
+        lines += [_dropped_line(color, found) for color in found.dropped]
     if found.evidence is not None:
         lines.append(_evidence_line(found.evidence))
     return lines
@@ -57,15 +58,30 @@ def _contour_lines(found: Palette) -> list[str]:
     ]
 
 
-def _dropped_line(color: DroppedColor) -> str:
+def _dropped_line(color: DroppedColor, found: Palette) -> str:
     line = f"{_line(color.rgb, color.share, color.name)}  {color.cost:.3f}"
-    if color.place is None:
-        return line
-    x, y, width, height = color.place.box
-    return f"{line}  picture {color.place.view} at ({x}, {y}), {width} x {height} px"
+    if color.place is not None:
+        x, y, width, height = color.place.box
+        line += f"  picture {color.place.view} at ({x}, {y}), {width} x {height} px"
+    return line + _like(color, found)
+
+
+def _like(color: DroppedColor, found: Palette) -> str:
+    """Return what colour of the palette a left-out one looks like; "" if it does not."""
+    import numpy as np
+
+    from toonset.palette.labels import nearest_colors
+    from toonset.palette.names import hex_of
+    from toonset.palette.oklab import JUST_NOTICEABLE
+
+    if color.cost > JUST_NOTICEABLE:
+        return ""
+    number = int(nearest_colors(np.array([color.rgb], dtype=np.uint8), found.rgb)[0])
+    return f", looks like {hex_of(found.colors[number].rgb)}"
 
 
 def _line(rgb: tuple[int, int, int], share: float, name: str) -> str:
     from toonset.palette.names import hex_of
 
-    return f"{hex_of(rgb)}  {HUNDRED * share:5.1f} %  {name}"
+    percent = f"{HUNDRED * share:5.1f}" if share >= LEAST_SHARE else "< 0.1"
+    return f"{hex_of(rgb)}  {percent} %  {name}"

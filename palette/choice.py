@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -80,6 +80,29 @@ class Amount:
     weight: float
 
 
+def with_wanted(
+    paints: Sequence[Paint], hidden: Sequence[Paint], wanted: Sequence[RGB]
+) -> tuple[list[Paint], list[Paint]]:
+    """Return the paints and the hidden ones, those that are wanted taken out of their paints.
+
+    Args:
+        paints: of a character, each colour of its pixels a member of one.
+        hidden: colours that are taken for one of these, though they are their own.
+        wanted: hidden ones that are nearer to one of these than every paint become paints.
+    """
+    paints, hidden = list(paints), list(hidden)
+    for rgb in wanted:
+        every = [*paints, *hidden]
+        number = int(_away(every, rgb).argmin())
+        if number >= len(paints):
+            chosen = hidden.pop(number - len(paints))
+            paints = [
+                replace(paint, members=np.setdiff1d(paint.members, chosen.members))
+                for paint in paints
+            ] + [chosen]
+    return paints, hidden
+
+
 def measure(
     paints: Sequence[Paint],
     areas: Areas,
@@ -136,18 +159,18 @@ def _keep_notes(wanted: Sequence[Amount], options: PaletteOptions) -> tuple[str,
         f"--keep: {hex_of(rgb)} itself was not found; kept the nearest, {hex_of(one.paint.rgb)}"
         f"{', which the rule keeps anyway' if one.weight >= options.min_share else ''}"
         for rgb, one in zip(options.keep, wanted, strict=True)
-        if _away([one], rgb)[0] > JUST_NOTICEABLE
+        if _away([one.paint], rgb)[0] > JUST_NOTICEABLE
     )
 
 
-def _away(amounts: Sequence[Amount], rgb: RGB) -> Float[np.ndarray, " amounts"]:
+def _away(paints: Sequence[Paint], rgb: RGB) -> Float[np.ndarray, " paints"]:
     """Return how far the paints are from a colour in OKLab."""
-    found = oklab_from_rgb(np.array([amount.paint.rgb for amount in amounts], dtype=np.uint8))
+    found = oklab_from_rgb(np.array([paint.rgb for paint in paints], dtype=np.uint8))
     return np.linalg.norm(found - oklab_from_rgb(np.array(rgb, dtype=np.uint8)), axis=1)
 
 
 def _nearest(amounts: Sequence[Amount], rgb: RGB) -> Amount:
-    away = _away(amounts, rgb)
+    away = _away([amount.paint for amount in amounts], rgb)
     nearest = amounts[int(away.argmin())]
     if away.min() > KEEP_REACH:
         raise PaletteError(

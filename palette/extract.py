@@ -15,9 +15,10 @@ from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError
 from toonset.palette.areas import paint_areas
-from toonset.palette.choice import Amount, PaletteOptions, choose, measure
+from toonset.palette.choice import Amount, PaletteOptions, choose, measure, with_wanted
 from toonset.palette.labels import nearest_colors
 from toonset.palette.names import hex_of, name_of
+from toonset.palette.near_equal import near_equal_paints
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.palette import (
     MAX_COLORS,
@@ -25,13 +26,16 @@ from toonset.palette.palette import (
     DroppedColor,
     Palette,
     PaletteColor,
+    Place,
 )
+from toonset.palette.patches import patches_of, pixels_of
 from toonset.palette.pixels import Histogram, count_pixels
 from toonset.palette.shades import Paint, find_paints
+from toonset.palette.tiny_paints import tiny_paints
 from toonset.palette.wide_paints import wide_paint_notes
 
 PICKED = "picked by hand; what is not among these colours counts for the nearest"
-LEAST_LISTED = 0.002  # of the pixels: what is rarer is not worth a line among the dropped
+LEAST_LISTED = 0.002  # of the pixels: a rarer paint is not worth a line among the dropped
 
 Images = Sequence[UInt8[np.ndarray, "_ _ 4"]]
 Masks = Sequence[Bool[np.ndarray, "_ _"]]
@@ -41,6 +45,10 @@ def extract_palette(
     images: Images, options: PaletteOptions | None = None, contours: Masks | None = None
 ) -> Palette:
     """Return the colours of a character, the most frequent first.
+
+    Left out, and listed, are paints under the rule, colours that look like another although much is
+    painted with them (`near_equal`), and those of tiny features (`tiny_paints`). To keep one of
+    these takes it out of the paint that it counts for otherwise.
 
     The result does not depend on the order or orientation of the pictures. If no colour reaches the
     least share, the largest one is kept and a warning says so.
@@ -55,15 +63,18 @@ def extract_palette(
     """
     options = options or PaletteOptions()
     histogram = _histogram(images)
-    paints, evidence = find_paints(histogram)
+    found = find_paints(histogram)
+    near = near_equal_paints(histogram, found.paints, max(options.min_share, LEAST_LISTED))
+    tiny = tiny_paints(histogram, found.paints, found.specks)
+    paints, hidden = with_wanted(found.paints, [*near, *tiny], options.keep)
     areas = paint_areas(histogram, paints, contours)
     amounts, ink = measure(paints, areas, options)
     kept, left, warnings = choose(amounts, options)
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)
     warnings += wide_paint_notes(histogram, [a.paint for a in kept], options.min_share)
     contour = None if ink is None else _contour(amounts[ink])
-    dropped = _dropped(left, histogram, colors)
-    return Palette(colors, _rule(options, contour), dropped, warnings, contour, evidence)
+    dropped = _dropped(left, hidden, histogram, colors)
+    return Palette(colors, _rule(options, contour), dropped, warnings, contour, found.evidence)
 
 
 def pick_palette(
@@ -95,7 +106,7 @@ def pick_palette(
 def _picked_paints(histogram: Histogram, rgb: UInt8[np.ndarray, "colors 3"]) -> list[Paint]:
     """Return the colours as paints of all pixels."""
     label = nearest_colors(histogram.colors, rgb)
-    found = find_paints(histogram)[0]
+    found = find_paints(histogram).paints
     for paint, own in zip(found, _only_picks(found, histogram, rgb), strict=True):
         if own is not None:
             label[paint.members] = own
@@ -162,17 +173,35 @@ def _contour(ink: Amount) -> ContourColor:
 
 
 def _dropped(
-    left: list[Amount], histogram: Histogram, colors: tuple[PaletteColor, ...]
+    left: Sequence[Amount],
+    hidden: Sequence[Paint],
+    histogram: Histogram,
+    colors: tuple[PaletteColor, ...],
 ) -> tuple[DroppedColor, ...]:
+    """Return what was left out, the most first: paints that are worth a line, and hidden colours.
+
+    Of hidden colours the pixels count that look like them.
+    """
+    total = int(histogram.counts.sum())
+    listed: list[tuple[Paint, float, Place | None]] = [
+        (amount.paint, amount.share, None) for amount in left if amount.share >= LEAST_LISTED
+    ]
+    pixels = pixels_of(histogram, [paint.members for paint in hidden])
+    for paint, own in zip(hidden, pixels, strict=True):
+        share = int(histogram.counts[paint.members].sum()) / total
+        listed.append((paint, share, next(iter(patches_of(own)), None)))
     palette = np.array([color.rgb for color in colors], dtype=np.uint8)
-    result = []
-    for amount in left:
-        if amount.share < LEAST_LISTED:
-            break
-        paint = amount.paint
-        own = histogram.colors[paint.members]
-        given = palette[nearest_colors(own, palette)]
-        away = np.linalg.norm(oklab_from_rgb(own) - oklab_from_rgb(given), axis=1)
-        cost = float(np.average(away, weights=histogram.counts[paint.members]))
-        result.append(DroppedColor(paint.rgb, amount.share, name_of(paint.rgb), cost))
-    return tuple(result)
+    return tuple(
+        DroppedColor(paint.rgb, share, name_of(paint.rgb), _cost(paint, histogram, palette), place)
+        for paint, share, place in sorted(listed, key=lambda one: (-one[1], one[0].rgb))
+    )
+
+
+def _cost(paint: Paint, histogram: Histogram, palette: UInt8[np.ndarray, "colors 3"]) -> float:
+    """Return how far a paint's pixels are from the palette in OKLab, the mean."""
+    own, counts = histogram.colors[paint.members], histogram.counts[paint.members]
+    if not len(own):  # ink that no pixel shows pure
+        own, counts = np.array([paint.rgb], dtype=np.uint8), np.ones(1, dtype=np.int64)
+    given = palette[nearest_colors(own, palette)]
+    away = np.linalg.norm(oklab_from_rgb(own) - oklab_from_rgb(given), axis=1)
+    return float(np.average(away, weights=counts))

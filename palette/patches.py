@@ -1,22 +1,27 @@
-"""Where left-out colours are: the largest patch of each, so that a person can look at it."""
+"""Where colours are: patches of them, the largest of each so that a person can look at it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Int, UInt8
 
 from toonset.palette.labels import nearest_labels
 from toonset.palette.palette import MAX_COLORS, Palette, Place
+from toonset.palette.pixels import OPAQUE_WORD, RGB, Histogram
 
-BLOCK = np.ones((2, 2), dtype=np.uint8)  # blends along an edge are thinner
+THIN = 2  # pixels: blends along an edge are thinner
+BITS = 8  # of a byte: so many kinds of colours are looked for at once
+
+Members = Int[np.ndarray, " members"]
+Box = tuple[int, int, int, int]
 
 
 def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Palette:
-    """Return the palette with the place of every left-out colour's largest patch.
+    """Return the palette with the place of every left-out colour's largest patch, if it lacks one.
 
     It is looked for in the picture with most of the colour's pixels, each pixel taken for the
     nearest of all colours, left-out ones included.
@@ -25,7 +30,7 @@ def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) 
         palette: of these pictures.
         images: the character on transparent ground.
     """
-    if not palette.dropped:
+    if all(color.place is not None for color in palette.dropped):
         return palette
     kept, left = ([c.rgb for c in palette.colors], [c.rgb for c in palette.dropped])
     listed = [*kept, *left][:MAX_COLORS]
@@ -36,17 +41,94 @@ def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) 
         view = int(counts[:, number].argmax()) if number < len(listed) else 0
         seen = number < len(listed) and counts[view, number] > 0
         place = Place(view, _largest_patch(labels[view] == number)) if seen else None
-        dropped.append(replace(color, place=place))
+        dropped.append(replace(color, place=color.place or place))
     return replace(palette, dropped=tuple(dropped))
 
 
-def _largest_patch(mask: Bool[np.ndarray, "height width"]) -> tuple[int, int, int, int]:
+@dataclass(frozen=True, eq=False)
+class Pixels:
+    """Where some colours are in a picture.
+
+    Attributes:
+        view: number of the picture.
+        rows: of every pixel.
+        columns: likewise.
+    """
+
+    view: int
+    rows: Int[np.ndarray, " pixels"]
+    columns: Int[np.ndarray, " pixels"]
+
+
+def pixels_of(histogram: Histogram, kinds: Sequence[Members]) -> list[list[Pixels]]:
+    """Return for every kind of colour where it is, per picture that has it.
+
+    Args:
+        histogram: of the character's pictures.
+        kinds: positions of each one's colours in it; a colour may be of several.
+    """
+    found: list[list[Pixels]] = [[] for _ in kinds]
+    for first in range(0, len(kinds), BITS):
+        some = kinds[first : first + BITS]
+        marks = np.zeros(1 << 24, dtype=np.uint8)
+        for bit, members in enumerate(some):
+            marks[histogram.codes[members]] |= 1 << bit
+        for view, picture in enumerate(histogram.pictures):
+            marked = marks[picture.words & RGB] * (picture.words >= OPAQUE_WORD)
+            at = np.flatnonzero(marked)
+            rows, columns = np.divmod(at, max(picture.words.shape[1], 1))
+            for bit in range(len(some)):
+                own = (marked.ravel()[at] & (1 << bit)) > 0
+                if own.any():
+                    pixels = Pixels(view, picture.top + rows[own], columns[own])
+                    found[first + bit].append(pixels)
+    return found
+
+
+def patches_of(places: Sequence[Pixels], thickness_px: int = THIN) -> list[Place]:
+    """Return every connected patch of some pixels, the largest first.
+
+    Args:
+        places: the pixels, per picture.
+        thickness_px: what is thinner is no patch.
+    """
+    found = []
+    for own in places:
+        (row, row_of), (column, column_of) = _squeezed(own.rows), _squeezed(own.columns)
+        mask = np.zeros((len(row_of), len(column_of)), dtype=bool)
+        mask[row, column] = True
+        for (x, y, width, height), area in _patches(mask, thickness_px):
+            box = (int(column_of[x]), int(row_of[y]), width, height)
+            found.append((area, Place(own.view, box)))
+    found.sort(key=lambda one: (-one[0], one[1].view, one[1].box))
+    return [place for _, place in found]
+
+
+def _squeezed(
+    values: Int[np.ndarray, " n"],
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " lines"]]:
+    """Return whole numbers with every gap shrunk to one, and what each of the new ones was."""
+    known = np.unique(values)
+    new = np.cumsum(np.minimum(np.diff(known, prepend=known[0]), 2))
+    old = np.zeros(new[-1] + 1, dtype=np.int64)
+    old[new] = known
+    return new[np.searchsorted(known, values)], old
+
+
+def _largest_patch(mask: Bool[np.ndarray, "height width"]) -> Box:
     """Return (x, y, width, height) of the largest connected part that is thicker than a blend."""
+    patches = _patches(mask, THIN) or _patches(mask, 1)
+    return max(patches, key=lambda patch: patch[1])[0]
+
+
+def _patches(mask: Bool[np.ndarray, "height width"], thickness_px: int) -> list[tuple[Box, int]]:
+    """Return box and area of every connected part of what such a square fits into."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     top, left = int(rows[0]), int(columns[0])
-    part = mask[top : rows[-1] + 1, left : columns[-1] + 1].astype(np.uint8)
-    thick = cv2.morphologyEx(part, cv2.MORPH_OPEN, BLOCK)
-    _, _, stats, _ = cv2.connectedComponentsWithStats(thick if thick.any() else part)
-    largest = stats[1:][stats[1:, cv2.CC_STAT_AREA].argmax()]
-    x, y, width, height = (int(value) for value in largest[:4])
-    return left + x, top + y, width, height
+    part = np.pad(mask[top : rows[-1] + 1, left : columns[-1] + 1], thickness_px)
+    square = np.ones((thickness_px, thickness_px), dtype=np.uint8)
+    corner = cv2.erode(part.view(np.uint8), square, anchor=(0, 0))
+    thick = cv2.dilate(corner, square, anchor=(thickness_px - 1, thickness_px - 1))
+    stats = cv2.connectedComponentsWithStats(thick)[2][1:]
+    top, left = top - thickness_px, left - thickness_px
+    return [((left + x, top + y, w, h), area) for x, y, w, h, area in stats.tolist()]

@@ -26,6 +26,8 @@ EXACT = 0.2  # of a paint: so frequent an exact colour is the paint itself
 MOST_CELLS = 4096  # the fullest; the others, of noisy pictures, join the nearest paint
 TOUCHING = 1.5 * JUST_NOTICEABLE  # shades with a wider gap between them are not of one paint
 LEAST_PEAK = 0.002  # of the flat pixels; less is no paint, but joins the nearest
+UNLIKE = 4 * JUST_NOTICEABLE  # from all paints' shades: nobody takes it for one of them
+FEW = 4  # flat pixels: a block of 2 x 2
 
 Owners = Int[np.ndarray, " cells"]
 
@@ -45,25 +47,39 @@ class Paint:
     is_ink: bool = False
 
 
-def find_paints(histogram: Histogram) -> tuple[list[Paint], Evidence]:
-    """Return the paints in no useful order, and why there are so many.
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The colours of a histogram.
 
-    Every colour of the histogram is a member of one paint.
+    Attributes:
+        paints: in no useful order; every colour of the histogram is a member of one.
+        evidence: why there are so many.
+        specks: positions in the histogram of colours alike that cover too little to be a paint, but
+            are unlike all paints' shades.
     """
+
+    paints: list[Paint]
+    evidence: Evidence
+    specks: list[Int[np.ndarray, " members"]]
+
+
+def find_paints(histogram: Histogram) -> Found:
+    """Return the paints, and what is none but unlike all of them."""
     ink = find_ink(histogram)
     cells, cell_of = _cells(histogram, ink)
-    owner = _peaks(cells)
-    owner = _only(cells, owner, _shares(cells, owner) >= LEAST_PEAK)
+    peaks = _peaks(cells)
+    owner = _only(cells, peaks, _shares(cells, peaks) >= LEAST_PEAK)
     owner, dearest = merge_peaks(cells.places, cells.weights, owner, TOUCHING)
     paints, solid = _paints(histogram, cells, owner[cell_of], owner)
     rgb = np.array([paint.rgb for paint in paints], dtype=np.float64)
     false = false_paints(rgb, solid, histogram.noise, ink)
+    keep = np.zeros(len(owner), dtype=bool)
+    keep[np.unique(owner)[~false]] = True
+    specks = _specks(histogram, cells, cell_of, peaks, keep[owner])
     if false.any():
-        keep = np.zeros(len(owner), dtype=bool)
-        keep[np.unique(owner)[~false]] = True
         owner = _only(cells, owner, keep)
         paints, _ = _paints(histogram, cells, owner[cell_of], owner)
-    return paints, evidence_for(cells.places, cells.weights, owner, dearest)
+    return Found(paints, evidence_for(cells.places, cells.weights, owner, dearest), specks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +145,35 @@ def _only(cells: _Cells, owner: Owners, kept: Bool[np.ndarray, " cells"]) -> Own
     if not own.any():
         return owner
     return owner[own][_nearest(cells.places[own], cells.places)]
+
+
+def _specks(
+    histogram: Histogram,
+    cells: _Cells,
+    cell_of: Int[np.ndarray, " n"],
+    peaks: Owners,
+    kept: Bool[np.ndarray, " cells"],
+) -> list[Int[np.ndarray, " members"]]:
+    """Return the colours of every small peak whose cells are unlike those of all paints.
+
+    Args:
+        histogram: of the character.
+        cells: its cells.
+        cell_of: every colour's cell.
+        peaks: every cell's peak.
+        kept: whether the paint that a cell is given to is one.
+    """
+    from scipy.spatial import KDTree
+
+    peak_of = peaks[cell_of]
+    flat = np.bincount(peak_of, histogram.flat, len(peaks))
+    large = (_shares(cells, peaks) >= LEAST_PEAK)[peaks]
+    known, small = large & kept, np.flatnonzero(~large & (flat[peaks] >= FEW))
+    if not len(small) or not known.any():
+        return []
+    away = KDTree(cells.places[known]).query(cells.places[small], distance_upper_bound=UNLIKE)[0]
+    unlike = np.setdiff1d(peaks[small], peaks[small[away < UNLIKE]])
+    return [np.flatnonzero(peak_of == peak) for peak in unlike]
 
 
 def _nearest(

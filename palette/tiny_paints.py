@@ -1,0 +1,80 @@
+"""Colours of tiny features: eyes, teeth, buttons, which cover too little to be a paint.
+
+What little there is of a colour is mostly a blend along an edge, or noise. A feature differs from
+both: its colour is unlike every paint, no two paints mix to it, and it is there at two places at
+least, as eyes are, or in two views. Each of these is thicker than a blend, which in a clean picture
+is a pixel wide and hardly ever flat, and wider where there is noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from toonset.palette.false_paints import LEAST_FLAT, false_paints
+from toonset.palette.ink_color import rounded
+from toonset.palette.oklab import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.patches import THIN, Members, Pixels, patches_of, pixels_of
+from toonset.palette.pixels import LEAST_NOISE, Histogram
+from toonset.palette.shades import UNLIKE, Paint
+
+PLACES = 2  # at which a colour is, or it may be a slip
+THICK = 5  # pixels: blends are thinner in a JPEG, too, which smears chroma over two
+
+
+def tiny_paints(
+    histogram: Histogram, paints: Sequence[Paint], specks: Sequence[Members]
+) -> tuple[Paint, ...]:
+    """Return the colours of tiny features, the most frequent first.
+
+    Args:
+        histogram: of the character.
+        paints: of this histogram.
+        specks: positions in the histogram of colours alike, which are unlike every paint.
+    """
+    tops = np.array([own[histogram.flat[own].argmax()] for own in specks], dtype=np.int64)
+    order = np.argsort([-int(histogram.flat[own].sum()) for own in specks], kind="stable")
+    tops = tops[order.astype(np.int64)]
+    tops = tops[~_mixed(histogram, tops, paints)]
+    alike = [_alike(histogram, top) for top in tops]
+    found: list[Paint] = []
+    for top, members, places in zip(tops, alike, pixels_of(histogram, alike), strict=True):
+        if _stands_out(histogram, top, paints, found) and _is_at_places(histogram, members, places):
+            found.append(Paint(rounded(histogram.colors[top]), members))
+    return tuple(found)
+
+
+def _alike(histogram: Histogram, top: np.int64) -> Members:
+    """Return the colours that nobody tells from one of them."""
+    reach = even_oklab_from_rgb(histogram.colors) - even_oklab_from_rgb(histogram.colors[top])
+    return np.flatnonzero(np.linalg.norm(reach, axis=1) <= JUST_NOTICEABLE)
+
+
+def _mixed(
+    histogram: Histogram, tops: Int[np.ndarray, " tops"], paints: Sequence[Paint]
+) -> Bool[np.ndarray, " tops"]:
+    """Return which colours look like a blend of two paints."""
+    rgb = np.array([*(paint.rgb for paint in paints), *histogram.colors[tops]], dtype=np.float64)
+    false = false_paints(rgb, np.arange(len(rgb)) < len(paints), histogram.noise, None)
+    return false[len(paints) :]
+
+
+def _stands_out(
+    histogram: Histogram, top: np.int64, paints: Sequence[Paint], found: Sequence[Paint]
+) -> bool:
+    """Return whether a colour is unlike those found before, and no blend of theirs."""
+    if not found:
+        return True
+    rgb = np.array([paint.rgb for paint in found], dtype=np.uint8)
+    away = even_oklab_from_rgb(rgb) - even_oklab_from_rgb(histogram.colors[top])
+    unlike = np.linalg.norm(away, axis=1).min() >= UNLIKE
+    return bool(unlike) and not _mixed(histogram, np.array([top]), [*paints, *found])[0]
+
+
+def _is_at_places(histogram: Histogram, members: Members, places: Sequence[Pixels]) -> bool:
+    """Return whether a colour is in patches thicker than a blend at two places or more."""
+    flat, count = (int(n[members].sum()) for n in (histogram.flat, histogram.counts))
+    clean = histogram.noise <= LEAST_NOISE and flat >= LEAST_FLAT * count
+    return len(patches_of(places, THIN if clean else THICK)) >= PLACES
