@@ -267,8 +267,8 @@ def judge_sheet(views: Sequence[ViewCalibration], sheet: SheetState) -> tuple[Ve
         return "weak", f"the drawings contradict each other by {off} under these cameras"
     typical = float(np.median([view.coverage for view in views]))
     if worst == "ok" and typical < WEAK_COVERAGE and sheet.drawings_confirm:
-        apart = f"{100 * (1 - typical):.0f} % of the outlines in its typical view"
-        return "ok", f"the mannequin's shape differs in {apart}, but the drawings agree"
+        apart = f"{100 * (1 - typical):.0f} % of the outlines are off in its typical view"
+        return "ok", f"the mannequin has another shape: {apart}; but the drawings agree"
     return worst, named
 
 
