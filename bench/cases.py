@@ -1,8 +1,9 @@
 """What is measured: folders with ground truth, or synthetic turnarounds with fresh seeds.
 
 A case folder holds `sheet.png`, `mannequin.obj` and `gt.json` (world_from_camera, OpenGL axes) for
-calibration; `views/` and `test/` with a transforms.json each for training. The condition is the
-part of its name after the last hyphen.
+calibration; `views/` and `test/` with a transforms.json each for training, where a `mannequin.obj`
+in the frame of their cameras is one more baseline. The condition is the part of its name after the
+last hyphen.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from toonset.view import View
 
 CLEAN = SynthOptions(yaw_jitter_deg=8, outline_px=0, elevation_deg=10)
 DRAWN = replace(CLEAN, outline_px=2.5, warp_percent=0.8)
+MANNEQUIN_FILE = "mannequin.obj"
 STRANGER = 1_000_000  # seeds this far from the drawn body's are other bodies
 
 
@@ -82,12 +84,23 @@ class CalibCase:
 
 @dataclass(frozen=True, eq=False)
 class TrainCase:
-    """Posed training pictures and held-out ones."""
+    """Posed training pictures and held-out ones.
+
+    Attributes:
+        name: of the character.
+        group: condition.
+        train: the drawings.
+        test: held-out views, for the figures alone.
+        mannequin: a body that stands where the drawn one does; None: there is none. Another body's,
+            as users have it, or in some folders the character's own mesh, without its colours:
+            views of that one are an upper bound of what a mannequin can show, no rival.
+    """
 
     name: str
     group: str
     train: Scene
     test: Scene
+    mannequin: Mesh | None = None
 
 
 def calib_cases(folder: Path | None, seed: int, count: int, only: str = "") -> Iterator[CalibCase]:
@@ -115,9 +128,7 @@ def calib_cases(folder: Path | None, seed: int, count: int, only: str = "") -> I
         if len(views) != len(poses):
             raise BundleError(f"{case}: split into {len(views)} views, {len(poses)} were drawn")
         rotations = np.stack([pose[:3, :3].T for pose in poses])
-        yield CalibCase(
-            case.name, _group(case), views, load_mesh(case / "mannequin.obj"), rotations
-        )
+        yield CalibCase(case.name, _group(case), views, load_mesh(case / MANNEQUIN_FILE), rotations)
 
 
 def train_cases(
@@ -143,13 +154,16 @@ def train_cases(
             train = _scene(make_turnaround(body, drawn, seed + i))
             test = _scene(make_turnaround(body, held_out, seed + i))
             odd = replace(test, frames=test.frames[1::2])  # between the training views
-            yield TrainCase(f"body {seed + i}", "clean", train, odd)
+            other = _as_tall(_stranger(seed + i), body)
+            yield TrainCase(f"body {seed + i}", "clean", train, odd, other)
         return
     for case in _folders(folder, "views/transforms.json"):
         train, test = read_scene(case / "views"), read_scene(case / "test")
         if half:
             train, test = _halved(train), _halved(test)
-        yield TrainCase(case.name, _group(case), train, test)
+        mesh = case / MANNEQUIN_FILE
+        mannequin = load_mesh(mesh) if mesh.is_file() else None
+        yield TrainCase(case.name, _group(case), train, test, mannequin)
 
 
 def _halved(scene: Scene) -> Scene:
@@ -182,8 +196,20 @@ def _synthetic_calib(name: str, group: str, condition: Condition, seed: int) -> 
     rotations = np.stack([camera.rotation for camera in made.cameras])
     if len(views) != len(rotations):
         raise BundleError(f"synthetic {name}: split into {len(views)} views")
-    other = random_body(seed + STRANGER, symmetric=True) if condition.other_body else body
+    other = _stranger(seed) if condition.other_body else body
     return CalibCase(name, group, views, other, rotations, body)
+
+
+def _stranger(seed: int) -> Mesh:
+    """Return the mannequin that somebody has who draws the body of this seed."""
+    return random_body(seed + STRANGER, symmetric=True)
+
+
+def _as_tall(mannequin: Mesh, drawn: Mesh) -> Mesh:
+    """Return the mannequin scaled to the drawn body's height, on the same ground."""
+    vertices = mannequin.vertices * (drawn.height / mannequin.height)
+    vertices[:, 1] += drawn.bounds[0, 1] - vertices[:, 1].min()
+    return replace(mannequin, vertices=vertices)
 
 
 def _folders(folder: Path, needed: str) -> list[Path]:

@@ -15,7 +15,7 @@ import numpy as np
 from toonset.bench.chart import Chart
 from toonset.bench.pareto import DEFAULT, Point
 from toonset.bench.record import Record, summarise
-from toonset.bench.train_plan import METHODS
+from toonset.bench.train_plan import MANNEQUIN, METHODS
 
 PARAMETERS = "parameters"
 COLORS_FOUND = "F1 of colours"
@@ -64,7 +64,11 @@ TRAINING = Plot(
     mean=True,
     switches=tuple(name for name, method in METHODS.items() if method.leaves_out),
     told={
-        f"paper, hand-picked palette, {steps} steps": "told the palette" for steps in (200, 2000)
+        MANNEQUIN: "told a body's shape",
+        **{
+            f"paper, hand-picked palette, {steps} steps": "told the palette"
+            for steps in (200, 2000)
+        },
     },
 )
 MODELS = replace(

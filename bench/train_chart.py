@@ -16,7 +16,7 @@ import numpy as np
 from toonset.bench.chart import COLORS, DEFAULT, SHOWN
 from toonset.bench.figure import DARK, LIGHT, Form, figure_bytes, log_ticks, new_figure
 from toonset.bench.train import in_order
-from toonset.bench.train_plan import METHODS, NEAREST
+from toonset.bench.train_plan import MANNEQUIN, METHODS, NEAREST
 from toonset.bench.train_run import RunResult, Seen
 
 if TYPE_CHECKING:
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 COLUMNS = 2
 POINTS = 64  # of a mean curve
 LEAST_S = 0.1  # left end of the time axis, for what takes none
-BASELINE = "coloured hull"
+BASELINES = {"coloured hull": "s", MANNEQUIN: "X"}  # marks of what is not followed
 VERMILION, GREY = COLORS[1], "#666666"
 *DISCS, STAR = SHOWN
-FOLLOWED = (DEFAULT, *(m for m in METHODS if METHODS[m].curve and m != DEFAULT), BASELINE)
+FOLLOWED = (DEFAULT, *(m for m in METHODS if METHODS[m].curve and m != DEFAULT), *BASELINES)
 
 
 def draw_curves(runs: Sequence[RunResult], caption: str, form: Form = "png") -> bytes:
@@ -119,7 +119,7 @@ def _handle(method: str, cases: int) -> Line2D:
     color, marker, width = _look(method)
     if method == NEAREST:
         return Line2D([], [], color=color, lw=1.2, ls=":", label=f"{method}, at no cost")
-    line, name = "none" if method == BASELINE else "-", f"{method} (n = {cases})"
+    line, name = "none" if method in BASELINES else "-", f"{method} (n = {cases})"
     return Line2D([], [], color=color, marker=marker, lw=width, ls=line, label=name)
 
 
@@ -127,8 +127,8 @@ def _look(method: str) -> tuple[str, str, float]:
     """Return colour, marker and line width; the default's are those of the charts."""
     if method == DEFAULT:
         return VERMILION, STAR, 2.6
-    if method in (NEAREST, BASELINE):
-        return GREY, "s", 1.2
+    if method == NEAREST or method in BASELINES:
+        return GREY, BASELINES.get(method, ""), 1.2
     number = FOLLOWED.index(method) - 1
     others = [color for color in COLORS if color != VERMILION]
     return others[number % len(others)], DISCS[(number + number // len(others)) % len(DISCS)], 1.3

@@ -12,6 +12,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.preset import paper
 
 NEAREST = "nearest drawing"
+MANNEQUIN = "coloured mannequin"
 Preparation = Literal["alignment", "symmetry"]
 PREPARATIONS: tuple[Preparation, ...] = get_args(Preparation)
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
@@ -35,6 +36,8 @@ class Method:
             "default", this is the same training, and is not run a second time.
         curve: held-out PSNR is followed while it trains, with the most views.
         share: cells of the planes, of the finest that the scene could have; None: as `options` say.
+        mannequin: no training either; the case's mannequin is shown in the drawings' colours, where
+            there is one.
     """
 
     options: TrainOptions | None
@@ -44,6 +47,7 @@ class Method:
     leaves_out: Preparation | None = None
     curve: bool = False
     share: float | None = None
+    mannequin: bool = False
 
 
 def _without(
@@ -62,6 +66,7 @@ PAPER: dict[str, Method] = {
 METHODS: dict[str, Method] = {
     DEFAULT: Method(TrainOptions(), curve=True),
     NEAREST: Method(None, first_seed_only=True),
+    MANNEQUIN: Method(None, first_seed_only=True, mannequin=True),
     "coloured hull": Method(TrainOptions(field="hull"), "no palette", first_seed_only=True),
     "75 steps": Method(TrainOptions(steps=75), first_seed_only=True, most_views_only=True),
     "600 steps": Method(TrainOptions(steps=600), first_seed_only=True, most_views_only=True),
@@ -115,7 +120,7 @@ SCOPES = {  # by subject and whether it must be quick
         tuple(name for name in METHODS if name not in FOR_THE_TABLE_ALONE),
         views=(8, 4, 3),
         seeds=3,
-        half_turn=(DEFAULT, NEAREST, "coloured hull", "without symmetry", "voxel"),
+        half_turn=(DEFAULT, NEAREST, MANNEQUIN, "coloured hull", "without symmetry", "voxel"),
         first_case=SLOW,
     ),
     ("train", True): Scope((DEFAULT, NEAREST, "coloured hull", "75 steps"), one_case=True),
@@ -207,6 +212,8 @@ def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list
 
 def _wanted(method: Method, case: TrainCase, number: int, fewer: int) -> bool:
     if method.palette == "hand-picked palette" and case.train.palette is None:
+        return False
+    if method.mannequin and case.mannequin is None:
         return False
     if number > 0 and method.first_seed_only:
         return False

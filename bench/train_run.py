@@ -13,10 +13,11 @@ from jaxtyping import UInt8
 from torch import Tensor
 
 from toonset.bench.cases import TrainCase
+from toonset.bench.mannequin_views import mannequin_view, paint_mannequin
 from toonset.bench.train_plan import METHODS, Job, PaletteChoice, Preparation, subset
 from toonset.camera import rotation_distance
 from toonset.dataset.scene import Frame, Scene
-from toonset.errors import ToonsetError
+from toonset.errors import BundleError, ToonsetError
 from toonset.nerf.checkpoint_state import FitState
 from toonset.nerf.evaluation import LAYERS, ScoredView, score_views
 from toonset.nerf.field_box import without_empty_space
@@ -87,6 +88,8 @@ def run_job(job: Job, judges: Judges, look: Look = lambda *_: None) -> RunResult
     """Return what training and rendering of one job gives; a refusal is a result, too."""
     case, method = subset(job.case, job.views), METHODS[job.method]
     try:
+        if method.mannequin:
+            return _colored_mannequin(job, case, judges)
         if method.options is None:
             return _nearest_drawing(job, case, judges)
         return _trained(job, case, replace(method.options, seed=job.seed), judges, look)
@@ -224,11 +227,37 @@ def _named(job: Job) -> tuple[str, str, str, int]:
 
 
 def _nearest_drawing(job: Job, case: TrainCase, judges: Judges) -> RunResult:
-    pictures = [(_nearest(case.train, frame), frame) for frame in case.test.frames]
-    figures = means([figures_of(picture, frame.rgba, judges)[0] for picture, frame in pictures])
+    views = [_nearest(case.train, frame) for frame in case.test.frames]
+    return _untrained(job, case, judges, views)
+
+
+def _colored_mannequin(job: Job, case: TrainCase, judges: Judges) -> RunResult:
+    mesh = case.mannequin
+    if mesh is None:
+        raise BundleError(f"{case.name}: has no mannequin")
+    paint_mannequin(mesh, case.train)  # loads what draws, which is not timed, as imports are not
+    wall, cpu = time.perf_counter(), time.process_time()
+    painted = paint_mannequin(mesh, case.train)
+    seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
+    began = time.perf_counter()
+    views = [mannequin_view(painted, frame.camera) for frame in case.test.frames]
+    render_seconds = (time.perf_counter() - began) / len(views)
+    return _untrained(job, case, judges, views, (seconds, cpu_seconds, render_seconds))
+
+
+def _untrained(
+    job: Job,
+    case: TrainCase,
+    judges: Judges,
+    views: Sequence[UInt8[np.ndarray, "height width 4"]],
+    spent: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> RunResult:
+    """Return the result of pictures of all held-out views, and what was spent on them."""
+    pairs = list(zip(views, case.test.frames, strict=True))
+    figures = means([figures_of(view, frame.rgba, judges)[0] for view, frame in pairs])
     sample = curve_frames(case.test)
-    psnr = _mean_psnr((_nearest(case.train, frame), frame) for frame in sample)
-    return RunResult(*_named(job), figures, 0.0, 0.0, 0.0, 0, (Seen(0.0, 0.0, psnr),))
+    psnr = _mean_psnr((view, frame) for view, frame in pairs if frame in sample)
+    return RunResult(*_named(job), figures, *spent, 0, (Seen(*spent[:2], psnr),))
 
 
 def _nearest(scene: Scene, frame: Frame) -> UInt8[np.ndarray, "height width 4"]:
