@@ -36,8 +36,8 @@ class Method:
             "default", this is the same training, and is not run a second time.
         curve: held-out PSNR is followed while it trains, with the most views.
         share: cells of the planes, of the finest that the scene could have; None: as `options` say.
-        mannequin: no training either; the case's mannequin is shown in the drawings' colours, where
-            there is one.
+        mannequin: no training either; the case's mannequin, where there is one, is fitted to the
+            outlines and shown in the drawings' colours.
     """
 
     options: TrainOptions | None

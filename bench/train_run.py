@@ -13,6 +13,7 @@ from jaxtyping import UInt8
 from torch import Tensor
 
 from toonset.bench.cases import TrainCase
+from toonset.bench.mannequin_fit import fitted_mannequin
 from toonset.bench.mannequin_views import mannequin_view, paint_mannequin
 from toonset.bench.train_plan import METHODS, Job, PaletteChoice, Preparation, subset
 from toonset.camera import rotation_distance
@@ -237,7 +238,7 @@ def _colored_mannequin(job: Job, case: TrainCase, judges: Judges) -> RunResult:
         raise BundleError(f"{case.name}: has no mannequin")
     paint_mannequin(mesh, case.train)  # loads what draws, which is not timed, as imports are not
     wall, cpu = time.perf_counter(), time.process_time()
-    painted = paint_mannequin(mesh, case.train)
+    painted = paint_mannequin(fitted_mannequin(mesh, case.train), case.train)
     seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
     began = time.perf_counter()
     views = [mannequin_view(painted, frame.camera) for frame in case.test.frames]

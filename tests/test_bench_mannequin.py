@@ -10,6 +10,7 @@ import pytest
 
 from toonset.bench import mannequin_views
 from toonset.bench.cases import TrainCase, train_cases
+from toonset.bench.mannequin_fit import fitted_mannequin
 from toonset.bench.mannequin_views import mannequin_view, paint_mannequin
 from toonset.bench.train import run_jobs, table_of
 from toonset.bench.train_chart import draw_curves
@@ -130,6 +131,22 @@ def test_a_mannequin_elsewhere_is_refused() -> None:
     aside = replace(BOX, vertices=BOX.vertices + np.array([50.0, 0, 0]))
     with pytest.raises(BundleError, match="box: no drawing shows"):
         paint_mannequin(aside, scene(BOX, turn(4)))
+
+
+def test_another_body_gets_the_drawn_proportions() -> None:
+    (made,) = train_cases(None, 1001, 1, px=64)
+    assert made.mannequin is not None
+    fitted = fitted_mannequin(made.mannequin, made.train)
+    assert fitted.faces is made.mannequin.faces
+
+    def overlap(mesh: Mesh) -> float:
+        painted = paint_mannequin(mesh, made.train)
+        views = [(mannequin_view(painted, f.camera), f.rgba) for f in made.test.frames]
+        return float(np.mean([silhouette_iou(view, rgba) or 0 for view, rgba in views]))
+
+    assert overlap(fitted) > overlap(made.mannequin) + 0.05
+    own = random_body(1001)
+    assert overlap(fitted_mannequin(own, made.train)) > overlap(own) - 0.01
 
 
 def test_it_is_planned_where_there_is_a_mannequin() -> None:
