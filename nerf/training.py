@@ -90,11 +90,10 @@ def train(
     if options.carve:
         hull, evidence = hull_of(scene, options, ready.apart_px)
     clock.append(time.perf_counter())
-    agree, choice = ready.apart_px == 0, None
-    weights = _weights(options, len(scene.frames), agree=agree)
+    weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None:
         tell("choosing the planes")
-        choice = _choice(ready.scene, hull, weights, options, device, agree=agree)
+        choice = _choice(ready.scene, hull, weights, options, device, agree=ready.agree)
         torch.manual_seed(options.seed)
     cells = choice.cells if choice else None
     clock.append(time.perf_counter())

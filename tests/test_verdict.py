@@ -19,6 +19,7 @@ from toonset.nerf.registration import Registration
 from toonset.nerf.symmetry import Symmetry
 from toonset.nerf.trained import Step, Training
 from toonset.nerf.verdict import MOST_OFF, OK, WEAK, blended, off_of, verdict_of
+from toonset.nerf.warp import Unbending
 
 SIDE, HEIGHT = 120, 80
 TURN = tuple(range(0, 360, 45))
@@ -171,3 +172,19 @@ def test_an_undrawn_side_that_is_the_mirror_image_of_another_is_no_guess() -> No
     assert "no drawing in the 180 deg" in judged(training(half)).reasons[0]
     found = Symmetry((1.0,), 0.0, ("45", "90", "135"))
     assert judged(training(half, symmetry=found)).verdict == OK
+
+
+# ---- whether drawings agree, which decides how much a field is smoothed
+
+
+@pytest.mark.parametrize(("apart_px", "applied"), [(0.9, False), (0.03, True)])
+def test_drawings_agree_as_they_are_or_once_cameras_follow_them(
+    apart_px: float, applied: bool
+) -> None:
+    assert moved(training(scene(*TURN)), apart_px, applied=applied).prepared.agree
+
+
+def test_drawings_that_were_bent_or_stay_apart_do_not_agree() -> None:
+    assert not moved(training(scene(*TURN)), 0.5, applied=True).prepared.agree
+    bends = Unbending(True, 5.0, 1.0, (9.0, 0.01), ())
+    assert not Prepared(scene(*TURN), None, None, bends, None).agree
