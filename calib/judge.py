@@ -30,6 +30,7 @@ MOST_CONTRADICTION = 0.012
 # mannequin another body: of 41 views wrong by more than 15 degrees, 3 were on such a sheet without
 # another mark against them; with 0.012 it would be 15. Drawing error of 1.2 % makes 0.0075 at most
 CONFIRMING = 0.008
+STEEP = np.radians(30.0)  # turnarounds are drawn from about eye level, none of ours from above 20
 # Of the probability that faces are none: at most 0.2 on sheets with right cameras
 MOST_FACES_CONTRADICT = 0.5
 TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly anything
@@ -51,12 +52,14 @@ class SheetState:
         contradiction: of the drawings with each other, over the height; nan for a single view.
         odd_view: the one drawing that disagrees with the others, if any.
         views: how many there are.
+        elevation: of the typical camera, radians.
     """
 
     yaw_observable: bool
     contradiction: float
     odd_view: int | None
     views: int
+    elevation: float = 0.0
 
     @property
     def drawings_agree(self) -> bool:
@@ -65,8 +68,12 @@ class SheetState:
 
     @property
     def drawings_confirm(self) -> bool:
-        """Return whether the drawings confirm the cameras without the mannequin."""
-        return self.drawings_agree and self.contradiction < CONFIRMING
+        """Return whether the drawings confirm the cameras without the mannequin.
+
+        How far all of them look down it says alone: steeply, if its shape is another's.
+        """
+        level = abs(self.elevation) < STEEP
+        return self.drawings_agree and self.contradiction < CONFIRMING and level
 
 
 def sheet_state(
@@ -81,7 +88,9 @@ def sheet_state(
         for view, pose in zip(views, joint.poses, strict=True)
     ]
     agreement = coherence(views, cameras)
-    return SheetState(observable, agreement.contradiction, agreement.odd_view, len(views))
+    elevation = float(np.median([camera.angles[1] for camera in cameras]))
+    found = (agreement.contradiction, agreement.odd_view, len(views), elevation)
+    return SheetState(observable, *found)
 
 
 def typical_coverage(drawings: Sequence[Drawing], joint: JointFit) -> float:

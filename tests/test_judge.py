@@ -53,8 +53,8 @@ def test_views_that_turn_without_their_lock_are_not_ok():
     assert verdicts(with_locks_in_mind(views, np.radians([9, 2, 9]))) == ["weak"] * 3
 
 
-def state(views: int = 3, contradiction: float = 0.0) -> SheetState:
-    return SheetState(True, contradiction, None, views)
+def state(views: int = 3, contradiction: float = 0.0, elevation: float = 0.1) -> SheetState:
+    return SheetState(True, contradiction, None, views, elevation)
 
 
 @pytest.mark.parametrize("how", ["bent", "faces", "uncertain", "shape", "failed"])
@@ -81,5 +81,6 @@ def test_another_shape_is_no_reason_to_doubt_where_many_drawings_agree(bent):
     verdict, said = judge_sheet(views, agreeing)
     assert verdict == "ok"
     assert "15 %" in said
-    for other in (state(TELLING_VIEWS - 1), state(TELLING_VIEWS, 1.01 * CONFIRMING)):
+    steep = state(TELLING_VIEWS, elevation=math.radians(40))
+    for other in (state(TELLING_VIEWS - 1), state(TELLING_VIEWS, 1.01 * CONFIRMING), steep):
         assert verdicts(with_sheet_in_mind(views, other, bent=bent)) == ["weak"] * len(views)
