@@ -230,7 +230,6 @@ def with_sheet_in_mind(
     """
     typical = float(np.median([view.coverage for view in views]))
     doubtful = sum(view.verdict != "ok" for view in views)
-    failed = sum(view.verdict == "failed" for view in views)
     if typical < WEAK_COVERAGE and not sheet.drawings_confirm:
         reason = (
             f"in the sheet's typical view {100 * (1 - typical):.0f} % of the outlines are more "
@@ -238,8 +237,8 @@ def with_sheet_in_mind(
         )
     elif bent and not sheet.drawings_confirm:
         reason = "the mannequin is another body: its proportions were fitted to the drawings"
-    elif failed:
-        reason = f"{failed} of the sheet's {len(views)} views failed, and were fitted with this one"
+    elif any(view.verdict == "failed" for view in views):
+        reason = "a view of this sheet failed, and all were fitted together"
     elif 2 * doubtful > len(views):
         reason = f"{doubtful} of the sheet's {len(views)} views are uncertain"
     elif faces_contradict > MOST_FACES_CONTRADICT:
@@ -276,8 +275,8 @@ def judge_sheet(views: Sequence[ViewCalibration], sheet: SheetState) -> tuple[Ve
         return "weak", f"the drawings contradict each other by {off} under these cameras"
     typical = float(np.median([view.coverage for view in views]))
     if worst == "ok" and typical < WEAK_COVERAGE and sheet.drawings_confirm:
-        apart = f"{100 * (1 - typical):.0f} % of the outlines are off in its typical view"
-        return "ok", f"the mannequin has another shape: {apart}; but the drawings agree"
+        apart = f"{100 * (1 - typical):.0f} % of the outlines are more than 5 % of the height apart"
+        return "ok", f"the mannequin has another shape, {apart}; but the drawings fit together"
     return worst, named
 
 

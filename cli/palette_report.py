@@ -33,10 +33,7 @@ def _evidence_line(evidence: Evidence) -> str:
     if number > 1:
         others.insert(0, _other_number(number - 1, evidence.one_less))
     colors = "1 colour describes" if number == 1 else f"{number} colours describe"
-    return (
-        f"{colors} the drawing most briefly, those left out included; {', '.join(others)} "
-        f"(bits per {PIXELS:,} pixels)"
-    )
+    return f"{colors} the drawing most briefly; {', '.join(others)} (bits per {PIXELS:,} pixels)"
 
 
 def _other_number(number: int, more_bits: float) -> str:
@@ -77,7 +74,7 @@ def _like(color: DroppedColor, found: Palette) -> str:
     if color.cost > JUST_NOTICEABLE:
         return ""
     number = int(nearest_colors(np.array([color.rgb], dtype=np.uint8), found.rgb)[0])
-    return f", looks like {hex_of(found.colors[number].rgb)}"
+    return f", looks like {hex_of(found.colors[number].rgb)} and is counted as that, too"
 
 
 def _line(rgb: tuple[int, int, int], share: float, name: str) -> str:

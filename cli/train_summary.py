@@ -32,8 +32,8 @@ def _verdict(found: dict[str, Any]) -> str:
     """Return what the run is worth, and by what."""
     off = found["off_height"]
     parts = f"outlines {_percent(off['outlines'])}, pictures {_percent(off['pictures'])}"
-    apart = f"drawings and field are {_percent(off['both'])} of the height apart ({parts})"
-    return f"verdict: {found['verdict']}; {apart}"
+    bound = f"together up to {_percent(off['most'])} is ok"
+    return f"verdict: {found['verdict']}; {parts} of the height apart from the drawings ({bound})"
 
 
 def _percent(share: float) -> str:

@@ -62,7 +62,7 @@ def shares_for(views: int, *, agree: bool) -> tuple[float, float]:
 
     Args:
         views: that show a figure.
-        agree: their outlines do, to the pixel.
+        agree: their outlines do (see `Prepared.agree`).
     """
     return (USUAL, COARSE) if agree and views < MANY_VIEWS else (FINE, USUAL)
 

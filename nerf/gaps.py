@@ -7,10 +7,11 @@ four even views have but two outlines, five have five.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from toonset.camera import Camera
 from toonset.dataset.scene import Scene
+from toonset.nerf.silhouette import figure_px
 
 # Between neighbouring drawings: a third of the turn. Three even drawings lose 5 dB by that; 100 to
 # 115 degrees among eight drawings lose nothing.
@@ -36,13 +37,14 @@ class Gap:
 
 def guesses(scene: Scene) -> list[str]:
     """Return what must be guessed of a character, a line each, for people."""
+    scene = replace(scene, frames=tuple(frame for frame in scene.frames if figure_px(frame)))
     if len(scene.frames) < 2:
         return []
     gap = outline_gap(scene)
     if gap > DEPTHLESS:
         return [
-            "all drawings look along nearly one line, so nothing tells how deep the figure is: it "
-            "is of no use from the side; add a drawing from there"
+            "all drawings look within 30 degrees of one line, which hardly tells how deep the "
+            "figure is: it is of no use from the side; add a drawing from there"
         ]
     said = [
         f"no drawing in the {math.degrees(gap.radians):.0f} deg from {gap.after} to {gap.before}: "

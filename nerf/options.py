@@ -21,7 +21,7 @@ class TrainOptions:
         resolution: cells of the planes along the character's longest side; None: one cell per
             pixel of the tallest figure, 48 to 256, or fewer (see `field`).
         smoothness: weight of the planes' total variation at eight views that agree; fewer views,
-            and drawings that had to be aligned, get more.
+            and drawings that were bent or do not agree, get more.
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
         field: what is fitted: "auto", planes with a small decoder, as coarse as predicts left-out

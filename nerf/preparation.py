@@ -54,9 +54,13 @@ class Prepared:
 
     @property
     def outlines_px(self) -> float:
-        """Return by how much outlines disagree now, even where nothing was mended for that."""
+        """Return by how much outlines disagree now, even where nothing was mended for that.
+
+        They are compared here where all steps that would have done so are switched off.
+        """
         steps = [step for step in (self.turning, self.registration, self.unbending) if step]
-        return self.apart_px or (steps[-1].apart_px[0] if steps else 0.0)
+        compared = steps[-1] if steps else registered(self.scene)[1]
+        return self.apart_px or compared.apart_px[0]
 
     @property
     def agree(self) -> bool:

@@ -74,7 +74,8 @@ def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
     if found is None or not found.mirrored:
         return scene
     sources = (frame for frame in scene.frames if frame.name in found.mirrored)
-    more = (mirrored(frame, found.plane_x) for frame in sources)
+    images = (mirrored(frame, found.plane_x) for frame in sources)
+    more = (replace(image, name=f"{image.name}, mirrored") for image in images)
     return replace(scene, frames=(*scene.frames, *more))
 
 

@@ -79,7 +79,7 @@ class Verdict:
         return {
             "verdict": self.verdict,
             "reasons": list(self.reasons),
-            "off_height": {"both": _rounded(self.off.both), **off},
+            "off_height": {"both": _rounded(self.off.both), "most": MOST_OFF, **off},
         }
 
 
@@ -93,7 +93,7 @@ def verdict_of(training: Training, pictures: Sequence[Picture]) -> Verdict:
     off = off_of(training.prepared.scene, pictures, training.prepared.outlines_px)
     reasons = guesses(with_mirrored(training.prepared.scene, training.symmetry))
     if off.both > MOST_OFF:
-        reasons.append(f"{_measured(off)}; {_remedy(training)}")
+        reasons.append(f"{_measured(off)}; {_remedy(training, off)}")
     return Verdict(WEAK if reasons else OK, tuple(reasons), off)
 
 
@@ -127,10 +127,9 @@ def _moved_by_a_pixel(drawn: Float[np.ndarray, "height width 3"]) -> float:
 
 def _measured(off: Off) -> str:
     """Return by how much a sheet is off, and which drawing is most."""
-    parts = f"outlines {100 * off.outlines:.2f} %, pictures {100 * off.pictures:.2f} %"
     said = (
-        f"drawings and field are {100 * off.both:.2f} % of the height apart ({parts}), where exact "
-        "drawings leave about 0.1 %"
+        f"drawings and field are {100 * off.both:.2f} % of the height apart, where up to "
+        f"{100 * MOST_OFF:.2f} % is ok"
     )
     name = max(off.views, key=off.views.__getitem__, default="")
     return f"{said}, most in {name}" if name and _stands_out(off, name) else said
@@ -140,13 +139,17 @@ def _stands_out(off: Off, name: str) -> bool:
     return off.views[name] > STANDS_OUT * off.pictures
 
 
-def _remedy(training: Training) -> str:
+def _remedy(training: Training, off: Off) -> str:
     """Return what helps, by what is most likely the cause."""
-    usual, done = TrainOptions().steps, len(training.history)
-    if done < usual and training.options.field != "hull":
-        return f"{done} of the usual {usual} steps: train longer"
-    if training.prepared.apart_px:
-        return "drawings disagree: `toonset consistency` shows which, and where"
+    if off.outlines > MOST_OFF or not training.prepared.agree:
+        return (
+            "the drawings do not fit together better: `toonset consistency` shows how far each of "
+            "them is off"
+        )
+    done = len(training.history)
+    ended = training.stopped in ("steps", "budget") and training.options.field != "hull"
+    if ended and done < TrainOptions().steps:
+        return f"these were {done} steps: train longer"
     blends = blended(training.prepared.scene)
     if blends > BLENDS:
         return (

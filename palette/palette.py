@@ -83,7 +83,8 @@ class Evidence:
     Bits to describe 4,096 independent pixels of the character, with the colours themselves.
 
     Attributes:
-        colors: that pay for themselves, those under the rule included.
+        colors: that pay for themselves, those under the rule included, near-equal and tiny ones
+            not.
         one_less: bits more with one colour less.
         one_more: bits more with one colour more.
     """

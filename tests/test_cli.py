@@ -140,7 +140,7 @@ def test_a_moved_bundle_goes_through_every_verb(bundle: Path, toonset, tmp_path,
     made = toonset("train", "--steps", 2, *FAST, "--quiet")
     assert made.code == 3
     assert "bundle/run: weak: " in made.err
-    assert "2 of the usual 300 steps: train longer" in made.err
+    assert "these were 2 steps: train longer" in made.err
     assert (bundle / "run" / "model.safetensors").is_file()
     shown = toonset("render", "bundle/run", "--cameras", "bundle", "-o", "views", "--json")
     assert shown.code == 0

@@ -122,7 +122,7 @@ def test_what_agrees_is_ok() -> None:
 def test_outlines_that_no_shape_explains_count_where_nothing_could_be_mended() -> None:
     apart = 1.1 * MOST_OFF * HEIGHT
     (reason,) = judged(moved(training(scene(*TURN)), apart, applied=False)).reasons
-    assert "what one body cannot" in reason
+    assert "toonset consistency" in reason
     (reason,) = judged(moved(training(scene(*TURN)), apart, applied=True)).reasons
     assert "toonset consistency" in reason
     assert judged(moved(training(scene(*TURN)), 0.5 * apart, applied=True)).verdict == OK
@@ -137,7 +137,9 @@ def test_a_reason_says_how_much_where_and_what_helps() -> None:
     assert ", most in 0; " in found.reasons[0]
     short = training(drawn, history=DONE[:20])
     (reason,) = verdict_of(short, pictures).reasons
-    assert f"20 of the usual {len(DONE)} steps: train longer" in reason
+    assert "these were 20 steps: train longer" in reason
+    (reason,) = verdict_of(replace(short, stopped="the loss grew"), pictures).reasons
+    assert "what one body cannot" in reason
 
 
 def test_blends_are_named_where_there_are_many() -> None:
@@ -154,7 +156,7 @@ def test_blends_are_named_where_there_are_many() -> None:
 @pytest.mark.parametrize(
     ("yaws", "said"),
     [
-        ((0, 180), ["all drawings look along nearly one line"]),
+        ((0, 180), ["within 30 degrees of one line"]),
         ((0, 90, 180, 270), ["opposite drawings share an outline, which leaves 90 deg"]),
         ((0, 120, 240), ["no drawing in the 120 deg"] * 3),
         ((0, 72, 144, 216, 288), []),
@@ -172,6 +174,13 @@ def test_an_undrawn_side_that_is_the_mirror_image_of_another_is_no_guess() -> No
     assert "no drawing in the 180 deg" in judged(training(half)).reasons[0]
     found = Symmetry((1.0,), 0.0, ("45", "90", "135"))
     assert judged(training(half, symmetry=found)).verdict == OK
+
+
+def test_outlines_are_compared_where_every_step_that_would_is_switched_off() -> None:
+    drawn = scene(*TURN)
+    lifted = replace(drawn.frames[0], rgba=disc(0, 6))
+    apart = Prepared(replace(drawn, frames=(lifted, *drawn.frames[1:])), None, None, None, None)
+    assert Prepared(drawn, None, None, None, None).outlines_px < 0.5 < apart.outlines_px
 
 
 # ---- whether drawings agree, which decides how much a field is smoothed
