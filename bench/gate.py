@@ -21,7 +21,7 @@ from toonset.errors import BundleError
 
 FORMAT = 1
 SECONDS, CPU, YARDS = ("s", "s/MP"), "CPU", "yardsticks"
-LOSS = {"dB": 0.3, "1": 0.02, "%": 2.0, "deg": 0.1, "views": 0.0, "px": 0.1}
+LOSS = {"dB": 0.3, "1": 0.02, "%": 2.0, "deg": 0.1, "views": 0.0, "px": 0.1, "OKLab": 0.001}
 SHARE = {"deg": 0.2, YARDS: 0.5}  # of the value, on top of it
 ANY_SHARE = 0.05  # of figures in other units
 SMALL = 0.2  # share of a number without unit that is lost at most: errors of 0.02 may not double
