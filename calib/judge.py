@@ -70,10 +70,21 @@ class SheetState:
     def drawings_confirm(self) -> bool:
         """Return whether the drawings confirm the cameras without the mannequin.
 
-        How far all of them look down it says alone: steeply, if its shape is another's.
+        How far all cameras look down it alone says: steeply, if its shape is another's.
         """
-        level = abs(self.elevation) < STEEP
-        return self.drawings_agree and self.contradiction < CONFIRMING and level
+        return not self.unconfirmed
+
+    @property
+    def unconfirmed(self) -> str:
+        """Return why the drawings alone do not confirm the cameras; "" where they do."""
+        if self.views < TELLING_VIEWS:
+            return f"{TELLING_VIEWS} drawings or more could confirm the camera all the same"
+        if not self.contradiction < CONFIRMING:
+            off = f"{100 * self.contradiction:.1f} % of the height"
+            return f"the drawings, {off} off each other, do not confirm the camera"
+        if abs(self.elevation) >= STEEP:
+            return "drawings from so steeply above cannot confirm the camera"
+        return ""
 
 
 def sheet_state(
@@ -233,10 +244,11 @@ def with_sheet_in_mind(
     if typical < WEAK_COVERAGE and not sheet.drawings_confirm:
         reason = (
             f"in the sheet's typical view {100 * (1 - typical):.0f} % of the outlines are more "
-            "than 5 % of the height apart: the mannequin's shape differs from the drawings'"
+            "than 5 % of the height apart: the mannequin's shape differs from the drawings'; "
+            f"{sheet.unconfirmed}"
         )
     elif bent and not sheet.drawings_confirm:
-        reason = "the mannequin is another body: its proportions were fitted to the drawings"
+        reason = f"the mannequin is another body, fitted to the drawings; {sheet.unconfirmed}"
     elif any(view.verdict == "failed" for view in views):
         reason = "a view of this sheet failed, and all were fitted together"
     elif 2 * doubtful > len(views):
@@ -319,7 +331,8 @@ def _verdict(
     if index == sheet.odd_view:
         return "weak", "disagrees with the other drawings: wrong direction, mirrored or other scale"
     if coverage < (FAILED_COVERAGE if sheet.drawings_confirm else WEAK_COVERAGE):
-        return "weak", f"{apart}: the mannequin's shape differs from the drawing's"
+        why = f"; {sheet.unconfirmed}" if sheet.unconfirmed else ""
+        return "weak", f"{apart}: the mannequin's shape differs from the drawing's{why}"
     if max(sigmas.yaw, sigmas.elevation) > WEAK_ANGLE:
         worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
         return "weak", f"the outline hardly changes with {worst}"

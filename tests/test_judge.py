@@ -83,4 +83,6 @@ def test_another_shape_is_no_reason_to_doubt_where_many_drawings_agree(bent):
     assert "15 %" in said
     steep = state(TELLING_VIEWS, elevation=math.radians(40))
     for other in (state(TELLING_VIEWS - 1), state(TELLING_VIEWS, 1.01 * CONFIRMING), steep):
-        assert verdicts(with_sheet_in_mind(views, other, bent=bent)) == ["weak"] * len(views)
+        judged = with_sheet_in_mind(views, other, bent=bent)
+        assert verdicts(judged) == ["weak"] * len(views)
+        assert other.unconfirmed in judged[0].reason
