@@ -21,9 +21,10 @@ from toonset.errors import BundleError
 
 FORMAT = 1
 SECONDS, CPU, YARDS = ("s", "s/MP"), "CPU", "yardsticks"
-LOSS = {"dB": 0.3, "1": 0.02, "%": 2.0, "deg": 0.1, "views": 0.0, "px": 0.1, "OKLab": 0.001}
+LOSS = {"dB": 0.3, "1": 0.02, "%": 2.0, "deg": 0.1, "views": 0.0, "px": 0.1}
 SHARE = {"deg": 0.2, YARDS: 0.5}  # of the value, on top of it
 ANY_SHARE = 0.05  # of figures in other units
+ROUNDING = 1e-9  # of any figure: errors of 1e-16 are none
 SMALL = 0.2  # share of a number without unit that is lost at most: errors of 0.02 may not double
 YARDSTICK_RUNS = 5
 HEAD = ("", "subject", "group", "metric", "committed", "now", "may lose", "unit")
@@ -167,7 +168,7 @@ def _guard(subject: str, record: Record, yard_s: float) -> Guard:
         value=value,
         unit=unit,
         direction=record.direction,
-        tolerance=spared + share * abs(value),
+        tolerance=max(spared + share * abs(value), ROUNDING),
         n=record.n,
         seed=record.seed,
         machine=record.machine,

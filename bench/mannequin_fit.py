@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import EFFECTIVE_POINTS, NOISE_OF_HEIGHT
+from toonset.calib.align import EFFECTIVE_POINTS, NOISE_OF_HEIGHT, robust_weights
 from toonset.calib.contour import drawn_contour
 from toonset.calib.known import Known
 from toonset.calib.match import Drawing, match
@@ -61,9 +61,7 @@ def _equations(
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, " p"]]:
     """Return a view's Gauss-Newton matrix and gradient; rim and drawn points count the same."""
     found = match(drawing, body.surface, pose)
-    weights = (width_px**2 / (width_px**2 + found.distances**2)) ** 2
-    weights[: found.drawn] /= 2 * found.drawn
-    weights[found.drawn :] /= 2 * max(len(weights) - found.drawn, 1)
+    weights = robust_weights(found, width_px)
     weights *= EFFECTIVE_POINTS / (NOISE_OF_HEIGHT * drawing.height) ** 2
     residual = (found.normals * (project(pose, found.points) - found.targets)).sum(axis=1)
     across = np.einsum("ni,nij->nj", found.normals, pixel_slopes(pose, found.points))

@@ -89,7 +89,7 @@ def align_all(
         costs = []
         for pose in before:
             matches = match(drawing, surface, pose)
-            weights = _robust_weights(matches, width * drawing.height)
+            weights = robust_weights(matches, width * drawing.height)
             step = _gauss_newton_step(matches, weights, pose, drawing.height)
             poses.append(pose.moved(step))
             costs.append(-float(weights.sum()))
@@ -124,7 +124,7 @@ def measure(drawing: Drawing, surface: Surface, pose: Pose, cap: float = 0.05) -
     return Fit(drawing.pose_out(pose), cost, error, float(met[shown].mean()))
 
 
-def _robust_weights(matches: Matches, width_px: float) -> Float[np.ndarray, " n"]:
+def robust_weights(matches: Matches, width_px: float) -> Float[np.ndarray, " n"]:
     """Return Geman-McClure weights; the weights of perfect matches sum to 1.
 
     Both directions count the same, however many points each has.

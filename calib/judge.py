@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.align import measure
-from toonset.calib.coherence import coherence
 from toonset.calib.hypotheses import Candidates, is_twin
 from toonset.calib.joint import JointFit
 from toonset.calib.labels import Label
@@ -17,23 +16,15 @@ from toonset.calib.match import Drawing
 from toonset.calib.pose import PARAMETERS, Pose
 from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
 from toonset.calib.rim import Surface
-from toonset.calib.templates import Templates, turns_visibly
+from toonset.calib.sheet_state import MOST_CONTRADICTION, SheetState
 from toonset.camera import angles_from_rotation, rotation_distance
 from toonset.view import View
 
 SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
 WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
 FAILED_COVERAGE = 0.70
-# Sheets with cameras that are right contradict themselves by 0.4 to 0.9 %, wrong ones by 1.8 % on
-MOST_CONTRADICTION = 0.012
-# Under it a mannequin of another shape is no reason to doubt the cameras. 144 synthetic sheets, the
-# mannequin another body: of 41 views wrong by more than 15 degrees, 3 were on such a sheet without
-# another mark against them; with 0.012 it would be 15. Drawing error of 1.2 % makes 0.0075 at most
-CONFIRMING = 0.008
-STEEP = np.radians(30.0)  # turnarounds are drawn from about eye level, none of ours from above 20
 # Of the probability that faces are none: at most 0.2 on sheets with right cameras
 MOST_FACES_CONTRADICT = 0.5
-TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly anything
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 OTHER = np.radians(15.0)  # an alternative this far away is another camera
 # 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
@@ -41,67 +32,6 @@ MOST_PULL = np.radians(5.0)
 FAR_FROM_LEVEL = np.radians(12.0)  # four times what the views of a sheet differ in elevation
 FAR_FROM_LABEL = np.radians(60.0)  # three quarters is neither front nor side
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
-
-
-@dataclass(frozen=True)
-class SheetState:
-    """What the sheet as a whole says about its views.
-
-    Attributes:
-        yaw_observable: the mannequin looks different from different sides.
-        contradiction: of the drawings with each other, over the height; nan for a single view.
-        odd_view: the one drawing that disagrees with the others, if any.
-        views: how many there are.
-        elevation: of the typical camera, radians.
-    """
-
-    yaw_observable: bool
-    contradiction: float
-    odd_view: int | None
-    views: int
-    elevation: float = 0.0
-
-    @property
-    def drawings_agree(self) -> bool:
-        """Return whether the drawings do not contradict the cameras."""
-        return self.views >= TELLING_VIEWS and self.contradiction < MOST_CONTRADICTION
-
-    @property
-    def drawings_confirm(self) -> bool:
-        """Return whether the drawings confirm the cameras without the mannequin.
-
-        How far all cameras look down it alone says: steeply, if its shape is another's.
-        """
-        return not self.unconfirmed
-
-    @property
-    def unconfirmed(self) -> str:
-        """Return why the drawings alone do not confirm the cameras; "" where they do."""
-        if self.views < TELLING_VIEWS:
-            return f"{TELLING_VIEWS} drawings or more could confirm the camera all the same"
-        if not self.contradiction < CONFIRMING:
-            off = f"{100 * self.contradiction:.1f} % of the height"
-            return f"the drawings, {off} off each other, do not confirm the camera"
-        if abs(self.elevation) >= STEEP:
-            return "drawings from so steeply above cannot confirm the camera"
-        return ""
-
-
-def sheet_state(
-    views: Sequence[View], joint: JointFit, surface: Surface, templates: Templates
-) -> SheetState:
-    """Return what the drawings say about each other under the joint fit's cameras."""
-    observable = turns_visibly(templates)
-    if len(views) < 2:
-        return SheetState(observable, float("nan"), None, len(views))
-    cameras = [
-        pose.camera(surface.middle, (view.rgba.shape[1], view.rgba.shape[0]))
-        for view, pose in zip(views, joint.poses, strict=True)
-    ]
-    agreement = coherence(views, cameras)
-    elevation = float(np.median([camera.angles[1] for camera in cameras]))
-    found = (agreement.contradiction, agreement.odd_view, len(views), elevation)
-    return SheetState(observable, *found)
 
 
 def typical_coverage(drawings: Sequence[Drawing], joint: JointFit) -> float:
@@ -243,9 +173,8 @@ def with_sheet_in_mind(
     doubtful = sum(view.verdict != "ok" for view in views)
     if typical < WEAK_COVERAGE and not sheet.drawings_confirm:
         reason = (
-            f"in the sheet's typical view {100 * (1 - typical):.0f} % of the outlines are more "
-            "than 5 % of the height apart: the mannequin's shape differs from the drawings'; "
-            f"{sheet.unconfirmed}"
+            f"in the sheet's typical view {_apart(typical)}: the mannequin's shape differs from "
+            f"the drawings'; {sheet.unconfirmed}"
         )
     elif bent and not sheet.drawings_confirm:
         reason = f"the mannequin is another body, fitted to the drawings; {sheet.unconfirmed}"
@@ -287,7 +216,7 @@ def judge_sheet(views: Sequence[ViewCalibration], sheet: SheetState) -> tuple[Ve
         return "weak", f"the drawings contradict each other by {off} under these cameras"
     typical = float(np.median([view.coverage for view in views]))
     if worst == "ok" and typical < WEAK_COVERAGE and sheet.drawings_confirm:
-        apart = f"{100 * (1 - typical):.0f} % of the outlines are more than 5 % of the height apart"
+        apart = _apart(typical)
         return "ok", f"the mannequin has another shape, {apart}; but the drawings fit together"
     return worst, named
 
@@ -317,7 +246,7 @@ def _verdict(
     index: int,
     twin_is: str,
 ) -> tuple[Verdict, str]:
-    apart = f"{100 * (1 - coverage):.0f} % of the outlines are more than 5 % of the height apart"
+    apart = _apart(coverage)
     if coverage < FAILED_COVERAGE and not sheet.drawings_agree:
         return "failed", f"{apart}: this is not the mannequin's pose or shape"
     if not sheet.yaw_observable:
@@ -337,6 +266,10 @@ def _verdict(
         worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
         return "weak", f"the outline hardly changes with {worst}"
     return "ok", ""
+
+
+def _apart(coverage: float) -> str:
+    return f"{100 * (1 - coverage):.0f} % of the outlines are more than 5 % of the height apart"
 
 
 def _direction(pose: Pose) -> str:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from toonset.calib.align import measure
-from toonset.calib.coherence import coherence
 from toonset.calib.contour import drawn_contour
 from toonset.calib.drawing_error import Noise
 from toonset.calib.hypotheses import is_twin
@@ -20,7 +19,6 @@ from toonset.calib.judge import (
     FAILED_COVERAGE,
     SURE,
     WEAK_ANGLE,
-    SheetState,
     angle_sigmas,
     judge_sheet,
 )
@@ -30,6 +28,7 @@ from toonset.calib.landmarks import LandmarkFit, solve_landmarks
 from toonset.calib.match import Drawing
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.rim import Surface, prepare_surface
+from toonset.calib.sheet_state import state_of
 from toonset.camera import angles_from_rotation
 from toonset.dataset.landmark_file import Landmarks
 from toonset.errors import LandmarkError
@@ -63,7 +62,7 @@ def calibrate_by_landmarks(
     solved = time.perf_counter()
     drawings = [Drawing(drawn_contour(v), OUTLINE_HEIGHT_PX, OUTLINE_POINTS) for v in views]
     judged = tuple(_judged(*each, surface) for each in zip(views, drawings, fits, strict=True))
-    state = _sheet_state(views, judged)
+    state = state_of(views, [view.camera for view in judged])
     # one drawing's landmarks confirm its scale and elevation; its outline would not
     only = judged[0]
     single = len(views) == 1
@@ -142,13 +141,6 @@ def _verdict(fit: LandmarkFit, sigmas: Sigmas, height_px: float) -> tuple[Verdic
         worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
         return "weak", f"the landmarks hardly tell {worst}: add points farther from the others"
     return "ok", ""
-
-
-def _sheet_state(views: Sequence[View], judged: Sequence[ViewCalibration]) -> SheetState:
-    if len(views) < 2:
-        return SheetState(True, float("nan"), None, len(views))
-    agreement = coherence(views, [view.camera for view in judged])
-    return SheetState(True, agreement.contradiction, agreement.odd_view, len(views))
 
 
 def _model(

@@ -71,8 +71,8 @@ class Request:
 def run(request: Request, printer: Printer) -> int:
     """Train, write the run and print the result; return the exit code."""
     from toonset.dataset.transforms import read_scene
-    from toonset.nerf.field_choice import FEWEST_VIEWS
     from toonset.nerf.gaps import guesses
+    from toonset.nerf.symmetry import with_all_mirrored
 
     place = request.place
     place.check([request.bundle, request.test], resume=request.resume)
@@ -87,9 +87,8 @@ def run(request: Request, printer: Printer) -> int:
         place.clear()
     else:
         _go_on(onlooker, checkpoint, place, printer)
-    if not options.symmetric or len(scene.frames) < FEWEST_VIEWS:  # no mirror images to come
-        for guess in guesses(scene):
-            printer.say(guess)
+    for guess in guesses(with_all_mirrored(scene) if options.symmetric else scene):
+        printer.say(guess)
     training = _fitted(scene, options, onlooker, stopper, printer)
     if stopper.signal and training.stopped == "interrupted":
         _leave(request, training, onlooker, printer)

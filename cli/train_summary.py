@@ -32,7 +32,7 @@ def _verdict(found: dict[str, Any]) -> str:
     """Return what the run is worth, and by what."""
     off = found["off_height"]
     parts = f"outlines {_percent(off['outlines'])}, pictures {_percent(off['pictures'])}"
-    bound = f"together up to {_percent(off['most'])} is ok"
+    bound = f"together up to {_percent(off['bound'])} is ok"
     return f"verdict: {found['verdict']}; {parts} of the height apart from the drawings ({bound})"
 
 

@@ -79,6 +79,12 @@ def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
     return replace(scene, frames=(*scene.frames, *more))
 
 
+def with_all_mirrored(scene: Scene) -> Scene:
+    """Return the scene with every drawing's mirror image: all that symmetry could ever show."""
+    names = tuple(frame.name for frame in scene.frames)
+    return with_mirrored(scene, Symmetry((), 0.0, names))
+
+
 def mirrored(frame: Frame, plane_x: float) -> Frame:
     """Return the drawing as one of the body's mirror image."""
     camera, flip = frame.camera, np.diag([-1.0, 1.0, 1.0])

@@ -79,7 +79,7 @@ class Verdict:
         return {
             "verdict": self.verdict,
             "reasons": list(self.reasons),
-            "off_height": {"both": _rounded(self.off.both), "most": MOST_OFF, **off},
+            "off_height": {"both": _rounded(self.off.both), "bound": MOST_OFF, **off},
         }
 
 
@@ -132,11 +132,8 @@ def _measured(off: Off) -> str:
         f"{100 * MOST_OFF:.2f} % is ok"
     )
     name = max(off.views, key=off.views.__getitem__, default="")
-    return f"{said}, most in {name}" if name and _stands_out(off, name) else said
-
-
-def _stands_out(off: Off, name: str) -> bool:
-    return off.views[name] > STANDS_OUT * off.pictures
+    stands_out = off.views.get(name, 0.0) > STANDS_OUT * off.pictures
+    return f"{said}, most in {name}" if stands_out else said
 
 
 def _remedy(training: Training, off: Off) -> str:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.gaps import FEW_OUTLINES, outline_gap, wide_gaps
+from toonset.nerf.gaps import FEW_OUTLINES, guesses, outline_gap, wide_gaps
+from toonset.nerf.symmetry import with_all_mirrored
 
 NOTHING = np.zeros((8, 8, 4), dtype=np.uint8)
 
@@ -59,3 +61,14 @@ def test_turns_without_a_drawing(
 def test_opposite_drawings_share_an_outline(yaws: tuple[float, ...], gap: float) -> None:
     assert math.degrees(outline_gap(scene(*yaws))) == pytest.approx(gap, abs=1e-6)
     assert (outline_gap(scene(*yaws)) > FEW_OUTLINES) == (gap > 75)
+
+
+def test_what_mirror_images_may_show_is_no_guess_yet() -> None:
+    drawn = np.full_like(NOTHING, 255)
+    half, ends = (
+        replace(some, frames=tuple(replace(frame, rgba=drawn) for frame in some.frames))
+        for some in (scene(0, 45, 90, 135, 180), scene(0, 180))
+    )
+    assert guesses(half)
+    assert not guesses(with_all_mirrored(half))
+    assert guesses(with_all_mirrored(ends)) == guesses(ends)

@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 
 from toonset.calib.judge import (
-    CONFIRMING,
-    TELLING_VIEWS,
-    SheetState,
     judge_sheet,
     with_elevations_in_mind,
     with_labels_in_mind,
@@ -17,6 +14,7 @@ from toonset.calib.judge import (
     with_sheet_in_mind,
 )
 from toonset.calib.result import Sigmas, ViewCalibration
+from toonset.calib.sheet_state import CONFIRMING, TELLING_VIEWS, SheetState
 from toonset.camera import Camera
 
 

@@ -21,7 +21,7 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
         "planes": None,
         "verdict": {
             "verdict": "weak",
-            "off_height": {"both": 0.0027, "most": 0.0014, "outlines": 0.0012, "pictures": 0.0015},
+            "off_height": {"both": 0.0027, "bound": 0.0014, "outlines": 0.0012, "pictures": 0.0015},
         },
         "drawings": dict.fromkeys(("turning", "registration", "unbending", "ink")) | drawings,
     }
