@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import ElevationPrior, tilt
+from toonset.calib.align import ElevationPrior, measure, tilt
 from toonset.calib.bank import load_bank
 from toonset.calib.common_elevation import common_elevation
 from toonset.calib.contour import drawn_contour
+from toonset.calib.cut_off import CutOff, FlatSide, beyond_px, ending_at, flat_sides
 from toonset.calib.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.face import read_faces
 from toonset.calib.hypotheses import Candidates, level_twins, refine, with_twins
@@ -86,6 +87,9 @@ FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held bac
 # Right bodies with 1.2 % drawing error have 0.98 and more. On 144 synthetic sheets with another
 # body's mannequin rotations are 9.6 degrees off (p95), with 0.93 they were 13.7
 SAME_BODY_COVERAGE = 0.96
+LEAST_LOST_PX = 1.5  # less is a sole that lies between two pixels
+MET = 0.005**2  # cost under which a figure at the picture's edge is whole
+CUT_EXPLAINS = 0.5  # of the cost, for a figure at the picture's edge to be cut
 # Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them
 SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
 
@@ -116,6 +120,7 @@ def calibrate(
         surface = prepare_surface(mesh)
         templates = load_bank(surface)
         contours = [drawn_contour(view) for view in views]
+        views = [replace(v, ends=c.ends) for v, c in zip(views, contours, strict=True)]
         coarse = [Drawing(c, options.coarse_height_px, COARSE_POINTS) for c in contours]
         fine = [Drawing(c, options.fine_height_px, FINE_POINTS) for c in contours]
         sheet = Sheet(
@@ -129,17 +134,22 @@ def calibrate(
         joint, turn, candidates = problem.together(candidates, together)
     with _timed(seconds, "joint"):
         progress("joint", 0.0)
-        joint, model, differs = problem.joint(joint, turn)
+        rigid = problem.rigid(joint, turn)
+        ended, cuts = problem.cut_off(rigid, turn)
+        if ended is not problem:
+            problem, rigid = ended, ended.rigid(rigid.joint, turn)
+        joint, model = problem.bent(rigid)
     with _timed(seconds, "judge"):
         progress("judge", 0.0)
         cameras = problem.cameras(joint)
-        state = state_of(views, cameras, yaw_observable=turns_visibly(templates))
-        bare = [drawing.inset(joint.offset) for drawing in fine]
-        final = problem.rivals(bare, joint, model, candidates, differs=differs)
+        state = state_of(problem.views, cameras, yaw_observable=turns_visibly(templates))
+        bare = [drawing.inset(joint.offset) for drawing in problem.fine]
+        final = problem.rivals(bare, joint, model, candidates, differs=rigid.differs)
         sure = sheet.probabilities(final)
+        body, differs = joint.body.surface, rigid.differs
         each = [
-            judge_view(view, bare[i], joint.body.surface, joint, i, final[i], sure[i], state)
-            for i, view in enumerate(views)
+            judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
+            for i, v in enumerate(views)
         ]
         each = with_labels_in_mind(with_elevations_in_mind(each), known.labels)
         each = with_locks_in_mind(each, problem.pulled(joint, model, turn))
@@ -156,7 +166,25 @@ def calibrate(
         verdict,
         reason,
         seconds,
+        cuts,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Rigid:
+    """The sheet fitted with the mannequin as it is.
+
+    Attributes:
+        problem: what was fitted.
+        joint: the fit.
+        model: of the cameras.
+        differs: the mannequin is another body than the drawn one.
+    """
+
+    problem: JointProblem
+    joint: JointFit
+    model: ModelChoice
+    differs: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,18 +236,79 @@ class _Problem:
         search = TogetherSearch(self.coarse, body, self.sheet, self._informed)
         return search.run(candidates, starts, self.options.rounds)
 
-    def joint(self, sketch: JointFit, turn: Turn) -> tuple[JointFit, ModelChoice, bool]:
-        """Return the fit at full resolution, its model, and whether the mannequin differs."""
+    def rigid(self, sketch: JointFit, turn: Turn) -> _Rigid:
+        """Return the fit at full resolution, the mannequin as it is."""
         differs = typical_coverage(self.fine, sketch) < SAME_BODY_COVERAGE
         samples = ROUGH_POINTS if differs else WHITE_POINTS
         problem = JointProblem(self.fine, turn, self._kept(), samples)
         keep_fov = "fov" in self.known.locked
         starts = self.known.at_locked_yaws(sketch.poses, self.surface.middle)
         joint, model = climb(problem, sketch.body, starts, doubtful=differs, keep_fov=keep_fov)
-        if differs:
-            joint, model = with_proportions(self._level(problem, joint), joint, model)
-        factor = SIGMA_OF_ANOTHER_BODY if differs else SIGMA_OF_SAME_BODY
-        return replace(joint, covariance=factor**2 * joint.covariance), model, differs
+        return _Rigid(problem, joint, model, differs)
+
+    def bent(self, rigid: _Rigid) -> tuple[JointFit, ModelChoice]:
+        """Return the fit, the mannequin bent where it is another body, and its model."""
+        joint, model = rigid.joint, rigid.model
+        if rigid.differs:
+            joint, model = with_proportions(self._level(rigid.problem, joint), joint, model)
+        factor = SIGMA_OF_ANOTHER_BODY if rigid.differs else SIGMA_OF_SAME_BODY
+        return replace(joint, covariance=factor**2 * joint.covariance), model
+
+    def cut_off(self, whole: _Rigid, turn: Turn) -> tuple[_Problem, tuple[CutOff, ...]]:
+        """Return the problem with cuts taken for no outline, and which those are.
+
+        Args:
+            whole: the fit that takes every figure for whole.
+            turn: where the views are meant to be seen from.
+        """
+        sides = [(i, flat) for i, view in enumerate(self.views) for flat in flat_sides(view)]
+        costs = self._costs(whole.joint)
+        seen, maybe = [], []
+        for i, cut in self._cuts(sides, whole.joint):
+            if cut.flat.is_end_of(self.views[i]):
+                seen.append(cut)
+            elif costs[i] > MET if cut.flat.at_edge else cut.lost_px >= LEAST_LOST_PX / 2:
+                maybe.append((i, cut.flat))
+        if not maybe:
+            return self, tuple(seen)
+        ended = self._ending_at(maybe)
+        tried = ended.rigid(whole.joint, turn).joint
+        explained = ended._costs(tried)
+        error = tried.noise.smooth * np.array([view.figure_box[3] for view in self.views])
+        cuts = [
+            (i, cut)
+            for i, cut in self._cuts(maybe, tried)
+            if cut.lost_px >= max(LEAST_LOST_PX, error[i])
+            and (not cut.flat.at_edge or explained[i] < CUT_EXPLAINS * costs[i])
+        ]
+        if not cuts:
+            return self, tuple(seen)
+        return self._ending_at([(i, cut.flat) for i, cut in cuts]), (*seen, *(c for _, c in cuts))
+
+    def _costs(self, joint: JointFit) -> list[float]:
+        return [
+            measure(drawing, joint.body.surface, drawing.pose_in(pose)).cost
+            for drawing, pose in zip(self.fine, joint.poses, strict=True)
+        ]
+
+    def _cuts(
+        self, sides: Sequence[tuple[int, FlatSide]], joint: JointFit
+    ) -> list[tuple[int, CutOff]]:
+        """Return how far the mannequin goes on beyond sides of views."""
+        surface = joint.body.surface
+        return [
+            (i, CutOff(view.name, flat, beyond_px(flat, surface, joint.poses[i], view)))
+            for i, flat in sides
+            for view in [self.views[i]]
+        ]
+
+    def _ending_at(self, sides: Sequence[tuple[int, FlatSide]]) -> _Problem:
+        views, fine = list(self.views), list(self.fine)
+        for i, flat in sides:
+            views[i] = ending_at(views[i], flat)
+            contour = drawn_contour(views[i])
+            fine[i] = Drawing(contour, self.options.fine_height_px, FINE_POINTS)
+        return replace(self, views=views, fine=fine)
 
     def cameras(self, joint: JointFit) -> list[Camera]:
         """Return the joint fit's cameras in pixels of the views."""

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float
 
 from toonset.calib.contour import drawn_contour
 from toonset.camera import Camera
-from toonset.view import View
+from toonset.view import Ends, View
 
 SAMPLES = 96  # along a ray through the whole figure: about 1 % of the height apart
 FINE = 17  # samples between the neighbours of the best one
@@ -34,7 +34,7 @@ class Silhouette:
         self.height = contour.height_px
         self.points = contour.points[:: max(1, len(contour.points) // POINTS)]
         self.pad = int(np.ceil(PAD_OF_HEIGHT * self.height))
-        self.distance = _signed_distance(np.pad(view.mask, self.pad))
+        self.distance = _signed_distance(_continued(view.mask, self.pad, contour.ends))
 
     def seen_by(self, camera: Camera) -> Silhouette:
         """Return the same drawing under another camera."""
@@ -113,6 +113,23 @@ def middle_of(silhouettes: Sequence[Silhouette]) -> Float[np.ndarray, " 3"]:
 def contradiction(residuals: Float[np.ndarray, " points"]) -> float:
     """Return the mean square of the negative residuals: what the other silhouettes exclude."""
     return float((np.minimum(residuals, 0) ** 2).mean())
+
+
+def _continued(
+    mask: Bool[np.ndarray, "height width"], pad: int, ends: Ends
+) -> Bool[np.ndarray, "height+2*pad width+2*pad"]:
+    """Return the padded mask; where the figure is cut off it goes on as it is at the cut."""
+    padded = np.pad(mask, pad)
+    left, top, right, bottom = (round(end) + pad if np.isfinite(end) else None for end in ends)
+    if top is not None:
+        padded[:top] = padded[top]
+    if bottom is not None:
+        padded[bottom:] = padded[bottom - 1]
+    if left is not None:
+        padded[:, :left] = padded[:, left, None]
+    if right is not None:
+        padded[:, right:] = padded[:, right - 1, None]
+    return padded
 
 
 def _signed_distance(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:

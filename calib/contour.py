@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from skimage.measure import find_contours
 
 from toonset.errors import SheetError
-from toonset.view import View
+from toonset.view import NO_ENDS, Ends, View
 
 MIN_LOOP_OF_HEIGHT = 0.04  # shorter closed loops are pinholes of the matting, not outline
 EDGE_PX = 0.75  # from the picture's edge: smoothing pulls an outline's corners off it
@@ -31,7 +31,8 @@ class Contour:
         normals: (n, 2) unit, pointing out of the figure.
         box: (left, top, width, height) of the figure in pixels.
         height_px: the figure's extent in v.
-        free: (n,) whether a point is outline; not where the picture's edge cuts the figure.
+        free: (n,) whether a point is outline; not where the figure is cut.
+        ends: lines where it is, see `View`; the picture's edges among them.
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -39,16 +40,19 @@ class Contour:
     box: tuple[float, float, float, float]
     height_px: float
     free: Bool[np.ndarray, " n"]
+    ends: Ends = NO_ENDS
 
     def scaled(self, factor: float) -> Contour:
         """Return the contour of the drawing scaled by `factor`."""
         left, top, width, height = (factor * value for value in self.box)
+        a, b, c, d = self.ends
         return Contour(
             self.points * factor,
             self.normals,
             (left, top, width, height),
             self.height_px * factor,
             self.free,
+            (factor * a, factor * b, factor * c, factor * d),
         )
 
 
@@ -77,21 +81,24 @@ def drawn_contour(view: View, spacing_of_height: float = 1 / 256) -> Contour:
     points = np.concatenate([points for points, _ in sampled])
     normals = np.concatenate([normals for _, normals in sampled])
     box = (float(left), float(top), float(width), float(height))
-    free = np.concatenate([_is_free(p, view.rgba.shape, height) for p, _ in sampled])
-    return Contour(points, normals, box, float(height), free)
+    cut = np.concatenate([_is_cut(p, view.rgba.shape, height) for p, _ in sampled])
+    ends = _with_edges(view.ends, points[cut], view.rgba.shape)
+    at_end = np.abs(points[:, [0, 1, 0, 1]] - ends) < EDGE_PX
+    free: Bool[np.ndarray, " n"] = ~np.any(at_end, axis=1)
+    return Contour(points, normals, box, float(height), free, ends)
 
 
-def _is_free(
+def _is_cut(
     loop: Float[np.ndarray, "n 2"], shape: tuple[int, ...], height: float
 ) -> Bool[np.ndarray, " n"]:
-    """Return which points of an evenly sampled loop are outline, not a cut by the picture's edge.
+    """Return which points of an evenly sampled loop are no outline, but the picture's edge.
 
     Short contacts with the edge are those of a closely cropped figure.
     """
     edge = np.array([shape[1], shape[0]])
     at_edge = ((loop < EDGE_PX) | (loop > edge - EDGE_PX)).any(axis=1)
     if not at_edge.any() or at_edge.all():
-        return np.ones(len(loop), dtype=bool)
+        return np.zeros(len(loop), dtype=bool)
     start = int(np.flatnonzero(~at_edge)[0])
     rolled = np.roll(at_edge, -start)
     changes = np.flatnonzero(np.diff(np.concatenate([[0], rolled.astype(np.int8), [0]])))
@@ -99,7 +106,18 @@ def _is_free(
     for first, last in zip(changes[::2], changes[1::2], strict=True):
         if (last - first) * spacing < CUT_OF_HEIGHT * height:
             rolled[first:last] = False
-    return ~np.roll(rolled, start)
+    return np.roll(rolled, start)
+
+
+def _with_edges(ends: Ends, cut: Float[np.ndarray, "n 2"], shape: tuple[int, ...]) -> Ends:
+    """Return `ends` with the picture's edges at which the points `cut` lie."""
+    (left, top, right, bottom), (u, v), (height, width) = ends, cut.T, shape[:2]
+    return (
+        0.0 if (u < EDGE_PX).any() else left,
+        0.0 if (v < EDGE_PX).any() else top,
+        float(width) if (u > width - EDGE_PX).any() else right,
+        float(height) if (v > height - EDGE_PX).any() else bottom,
+    )
 
 
 def _length(loop: Float[np.ndarray, "n 2"]) -> float:

@@ -55,8 +55,22 @@ def judge_view(
     candidates: Candidates,
     probability: Float[np.ndarray, " n"],
     sheet: SheetState,
+    *,
+    differs: bool,
 ) -> ViewCalibration:
-    """Return the camera of view `index` with what is known about it."""
+    """Return the camera of view `index` with what is known about it.
+
+    Args:
+        view: the drawing.
+        drawing: its outline, the sheet's offset taken off.
+        surface: the mannequin, bent where it was.
+        joint: the sheet's fit.
+        index: of the view.
+        candidates: what else it could be.
+        probability: of each candidate.
+        sheet: what the drawings say about each other.
+        differs: the mannequin is another body than the drawn one.
+    """
     pose = joint.poses[index]
     size_wh = (view.rgba.shape[1], view.rgba.shape[0])
     fit = measure(drawing, surface, drawing.pose_in(pose))
@@ -78,8 +92,11 @@ def judge_view(
     sideways = abs(np.cos(angles_from_rotation(pose.rotation)[0])) < SIDEWAYS
     twin_is = "seen from below for above" if sideways else "front and back swapped"
     verdict, reason = _verdict(fit.coverage, sigmas, p_flip, others, sheet, index, twin_is)
-    if verdict == "ok" and not drawing.free.all():
-        verdict, reason = "weak", "the picture's edge cuts the figure: scale and shift are guesses"
+    if verdict == "ok" and not drawing.free.all() and differs:
+        verdict = "weak"
+        reason = (
+            "the figure is cut off, and the mannequin another body: scale and shift are guesses"
+        )
     return ViewCalibration(
         view.name,
         pose.camera(surface.middle, size_wh),

@@ -11,7 +11,7 @@ import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from toonset.calib.contour import Contour
 from toonset.calib.pose import Pose, project
@@ -71,6 +71,7 @@ class Drawing:
         self.points = scaled.points[::every] - self.offset
         self.normals = scaled.normals[::every]
         self.free = scaled.free[::every]
+        self.low, self.high = np.reshape(scaled.ends, (2, 2)) - self.offset
         self.height = height
         self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
         self.subpixels = max(1, round(height_px / SUBPIXEL_HEIGHT))
@@ -91,6 +92,10 @@ class Drawing:
         other._lay()
         return other
 
+    def shows(self, pixels: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Return which pixels the drawing says something of: none beyond a cut."""
+        return ((pixels > self.low) & (pixels < self.high)).all(axis=1)
+
     def pose_in(self, pose: Pose) -> Pose:
         """Return a full-size pose in working pixels."""
         scaled = pose.scaled(self.factor)
@@ -105,6 +110,9 @@ def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
     """Return two-sided nearest neighbours of rim and drawn outline at a working pose."""
     spacing = max(1.0, drawing.height / 128)
     rim = rim_at(surface, pose, drawing.size_wh, spacing, drawing.subpixels)
+    if np.isfinite([drawing.low, drawing.high]).any():
+        shown = drawing.shows(project(pose, rim.points))
+        rim = Rim(rim.points[shown], rim.normals[shown])
     if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
         far = np.full(len(drawing.points), drawing.height)
         zeros = np.zeros((len(far), 3))

@@ -45,6 +45,10 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
             calibration.contradiction if math.isfinite(calibration.contradiction) else None
         ),
         "views": [_view_dict(view) for view in calibration.views],
+        "cut_off": [
+            {"view": cut.view, "side": cut.flat.side, "lost_px": cut.lost_px}
+            for cut in calibration.cuts
+        ],
         "seconds": {step: round(value, 4) for step, value in calibration.seconds.items()},
     }
 

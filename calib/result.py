@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from toonset.calib.cut_off import CutOff
 from toonset.calib.drawing_error import Noise
 from toonset.calib.ladder import ModelChoice
 from toonset.camera import Camera
@@ -80,6 +81,7 @@ class Calibration:
         verdict: the worst that holds for the sheet as a whole.
         reason: why, in words.
         seconds: per step.
+        cuts: parts of figures that their pictures lack.
     """
 
     views: tuple[ViewCalibration, ...]
@@ -91,3 +93,4 @@ class Calibration:
     verdict: Verdict
     reason: str
     seconds: dict[str, float]
+    cuts: tuple[CutOff, ...] = ()

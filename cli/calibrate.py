@@ -141,6 +141,7 @@ def calibrate(
     hints.check_usage()
     printer = Printer(as_json, quiet)
     check_output(out, [*sheets, mesh, landmarks, init, boxes], WRITTEN, force=force)
+    from toonset.calib.cut_off import at_cuts
     from toonset.calib.enclosed import without_false_holes
 
     body = load_body(mesh)
@@ -150,9 +151,10 @@ def calibrate(
     marks = _landmark_fits(known, body.mesh)
     _say_inputs(views, body, marks, printer)
     found = _fit(views, body.mesh, known, printer, landmarks_only=landmarks_only)
+    views, found = at_cuts(views, found)
     views, filled = without_false_holes(views, found.views, given.papers, found.mannequin)
-    for hole in filled:
-        printer.say(str(hole))
+    for change in (*found.cuts, *filled):
+        printer.say(str(change))
     report = _report(found, marks, filled) | provenance(given.files, body, hints, seed)
     _write(out, views, body.mesh, found, report, force=force)
     _say_result(found, out, printer)

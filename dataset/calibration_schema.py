@@ -169,6 +169,14 @@ class FilledHole(_Record):
     by: Annotated[str, Field(min_length=1, max_length=255)]
 
 
+class CutOff(_Record):
+    """A part of a figure that its picture lacks: a frame, not in the picture, cut it off."""
+
+    view: Annotated[str, Field(min_length=1, max_length=255)]
+    side: Literal["left", "top", "right", "bottom"]
+    lost_px: Spread
+
+
 class CalibrationFile(_Record):
     """The whole file, except `schema`."""
 
@@ -181,6 +189,7 @@ class CalibrationFile(_Record):
     views: Annotated[list[ViewRecord], Field(min_length=1, max_length=MAX_FRAMES)]
     landmarks: Annotated[list[LandmarkFit], Field(max_length=MAX_FRAMES)] = []
     filled_holes: Annotated[list[FilledHole], Field(max_length=100_000)] = []
+    cut_off: Annotated[list[CutOff], Field(max_length=4 * MAX_FRAMES)] = []
     options: dict[str, Any] = {}
     seed: Annotated[int, Field(ge=0)] | None = None
     versions: dict[str, Text] = {}

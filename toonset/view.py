@@ -12,6 +12,8 @@ from toonset.errors import SheetError
 VISIBLE = 16  # alpha: fainter is a file's noise
 
 Box = tuple[int, int, int, int]  # x, y, width, height
+Ends = tuple[float, float, float, float]  # left, top, right, bottom
+NO_ENDS: Ends = (-np.inf, -np.inf, np.inf, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +25,15 @@ class View:
         box: (x, y, width, height) of the crop in the sheet, pixels.
         line_width_px: width of the drawn contour line; 0 where there is none.
         name: file name of the view in a bundle, e.g. "000.png".
+        ends: lines in pixels of the crop where a frame cuts the figure, infinite where none does:
+            beyond them the drawing says nothing.
     """
 
     rgba: UInt8[np.ndarray, "height width 4"]
     box: tuple[int, int, int, int]
     line_width_px: float
     name: str
+    ends: Ends = NO_ENDS
 
     def __post_init__(self) -> None:
         """Refuse an empty drawing.

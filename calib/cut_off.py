@@ -1,0 +1,184 @@
+"""Figures that a frame cuts off: a foot that ends in a ruled line is no outline.
+
+At the picture's own edge everybody sees it. But a picture that was cut out of a larger one keeps
+the cut when it is laid on a sheet, with paper beyond. There the drawing is opaque to the last
+pixel, along a row or column, while a drawn outline is mixed with paper wherever it does not lie
+between two pixels by chance (hard pixels end like this everywhere: only smooth drawings are looked
+at). A flat sole may do so, too, as a whole figure may touch the picture's edge; so the mannequin
+decides: it ends at a sole and goes on beyond a cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+from scipy.ndimage import binary_erosion
+
+from toonset.calib.pose import Pose
+from toonset.calib.rim import Surface, mask_at
+from toonset.camera import Camera
+from toonset.view import NO_ENDS, VISIBLE, View
+
+if TYPE_CHECKING:
+    from toonset.calib.result import Calibration, ViewCalibration
+
+Side = Literal["left", "top", "right", "bottom"]
+SIDES: tuple[Side, ...] = ("left", "top", "right", "bottom")  # as in a view's ends
+OPPOSITE: dict[Side, Side] = {"bottom": "top", "top": "bottom", "left": "right", "right": "left"}
+
+OPAQUE = 250  # alpha of a pixel that no paper shows through
+SOFT = 0.2  # mixed pixels over the outline's length: of a smooth drawing
+SHORTEST_PX = 3
+TOUCHING = 0.02  # of the figure's height: along the picture's edge
+MOST_LOST = 0.4  # of the figure's height: how far beyond a side is looked
+
+
+@dataclass(frozen=True)
+class FlatSide:
+    """A side on which a figure ends in a ruled line.
+
+    Attributes:
+        side: of the figure.
+        at: between which pixels: the row or column from 0 that begins there.
+        spans: (first, last + 1) columns or rows where the figure ends there.
+        at_edge: the line is the picture's edge.
+    """
+
+    side: Side
+    at: int
+    spans: tuple[tuple[int, int], ...]
+    at_edge: bool
+
+    @property
+    def axis(self) -> int:
+        """Return which pixel coordinate `at` is one of: u (0) or v (1)."""
+        return SIDES.index(self.side) % 2
+
+    def is_end_of(self, view: View) -> bool:
+        """Return whether the view is known to end there."""
+        return bool(view.ends[SIDES.index(self.side)] == self.at)
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """A part of a figure that its picture lacks.
+
+    Attributes:
+        view: the drawing.
+        flat: where it ends.
+        lost_px: how far the mannequin goes on beyond.
+    """
+
+    view: str
+    flat: FlatSide
+    lost_px: float
+
+    def __str__(self) -> str:
+        """Return what was found, for people."""
+        lost = f"about {self.lost_px:.0f} px are missing"
+        ends = "" if self.flat.at_edge else "; the picture ends there now"
+        return f"{self.view}: the figure is cut off at the {self.flat.side}, {lost}{ends}"
+
+
+def flat_sides(view: View) -> tuple[FlatSide, ...]:
+    """Return the sides on which a drawing may have been cut off."""
+    flats = tuple(_flat(view))
+    touched = {flat.side for flat in flats if flat.at_edge}
+    return tuple(f for f in flats if not f.at_edge or OPPOSITE[f.side] not in touched)
+
+
+def _flat(view: View) -> Iterator[FlatSide]:
+    alpha = view.rgba[..., 3]
+    mixed = (alpha >= VISIBLE) & (alpha < OPAQUE)
+    inner: Bool[np.ndarray, "height width"] = binary_erosion(view.mask)
+    is_smooth = mixed.sum() >= SOFT * (view.mask & ~inner).sum()
+    sides: tuple[tuple[Side, UInt8[np.ndarray, "rows columns"]], ...] = (
+        ("bottom", alpha),
+        ("right", alpha.T),
+        ("top", alpha[::-1]),
+        ("left", alpha.T[::-1]),
+    )
+    for side, turned in sides:
+        last = int(np.flatnonzero((turned >= VISIBLE).any(axis=1))[-1])
+        at_edge = last + 1 == len(turned)
+        spans = _runs(turned[last] >= OPAQUE)
+        shortest = TOUCHING * view.figure_box[3] if at_edge else SHORTEST_PX
+        if sum(b - a for a, b in spans) >= shortest and (at_edge or is_smooth):
+            at = last + 1 if side in ("bottom", "right") else len(turned) - last - 1
+            yield FlatSide(side, at, spans, at_edge)
+
+
+def _runs(row: Bool[np.ndarray, " n"]) -> tuple[tuple[int, int], ...]:
+    changes = np.flatnonzero(np.diff(np.concatenate([[0], row.astype(np.int8), [0]])))
+    runs = zip(changes[::2].tolist(), changes[1::2].tolist(), strict=True)
+    return tuple((first, last) for first, last in runs if last - first >= SHORTEST_PX)
+
+
+def beyond_px(flat: FlatSide, surface: Surface, pose: Pose, view: View) -> float:
+    """Return how far the mannequin goes on beyond a flat side, the median along it.
+
+    Args:
+        flat: of the view.
+        surface: the mannequin.
+        pose: of its camera, pixels of the view.
+        view: the drawing.
+    """
+    height, width = view.mask.shape
+    pad = int(np.ceil(MOST_LOST * view.figure_box[3]))
+    moved = replace(pose, shift=pose.shift + pad)
+    mask = mask_at(surface, moved, (width + 2 * pad, height + 2 * pad))
+    turned = mask if flat.axis == 1 else mask.T
+    at = flat.at + pad
+    outwards = turned[at:] if flat.side in ("bottom", "right") else turned[:at][::-1]
+    along = np.concatenate([np.arange(*span) + pad for span in flat.spans])
+    beyond = outwards[:pad, along]
+    return float(np.median(np.where(beyond.all(axis=0), pad, beyond.argmin(axis=0))))
+
+
+def ending_at(view: View, flat: FlatSide) -> View:
+    """Return the drawing, cut off at a side."""
+    ends = list(view.ends)
+    ends[SIDES.index(flat.side)] = float(flat.at)
+    left, top, right, bottom = ends
+    return replace(view, ends=(left, top, right, bottom))
+
+
+def at_cuts(
+    views: Sequence[View], calibration: Calibration
+) -> tuple[tuple[View, ...], Calibration]:
+    """Return drawings and cameras with every picture ending where its figure is cut off.
+
+    What lies beyond a picture's edge is unknown to whoever reads it, paper within it is not.
+    """
+    pairs = [
+        _cropped(view, fit, [cut.flat for cut in calibration.cuts if cut.view == view.name])
+        for view, fit in zip(views, calibration.views, strict=True)
+    ]
+    shown, fits = zip(*pairs, strict=True)
+    return shown, replace(calibration, views=fits)
+
+
+def _cropped(
+    view: View, fit: ViewCalibration, sides: Sequence[FlatSide]
+) -> tuple[View, ViewCalibration]:
+    if not sides:
+        return view, fit
+    rows, columns = view.mask.shape
+    at: dict[Side, int] = {flat.side: flat.at for flat in sides}
+    whole = (0, 0, columns, rows)
+    left, top, right, bottom = (at.get(side, end) for side, end in zip(SIDES, whole, strict=True))
+    x, y, _, _ = view.box
+    size = (right - left, bottom - top)
+    kept = replace(
+        view, rgba=view.rgba[top:bottom, left:right], box=(x + left, y + top, *size), ends=NO_ENDS
+    )
+
+    def moved(camera: Camera) -> Camera:
+        return camera.moved((left, top), size)
+
+    others = tuple(replace(other, camera=moved(other.camera)) for other in fit.alternatives)
+    return kept, replace(fit, camera=moved(fit.camera), twin=moved(fit.twin), alternatives=others)
