@@ -33,7 +33,7 @@ OPPOSITE: dict[Side, Side] = {"bottom": "top", "top": "bottom", "left": "right",
 OPAQUE = 250  # alpha of a pixel that no paper shows through
 SOFT = 0.2  # mixed pixels over the outline's length: of a smooth drawing
 SHORTEST_PX = 3
-TOUCHING = 0.02  # of the figure's height: along the picture's edge
+LEAST_LENGTH = 0.02  # of the figure's height, along all of a side
 MOST_LOST = 0.4  # of the figure's height: how far beyond a side is looked
 
 
@@ -106,8 +106,8 @@ def _flat(view: View) -> Iterator[FlatSide]:
         last = int(np.flatnonzero((turned >= VISIBLE).any(axis=1))[-1])
         at_edge = last + 1 == len(turned)
         spans = _runs(turned[last] >= OPAQUE)
-        shortest = TOUCHING * view.figure_box[3] if at_edge else SHORTEST_PX
-        if sum(b - a for a, b in spans) >= shortest and (at_edge or is_smooth):
+        long = sum(b - a for a, b in spans) >= LEAST_LENGTH * view.figure_box[3]
+        if long and (at_edge or is_smooth):
             at = last + 1 if side in ("bottom", "right") else len(turned) - last - 1
             yield FlatSide(side, at, spans, at_edge)
 
