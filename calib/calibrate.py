@@ -26,7 +26,14 @@ from toonset.calib.contour import drawn_contour
 from toonset.calib.cut_off import CutOff, FlatSide, beyond_px, ending_at, flat_sides
 from toonset.calib.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.face import read_faces
-from toonset.calib.hypotheses import Candidates, level_twins, refine, with_twins
+from toonset.calib.hypotheses import (
+    Candidates,
+    half_turned,
+    level_twins,
+    looks_alike_from_behind,
+    refine,
+    with_twins,
+)
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.judge import (
     judge_sheet,
@@ -328,11 +335,14 @@ class _Problem:
     ) -> list[Candidates]:
         """Return what else every view could be, refined to `drawings`, those of full resolution."""
         bent = joint.body.surface
+        from_behind = looks_alike_from_behind(bent, joint.poses)
         found = []
         for i, (pose, view) in enumerate(zip(joint.poses, candidates, strict=True)):
-            final = refine(drawings[i], bent, _rivals(pose, view), FINE_WIDTHS)
+            starts = _rivals(pose, view) + with_twins([half_turned(pose)]) * from_behind
+            final = refine(drawings[i], bent, starts, FINE_WIDTHS)
             seen = pose if model.is_perspective else replace(pose, k=0.0)
-            found.append(self._informed(level_twins(final, bent, seen, always=differs), i))
+            final = level_twins(final, bent, seen, always=differs, from_behind=from_behind)
+            found.append(self._informed(final, i))
         return found
 
     def _informed(self, view: Candidates, index: int) -> Candidates:

@@ -64,8 +64,20 @@ def is_twin(pose: Pose, other: Pose) -> bool:
     return rotation_distance(pose.twin().rotation, other.rotation) < MIRROR
 
 
-def level_twins(view: Candidates, surface: Surface, pose: Pose, *, always: bool) -> Candidates:
-    """Return the candidates with equal energies for `pose` and a twin that looks the same.
+def half_turned(pose: Pose) -> Pose:
+    """Return the pose that sees the other side: turned by 180 degrees about the vertical."""
+    return replace(pose, rotation=pose.rotation @ np.diag([-1.0, 1.0, -1.0]))
+
+
+def looks_alike_from_behind(surface: Surface, poses: Sequence[Pose]) -> bool:
+    """Return whether no view tells the body from itself turned by 180 degrees: a stack of boxes."""
+    return all(_look_alike(surface, pose, half_turned(pose)) for pose in poses)
+
+
+def level_twins(
+    view: Candidates, surface: Surface, pose: Pose, *, always: bool, from_behind: bool
+) -> Candidates:
+    """Return the candidates with equal energies for `pose` and those that look the same.
 
     Both outlines of a symmetric body are one curve, but sampled at other points; what their costs
     differ by is no evidence, and would add up over the views of a sheet.
@@ -75,22 +87,31 @@ def level_twins(view: Candidates, surface: Surface, pose: Pose, *, always: bool)
         surface: the mannequin.
         pose: the chosen one; with k = 0 where perspective is no evidence.
         always: the mannequin is not the character: its asymmetries are no evidence either.
+        from_behind: the body looks alike from behind.
     """
-    if not always and not _twins_look_alike(surface, pose):
+    alike = [pose]
+    if always or _look_alike(surface, pose, pose.twin()):
+        alike.append(pose.twin())
+    if from_behind:
+        alike += [half_turned(p) for p in alike]
+    if len(alike) == 1:
         return view
-    turns = [(fit.pose, rotation_distance(fit.pose.rotation, pose.rotation)) for fit in view.fits]
-    pair = [i for i, (p, turn) in enumerate(turns) if turn < SAME_POSE or is_twin(pose, p)]
+    pair = [
+        i
+        for i, fit in enumerate(view.fits)
+        if rotation_distance(fit.pose.rotation, pose.rotation) < SAME_POSE
+        or any(rotation_distance(fit.pose.rotation, p.rotation) < MIRROR for p in alike[1:])
+    ]
     energies = view.energies.copy()
     energies[pair] = energies[pair].min(initial=np.inf)
     return Candidates(view.fits, energies)
 
 
-def _twins_look_alike(surface: Surface, pose: Pose) -> bool:
+def _look_alike(surface: Surface, pose: Pose, other: Pose) -> bool:
     size = (LOOK_PX, LOOK_PX)
     scale = 0.5 * LOOK_PX / surface.radius
-    centred = replace(pose, shift=np.full(2, LOOK_PX / 2), scale=scale)
     a, b = (
         silhouette_mask(project(p, surface.vertices), surface.faces, size)
-        for p in (centred, centred.twin())
+        for p in (replace(q, shift=np.full(2, LOOK_PX / 2), scale=scale) for q in (pose, other))
     )
     return float((a & b).sum() / max((a | b).sum(), 1)) >= ALIKE

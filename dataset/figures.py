@@ -21,6 +21,8 @@ LEAST_AREA = 0.25  # of the views' median area: a side view is rarely below a th
 SMALLER = 0.85  # of the views' median height or area
 STRANGE = 0.6  # of what the views commonly share of their colours: less is another thing
 RECTANGLE = 0.96  # of its box that a patch fills: a block of colour, no character
+LEVEL = 0.12  # of the views' height: perspective moves feet and heads by that
+PLAIN = 0.9  # of a patch in one of 64 colours: a swatch
 LEAST_SPECK = 4  # cells: smaller things are noise
 
 
@@ -78,6 +80,35 @@ def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
     return large
 
 
+def with_blocks(
+    blobs: Blobs,
+    mains: Int[np.ndarray, " mains"],
+    painted: Bool[np.ndarray, "height width"],
+    rgb: UInt8[np.ndarray, "height width 3"],
+) -> Int[np.ndarray, " mains"]:
+    """Return the bodies and the rectangles that are views, too: a blocky character's profile.
+
+    It stands level with another view and has its colours, several of them; a swatch has one.
+    """
+    fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
+    blocks = np.setdiff1d(np.flatnonzero(fill >= RECTANGLE), mains)
+    height, area = np.median(blobs.boxes[mains, 3]), np.median(blobs.areas[mains])
+    blocks = blocks[(blobs.areas[blocks] >= LEAST_AREA * area)]
+    if not len(blocks) or len(mains) < 2:
+        return mains
+    ends = np.stack([blobs.boxes[:, 1], blobs.boxes[:, 1] + blobs.boxes[:, 3]], axis=1)
+    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in mains])
+    typical = np.median([np.minimum(look, looks.mean(axis=0)).sum() for look in looks])
+    views = []
+    for block in blocks.tolist():
+        level = np.abs(ends[mains] - ends[block]).max(axis=1) <= LEVEL * height
+        look = _look_of(blobs, block, painted, rgb)
+        alike = np.minimum(look, looks.mean(axis=0)).sum() >= STRANGE * typical
+        if level.any() and alike and look.max() <= PLAIN:
+            views.append(block)
+    return np.concatenate([mains, np.array(views, dtype=mains.dtype)])
+
+
 def without_strangers(
     blobs: Blobs,
     mains: Int[np.ndarray, " mains"],
@@ -87,12 +118,7 @@ def without_strangers(
     """Return the bodies without smaller ones in other colours: a sword as high as its bearer."""
     if len(mains) < 3:
         return mains
-    looks = np.array(
-        [
-            _look(rgb[blobs.window(int(n))][blobs.mask(int(n)) & painted[blobs.window(int(n))]])
-            for n in mains
-        ]
-    )
+    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in mains])
     others = (looks.sum(axis=0) - looks) / (len(mains) - 1)
     shared = np.minimum(looks, others).sum(axis=1)
     heights, areas = blobs.boxes[mains, 3], blobs.areas[mains]
@@ -103,6 +129,16 @@ def without_strangers(
 def shared_colors(a: UInt8[np.ndarray, "_ 3"], b: UInt8[np.ndarray, "_ 3"]) -> float:
     """Return how much of their colours two figures share: the histograms' intersection."""
     return float(np.minimum(_look(a), _look(b)).sum())
+
+
+def _look_of(
+    blobs: Blobs,
+    number: int,
+    painted: Bool[np.ndarray, "height width"],
+    rgb: UInt8[np.ndarray, "height width 3"],
+) -> Float[np.ndarray, " 64"]:
+    window = blobs.window(number)
+    return _look(rgb[window][blobs.mask(number) & painted[window]])
 
 
 def _look(colors: UInt8[np.ndarray, "_ 3"]) -> Float[np.ndarray, " 64"]:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.background import Background, difference, ring_of, with_final_tolerance
-from toonset.dataset.figures import Blobs, find_blobs, find_mains, without_strangers
+from toonset.dataset.figures import Blobs, find_blobs, find_mains, with_blocks, without_strangers
 from toonset.dataset.lines import Line, find_lines, line_pixels
 from toonset.dataset.parts import Grouping, group_blobs
 from toonset.dataset.shadows import find_shadows
@@ -96,7 +96,8 @@ def survey(
         paper = joined(~painted | ruled | shadow, ring)
         blobs = find_blobs(~paper)
     blobs, cuts = part_touching(blobs, painted & ~ruled & ~shadow, small[..., :3])
-    mains = without_strangers(blobs, find_mains(blobs), painted, small[..., :3])
+    mains = with_blocks(blobs, find_mains(blobs), painted, small[..., :3])
+    mains = without_strangers(blobs, mains, painted, small[..., :3])
     grouping = group_blobs(blobs, mains, small[..., :3])
     blobs, bodies, shared = part_shared(blobs, mains, grouping)
     if shared:
