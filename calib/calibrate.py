@@ -23,7 +23,15 @@ from toonset.calib.align import ElevationPrior, measure, tilt
 from toonset.calib.bank import load_bank
 from toonset.calib.common_elevation import common_elevation
 from toonset.calib.contour import drawn_contour
-from toonset.calib.cut_off import CutOff, FlatSide, beyond_px, ending_at, flat_sides
+from toonset.calib.cut_off import (
+    CutOff,
+    FlatSide,
+    Side,
+    beyond_px,
+    ending_at,
+    flat_sides,
+    overhang_px,
+)
 from toonset.calib.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.face import read_faces
 from toonset.calib.hypotheses import (
@@ -282,15 +290,32 @@ class _Problem:
         tried = ended.rigid(whole.joint, turn).joint
         explained = ended._costs(tried)
         error = tried.noise.smooth * np.array([view.figure_box[3] for view in self.views])
-        cuts = [
-            (i, cut)
-            for i, cut in self._cuts(maybe, tried)
-            if cut.lost_px >= max(LEAST_LOST_PX, error[i])
-            and (not cut.flat.at_edge or explained[i] < CUT_EXPLAINS * costs[i])
-        ]
+        cuts = []
+        for i, cut in self._cuts(maybe, tried):
+            explains = explained[i] < CUT_EXPLAINS * costs[i]
+            usual = self._elsewhere(cut.flat.side, maybe, tried)
+            alone = not cut.flat.at_edge and cut.lost_px >= LEAST_LOST_PX + usual
+            if cut.lost_px >= max(LEAST_LOST_PX, error[i]) and (explains or alone):
+                cuts.append((i, cut))
         if not cuts:
             return self, tuple(seen)
         return self._ending_at([(i, cut.flat) for i, cut in cuts]), (*seen, *(c for _, c in cuts))
+
+    def _elsewhere(
+        self, side: Side, maybe: Sequence[tuple[int, FlatSide]], joint: JointFit
+    ) -> float:
+        """Return how far the mannequin goes beyond figures that nothing cuts there, in pixels.
+
+        Longer legs than the character's are no reason to think its feet cut off; where all views
+        end alike, on a ground line, nothing tells (infinity).
+        """
+        flat = {i for i, other in maybe if other.side == side}
+        found = [
+            overhang_px(side, joint.body.surface, joint.poses[i], view)
+            for i, view in enumerate(self.views)
+            if i not in flat
+        ]
+        return max(0.0, float(np.median(found))) if found else np.inf
 
     def _costs(self, joint: JointFit) -> list[float]:
         return [

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 from scipy.ndimage import binary_erosion
 
-from toonset.calib.pose import Pose
+from toonset.calib.pose import Pose, project
 from toonset.calib.rim import Surface, mask_at
 from toonset.camera import Camera
 from toonset.view import NO_ENDS, VISIBLE, View
@@ -33,6 +33,8 @@ OPPOSITE: dict[Side, Side] = {"bottom": "top", "top": "bottom", "left": "right",
 OPAQUE = 250  # alpha of a pixel that no paper shows through
 SOFT = 0.2  # mixed pixels over the outline's length: of a smooth drawing
 SHORTEST_PX = 3
+INWARDS = 2  # rows: there a figure that ends roundly, between two pixels by chance, is far wider
+BLUNT = 0.5  # times that width, at least, of what is cut off
 LEAST_LENGTH = 0.02  # of the figure's height, along all of a side
 MOST_LOST = 0.4  # of the figure's height: how far beyond a side is looked
 
@@ -106,10 +108,21 @@ def _flat(view: View) -> Iterator[FlatSide]:
         last = int(np.flatnonzero((turned >= VISIBLE).any(axis=1))[-1])
         at_edge = last + 1 == len(turned)
         spans = _runs(turned[last] >= OPAQUE)
+        if not at_edge:
+            spans = _blunt(spans, turned[max(last - INWARDS, 0)])
         long = sum(b - a for a, b in spans) >= LEAST_LENGTH * view.figure_box[3]
         if long and (at_edge or is_smooth):
             at = last + 1 if side in ("bottom", "right") else len(turned) - last - 1
             yield FlatSide(side, at, spans, at_edge)
+
+
+def _blunt(
+    spans: tuple[tuple[int, int], ...], inner: UInt8[np.ndarray, " n"]
+) -> tuple[tuple[int, int], ...]:
+    """Return the spans that are about as wide as the figure is a little further in."""
+    wide = _runs(inner >= OPAQUE // 2)
+    widths = [max((d - c for c, d in wide if c < b and d > a), default=0) for a, b in spans]
+    return tuple(s for s, width in zip(spans, widths, strict=True) if s[1] - s[0] >= BLUNT * width)
 
 
 def _runs(row: Bool[np.ndarray, " n"]) -> tuple[tuple[int, int], ...]:
@@ -137,6 +150,17 @@ def beyond_px(flat: FlatSide, surface: Surface, pose: Pose, view: View) -> float
     along = np.concatenate([np.arange(*span) + pad for span in flat.spans])
     beyond = outwards[:pad, along]
     return float(np.median(np.where(beyond.all(axis=0), pad, beyond.argmin(axis=0))))
+
+
+def overhang_px(side: Side, surface: Surface, pose: Pose, view: View) -> float:
+    """Return how far the mannequin goes beyond the figure's outermost pixel on a side."""
+    axis = SIDES.index(side) % 2
+    x, y, width, height = view.figure_box
+    first = (x, y)[axis] - view.box[axis]
+    reach = project(pose, surface.vertices)[:, axis]
+    if side in ("left", "top"):
+        return float(first - reach.min())
+    return float(reach.max() - first - (width, height)[axis])
 
 
 def ending_at(view: View, flat: FlatSide) -> View:
