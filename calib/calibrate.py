@@ -26,7 +26,6 @@ from toonset.calib.contour import drawn_contour
 from toonset.calib.cut_off import (
     CutOff,
     FlatSide,
-    Side,
     beyond_px,
     ending_at,
     flat_sides,
@@ -104,6 +103,8 @@ FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held bac
 SAME_BODY_COVERAGE = 0.96
 LEAST_LOST_PX = 1.5  # less is a sole that lies between two pixels
 MET = 0.005**2  # cost under which a figure at the picture's edge is whole
+FARTHER = 2.0  # times what it does elsewhere the mannequin goes on beyond a cut
+SAME_SCALE = 0.02  # views of a sheet differ by 1 % (`ties.Spreads`)
 CUT_EXPLAINS = 0.5  # of the cost, for a figure at the picture's edge to be cut
 # Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them
 SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
@@ -272,6 +273,9 @@ class _Problem:
     def cut_off(self, whole: _Rigid, turn: Turn) -> tuple[_Problem, tuple[CutOff, ...]]:
         """Return the problem with cuts taken for no outline, and which those are.
 
+        At the picture's edge a cut must explain the outline far better. Within the picture, where
+        a ruled line is seen, the mannequin must be the character: another body's legs are longer.
+
         Args:
             whole: the fit that takes every figure for whole.
             turn: where the views are meant to be seen from.
@@ -281,7 +285,7 @@ class _Problem:
         seen, maybe = [], []
         for i, cut in self._cuts(sides, whole.joint):
             if cut.flat.is_end_of(self.views[i]):
-                seen.append(cut)
+                seen += [cut] if cut.lost_px >= LEAST_LOST_PX else []
             elif costs[i] > MET if cut.flat.at_edge else cut.lost_px >= LEAST_LOST_PX / 2:
                 maybe.append((i, cut.flat))
         if not maybe:
@@ -292,30 +296,36 @@ class _Problem:
         error = tried.noise.smooth * np.array([view.figure_box[3] for view in self.views])
         cuts = []
         for i, cut in self._cuts(maybe, tried):
-            explains = explained[i] < CUT_EXPLAINS * costs[i]
-            usual = self._elsewhere(cut.flat.side, maybe, tried)
-            alone = not cut.flat.at_edge and cut.lost_px >= LEAST_LOST_PX + usual
-            if cut.lost_px >= max(LEAST_LOST_PX, error[i]) and (explains or alone):
+            if cut.flat.at_edge:
+                proven = explained[i] < CUT_EXPLAINS * costs[i]
+            else:
+                proven = not whole.differs and self._stands_out(i, cut, maybe, tried)
+            if proven and cut.lost_px >= max(LEAST_LOST_PX, error[i]):
                 cuts.append((i, cut))
         if not cuts:
             return self, tuple(seen)
         return self._ending_at([(i, cut.flat) for i, cut in cuts]), (*seen, *(c for _, c in cuts))
 
-    def _elsewhere(
-        self, side: Side, maybe: Sequence[tuple[int, FlatSide]], joint: JointFit
-    ) -> float:
-        """Return how far the mannequin goes beyond figures that nothing cuts there, in pixels.
+    def _stands_out(
+        self, index: int, cut: CutOff, maybe: Sequence[tuple[int, FlatSide]], joint: JointFit
+    ) -> bool:
+        """Return whether views that nothing cuts there agree with what a view's cut says.
 
-        Longer legs than the character's are no reason to think its feet cut off; where all views
-        end alike, on a ground line, nothing tells (infinity).
+        Longer legs than the character's reach below all feet, or make the views that end in a
+        ruled line larger than the others; where all end so, on a ground line, nothing tells.
         """
-        flat = {i for i, other in maybe if other.side == side}
-        found = [
-            overhang_px(side, joint.body.surface, joint.poses[i], view)
-            for i, view in enumerate(self.views)
-            if i not in flat
-        ]
-        return max(0.0, float(np.median(found))) if found else np.inf
+        flat = {i for i, other in maybe if other.side == cut.flat.side}
+        whole = [i for i in range(len(self.views)) if i not in flat]
+        if not whole:
+            return False
+        surface, poses = joint.body.surface, joint.poses
+        usual = np.median(
+            [overhang_px(cut.flat.side, surface, poses[i], self.views[i]) for i in whole]
+        )
+        larger = poses[index].scale / np.median([poses[i].scale for i in whole]) - 1
+        return bool(
+            abs(larger) < SAME_SCALE and cut.lost_px >= LEAST_LOST_PX + FARTHER * max(0.0, usual)
+        )
 
     def _costs(self, joint: JointFit) -> list[float]:
         return [
@@ -327,12 +337,11 @@ class _Problem:
         self, sides: Sequence[tuple[int, FlatSide]], joint: JointFit
     ) -> list[tuple[int, CutOff]]:
         """Return how far the mannequin goes on beyond sides of views."""
-        surface = joint.body.surface
-        return [
-            (i, CutOff(view.name, flat, beyond_px(flat, surface, joint.poses[i], view)))
-            for i, flat in sides
-            for view in [self.views[i]]
-        ]
+
+        def lost_px(i: int, flat: FlatSide) -> float:
+            return beyond_px(flat, joint.body.surface, joint.poses[i], self.views[i])
+
+        return [(i, CutOff(self.views[i].name, flat, lost_px(i, flat))) for i, flat in sides]
 
     def _ending_at(self, sides: Sequence[tuple[int, FlatSide]]) -> _Problem:
         views, fine = list(self.views), list(self.fine)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from toonset.calib.calibrate import calibrate
 from toonset.calib.contour import drawn_contour
@@ -13,9 +14,11 @@ from toonset.camera import Camera
 from toonset.dataset.bodies import random_body
 from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.picture import encode_png, load_rgba
+from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
 from toonset.files import write_bytes
+from toonset.mesh import Mesh
 from toonset.view import View
 
 OPTIONS = SynthOptions(views=5, cell_px=220, outline_px=0, elevation_deg=8)
@@ -126,6 +129,24 @@ def test_a_closely_cropped_figure_is_whole(made):
     found = calibrate([view for view, _ in pairs], made.mesh)
     assert found.cuts == ()
     assert found.verdict == "ok"
+
+
+@pytest.mark.parametrize("elevation", [0, 8])
+def test_longer_legs_than_the_characters_are_no_cut(elevation):
+    """Flat soles on whole pixels, in one view or in all, and a mannequin that reaches below."""
+
+    def figure(leg: float) -> Mesh:
+        sizes = [(1, 1, 1), (0.9, 1, 0.5), (0.35, leg, 0.4), (0.35, leg, 0.4)]
+        middles = [(0, leg + 1.5, 0), (0, leg + 0.5, 0), (-0.25, leg / 2, 0), (0.25, leg / 2, 0)]
+        parts = [trimesh.creation.box(size) for size in sizes]
+        vertices = [part.vertices + at for part, at in zip(parts, middles, strict=True)]
+        faces = [part.faces + 8 * i for i, part in enumerate(parts)]
+        return Mesh(np.concatenate(vertices), np.concatenate(faces))
+
+    options = replace(OPTIONS, views=8, cell_px=200, elevation_deg=elevation)
+    views = split_sheet(make_turnaround(figure(1.0), options, 0).sheet).views
+    assert any(side.side == "bottom" for view in views for side in flat_sides(view))
+    assert calibrate(views, figure(1.3)).cuts == ()
 
 
 def test_calibrate_ends_the_picture_at_the_cut_and_says_so(toonset, made, tmp_path):
