@@ -19,18 +19,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import ElevationPrior, measure, tilt
+from toonset.calib.align import ElevationPrior, tilt
 from toonset.calib.bank import load_bank
 from toonset.calib.common_elevation import common_elevation
 from toonset.calib.contour import drawn_contour
-from toonset.calib.cut_off import (
-    CutOff,
-    FlatSide,
-    beyond_px,
-    ending_at,
-    flat_sides,
-    overhang_px,
-)
+from toonset.calib.cut_off import CutOff, ending_at
+from toonset.calib.cut_proof import Cuts, possible_cuts, proven_cuts
 from toonset.calib.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.face import read_faces
 from toonset.calib.hypotheses import (
@@ -45,6 +39,7 @@ from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.judge import (
     judge_sheet,
     judge_view,
+    measured,
     typical_coverage,
     with_elevations_in_mind,
     with_labels_in_mind,
@@ -101,11 +96,6 @@ FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held bac
 # Right bodies with 1.2 % drawing error have 0.98 and more. On 144 synthetic sheets with another
 # body's mannequin rotations are 9.6 degrees off (p95), with 0.93 they were 13.7
 SAME_BODY_COVERAGE = 0.96
-LEAST_LOST_PX = 1.5  # less is a sole that lies between two pixels
-MET = 0.005**2  # cost under which a figure at the picture's edge is whole
-FARTHER = 2.0  # times what it does elsewhere the mannequin goes on beyond a cut
-SAME_SCALE = 0.02  # views of a sheet differ by 1 % (`ties.Spreads`)
-CUT_EXPLAINS = 0.5  # of the cost, for a figure at the picture's edge to be cut
 # Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them
 SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
 
@@ -151,9 +141,7 @@ def calibrate(
     with _timed(seconds, "joint"):
         progress("joint", 0.0)
         rigid = problem.rigid(joint, turn)
-        ended, cuts = problem.cut_off(rigid, turn)
-        if ended is not problem:
-            problem, rigid = ended, ended.rigid(rigid.joint, turn)
+        problem, rigid, cuts = problem.cut_off(rigid, turn)
         joint, model = problem.bent(rigid)
     with _timed(seconds, "judge"):
         progress("judge", 0.0)
@@ -270,83 +258,36 @@ class _Problem:
         factor = SIGMA_OF_ANOTHER_BODY if rigid.differs else SIGMA_OF_SAME_BODY
         return replace(joint, covariance=factor**2 * joint.covariance), model
 
-    def cut_off(self, whole: _Rigid, turn: Turn) -> tuple[_Problem, tuple[CutOff, ...]]:
-        """Return the problem with cuts taken for no outline, and which those are.
-
-        At the picture's edge a cut must explain the outline far better. Within the picture, where
-        a ruled line is seen, the mannequin must be the character: another body's legs are longer.
+    def cut_off(self, whole: _Rigid, turn: Turn) -> tuple[_Problem, _Rigid, tuple[CutOff, ...]]:
+        """Return the problem with cuts taken for no outline, its fit, and which those are.
 
         Args:
             whole: the fit that takes every figure for whole.
             turn: where the views are meant to be seen from.
         """
-        sides = [(i, flat) for i, view in enumerate(self.views) for flat in flat_sides(view)]
-        costs = self._costs(whole.joint)
-        seen, maybe = [], []
-        for i, cut in self._cuts(sides, whole.joint):
-            if cut.flat.is_end_of(self.views[i]):
-                seen += [cut] if cut.lost_px >= LEAST_LOST_PX else []
-            elif costs[i] > MET if cut.flat.at_edge else cut.lost_px >= LEAST_LOST_PX / 2:
-                maybe.append((i, cut.flat))
-        if not maybe:
-            return self, tuple(seen)
-        ended = self._ending_at(maybe)
-        tried = ended.rigid(whole.joint, turn).joint
-        explained = ended._costs(tried)
-        error = tried.noise.smooth * np.array([view.figure_box[3] for view in self.views])
-        cuts = []
-        for i, cut in self._cuts(maybe, tried):
-            if cut.flat.at_edge:
-                proven = explained[i] < CUT_EXPLAINS * costs[i]
-            else:
-                proven = not whole.differs and self._stands_out(i, cut, maybe, tried)
-            if proven and cut.lost_px >= max(LEAST_LOST_PX, error[i]):
-                cuts.append((i, cut))
-        if not cuts:
-            return self, tuple(seen)
-        return self._ending_at([(i, cut.flat) for i, cut in cuts]), (*seen, *(c for _, c in cuts))
+        costs = self._costs(whole)
+        known, possible = possible_cuts(self.views, whole.joint, costs)
+        ended, fitted = self, whole
+        if possible:
+            ended = self._ending_at(possible)
+            fitted = ended.rigid(whole.joint, turn)
+            both, differs = (costs, ended._costs(fitted)), whole.differs
+            proven = proven_cuts(self.views, possible, fitted.joint, both, differs=differs)
+            if not proven:
+                ended, fitted = self, whole
+            elif len(proven) < len(possible):
+                ended = self._ending_at(proven)
+                fitted = ended.rigid(whole.joint, turn)
+            known += proven
+        return ended, fitted, tuple(cut for _, cut in known)
 
-    def _stands_out(
-        self, index: int, cut: CutOff, maybe: Sequence[tuple[int, FlatSide]], joint: JointFit
-    ) -> bool:
-        """Return whether views that nothing cuts there agree with what a view's cut says.
+    def _costs(self, fitted: _Rigid) -> list[float]:
+        return [fit.cost for fit in measured(self.fine, fitted.joint)]
 
-        Longer legs than the character's reach below all feet, or make the views that end in a
-        ruled line larger than the others; where all end so, on a ground line, nothing tells.
-        """
-        flat = {i for i, other in maybe if other.side == cut.flat.side}
-        whole = [i for i in range(len(self.views)) if i not in flat]
-        if not whole:
-            return False
-        surface, poses = joint.body.surface, joint.poses
-        usual = np.median(
-            [overhang_px(cut.flat.side, surface, poses[i], self.views[i]) for i in whole]
-        )
-        larger = poses[index].scale / np.median([poses[i].scale for i in whole]) - 1
-        return bool(
-            abs(larger) < SAME_SCALE and cut.lost_px >= LEAST_LOST_PX + FARTHER * max(0.0, usual)
-        )
-
-    def _costs(self, joint: JointFit) -> list[float]:
-        return [
-            measure(drawing, joint.body.surface, drawing.pose_in(pose)).cost
-            for drawing, pose in zip(self.fine, joint.poses, strict=True)
-        ]
-
-    def _cuts(
-        self, sides: Sequence[tuple[int, FlatSide]], joint: JointFit
-    ) -> list[tuple[int, CutOff]]:
-        """Return how far the mannequin goes on beyond sides of views."""
-
-        def lost_px(i: int, flat: FlatSide) -> float:
-            return beyond_px(flat, joint.body.surface, joint.poses[i], self.views[i])
-
-        return [(i, CutOff(self.views[i].name, flat, lost_px(i, flat))) for i, flat in sides]
-
-    def _ending_at(self, sides: Sequence[tuple[int, FlatSide]]) -> _Problem:
+    def _ending_at(self, cuts: Cuts) -> _Problem:
         views, fine = list(self.views), list(self.fine)
-        for i, flat in sides:
-            views[i] = ending_at(views[i], flat)
+        for i, cut in cuts:
+            views[i] = ending_at(views[i], cut.flat)
             contour = drawn_contour(views[i])
             fine[i] = Drawing(contour, self.options.fine_height_px, FINE_POINTS)
         return replace(self, views=views, fine=fine)

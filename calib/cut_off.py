@@ -5,7 +5,7 @@ the cut when it is laid on a sheet, with paper beyond. There the drawing is opaq
 pixel, along a row or column, while a drawn outline is mixed with paper wherever it does not lie
 between two pixels by chance (hard pixels end like this everywhere: only smooth drawings are looked
 at). A flat sole may do so, too, as a whole figure may touch the picture's edge; so the mannequin
-decides: it ends at a sole and goes on beyond a cut.
+decides (`toonset.calib.cut_proof`): it ends at a sole and goes on beyond a cut.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _flat(view: View) -> Iterator[FlatSide]:
         at_edge = last + 1 == len(turned)
         spans = _runs(turned[last] >= OPAQUE)
         if not at_edge:
-            spans = _blunt(spans, turned[max(last - INWARDS, 0)])
+            spans = _blunt(spans, turned[max(last - INWARDS, 0)] >= OPAQUE)
         long = sum(b - a for a, b in spans) >= LEAST_LENGTH * view.figure_box[3]
         if long and (at_edge or is_smooth):
             at = last + 1 if side in ("bottom", "right") else len(turned) - last - 1
@@ -117,10 +117,10 @@ def _flat(view: View) -> Iterator[FlatSide]:
 
 
 def _blunt(
-    spans: tuple[tuple[int, int], ...], inner: UInt8[np.ndarray, " n"]
+    spans: tuple[tuple[int, int], ...], inner: Bool[np.ndarray, " n"]
 ) -> tuple[tuple[int, int], ...]:
     """Return the spans that are about as wide as the figure is a little further in."""
-    wide = _runs(inner >= OPAQUE // 2)
+    wide = _runs(inner)
     widths = [max((d - c for c, d in wide if c < b and d > a), default=0) for a, b in spans]
     return tuple(s for s, width in zip(spans, widths, strict=True) if s[1] - s[0] >= BLUNT * width)
 

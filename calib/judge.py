@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import measure
+from toonset.calib.align import Fit, measure
 from toonset.calib.hypotheses import Candidates, is_twin
 from toonset.calib.joint import JointFit
 from toonset.calib.labels import Label
@@ -34,16 +34,17 @@ FAR_FROM_LABEL = np.radians(60.0)  # three quarters is neither front nor side
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
 
+def measured(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
+    """Return how well the outlines of a sheet meet under its fit, view by view."""
+    return [
+        measure(drawing, joint.body.surface, drawing.pose_in(pose))
+        for drawing, pose in zip(drawings, joint.poses, strict=True)
+    ]
+
+
 def typical_coverage(drawings: Sequence[Drawing], joint: JointFit) -> float:
     """Return the share of the outlines that meet, in the sheet's typical view."""
-    return float(
-        np.median(
-            [
-                measure(drawing, joint.body.surface, drawing.pose_in(pose)).coverage
-                for drawing, pose in zip(drawings, joint.poses, strict=True)
-            ]
-        )
-    )
+    return float(np.median([fit.coverage for fit in measured(drawings, joint)]))
 
 
 def judge_view(

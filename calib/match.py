@@ -72,6 +72,7 @@ class Drawing:
         self.normals = scaled.normals[::every]
         self.free = scaled.free[::every]
         self.low, self.high = np.reshape(scaled.ends, (2, 2)) - self.offset
+        self.is_cut = bool(np.isfinite(scaled.ends).any())
         self.height = height
         self.size_wh = (int(width + 2 * margin) + 1, int(height + 2 * margin) + 1)
         self.subpixels = max(1, round(height_px / SUBPIXEL_HEIGHT))
@@ -110,7 +111,7 @@ def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
     """Return two-sided nearest neighbours of rim and drawn outline at a working pose."""
     spacing = max(1.0, drawing.height / 128)
     rim = rim_at(surface, pose, drawing.size_wh, spacing, drawing.subpixels)
-    if np.isfinite([drawing.low, drawing.high]).any():
+    if drawing.is_cut:
         shown = drawing.shows(project(pose, rim.points))
         rim = Rim(rim.points[shown], rim.normals[shown])
     if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
