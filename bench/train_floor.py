@@ -97,9 +97,9 @@ def step_parts(scene: Scene, options: TrainOptions) -> list[Part]:
         adam.step()
 
     for number in range(PRUNE_AFTER):
-        step(rays.batch(number % len(rays), number))
+        step(*rays.batches(number % len(rays), number))
         rays.after(number, model)
-    batch = rays.batch(0, PRUNE_AFTER)
+    (batch,) = rays.batches(0, PRUNE_AFTER)
     whole = _fastest(lambda: step(batch))
     parts = [*_parts_of(model, batch), _adam(model, lambda: adam.step())]
     return [*parts, Part("whole step", _total(parts, "operations"), _total(parts, "bytes"), whole)]

@@ -37,7 +37,7 @@ def train(
     ] = None,
     steps: Annotated[
         int | None,
-        typer.Option("--steps", min=1, help="Optimiser steps (default: 300)."),
+        typer.Option("--steps", min=1, help="Optimiser steps (default: 400)."),
     ] = None,
     budget: Annotated[
         float | None, typer.Option("--budget", min=0.1, help="Train for at most SECONDS.")

@@ -134,13 +134,13 @@ def _prepared(
 ) -> Scene:
     """Set torch up and return the scene with what is trained."""
     from toonset.nerf.memory import check_memory
-    from toonset.nerf.threads import use_threads
+    from toonset.nerf.threads import SIDES, use_threads
     from toonset.nerf.training import device_of
 
     device = device_of(options.device)  # refused before anything is computed or said
     asked = request.threads if checkpoint is None else str(checkpoint.record.threads)
     count = threads_of(asked)
-    use_threads(count)
+    use_threads(count, SIDES)
     printer.say(f"{check_memory(scene, options, device)}; {count} CPU thread{'s' * (count > 1)}")
     palette = request.palette if checkpoint is None else checkpoint.record.with_palette
     return _with_palette(scene, palette, printer)

@@ -45,7 +45,7 @@ def measured(most: int) -> int:
     Numbers are doubled as long as that pays: on a machine that others use, threads wait for each
     other, and one is faster than two.
     """
-    import torch
+    from toonset.nerf.threads import SIDES, use_threads
 
     best, count = 1, 2
     rate = _rate(1) if most > 1 else 0.0
@@ -54,12 +54,12 @@ def measured(most: int) -> int:
         if faster < WORTH * rate:
             break
         best, rate, count = count, faster, 2 * count
-    torch.set_num_threads(best)
+    use_threads(best, SIDES)
     return best
 
 
 def _rate(threads: int) -> float:
-    """Return rounds per second of a step's lookups and its decoder, forwards and backwards.
+    """Return rounds per second of half a step's lookups and its decoder, forwards and backwards.
 
     The decoder's many small products are what threads wait for each other at: lookups alone would
     promise a speed that no step reaches.
@@ -69,21 +69,24 @@ def _rate(threads: int) -> float:
     from torch import nn
 
     from toonset.nerf.decoder import two_layers
+    from toonset.nerf.threads import SIDES, side_by_side, use_threads
 
-    torch.set_num_threads(threads)
+    use_threads(threads, SIDES)
     generator = torch.Generator().manual_seed(0)
-    rows = torch.randint(0, 16_384, (16_384, 12), generator=generator, dtype=torch.int32)
-    weights = torch.rand(16_384, 12, generator=generator)
+    rows = torch.randint(0, 16_384, (8192, 12), generator=generator, dtype=torch.int32)
+    weights = torch.rand(8192, 12, generator=generator)
     table = torch.rand(16_384, 16, generator=generator)
     hidden, out = nn.Linear(16, 32), nn.Linear(32, 4)
 
     def work() -> None:
         features = F.embedding_bag(rows, table, per_sample_weights=weights, mode="sum")
-        two_layers(features.requires_grad_(), hidden, out).sum().backward()
+        total = two_layers(features.requires_grad_(), hidden, out).sum()
+        torch.autograd.grad(total, [features, *hidden.parameters(), *out.parameters()])
 
-    work()  # starts the threads
+    halves = [work] * SIDES
+    side_by_side(halves)  # starts the threads
     began, rounds = time.perf_counter(), 0
     while time.perf_counter() - began < TRIAL_S:
-        work()
+        side_by_side(halves)
         rounds += 1
     return rounds / (time.perf_counter() - began)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,9 +16,10 @@ from toonset.dataset.scene import Scene
 from toonset.nerf.fields import Constants, Field
 from toonset.nerf.hull import Hull, occupancy
 from toonset.nerf.march import Rays, Samples, march, rays_of
+from toonset.nerf.threads import side_by_side
 from toonset.palette.labels import UNLABELLED
 
-RAYS_PER_BATCH = 2048  # activations of a batch stay in a core's cache
+RAYS_PER_STEP = 2048  # activations stay in a core's cache
 MOST_RAYS = 100_000  # drawn by lot from larger scenes; bounds memory at about 1 GB
 
 
@@ -75,20 +77,35 @@ def make_batches(
     most: int,
     generator: torch.Generator,
     most_rays: int = MOST_RAYS,
-) -> list[Batch]:
-    """Return the scene's rays on and just beside the figure, shuffled and cut into batches."""
+    parts: int = 1,
+) -> list[tuple[Batch, ...]]:
+    """Return the scene's rays on and just beside the figure, shuffled and cut up for the steps.
+
+    Args:
+        scene: the drawings.
+        hull: where samples may lie.
+        field: says what it knows of the samples' places.
+        step: distance of samples along a ray, world units.
+        most: samples per ray.
+        generator: shuffles.
+        most_rays: drawn by lot from larger scenes.
+        parts: batches of a step, which may be rendered side by side.
+    """
     rays, drawn = _near_figure(scene, hull)
     chosen = torch.randperm(len(drawn.alpha), generator=generator)[:most_rays]
     rays, drawn = rays.at(chosen), drawn.at(chosen)
-    count = max(1, round(len(chosen) / RAYS_PER_BATCH))
-    cuts = np.linspace(0, len(chosen), count + 1).astype(int).tolist()
-    batches = []
-    for first, last in pairwise(cuts):
+    count = max(1, round(len(chosen) / RAYS_PER_STEP))
+    cuts = np.linspace(0, len(chosen), count * parts + 1).astype(int).tolist()
+
+    def cut(first: int, last: int) -> Batch | None:
         part = slice(first, last)
         samples = march(rays.at(part), hull, step, most)
-        if len(samples.ray):
-            batches.append(_batch(samples, field, step, drawn.at(part)))
-    return batches
+        return _batch(samples, field, step, drawn.at(part)) if len(samples.ray) else None
+
+    made = side_by_side([partial(cut, first, last) for first, last in pairwise(cuts)])
+    steps = (made[i : i + parts] for i in range(0, len(made), parts))
+    kept = (tuple(batch for batch in step if batch is not None) for step in steps)
+    return [batches for batches in kept if batches]
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,7 @@ from toonset.files import write_bytes, write_json
 from toonset.nerf.checkpoint_state import FitState
 from toonset.nerf.manifest import entry_of
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.threads import threads_in_use
 from toonset.nerf.trained import Step
 from toonset.reading import read_whole
 from toonset.schema_name import schema_version
@@ -99,7 +100,7 @@ def write_checkpoint(folder: Path, state: FitState, options: TrainOptions, scene
         "options": asdict(options),
         "scene": scene_digest(scene),
         "with_palette": scene.palette is not None,
-        "threads": torch.get_num_threads(),
+        "threads": threads_in_use(),
         "versions": versions(),
         "tensors": {"name": name, **entry_of(data)},
     }

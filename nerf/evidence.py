@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -15,6 +16,7 @@ from toonset.errors import BundleError
 from toonset.nerf.hull import LEVEL, Hull, carve
 from toonset.nerf.hull_views import alpha_at
 from toonset.nerf.march import march, pixels_near, rays_of
+from toonset.nerf.threads import side_by_side
 
 RESOLUTION = 64  # voxels: coarse, since only the ranking matters
 MOST_LEFT_OUT = 8  # views tried
@@ -54,10 +56,13 @@ def choose_missing(
     scores = []
     for missing in (0, 1):
         lower, upper = ranked[missing], ranked[missing + 1]
-        each = []
-        for view in left_out:  # a view among the lowest moves the others up by one rank
+
+        def met(view: int, lower: Tensor = lower, upper: Tensor = upper) -> float:
+            # a view among the lowest moves the others up by one rank
             support = torch.where(values[view] <= lower, upper, lower).view(grid.support.shape)
-            each.append(mask_iou(replace(grid, support=support), cameras[view], alphas[view], 2))
+            return mask_iou(replace(grid, support=support), cameras[view], alphas[view], 2)
+
+        each = side_by_side([partial(met, view) for view in left_out])
         scores.append(sum(each) / len(each))
     return HullEvidence(int(scores[1] > scores[0]), tuple(scores))
 

@@ -5,13 +5,13 @@ wider at its corners. A body is rounder than that. Among all surfaces inside the
 every ray through a drawn outline, the one that bends least is taken: on a coarse grid, the signed
 distance f (negative inside, in voxels) minimises
 
-    mean over outline rays of (min f along the ray)^2  +  BENDING * mean of (Laplacian f)^2
+    mean over outline rays of (min f along the ray)^2  +  stiffness * mean of (Laplacian f)^2
     + the square of how far f dips below the hull's own signed distance, per ray
 
-by Adam over a pyramid of grids. Where a ray touches is found anew in every step, so the contact
-may slide along the ray. Thin parts that the coarse grid loses come back from the hull: a ray
-through a drawing's mask keeps at least the voxels that f likes best, and capes and blades, which
-hide each other from most views, are taken over whole.
+by Adam over a pyramid of grids, stiff first, then softer. Where a ray touches is found anew in
+every step, so the contact may slide along the ray. Thin parts that the coarse grid loses come back
+from the hull: a ray through a drawing's mask keeps at least the voxels that f likes best, and capes
+and blades, which hide each other from most views, are taken over whole.
 
 Sources: thin-plate energy of an implicit surface, Turk and O'Brien, "Shape transformation using
 variational implicit functions", 1999; contact of an outline ray with its surface, Cipolla and
@@ -23,11 +23,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from toonset.camera import Camera
@@ -35,10 +36,11 @@ from toonset.nerf.fairing_distance import signed_distance, squared_distance
 from toonset.nerf.fairing_fit import Contacts, fit
 from toonset.nerf.hull import LEVEL, Hull, grown
 from toonset.nerf.march import Rays, march, rays_of
+from toonset.nerf.threads import side_by_side
 from toonset.nerf.volume import Volume, trilinear
 
 COARSE = 64  # voxels along the longest side of the grid on which the surface bends
-OUTLINE_RAYS = 4000  # of all views together
+OUTLINE_RAYS = 8000  # of all views together
 SLOPE = 0.7  # of the support per voxel of distance, where the fair surface makes the border
 SHEET = 0.8  # coarse voxels: half the thickness of what the coarse grid has no room for
 NEAREST = 2.0  # times a lost ray's least distance: what is as near is kept, too
@@ -64,7 +66,7 @@ def faired(
     hull = _padded(hull, reach)
     factor = max(1, round(max(hull.support.shape) / COARSE))
     outside = signed_distance(hull, factor) - slack / factor
-    fair = fit(outside, _contacts(hull, factor, outside, cameras, alphas))
+    fair = fit(outside, _contacts(hull, factor, outside, cameras, alphas), len(cameras))
     x, y, z = hull.support.shape
     fine = F.interpolate(fair[None, None], scale_factor=factor, mode="trilinear")[0, 0, :x, :y, :z]
     smooth = (LEVEL - SLOPE * factor * fine).clamp_(0, 1).minimum(grown(hull.support, reach))
@@ -152,8 +154,8 @@ def _lost(
     A ray that just misses the surface keeps a spot; one that runs along a sheet which is lost as a
     whole keeps the sheet.
     """
-    kept = torch.zeros(hull.support.numel(), dtype=torch.bool)
-    for camera, alpha in zip(cameras, alphas, strict=True):
+
+    def nearest(camera: Camera, alpha: Tensor) -> Int[Tensor, " n"]:
         drawn = (alpha >= LEVEL).numpy()
         seen = np.zeros_like(drawn)
         pixels = np.argwhere(drawn)
@@ -166,5 +168,9 @@ def _lost(
         values = distance.reshape(-1)[cells]
         best = torch.full((samples.rays,), torch.inf)
         best = best.scatter_reduce(0, samples.ray, values, "amin").clamp_min(0)
-        kept[cells[values <= NEAREST * best[samples.ray] + SPOT]] = True
+        return cells[values <= NEAREST * best[samples.ray] + SPOT]
+
+    views = zip(cameras, alphas, strict=True)
+    kept = torch.zeros(hull.support.numel(), dtype=torch.bool)
+    kept[torch.cat(side_by_side([partial(nearest, *view) for view in views]))] = True
     return kept.view(hull.support.shape)

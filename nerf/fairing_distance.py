@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import torch
 import torch.nn.functional as F
@@ -10,11 +11,13 @@ from jaxtyping import Bool, Float, Int16
 from torch import Tensor
 
 from toonset.nerf.hull import LEVEL, Hull, grown
+from toonset.nerf.threads import side_by_side
 from toonset.nerf.volume import Volume
 
 REACH = 6.0  # coarse voxels: distances are clipped beyond
 BESIDE = 1.5  # voxels: nearer to the surface the support says where it lies
 LEAST_SLOPE = 0.05  # of the support per voxel, where it says so
+SLAB = 1 << 19  # cells whose passes stay in cache
 UNKNOWN = 1 << 14  # more than any squared distance within reach, far from int16's end
 
 
@@ -24,7 +27,8 @@ def signed_distance(hull: Hull, factor: int) -> Volume:
     support = F.pad(hull.support, [0, z, 0, y, 0, x])
     inside = support >= LEVEL
     reach = math.ceil(REACH + 1) * factor
-    outer, inner = (squared_distance(part, reach).float().sqrt_() for part in (inside, ~inside))
+    sides = [partial(squared_distance, part, reach) for part in (inside, ~inside)]
+    outer, inner = (squared.float().sqrt_() for squared in side_by_side(sides))
     distance = torch.where(inside, 0.5 - inner, outer - 0.5)
     beside = grown(inside, 1) & grown(~inside, 1)  # all with a distance below BESIDE, and no other
     distance[beside] = _between(support, beside, distance[beside])
@@ -35,16 +39,21 @@ def squared_distance(cells: Bool[Tensor, "x y z"], reach: int) -> Int16[Tensor, 
     """Return the squared distance to the nearest set cell, in cells; UNKNOWN or more beyond reach.
 
     Axis by axis, the least of the neighbours' values plus the squared way to them: under half the
-    time of scipy's transform, which knows no limit.
+    time of scipy's transform, which knows no limit. In slabs that stay in cache: half the time
+    again.
     """
     volume = torch.full(cells.shape, UNKNOWN, dtype=torch.int16).masked_fill_(cells, 0)
     for axis, length in enumerate(cells.shape):
-        least = volume.clone()
-        for way in range(1, min(reach, length - 1) + 1):
-            there = volume + way**2
-            for to, source in ((0, way), (way, 0)):
-                part = least.narrow(axis, to, length - way)
-                torch.minimum(part, there.narrow(axis, source, length - way), out=part)
+        least, across = volume.clone(), 0 if axis else 1
+        thick = max(1, SLAB * cells.shape[across] // cells.numel())
+        for here, nearest in zip(
+            volume.split(thick, across), least.split(thick, across), strict=True
+        ):
+            for way in range(1, min(reach, length - 1) + 1):
+                there = here + way**2
+                for to, source in ((0, way), (way, 0)):
+                    part = nearest.narrow(axis, to, length - way)
+                    torch.minimum(part, there.narrow(axis, source, length - way), out=part)
         volume = least
     return volume
 

@@ -17,7 +17,12 @@ from torch import Tensor
 from toonset.nerf.adam import Adam, Group
 from toonset.nerf.volume import Volume, add_bending, along_axes, inner
 
-BENDING = 1.0  # weight of the Laplacian
+# Weights of the Laplacian at the start and, from 8 views on, at the end: stiff, the surface leaves
+# what no outline asks for, soft, it meets the outlines. Outlines of held-out views lie 0.32 px from
+# it, with 1.0 throughout 0.37 px (8 drawings; mean of 7 development characters' root mean squares).
+# Fewer views ask for less, and more must be guessed: soft ends render 0.2 dB worse with 4 drawings
+# and 0.7 dB with 3
+STIFF, SOFT, REFERENCE_VIEWS = 1.0, 0.1, 8
 STEPS, RATE, LAST_RATE = 100, 0.1, 0.1  # of Adam; the rate decays exponentially to a tenth
 PYRAMID = (1, 2, 4, 8)  # coarse voxels per cell of each level
 BAND = 5.0  # coarse voxels from the hull's surface within which bending counts
@@ -60,20 +65,27 @@ class Contacts:
 
 
 @torch.no_grad()
-def fit(outside: Volume, contacts: Contacts) -> Volume:
-    """Return the fair signed distance; `outside` is the hull's."""
+def fit(outside: Volume, contacts: Contacts, views: int) -> Volume:
+    """Return the fair signed distance.
+
+    Args:
+        outside: the hull's own.
+        contacts: where outline rays may touch.
+        views: that the outlines are of.
+    """
     pyramid = Pyramid.over(outside.shape)
     levels = pyramid.zeros()
     optimizer = Adam([Group(levels, RATE)])
     band = inner(outside.abs() < BAND).float()
-    bending = BENDING / band.sum()
+    stiff = band * (2 * STIFF / band.sum())
+    softer = min(1.0, SOFT / STIFF * max(1.0, REFERENCE_VIEWS / views) ** 2)
     fair, touching = outside, contacts
     for step in range(STEPS):
         if step % 2 == 0:
             touching = contacts.lowest(fair.maximum(outside))
         gradient = (fair - outside).clamp_(max=0).mul_(2 / contacts.rays)
         touching.add_to(gradient, touching.values(fair) * (2 / contacts.rays))
-        add_bending(gradient, fair, band * (2 * bending))
+        add_bending(gradient, fair, stiff * softer ** (step / STEPS))
         for level, part in zip(levels, pyramid.gathered(gradient), strict=True):
             level.grad = part
         optimizer.step(LAST_RATE ** (step / STEPS))

@@ -60,19 +60,29 @@ def clear(field: Field) -> Field:
 class BoxRays:
     """The rays of all pixels that meet the box, background too."""
 
-    def __init__(self, scene: Scene, hull: Hull, seed: int, generator: torch.Generator) -> None:
-        """Lay out the rays in an order drawn by `generator`; `seed` draws the samples."""
+    def __init__(
+        self, scene: Scene, hull: Hull, seed: int, generator: torch.Generator, parts: int = 1
+    ) -> None:
+        """Lay out the rays in an order drawn by `generator`; `seed` draws the samples.
+
+        Args:
+            scene: the drawings.
+            hull: the box.
+            seed: of the samples.
+            generator: shuffles the rays.
+            parts: batches of a step, which may be rendered side by side.
+        """
         rays, rgb, alpha, labels = _pixels(scene, hull)
         near, far = clip(rays, hull)
         meets = (far > near).nonzero()[:, 0]
         order = meets[torch.randperm(len(meets), generator=generator)]
         self._rays, self._near, self._far = rays.at(order), near[order], far[order]
         self._rgb, self._alpha, self._labels = rgb[order], alpha[order], labels[order]
-        self._seed = seed
+        self._seed, self._parts = seed, parts
         self._device = torch.device("cpu")
 
     def __len__(self) -> int:
-        """Return how many batches go through all rays once."""
+        """Return how many steps go through all rays once."""
         return max(1, len(self._near) // RAYS_PER_STEP)
 
     @property
@@ -85,11 +95,15 @@ class BoxRays:
         self._device = device
         return self
 
-    def batch(self, index: int, step: int) -> Batch:
-        """Return a batch with this step's samples."""
+    def batches(self, index: int, step: int) -> tuple[Batch, ...]:
+        """Return a step's rays with samples of its own."""
         part = torch.arange(index, self.rays, len(self))
         generator = torch.Generator().manual_seed((self._seed << 32) + step)
         shift = torch.rand(len(part), BINS, generator=generator)
+        pairs = zip(part.chunk(self._parts), shift.chunk(self._parts), strict=True)
+        return tuple(self._batch(*pair) for pair in pairs)
+
+    def _batch(self, part: Int[Tensor, " rays"], shift: Float[Tensor, "rays bins"]) -> Batch:
         near, far = self._near[part, None], self._far[part, None]
         distance = near + (far - near) / BINS * (torch.arange(BINS) + shift)
         rays = self._rays.at(part)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import torch
 
@@ -29,6 +30,7 @@ from toonset.nerf.fitting import fit
 from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import figure_px
+from toonset.nerf.threads import side_by_side
 
 MOST_RAYS = 32_000  # drawn by lot; a trial goes through them four times
 STEPS = 60  # by then the order of the candidates shows
@@ -61,12 +63,12 @@ class Ground:
 
     def batches(
         self, frames: Sequence[Frame], field: Field, generator: torch.Generator
-    ) -> list[Batch]:
+    ) -> list[tuple[Batch, ...]]:
         """Return the rays of some drawings."""
         part = replace(self.scene, frames=tuple(frames))
         sampling = (self.step, self.samples)
         found = make_batches(part, self.hull, field, *sampling, generator, MOST_RAYS)
-        return [batch.to(self.device) for batch in found]
+        return [tuple(batch.to(self.device) for batch in batches) for batches in found]
 
 
 def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> FieldChoice:
@@ -86,7 +88,10 @@ def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> F
     cells = [max(1, round(share * finest)) for share in shares]
     left = left_out(shown)
     kept = [frame for frame in frames if frame not in left]
-    candidates = tuple(_tried(ground, kept, left, count, build) for count in cells)
+    torch.manual_seed(ground.options.seed)
+    fields = [build(count) for count in cells]
+    tasks = [partial(_tried, ground, kept, left, field) for field in fields]
+    candidates = tuple(side_by_side(tasks))
     names = tuple(frame.name for frame in left)
     return FieldChoice(chosen(candidates), "", candidates, names)
 
@@ -105,24 +110,20 @@ def left_out(frames: Sequence[Frame]) -> list[Frame]:
     return [frames[number] for number in numbers]
 
 
-def _tried(
-    ground: Ground, kept: Sequence[Frame], left: Sequence[Frame], cells: int, build: Build
-) -> Candidate:
-    torch.manual_seed(ground.options.seed)
+def _tried(ground: Ground, kept: Sequence[Frame], left: Sequence[Frame], field: Field) -> Candidate:
     generator = torch.Generator().manual_seed(ground.options.seed)
-    field = build(cells)
     seen, unseen = (ground.batches(frames, field, generator) for frames in (kept, left))
     model = Model(field, None).to(ground.device)
     few = replace(ground.options, steps=STEPS, budget_s=None)
     fit(model, FixedRays(seen), ground.weights, few, generator)
     parameters = sum(values.numel() for values in field.parameters())
-    return Candidate(cells, parameters, _psnr(field, unseen))
+    return Candidate(field.spec.resolution, parameters, _psnr(field, unseen))
 
 
 @torch.no_grad()
-def _psnr(field: Field, batches: Sequence[Batch]) -> float:
+def _psnr(field: Field, batches: Sequence[tuple[Batch, ...]]) -> float:
     error, rays = 0.0, 0
-    for batch in batches:
+    for batch in (batch for parts in batches for batch in parts):
         color, opacity = render_batch(field, batch)
         drawn = batch.rgb * batch.alpha[:, None] + 1 - batch.alpha[:, None]
         error += float(((color + 1 - opacity[:, None] - drawn) ** 2).mean(dim=1).sum())

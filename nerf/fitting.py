@@ -14,7 +14,8 @@ from torch import Tensor
 from toonset.nerf.adam import Adam, Group
 from toonset.nerf.checkpoint_good import LastGood
 from toonset.nerf.checkpoint_state import FitState
-from toonset.nerf.field_loss import Model, Weights, loss_terms
+from toonset.nerf.field_gradients import gradients_of
+from toonset.nerf.field_loss import Model, Weights
 from toonset.nerf.field_rays import TrainingRays
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.trained import Step, TrainedField
@@ -165,14 +166,15 @@ class _Loop:
         if not self._queue:
             order = torch.randperm(len(self._rays), generator=self._generator)
             self._queue = order.tolist()
-        batch = self._rays.batch(self._queue.pop(), number)
-        terms = loss_terms(self._model, batch, self._weights)
-        loss = torch.stack(terms).sum()
+        batches = self._rays.batches(self._queue.pop(), number)
+        terms, gradients = gradients_of(self._model, batches, self._weights)
+        loss = terms.sum()
         # one transfer from the device for all of them
-        value, photometric, entropy = torch.stack([loss, *terms[:2]]).detach().tolist()
+        value, photometric, entropy = torch.stack([loss, *terms[:2]]).tolist()
         if wrong := good.wrong(loss, value, number):
             return wrong
-        loss.backward()
+        for parameter, gradient in zip(self._model.parameters(), gradients, strict=True):
+            parameter.grad = gradient
         self._adam.step(rate)
         self._rays.after(number, self._model)
         self.history.append(Step(number, value, photometric, entropy, self.clock.seconds))

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import torch
@@ -28,6 +28,7 @@ from toonset.camera import Camera
 from toonset.errors import BundleError
 from toonset.nerf.bounds import Box, box_of_masks
 from toonset.nerf.hull_views import agreement, agreement_within
+from toonset.nerf.threads import side_by_side
 
 LEVEL = 0.5
 EDGE = 0.02  # support from which a point can be part of the figure's soft border
@@ -178,9 +179,14 @@ def _carve_box(
     least, most = agreement_within(middles, radius, cameras, alphas, missing)
     support = least[:, None].repeat(1, BLOCK**3)
     inner = voxel * (torch.cartesian_prod(*[torch.arange(BLOCK) - (BLOCK - 1) / 2] * 3))
-    for chunk in (least < most).nonzero()[:, 0].split(POINTS_PER_CHUNK // BLOCK**3):
+    crossed = (least < most).nonzero()[:, 0]
+
+    def within(chunk: Int[Tensor, " blocks"]) -> Float[Tensor, "blocks voxels"]:
         points = (middles[chunk, None] + inner).view(-1, 3)
-        support[chunk] = agreement(points, cameras, alphas, missing).view(-1, BLOCK**3)
+        return agreement(points, cameras, alphas, missing).view(-1, BLOCK**3)
+
+    chunks = crossed.split(POINTS_PER_CHUNK // BLOCK**3)
+    support[crossed] = torch.cat(side_by_side([partial(within, chunk) for chunk in chunks]))
     volume = support.view(*blocks, BLOCK, BLOCK, BLOCK).permute(0, 3, 1, 4, 2, 5)
     volume = volume.reshape([n * BLOCK for n in blocks])
     x, y, z = counts

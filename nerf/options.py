@@ -40,7 +40,7 @@ class TrainOptions:
             eyes and mouths may go with the lines.
     """
 
-    steps: int = 300
+    steps: int = 400
     budget_s: float | None = None
     seed: int = 0
     device: str = "auto"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from toonset.nerf.layers import color_picture
 from toonset.nerf.manifest import write_manifest
 from toonset.nerf.metrics import compare, means, over_white
 from toonset.nerf.run_folder import write_field
+from toonset.nerf.threads import side_by_side, threads_in_use
 from toonset.nerf.trained import HeldOut, Step, TrainedField, Training
 from toonset.nerf.turntable import turntable
 from toonset.nerf.verdict import verdict_of
@@ -49,14 +51,15 @@ def write_run(
         held_out: what was seen of them on the way.
     """
     drawn = training.prepared.scene
-    shown = pictures_of(replace(training.result, ink=None), drawn)
+    baked = Baked.of(training.result)
+    shown = pictures_of(replace(baked, trained=replace(training.result, ink=None)), drawn)
     metrics = {
         **_course(training, held_out),
         "train": figures_of(shown, drawn),
-        "test": None if test is None else compared(training.result, test),
+        "test": None if test is None else compared(baked, test),
         "verdict": verdict_of(training, shown).to_json(),
     }
-    write_bytes(folder / "preview.png", encode_png(preview(training.result)))
+    write_bytes(folder / "preview.png", encode_png(preview(baked)))
     _write_files(folder, training, scene, metrics)
     return metrics
 
@@ -68,15 +71,17 @@ def write_unfinished(
     _write_files(folder, training, scene, {**_course(training, held_out), "train": None})
 
 
-def compared(trained: TrainedField, scene: Scene) -> dict[str, float | None]:
+def compared(source: TrainedField | Baked, scene: Scene) -> dict[str, float | None]:
     """Return the mean figures of the field's renderings beside a scene's pictures."""
-    return figures_of(pictures_of(trained, scene), scene)
+    return figures_of(pictures_of(source, scene), scene)
 
 
-def pictures_of(trained: TrainedField, scene: Scene) -> list[UInt8[np.ndarray, "height width 4"]]:
+def pictures_of(
+    source: TrainedField | Baked, scene: Scene
+) -> list[UInt8[np.ndarray, "height width 4"]]:
     """Return the field's pictures, straight alpha, seen by a scene's cameras."""
-    baked = Baked.of(trained)
-    views = (render(baked, frame.camera) for frame in scene.frames)
+    baked = source if isinstance(source, Baked) else Baked.of(source)
+    views = side_by_side([partial(render, baked, frame.camera) for frame in scene.frames])
     return [color_picture(view.rgb, view.alpha) for view in views]
 
 
@@ -110,7 +115,7 @@ def _write_files(folder: Path, training: Training, scene: Scene, metrics: dict[s
         "options": asdict(training.options),
         "scene": {"views": [frame.name for frame in scene.frames]},
         "versions": {"toonset": __version__, "torch": torch.__version__, "numpy": np.__version__},
-        "threads": torch.get_num_threads(),
+        "threads": threads_in_use(),
     }
     write_json(folder / "config.json", write_field(folder, training.result, about))
     write_json(folder / "metrics.json", metrics)
@@ -118,11 +123,11 @@ def _write_files(folder: Path, training: Training, scene: Scene, metrics: dict[s
     write_manifest(folder)
 
 
-def preview(trained: TrainedField) -> np.ndarray:
+def preview(source: TrainedField | Baked) -> np.ndarray:
     """Return four views side by side over white, (height, 4 height, 3) bytes."""
-    cameras = turntable(trained, PREVIEW_VIEWS, PREVIEW_ELEVATION)
-    baked = Baked.of(trained)
-    views = [render(baked, camera) for camera in cameras]
+    baked = source if isinstance(source, Baked) else Baked.of(source)
+    cameras = turntable(baked.trained, PREVIEW_VIEWS, PREVIEW_ELEVATION)
+    views = side_by_side([partial(render, baked, camera) for camera in cameras])
     pictures = [over_white(color_picture(view.rgb, view.alpha)) for view in views]
     return (np.concatenate(pictures, axis=1) * 255 + 0.5).astype(np.uint8)
 

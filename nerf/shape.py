@@ -15,7 +15,7 @@ from toonset.nerf.hull import Hull, carve
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import alpha_of, figure_px
 
-VOXELS_PER_PX, VOXELS = 1.25, (64, 208)
+VOXELS_PER_PX, VOXELS = 1.8, (64, 300)
 SLACK = 1.5  # times the outlines' disagreement: as far as the surface may leave the hull
 
 

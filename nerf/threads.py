@@ -1,17 +1,85 @@
-"""How many CPU threads torch may use."""
+"""How many CPU threads training may use, and what they do at the same time.
+
+Torch shares single operations among threads, and a step's are too short for that: two threads are
+slower than one. So two threads work side by side instead, each on its own half of a step, of the
+rays, of the trials. What a half is does not depend on how many threads there are: one and two give
+the same bits. Further threads share torch's operations.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import TypeVar
 
 import torch
 
+Result = TypeVar("Result")
 
-def use_threads(count: int | None) -> None:
-    """Let torch use `count` threads; None leaves its choice (all cores)."""
-    if count is not None:
-        torch.set_num_threads(count)
+SIDES = 2  # threads that work side by side, the calling one included
+
+
+class _Team(threading.local):
+    """What works beside the calling thread, if anything; the others of a team have none."""
+
+    pool: ThreadPoolExecutor | None = None
+
+
+_TEAM = _Team()
+
+
+def use_threads(count: int | None, sides: int = 1) -> None:
+    """Let torch use `count` threads; None leaves its choice (all cores).
+
+    Args:
+        count: of threads.
+        sides: 1: they share torch's operations; SIDES: where there are as many, what the calling
+            thread asks for runs side by side, and each side has its share of them.
+    """
+    if _TEAM.pool is not None:
+        _TEAM.pool.shutdown()
+        _TEAM.pool = None
+    if count is None:
+        return
+    sides = min(sides, count)
+    torch.set_num_threads(count // sides)
+    if sides > 1:
+        _TEAM.pool = ThreadPoolExecutor(sides - 1)
+
+
+def threads_in_use() -> int:
+    """Return how many threads work for the calling one."""
+    return torch.get_num_threads() * (1 if _TEAM.pool is None else SIDES)
+
+
+def side_by_side(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
+    """Return what the tasks return, in their order; every other one runs in the other thread.
+
+    Tasks must not write what another one reads. A task's own tasks run one after the other.
+    """
+    pool = _TEAM.pool
+    if pool is None or len(tasks) < 2:
+        return [task() for task in tasks]
+    _TEAM.pool = None  # the other thread is taken
+    follows = torch.is_grad_enabled()  # each thread has its own
+    future = pool.submit(_in_a_row, tasks[1::2], follows)
+    try:
+        mine = _in_a_row(tasks[::2], follows)
+    finally:
+        failed = future.exception()  # waits: nothing goes on behind an error's back
+        _TEAM.pool = pool
+    if failed is not None:
+        raise failed
+    results: list[Result] = [mine[0]] * len(tasks)
+    results[::2], results[1::2] = mine, future.result()
+    return results
+
+
+def _in_a_row(tasks: Sequence[Callable[[], Result]], gradients: bool) -> list[Result]:
+    with torch.set_grad_enabled(gradients):
+        return [task() for task in tasks]
 
 
 @contextmanager

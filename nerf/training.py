@@ -43,12 +43,13 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import prepared
 from toonset.nerf.shape import hull_of, per_px
 from toonset.nerf.symmetry import completed
+from toonset.nerf.threads import SIDES
 from toonset.nerf.trained import TrainedField, Training
 
 CHANNELS, HIDDEN = 16, 32
 CELLS_PER_PX, CELLS = 1.0, (48, 256)
-STEPS_ALONG = 160  # samples that the longest side of the hull would take
-MOST_SAMPLES = 24  # per ray, from its first inside the hull; 48: +.2 dB, but surfaces turn to mist
+STEPS_ALONG = 200  # samples that the longest side of the hull would take
+MOST_SAMPLES = 30  # per ray, from its first inside the hull
 MLP_LAYERS, MLP_WIDTH = 4, 64
 PARTS: tuple[str, ...] = ("drawings", "hull", "planes", "rays")  # before the steps, in order
 NO_EVIDENCE = HullEvidence(0, ())
@@ -151,17 +152,21 @@ def _rays(
     device: torch.device,
 ) -> tuple[TrainingRays, dict[str, int]]:
     """Return where the steps' batches come from, and how many rays and samples there are."""
+    parts = 1 if device.type == "cuda" else SIDES  # small kernels would leave a GPU idle
     if not options.carve:
-        box_rays = BoxRays(scene, start.hull, options.seed, generator)
+        box_rays = BoxRays(scene, start.hull, options.seed, generator, parts)
         return box_rays.to(device), {"rays": box_rays.rays, "samples": box_rays.rays * BINS}
-    batches = make_batches(scene, start.hull, start.field, start.step, start.samples, generator)
+    sampling = (start.step, start.samples)
+    steps = make_batches(scene, start.hull, start.field, *sampling, generator, parts=parts)
+    batches = [batch for step in steps for batch in step]
     if not batches:
         raise BundleError(f"{scene.name}: no drawn pixel meets the hull; the cameras are wrong")
     counts = {
         "rays": sum(len(batch.rgb) for batch in batches),
         "samples": sum(len(batch.ray) for batch in batches),
     }
-    return FixedRays([batch.to(device) for batch in batches]), counts
+    there = [tuple(batch.to(device) for batch in step) for step in steps]
+    return FixedRays(there), counts
 
 
 def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -23,6 +24,7 @@ from torch import Tensor
 
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.hull import EDGE, Hull, grown, occupancy
+from toonset.nerf.threads import side_by_side
 from toonset.nerf.trained import TrainedField
 from toonset.nerf.views_labels import label_table
 
@@ -65,18 +67,24 @@ class Baked:
         """Return the field, read at the voxels where the hull leaves anything."""
         hull = trained.hull
         read = grown(hull.near, 1)
-        density, color = torch.zeros(read.numel()), torch.ones(read.numel(), 4)
-        for chunk in read.reshape(-1).nonzero()[:, 0].split(POINTS_PER_CHUNK):
-            per_unit, color[chunk, :3] = trained.field(_middles(hull, chunk))
-            density[chunk] = _unsoftened(per_unit * trained.step)
-        shown = color[(hull.inside & grown(~hull.inside, 1)).reshape(-1), :3]
-        paints = _paints(trained.classifier, shown)
-        here = np.stack(
-            [np.pad(density.view(read.shape), 1, mode="edge"), np.pad(hull.support, 1)], axis=-1
-        )
-        matter = Slices.of(np.concatenate([here, np.roll(here, -1, axis=0)], axis=-1))
-        levels = color.mul_(255).round_().byte().view(*read.shape, 4)
-        colors = Slices.of(np.pad(levels, [(1, 1)] * 3 + [(0, 0)], mode="edge"))
+        cells = read.reshape(-1).nonzero()[:, 0]
+
+        def look(chunk: Int[Tensor, " n"]) -> tuple[Tensor, Tensor]:
+            per_unit, color = trained.field(_middles(hull, chunk))
+            return _unsoftened(per_unit * trained.step), color
+
+        found = side_by_side([partial(look, chunk) for chunk in cells.split(POINTS_PER_CHUNK)])
+        depth, color = (torch.cat(parts) for parts in zip(*found, strict=True))
+        surface = (hull.inside & grown(~hull.inside, 1)).reshape(-1)
+        paints = _paints(trained.classifier, color[surface[cells]])
+        density = torch.zeros(read.numel()).index_copy_(0, cells, depth).view(read.shape)
+        here = (np.pad(density, 1, mode="edge"), np.pad(hull.support, 1))
+        beyond = (np.roll(part, -1, axis=0) for part in here)
+        matter = Slices.of(*(part[..., None] for part in (*here, *beyond)))
+        levels = torch.full((read.numel(), 4), 255, dtype=torch.uint8)
+        levels[cells, :3] = color.mul_(255).round_().byte()
+        padded = np.pad(levels.view(*read.shape, 4), [(1, 1)] * 3 + [(0, 0)], mode="edge")
+        colors = Slices.of(padded)
         leaps = _leaps(hull, trained.step)
         labels = None if trained.classifier is None else label_table(trained.classifier)
         return cls(trained, matter, colors, leaps, _shell(hull.near), labels, paints)
@@ -130,15 +138,19 @@ class Slices:
     size: tuple[int, int]
 
     @classmethod
-    def of(cls, volume: Shaped[np.ndarray, "x y z 4"]) -> Slices:
-        """Return the slices in a picture that is about a square."""
-        x, y, z = volume.shape[:3]
+    def of(cls, *volumes: Shaped[np.ndarray, "x y z _"]) -> Slices:
+        """Return the slices, with the channels of all volumes, four, in about a square."""
+        x, y, z = volumes[0].shape[:3]
         rows = min(x, max(1, round(math.sqrt(x * z / y))))
         columns = -(-x // rows)
-        tiles = np.zeros((columns * rows, y, z, 4), dtype=volume.dtype)
-        tiles[:x] = volume
-        picture = tiles.reshape(columns, rows * y, z, 4).swapaxes(0, 1)
-        return cls(np.ascontiguousarray(picture.reshape(rows * y, columns * z, 4)), rows, (y, z))
+        picture, first = np.zeros((rows, y, columns, z, 4), dtype=volumes[0].dtype), 0
+        for volume in volumes:
+            last = first + volume.shape[-1]
+            for column in range(columns):
+                part = volume[column * rows : (column + 1) * rows]
+                picture[: len(part), :, column, :, first:last] = part
+            first = last
+        return cls(picture.reshape(rows * y, columns * z, 4), rows, (y, z))
 
     def at(
         self, number: Float[Tensor, "h w"], y: Float[Tensor, "h w"], z: Float[Tensor, "h w"]
@@ -157,11 +169,11 @@ def _leaps(hull: Hull, step: float) -> UInt8[Tensor, "x y z"]:
     A voxel whose nearest neighbour that may hold one is n voxels away, along the axis on which it
     is most, has n - 1 voxels without any round it.
     """
-    away, cells = torch.zeros(hull.near.shape), hull.near
+    away, cells = torch.zeros(hull.near.shape, dtype=torch.uint8), hull.near.byte()
     for _ in range(MOST_CLEAR):
-        away += ~cells
+        away += 1 - cells
         cells = grown(cells, 1)
-    return ((away - 1) * (hull.voxel / step)).floor_().add_(1).clamp_(0, 255).byte()
+    return ((away.float() - 1) * (hull.voxel / step)).floor_().add_(1).clamp_(0, 255).byte()
 
 
 def _shell(near: Bool[Tensor, "x y z"]) -> Float[Tensor, "3 n"]:

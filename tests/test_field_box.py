@@ -63,7 +63,7 @@ def rays_in_box(seed: int = 0) -> tuple[BoxRays, Hull]:
 
 def test_every_bin_has_one_sample_and_samples_fill_the_ray() -> None:
     rays, hull = rays_in_box()
-    batch = rays.batch(0, 7)
+    batch = rays.batches(0, 7)[0]
     assert isinstance(batch.constants, Places)
     points = batch.constants.points.view(-1, BINS, 3).double()
     inside = (points - torch.as_tensor(hull.low)) / float(hull.box.size.max())
@@ -78,18 +78,20 @@ def test_every_bin_has_one_sample_and_samples_fill_the_ray() -> None:
 
 def test_samples_depend_on_seed_and_step_alone() -> None:
     rays, _ = rays_in_box()
-    first = rays.batch(0, 3).length
-    rays.batch(0, 4)
-    assert torch.equal(rays.batch(0, 3).length, first)
-    assert not torch.equal(rays.batch(0, 4).length, first)
-    assert not torch.equal(rays_in_box(1)[0].batch(0, 3).length, first)
+    first = rays.batches(0, 3)[0].length
+    rays.batches(0, 4)[0]
+    assert torch.equal(rays.batches(0, 3)[0].length, first)
+    assert not torch.equal(rays.batches(0, 4)[0].length, first)
+    assert not torch.equal(rays_in_box(1)[0].batches(0, 3)[0].length, first)
 
 
-def test_batches_hold_every_ray_once_background_too() -> None:
-    rays, _ = rays_in_box()
-    sizes = [len(rays.batch(i, 0).rgb) for i in range(len(rays))]
-    assert sum(sizes) == rays.rays
-    alphas = torch.cat([rays.batch(i, 0).alpha for i in range(len(rays))])
+@pytest.mark.parametrize("parts", [1, 2])
+def test_batches_hold_every_ray_once_background_too(parts: int) -> None:
+    rays = BoxRays(drum(), open_box(drum()), 0, torch.Generator().manual_seed(0), parts)
+    batches = [batch for i in range(len(rays)) for batch in rays.batches(i, 0)]
+    assert len(batches) == parts * len(rays)
+    assert sum(len(batch.rgb) for batch in batches) == rays.rays
+    alphas = torch.cat([batch.alpha for batch in batches])
     assert int((alphas == 1).sum()) == 4 * 16 * 12
     assert int((alphas == 0).sum()) > 100
 
@@ -114,7 +116,7 @@ def test_a_step_renders_and_learns_what_torch_alone_would() -> None:
     rays, hull = rays_in_box()
     torch.manual_seed(1)
     field = TriplaneField(hull.box, 20, 5, 6).double()
-    batch = rays.batch(0, 0)
+    batch = rays.batches(0, 0)[0]
     assert isinstance(batch.constants, Places)
     assert batch.even
     points, length = batch.constants.points.double(), batch.length.double()

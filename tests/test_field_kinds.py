@@ -13,6 +13,7 @@ from toonset.nerf.batches import Batch
 from toonset.nerf.bounds import Box
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.field import PLANES, TriplaneField
+from toonset.nerf.field_gradients import gradients_of
 from toonset.nerf.field_kinds import build_field
 from toonset.nerf.field_loss import Model, Weights, loss_terms, render_batch
 from toonset.nerf.field_rays import PRUNE_AFTER, FixedRays, seen_samples
@@ -175,22 +176,37 @@ def test_gradients_of_the_whole_loss_match_central_differences(spec: FieldSpec) 
         assert (found[0] - found[1]) / 2e-6 == pytest.approx(slope, rel=1e-4, abs=1e-8)
 
 
+def test_the_gradient_of_parts_is_that_of_their_mean_and_smoothness() -> None:
+    field = made(SPECS[0]).double()
+    model = Model(field, PaletteClassifier(3).double())
+    parts = [batch_of(field, counts, torch.float64) for counts in ([4, 2, 5], [3])]
+    weights = Weights(0.3, 0.02)
+    terms, gradients = gradients_of(model, parts, weights)
+    total = [torch.stack(loss_terms(model, part, weights)) for part in parts]
+    mean = (3 * total[0] + total[1]) / 4
+    torch.testing.assert_close(terms, mean.detach())
+    torch.autograd.backward(mean.sum())
+    for found, parameter in zip(gradients, model.parameters(), strict=True):
+        assert found is not None
+        torch.testing.assert_close(found, parameter.grad)
+
+
 def test_only_hidden_samples_are_dropped_and_the_choice_comes_back() -> None:
     field = made(SPECS[1])
     with torch.no_grad():
         field.tables()[0][:, 0] = 40.0  # opaque
     model, batch = Model(field, None), batch_of(field, [6, 8, 1, 7])
-    rays = FixedRays([batch])
+    rays = FixedRays([(batch,)])
     for step in range(PRUNE_AFTER):
-        assert rays.batch(0, step) is batch
+        assert rays.batches(0, step)[0] is batch
         rays.after(step, model)
-    pruned = rays.batch(0, PRUNE_AFTER)
+    (pruned,) = rays.batches(0, PRUNE_AFTER)
     assert len(pruned.ray) == int(seen_samples(model, batch).sum()) < 0.9 * len(batch.ray)
     assert set(pruned.ray.tolist()) == {0, 1, 2, 3}
     for few, all_samples in zip(
         render_batch(field, pruned), render_batch(field, batch), strict=True
     ):
         assert (few - all_samples).abs().max() < 0.011
-    again = FixedRays([batch])
+    again = FixedRays([(batch,)])
     again.restore(rays.state())
-    assert torch.equal(again.batch(0, 0).length, pruned.length)
+    assert torch.equal(again.batches(0, 0)[0].length, pruned.length)
