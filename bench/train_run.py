@@ -29,6 +29,7 @@ from toonset.nerf.layers import color_picture
 from toonset.nerf.metrics import Figures, means, over_white, psnr_of
 from toonset.nerf.metrics_view import Judges, figures_of
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.threads import use_threads
 from toonset.nerf.run_folder import model_of
 from toonset.nerf.trained import TrainedField, Training
 from toonset.nerf.training import finest_cells, train
@@ -88,6 +89,7 @@ class RunResult:
 def run_job(job: Job, judges: Judges, look: Look = lambda *_: None) -> RunResult:
     """Return what training and rendering of one job gives; a refusal is a result, too."""
     case, method = subset(job.case, job.views), METHODS[job.method]
+    use_threads(1)  # neither figures nor CPU seconds may depend on the machine's cores
     try:
         if method.mannequin:
             return _colored_mannequin(job, case, judges)

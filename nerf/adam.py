@@ -58,10 +58,11 @@ class Adam:
                 first, second = next(moments)
                 if parameter.grad is None:
                     continue
+                gradient = _laid_out_as(parameter, parameter.grad)
                 count = torch.full((), float(self.count), device=parameter.device)
                 torch._fused_adam_(
                     [parameter],
-                    [parameter.grad],
+                    [gradient],
                     [first],
                     [second],
                     [],
@@ -75,3 +76,10 @@ class Adam:
                     maximize=False,
                 )
                 parameter.grad = None
+
+
+def _laid_out_as(parameter: Tensor, gradient: Tensor) -> Tensor:
+    """Return the gradient with the parameter's strides: the kernel walks memory and asks nobody."""
+    if gradient.stride() == parameter.stride():
+        return gradient
+    return torch.empty_like(parameter).copy_(gradient)

@@ -38,7 +38,7 @@ from toonset.reading import read_whole
 from toonset.schema_name import schema_version
 
 FILE, TENSORS = "checkpoint.json", "checkpoint-*.safetensors"
-SCHEMA, VERSION = "toonset-checkpoint", 1
+SCHEMA, VERSION = "toonset-checkpoint", 2  # 1: a step's rays were one batch
 MAX_BYTES = 4 * 2**30
 GROUPS = ("parameters", "means", "squares", "rays")
 SINGLE = ("queue", "generator", "torch_generator", "history")
@@ -140,7 +140,11 @@ def read_record(folder: Path) -> CheckpointRecord:
     """
     file = folder / FILE
     content = read_json(file)
-    schema_version(content, SCHEMA, VERSION, str(file), BundleError)
+    if schema_version(content, SCHEMA, VERSION, str(file), BundleError) != VERSION:
+        raise BundleError(
+            f"{file}: the training was begun by an earlier toonset, whose steps were others; train "
+            "again without --resume"
+        )
     return validated(CheckpointRecord, content, file)
 
 

@@ -49,7 +49,7 @@ from toonset.nerf.trained import TrainedField, Training
 CHANNELS, HIDDEN = 16, 32
 CELLS_PER_PX, CELLS = 1.0, (48, 256)
 STEPS_ALONG = 200  # samples that the longest side of the hull would take
-MOST_SAMPLES = 30  # per ray, from its first inside the hull
+MOST_SAMPLES = 30  # per ray, from its first inside the hull; twice as deep, surfaces turn to mist
 MLP_LAYERS, MLP_WIDTH = 4, 64
 PARTS: tuple[str, ...] = ("drawings", "hull", "planes", "rays")  # before the steps, in order
 NO_EVIDENCE = HullEvidence(0, ())

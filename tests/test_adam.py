@@ -34,3 +34,12 @@ def test_what_has_no_gradient_stays() -> None:
     assert still.tolist() == [1, 1, 1]
     assert moved.tolist() == pytest.approx([0.9] * 3)
     assert moved.grad is None
+
+
+def test_a_gradient_by_columns_moves_its_own_rows() -> None:
+    rows, columns = (torch.arange(6.0).view(2, 3).requires_grad_() for _ in range(2))
+    gradient = torch.tensor([[1.0, -1.0, 1.0], [1.0, 1.0, -1.0]])
+    for values, given in ((rows, gradient), (columns, gradient.T.contiguous().T)):
+        values.grad = given
+        Adam([Group([values], 0.1)]).step()
+    torch.testing.assert_close(columns, rows, rtol=0, atol=0)

@@ -204,6 +204,7 @@ def change(**values: object) -> Callable[[Path], None]:
         (lambda folder: (folder / "checkpoint.json").unlink(), "no such file"),
         (lambda folder: (folder / "checkpoint.json").write_text("{"), "no valid JSON"),
         (change(schema="toonset-checkpoint/9"), "newer than this toonset"),
+        (change(schema="toonset-checkpoint/1"), "begun by an earlier toonset"),
         (change(tensors__name="../x.safetensors"), "tensors.name"),
         (change(options__steps="many"), "steps"),
         (change(options__magic=1), "options magic are of another toonset"),
