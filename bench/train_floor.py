@@ -5,7 +5,8 @@
 prints two tables: a step's parts at the first size, after samples behind surfaces are dropped; and
 whole trainings at all sizes, each in a process of its own, with their peak of memory. A part's
 floor is the longer of its operations at the speed of a large matrix product and of its bytes at the
-speed of a copy as large as the planes, both measured in the same run. Seconds are of one thread.
+speed of a copy as large as the planes, both measured in the same run, in one thread; whole
+trainings take two, as `toonset train` does.
 """
 
 from __future__ import annotations

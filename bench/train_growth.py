@@ -11,6 +11,7 @@ from pathlib import Path
 from toonset.dataset.scene import Scene
 from toonset.nerf.memory import needed_bytes
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.threads import SIDES, use_threads
 from toonset.nerf.training import train
 
 
@@ -37,10 +38,10 @@ class Growth:
 
 
 def growths(scenes: Mapping[int, Scene], options: TrainOptions) -> Iterator[Growth]:
-    """Train on scenes of some sizes, each in a process of its own, with one thread."""
+    """Train on scenes of some sizes, each in a process of its own, with the threads of `train`."""
     context = multiprocessing.get_context("spawn")
     for px, scene in scenes.items():
-        with context.Pool(1, _one_thread) as pool:
+        with context.Pool(1, _two_threads) as pool:
             yield pool.apply(growth, (scene, px, options))
 
 
@@ -79,7 +80,5 @@ def print_growth(rows: Iterable[Growth]) -> None:
         print(f" {' | '.join(f'{s:.1f} s' for s in stages)} | {sizes} |", flush=True)
 
 
-def _one_thread() -> None:
-    import torch
-
-    torch.set_num_threads(1)
+def _two_threads() -> None:
+    use_threads(SIDES, SIDES)

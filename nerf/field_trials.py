@@ -32,7 +32,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import figure_px
 from toonset.nerf.threads import side_by_side
 
-MOST_RAYS = 32_000  # drawn by lot; a trial goes through them four times
+SEEN_RAYS, UNSEEN_RAYS = 32_000, 8_000  # drawn by lot; a trial goes through the first four times
 STEPS = 60  # by then the order of the candidates shows
 TWO_FROM = 6  # views from which two drawings are left out, half a turn apart
 
@@ -62,12 +62,12 @@ class Ground:
     device: torch.device
 
     def batches(
-        self, frames: Sequence[Frame], field: Field, generator: torch.Generator
+        self, frames: Sequence[Frame], field: Field, generator: torch.Generator, most: int
     ) -> list[tuple[Batch, ...]]:
-        """Return the rays of some drawings."""
+        """Return the rays of some drawings, `most` at most."""
         part = replace(self.scene, frames=tuple(frames))
         sampling = (self.step, self.samples)
-        found = make_batches(part, self.hull, field, *sampling, generator, MOST_RAYS)
+        found = make_batches(part, self.hull, field, *sampling, generator, most)
         return [tuple(batch.to(self.device) for batch in batches) for batches in found]
 
 
@@ -112,7 +112,8 @@ def left_out(frames: Sequence[Frame]) -> list[Frame]:
 
 def _tried(ground: Ground, kept: Sequence[Frame], left: Sequence[Frame], field: Field) -> Candidate:
     generator = torch.Generator().manual_seed(ground.options.seed)
-    seen, unseen = (ground.batches(frames, field, generator) for frames in (kept, left))
+    seen = ground.batches(kept, field, generator, SEEN_RAYS)
+    unseen = ground.batches(left, field, generator, UNSEEN_RAYS)
     model = Model(field, None).to(ground.device)
     few = replace(ground.options, steps=STEPS, budget_s=None)
     fit(model, FixedRays(seen), ground.weights, few, generator)

@@ -19,11 +19,12 @@ from toonset.nerf.shape import VOXELS, VOXELS_PER_PX, per_px
 from toonset.nerf.training import MOST_SAMPLES
 
 # Measured by `python -m toonset.bench.train_floor`: peak resident memory over that before.
-VOXEL_BYTES = 40  # of the hull's grid, while it is carved and faired
-SAMPLE_BYTES = 260  # interpolation both ways, and its pruned copy
+CARVED_BYTES = 40  # of a voxel of the hull's grid, while it is carved and faired
+VOXEL_BYTES = 12  # and later
+SAMPLE_BYTES = 265  # interpolation both ways, and its pruned copy
 FIXED_BYTES = 60 * 2**20  # activations of a batch, parameters, allocator
-PIXEL_BYTES = 200  # of a whole ray through the box, while rays are laid out
-BOX_SAMPLE_BYTES = 800  # of a step along whole rays: points, features, hidden values, gradients
+PIXEL_BYTES = 100  # of a whole ray through the box, while rays are laid out
+BOX_SAMPLE_BYTES = 650  # of a step along whole rays: points, features, hidden values, gradients
 GIGABYTE = 1e9
 OUT_OF_MEMORY = ("can't allocate memory", "out of memory", "not enough memory")
 CGROUP = Path("/sys/fs/cgroup")
@@ -60,7 +61,8 @@ def needed_bytes(scene: Scene, options: TrainOptions) -> int:
         return int(FIXED_BYTES + PIXEL_BYTES * pixels + BOX_SAMPLE_BYTES * samples)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS) ** 3 * _slenderness(scene)
     samples = min(MOST_RAYS, _rays(scene)) * MOST_SAMPLES
-    return int(FIXED_BYTES + VOXEL_BYTES * voxels + SAMPLE_BYTES * samples)
+    steps = VOXEL_BYTES * voxels + SAMPLE_BYTES * samples
+    return int(FIXED_BYTES + max(CARVED_BYTES * voxels, steps))
 
 
 def free_bytes() -> int | None:

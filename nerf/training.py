@@ -50,6 +50,7 @@ CHANNELS, HIDDEN = 16, 32
 CELLS_PER_PX, CELLS = 1.0, (48, 256)
 STEPS_ALONG = 200  # samples that the longest side of the hull would take
 MOST_SAMPLES = 30  # per ray, from its first inside the hull; twice as deep, surfaces turn to mist
+TRIAL_STRIDE = 2  # times the samples' distance: the order of fields is the same, in half the time
 MLP_LAYERS, MLP_WIDTH = 4, 64
 PARTS: tuple[str, ...] = ("drawings", "hull", "planes", "rays")  # before the steps, in order
 NO_EVIDENCE = HullEvidence(0, ())
@@ -130,8 +131,8 @@ def _choice(
     agree: bool,
 ) -> FieldChoice:
     """Return how fine the planes are that this scene needs."""
-    step = float(hull.box.size.max()) / STEPS_ALONG
-    ground = Ground(scene, hull, step, MOST_SAMPLES, weights, options, device)
+    step = TRIAL_STRIDE * float(hull.box.size.max()) / STEPS_ALONG
+    ground = Ground(scene, hull, step, MOST_SAMPLES // TRIAL_STRIDE, weights, options, device)
 
     def build(cells: int) -> Field:
         return build_field(FieldSpec("triplane", cells, CHANNELS, HIDDEN), hull.box)
