@@ -20,7 +20,7 @@ from toonset.nerf.threads import side_by_side
 from toonset.palette.labels import UNLABELLED
 
 RAYS_PER_STEP = 2048  # activations stay in a core's cache
-MOST_RAYS = 100_000  # drawn by lot from larger scenes; bounds memory at about 1 GB
+MOST_RAYS = 200_000  # drawn by lot from larger scenes; bounds memory at about 2 GB
 
 
 @dataclass(frozen=True, eq=False)
