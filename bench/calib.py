@@ -42,9 +42,10 @@ from toonset.bench.record import Record
 from toonset.bench.sfm import METHODS as SFM_METHODS
 from toonset.bench.sfm import SfmResult, aligned_errors, reconstruct
 from toonset.calib.bank import load_bank
-from toonset.calib.calibrate import CalibrationOptions, calibrate
+from toonset.calib.calibrate import calibrate
 from toonset.calib.known import Known
 from toonset.calib.labels import Label
+from toonset.calib.problem import CalibrationOptions
 from toonset.calib.rim import prepare_surface
 from toonset.camera import Camera, angles_from_rotation
 

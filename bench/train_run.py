@@ -29,8 +29,8 @@ from toonset.nerf.layers import color_picture
 from toonset.nerf.metrics import Figures, means, over_white, psnr_of
 from toonset.nerf.metrics_view import Judges, figures_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.threads import use_threads
 from toonset.nerf.run_folder import model_of
+from toonset.nerf.threads import use_threads
 from toonset.nerf.trained import TrainedField, Training
 from toonset.nerf.training import finest_cells, train
 from toonset.nerf.views import render

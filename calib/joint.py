@@ -36,6 +36,8 @@ from toonset.calib.ties import Spreads, Turn, anchors, locks, sheet_ties
 OFFSET_OF_HEIGHT = 0.006  # prior of the outline offset: a line's half width
 MAX_K_RADIUS = 0.6  # nearest camera: the mesh's radius is 0.6 of the distance
 FIRST_K_RADIUS = 0.02  # where the search for perspective starts
+STRETCH = 0.1  # relative spread of height over width between drawings, where it is free
+COMMON_STRETCH = 0.05  # and of their mean, which the mannequin tells
 SETTLED = 2  # steps before the spreads are estimated: the first matches are wrong
 
 Perspective = Literal["none", "given", "shared", "per view"]
@@ -49,11 +51,13 @@ class SheetModel:
         perspective: whose k is free; none: orthographic, given: every k stays as it is.
         spreads: expected differences between the views.
         proportions: whether the mannequin's body is free.
+        stretches: whether drawings may be taller or lower than their width asks for.
     """
 
     perspective: Perspective = "none"
     spreads: Spreads = field(default_factory=Spreads)
     proportions: bool = False
+    stretches: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +73,7 @@ class JointFit:
         energy: -2 log likelihood of the drawings, up to a constant, at `noise`.
         covariance: (u, u) of (w, shift, log scale) per view in working pixels, k, offset, body.
         freedom: number of unknowns that the drawings and not the priors determine.
+        stretches: (views,) log of height over width of every drawing, over the camera's.
     """
 
     poses: tuple[Pose, ...]
@@ -79,6 +84,7 @@ class JointFit:
     energy: float
     covariance: Float[np.ndarray, "u u"]
     freedom: float
+    stretches: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +96,7 @@ class _State:
     offset: float
     noise: Noise
     spreads: Spreads
+    stretches: Float[np.ndarray, " views"]
     covariance: Float[np.ndarray, "u u"] | None = None
 
 
@@ -164,7 +171,8 @@ class JointProblem:
         elif model.perspective != "given":
             first_k = FIRST_K_RADIUS / body.rest.radius
             working = [replace(p, k=p.k or first_k) for p in working]
-        state = _State(tuple(working), body, offset, noise or Noise(), model.spreads)
+        start = np.zeros(len(working))
+        state = _State(tuple(working), body, offset, noise or Noise(), model.spreads, start)
         for step, width in enumerate(widths):
             system = self._system(state, model, width, settled=step >= SETTLED)
             state = self._stepped(state, system, model, keep_noise=noise is not None)
@@ -179,6 +187,7 @@ class JointProblem:
             system.energy,
             covariance,
             float(np.einsum("ij,ji->", covariance, system.data)),
+            tuple(state.stretches.tolist()),
         )
 
     def _size(self, state: _State, model: SheetModel) -> int:
@@ -191,6 +200,8 @@ class JointProblem:
     ) -> tuple[list[int], Marginal]:
         """Return which unknowns view `index` has and its normal equations."""
         drawing, pose = self.drawings[index], state.poses[index]
+        if model.stretches:
+            drawing = drawing.unstretched(state.stretches[index])
         height = drawing.height
         found = match(drawing, state.body.surface, pose)
         pixels, jacobian = project_with_jacobian(pose, found.points)
@@ -203,6 +214,10 @@ class JointProblem:
             where.append(PARAMETERS * views + (index if model.perspective == "per view" else 0))
             parts.append(across[:, PARAMETERS:])
         first = _first_shared(model, views)
+        if model.stretches:
+            where.append(first - views + index)
+            by = np.array([0.5, -0.5]) * (found.targets - np.array(drawing.size_wh) / 2)
+            parts.append(-(found.normals * by).sum(axis=1)[:, None])
         where.append(first)
         parts.append(np.full((len(residuals), 1), height))
         if model.proportions:
@@ -240,6 +255,11 @@ class JointProblem:
         first = _first_shared(model, len(views))
         normal[first, first] += OFFSET_OF_HEIGHT**-2
         gradient[first] += state.offset / OFFSET_OF_HEIGHT**2
+        if model.stretches:
+            own = slice(first - len(views), first)
+            known = np.eye(len(views)) / STRETCH**2 + 1 / (len(views) * COMMON_STRETCH) ** 2
+            normal[own, own] += known
+            gradient[own] += known @ state.stretches
         if model.proportions:
             normal[first + 1 :, first + 1 :] += state.body.precision
             gradient[first + 1 :] += state.body.precision @ state.body.theta
@@ -281,7 +301,8 @@ class JointProblem:
         shrink = min(1.0, MAX_TURN / max(np.abs(per_view[:, :3]).max(), 1e-12))
         step = step * shrink
         first = _first_shared(model, views)
-        k_steps = step[PARAMETERS * views : first]
+        last_k = first - views * model.stretches
+        k_steps = step[PARAMETERS * views : last_k]
         k_steps = np.broadcast_to(k_steps, views) if len(k_steps) else np.zeros(views)
         most = MAX_K_RADIUS / state.body.rest.radius
         poses = tuple(
@@ -294,11 +315,12 @@ class JointProblem:
             state.offset + float(step[first]),
             state.noise if keep_noise else system.noise,
             system.spreads,
+            state.stretches + (step[last_k:first] if model.stretches else 0.0),
             covariance,
         )
 
 
 def _first_shared(model: SheetModel, views: int) -> int:
-    """Return the index of the outline offset, the first unknown after poses and distances."""
+    """Return the index of the outline offset, after poses, distances and stretches."""
     distances = {"none": 0, "given": 0, "shared": 1, "per view": views}[model.perspective]
-    return PARAMETERS * views + distances
+    return PARAMETERS * views + distances + views * model.stretches

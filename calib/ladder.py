@@ -4,6 +4,7 @@
 2. orthographic, a scale per view
 3. perspective, one distance for the sheet
 4. perspective, a distance per view
+with drawings and a mannequin that are stretched, where that is proven (`toonset.calib.stretch`),
 and, only where the mannequin's outline is visibly not the drawings', its proportions (which have
 priors of their own and therefore pay Akaike's 2 per number instead of BIC's log(samples)).
 
@@ -40,6 +41,7 @@ ORTHOGRAPHIC, SCALES = "orthographic", "orthographic, a scale per view"
 SHARED, PER_VIEW = "perspective", "perspective, a distance per view"
 GIVEN = "as given"
 PROPORTIONS = "the mannequin's proportions"
+STRETCHED, TALLER = "drawings stretched, a scale per view", "the mannequin's height over width"
 MODELS: dict[str, SheetModel] = {
     GIVEN: SheetModel("given"),
     ORTHOGRAPHIC: SheetModel("none"),
@@ -95,7 +97,8 @@ class ModelChoice:
     @property
     def bends_mannequin(self) -> bool:
         """Return whether the mannequin's proportions were changed."""
-        return any(rung.name == PROPORTIONS and rung.is_proven for rung in self.rungs)
+        bends = (PROPORTIONS, TALLER)
+        return any(rung.name in bends and rung.is_proven for rung in self.rungs)
 
 
 def climb(

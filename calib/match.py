@@ -93,6 +93,21 @@ class Drawing:
         other._lay()
         return other
 
+    def unstretched(self, taller: float) -> Drawing:
+        """Return the outline of a drawing whose height over width is e^`taller` times too large.
+
+        Areas and the middle of the working picture stay.
+        """
+        other = copy.copy(self)
+        by = np.exp(np.array([taller, -taller]) / 2)
+        middle = np.array(self.size_wh) / 2
+        other.points = middle + (self.points - middle) * by
+        normals = self.normals / by
+        other.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        other.low, other.high = (middle + (end - middle) * by for end in (self.low, self.high))
+        other._lay()
+        return other
+
     def shows(self, pixels: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
         """Return which pixels the drawing says something of: none beyond a cut."""
         return ((pixels > self.low) & (pixels < self.high)).all(axis=1)

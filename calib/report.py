@@ -9,6 +9,8 @@ from toonset.calib.result import Calibration, ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.calibration_schema import SCHEMA, VERSION
 
+STRETCHED_BY = 0.005  # of height over width: less is how pictures are rounded to pixels
+
 
 def calibration_dict(calibration: Calibration) -> dict[str, Any]:
     """Return the JSON form; angles in degrees, lengths in world units or pixels of the view.
@@ -74,6 +76,8 @@ def view_line(view: ViewCalibration) -> str:
         f"elevation {elevation:5.1f} +- {math.degrees(view.sigmas.elevation):4.1f}  "
         f"p_flip {view.p_flip:.2f}  {view.verdict}"
     )
+    if abs(view.camera.pixel_aspect - 1) >= STRETCHED_BY:
+        text += f" (drawn {view.camera.pixel_aspect:.2f} times as high)"
     return f"{text}: {view.reason}" if view.reason else text
 
 
@@ -114,6 +118,7 @@ def _camera_dict(camera: Camera) -> dict[str, Any]:
         "camera_from_world_rotation": camera.rotation.tolist(),
         "target": camera.target.tolist(),
         "scale_px_per_unit": camera.scale,
+        "pixel_aspect": camera.pixel_aspect,
         "center_px": camera.center.tolist(),
         "k": camera.k,
         "size_wh": list(camera.size_wh),

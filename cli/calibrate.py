@@ -195,8 +195,8 @@ def _fit(
         from toonset.calib.landmarks_alone import calibrate_by_landmarks
 
         return calibrate_by_landmarks(views, mesh, known.landmarks)
-    from toonset.calib.calibrate import CalibrationOptions
     from toonset.calib.calibrate import calibrate as fit
+    from toonset.calib.problem import CalibrationOptions
 
     def progress(step: str, done: float) -> None:
         printer.progress(f"{step} {done:.0%}" if done else step)

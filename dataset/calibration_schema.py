@@ -43,6 +43,7 @@ class CalibratedCamera(_Record):
     camera_from_world_rotation: Rotation
     target: Row
     scale_px_per_unit: float
+    pixel_aspect: float = 1.0
     center_px: Pair
     k: float
     size_wh: tuple[int, int]
@@ -55,10 +56,11 @@ class CalibratedCamera(_Record):
                 described.
         """
         rotation, target = np.array(self.camera_from_world_rotation), np.array(self.target)
-        numbers = [*rotation.flat, *self.target, *self.center_px, self.scale_px_per_unit, self.k]
-        check_numbers(numbers)
+        lens = [self.scale_px_per_unit, self.k, self.pixel_aspect]
+        check_numbers([*rotation.flat, *self.target, *self.center_px, *lens])
+        scale, k, aspect = lens
         center = np.array(self.center_px)
-        camera = Camera(rotation, target, self.scale_px_per_unit, center, self.size_wh, self.k)
+        camera = Camera(rotation, target, scale, center, self.size_wh, k, aspect)
         check_range(camera)
         if camera.is_orthographic != (self.model == "orthographic"):
             raise BundleError(f"camera: is called {self.model} but k is {self.k:g}")

@@ -1,0 +1,213 @@
+"""Drawings that are taller or lower than their width asks for, by as much as the sheet proves.
+
+An artist squashes a drawing, a layout program stretches another; and a mannequin has another build
+than the character. One number per drawing, the log of its height over its width, is fitted with the
+cameras and a scale per view (`toonset.calib.joint`). What differs between the drawings is their own
+and becomes the pixels' aspect of their cameras; what the typical drawing has is the mannequin's,
+who is made as tall. Either is proven as richer cameras are (`toonset.calib.ladder`), else it is 0.
+The sheet is then calibrated anew, as if it had been drawn so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from toonset.calib.cut_off import CutOff
+from toonset.calib.joint import JointFit, JointProblem
+from toonset.calib.ladder import (
+    BIC_MARGIN,
+    DOUBTFUL_MARGIN,
+    FREE_SCALE,
+    MODELS,
+    STRETCHED,
+    TALLER,
+    Rung,
+)
+from toonset.calib.pose import PARAMETERS
+from toonset.calib.result import Alternative, Calibration, ViewCalibration
+from toonset.calib.ties import Spreads
+from toonset.camera import Camera
+from toonset.mesh import Mesh
+from toonset.view import View
+
+FEWEST_VIEWS = 3  # two drawings do not say which of them is the stretched one
+# Drawing error of 1 and 2 % of the height gains up to 50; one drawing in two stretched by 5 % 200
+MARGIN = 100.0
+GLANCE = np.geomspace(0.05, 0.03, 3)  # robust widths over the height: enough to see that it is none
+WIDTHS = np.geomspace(0.05, 0.012, 10)
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """How drawings and mannequin are stretched; logarithms of height over width.
+
+    Attributes:
+        views: of every drawing beside the typical one; 0 where that is not proven.
+        mannequin: how much taller than the mannequin the typical drawing is; 0 likewise.
+        rungs: the evidence.
+    """
+
+    views: tuple[float, ...]
+    mannequin: float
+    rungs: tuple[Rung, ...]
+
+    @property
+    def is_none(self) -> bool:
+        """Return whether everything is as drawn."""
+        return not self.mannequin and not any(self.views)
+
+    def and_then(self, more: Stretches) -> Stretches:
+        """Return both, with the first evidence."""
+        views = tuple(a + b for a, b in zip(self.views, more.views, strict=True))
+        return Stretches(views, self.mannequin + more.mannequin, self.rungs or more.rungs)
+
+
+def nothing_stretched(views: int) -> Stretches:
+    """Return what holds of so many views before anybody has looked."""
+    return Stretches((0.0,) * views, 0.0, ())
+
+
+def find_stretches(
+    problem: JointProblem, fit: JointFit, model: str, *, doubtful: bool
+) -> Stretches:
+    """Return what the drawings of a sheet prove.
+
+    Args:
+        problem: the drawings at the working scale.
+        fit: theirs, as if none were stretched.
+        model: name of its camera model.
+        doubtful: the mannequin is visibly another body.
+    """
+    views = len(fit.poses)
+    if views < FEWEST_VIEWS:
+        return nothing_stretched(views)
+    free = replace(MODELS[model], stretches=True, spreads=Spreads(scale=FREE_SCALE))
+    margin = DOUBTFUL_MARGIN if doubtful else MARGIN
+    for widths in (GLANCE, WIDTHS):
+        rich = problem.fit(fit.body, fit.poses, widths, free, offset=fit.offset)
+        apart, taller = _rungs(rich, np.log(problem.samples * views), margin)
+        if not (apart.is_proven or taller.is_proven):
+            break
+    found = np.array(rich.stretches)
+    typical = float(np.median(found))
+    own = tuple((found - typical).tolist()) if apart.is_proven else (0.0,) * views
+    return Stretches(own, typical if taller.is_proven else 0.0, (apart, taller))
+
+
+def _rungs(rich: JointFit, price: float, margin: float) -> tuple[Rung, Rung]:
+    """Return the evidence that drawings differ, and that the typical one is the mannequin's not.
+
+    Args:
+        rich: a fit whose stretches and scales are free.
+        price: of a number.
+        margin: what the gain must exceed; strong evidence is enough for the second once the first
+            is proven, for then one of the drawings must be taken for the one that is not stretched.
+    """
+    views = len(rich.poses)
+    first = len(rich.covariance) - 1 - views
+    where = np.concatenate([PARAMETERS * np.arange(views) + 5, first + np.arange(views)])
+    values = np.concatenate([np.log([pose.scale for pose in rich.poses]), rich.stretches])
+    covariance = rich.covariance[np.ix_(where, where)]
+
+    def rung(name: str, over: Float[np.ndarray, "numbers unknowns"], margin: float) -> Rung:
+        off, unknowns = over.T @ values, over.shape[1]
+        gain = off @ np.linalg.solve(over.T @ covariance @ over, off) - unknowns * price
+        return Rung(name, float(gain), unknowns, margin)
+
+    others = np.column_stack([np.ones(views), np.eye(views)[:, 1:]])
+    apart = rung(STRETCHED, np.kron(np.eye(2), np.linalg.qr(others)[0][:, 1:]), margin)
+    typical = np.zeros((2 * views, 1))
+    if apart.is_proven:
+        middle = np.argsort(rich.stretches)[(views - 1) // 2 : views // 2 + 1]
+        typical[views + middle] = 1 / len(middle)
+        return apart, rung(TALLER, typical, BIC_MARGIN)
+    typical[views:] = 1 / views
+    return apart, rung(TALLER, typical, margin)
+
+
+def stretched_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:
+    """Return the mannequin as tall as the drawings have it; its feet stay where they are."""
+    ground = mesh.vertices[:, 1].min()
+    vertices = mesh.vertices.copy()
+    vertices[:, 1] = ground + np.exp(stretches.mannequin) * (vertices[:, 1] - ground)
+    return replace(mesh, vertices=vertices)
+
+
+def unstretched(view: View, stretch: float) -> View:
+    """Return a drawing without its stretch: the shorter way of its picture is made longer."""
+    if not stretch:
+        return view
+    height, width = view.rgba.shape[:2]
+    across, down = max(1.0, np.exp(stretch)), max(1.0, np.exp(-stretch))
+    size_wh = (round(width * across), round(height * down))
+    by = np.array(size_wh) / (width, height)
+    premultiplied = view.rgba.astype(np.float32)
+    premultiplied[..., :3] *= premultiplied[..., 3:] / 255
+    larger = cv2.resize(premultiplied, size_wh, interpolation=cv2.INTER_LINEAR)
+    larger[..., :3] *= 255 / np.maximum(larger[..., 3:], 1e-3)
+    rgba = np.clip(np.round(larger), 0, 255).astype(np.uint8)
+    left, top, right, bottom = np.array(view.ends) * np.tile(by, 2)
+    x, y, _, _ = view.box
+    return replace(view, rgba=rgba, box=(x, y, *size_wh), ends=(left, top, right, bottom))
+
+
+def as_drawn(found: Calibration, shown: Sequence[View], drawn: Sequence[View]) -> Calibration:
+    """Return the calibration of unstretched drawings in pixels of those that were drawn.
+
+    Args:
+        found: of `shown`.
+        shown: the drawings, unstretched.
+        drawn: the same as they are.
+    """
+    by = [
+        np.array(s.rgba.shape[1::-1]) / d.rgba.shape[1::-1]
+        for s, d in zip(shown, drawn, strict=True)
+    ]
+    views = [
+        _view_as_drawn(view, own, (d.rgba.shape[1], d.rgba.shape[0]))
+        for view, own, d in zip(found.views, by, drawn, strict=True)
+    ]
+    numbers = {view.name: own for view, own in zip(drawn, by, strict=True)}
+    cuts = tuple(_cut_as_drawn(cut, numbers[cut.view]) for cut in found.cuts)
+    return replace(found, views=tuple(views), cuts=cuts)
+
+
+def _view_as_drawn(
+    view: ViewCalibration, by: Float[np.ndarray, " 2"], size_wh: tuple[int, int]
+) -> ViewCalibration:
+    if (by == 1).all():
+        return view
+
+    def drawn(camera: Camera) -> Camera:
+        return replace(
+            camera,
+            scale=float(camera.scale / by[0]),
+            pixel_aspect=float(by[0] / by[1]),
+            center=camera.center / by,
+            size_wh=size_wh,
+        )
+
+    units = np.array([1, 1, 1, *(1 / by), 1])
+    covariance = view.covariance * np.outer(units, units)
+    shift = float(np.sqrt(np.trace(covariance[3:5, 3:5]) / 2))
+    others = [Alternative(drawn(other.camera), other.probability) for other in view.alternatives]
+    return replace(
+        view,
+        camera=drawn(view.camera),
+        twin=drawn(view.twin),
+        alternatives=tuple(others),
+        covariance=covariance,
+        sigmas=replace(view.sigmas, shift_px=shift),
+    )
+
+
+def _cut_as_drawn(cut: CutOff, by: Float[np.ndarray, " 2"]) -> CutOff:
+    own, along = by[cut.flat.axis], by[1 - cut.flat.axis]
+    spans = tuple((round(a / along), round(b / along)) for a, b in cut.flat.spans)
+    flat = replace(cut.flat, at=round(cut.flat.at / own), spans=spans)
+    return replace(cut, flat=flat, lost_px=cut.lost_px / float(own))
