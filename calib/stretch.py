@@ -38,6 +38,7 @@ from toonset.view import View
 FEWEST_VIEWS = 3  # two drawings do not say which of them is the stretched one
 # Drawing error of 1 and 2 % of the height gains up to 50; one drawing in two stretched by 5 % 200
 MARGIN = 100.0
+CLEAR = 3.0  # standard deviations: a drawing that is stretched by less keeps square pixels
 GLANCE = np.geomspace(0.05, 0.03, 3)  # robust widths over the height: enough to see that it is none
 WIDTHS = np.geomspace(0.05, 0.012, 10)
 
@@ -47,7 +48,7 @@ class Stretches:
     """How drawings and mannequin are stretched; logarithms of height over width.
 
     Attributes:
-        views: of every drawing beside the typical one; 0 where that is not proven.
+        views: of every drawing beside the typical one; 0 where that is not proven or clear.
         mannequin: how much taller than the mannequin the typical drawing is; 0 likewise.
         rungs: the evidence.
     """
@@ -93,10 +94,21 @@ def find_stretches(
         apart, taller = _rungs(rich, np.log(problem.samples * views), margin)
         if not (apart.is_proven or taller.is_proven):
             break
-    found = np.array(rich.stretches)
+    found, sigma = np.array(rich.stretches), np.sqrt(np.diag(_own(rich)))
     typical = float(np.median(found))
-    own = tuple((found - typical).tolist()) if apart.is_proven else (0.0,) * views
-    return Stretches(own, typical if taller.is_proven else 0.0, (apart, taller))
+    own = np.where(np.abs(found - typical) > CLEAR * sigma, found - typical, 0.0)
+    return Stretches(
+        tuple(own.tolist()) if apart.is_proven else (0.0,) * views,
+        typical if taller.is_proven else 0.0,
+        (apart, taller),
+    )
+
+
+def _own(rich: JointFit) -> Float[np.ndarray, "views views"]:
+    """Return the covariance of the stretches."""
+    views = len(rich.poses)
+    first = len(rich.covariance) - 1 - views
+    return rich.covariance[first : first + views, first : first + views]
 
 
 def _rungs(rich: JointFit, price: float, margin: float) -> tuple[Rung, Rung]:
