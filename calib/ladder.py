@@ -41,7 +41,7 @@ ORTHOGRAPHIC, SCALES = "orthographic", "orthographic, a scale per view"
 SHARED, PER_VIEW = "perspective", "perspective, a distance per view"
 GIVEN = "as given"
 PROPORTIONS = "the mannequin's proportions"
-STRETCHED, TALLER = "drawings stretched, a scale per view", "the mannequin's height over width"
+STRETCHED, TALLER = "stretched drawings", "the mannequin's height over width"
 MODELS: dict[str, SheetModel] = {
     GIVEN: SheetModel("given"),
     ORTHOGRAPHIC: SheetModel("none"),
