@@ -10,7 +10,7 @@ import torch
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.shape import hull_of
+from toonset.nerf.shape import LEVELS, hull_of
 
 RADIUS, SCALE, SIDE = 1.0, 12.0, 32
 
@@ -32,6 +32,7 @@ def test_the_fair_surface_is_rounder_than_the_hull_as_carved() -> None:
     def volume(*, fair: bool) -> float:
         hull, _ = hull_of(ball(4), TrainOptions(fair=fair))
         assert torch.equal(hull.support, (hull.support * 255).round() / 255)
+        assert len(hull.support.unique()) <= LEVELS + 1
         return float(hull.inside.sum()) * hull.voxel**3
 
     true = 4 / 3 * math.pi * RADIUS**3
