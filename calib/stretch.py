@@ -91,7 +91,7 @@ def find_stretches(
     for widths in (GLANCE, WIDTHS):
         rich = problem.fit(fit.body, fit.poses, widths, free, offset=fit.offset)
         apart, taller = _rungs(rich, np.log(problem.samples * views), margin)
-        if not (apart.is_proven or taller.is_proven):
+        if max(apart.bic_gain, taller.bic_gain) <= 0:
             break
     found, sigma = np.array(rich.stretches), np.sqrt(np.diag(_covariance(rich)))
     typical = float(np.median(found))
