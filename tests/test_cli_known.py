@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import toonset.calib.calibrate as library
+import toonset.calib.problem as library
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
 from toonset.dataset.landmark_formats import SCHEMA
 from toonset.dataset.mesh_file import load_mesh
