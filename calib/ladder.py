@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.pose import PARAMETERS, Pose
@@ -168,10 +169,15 @@ def _differences(rich: JointFit, name: str) -> float:
         values = np.log([pose.scale for pose in rich.poses])
         where = PARAMETERS * np.arange(views) + 5
     covariance = rich.covariance[np.ix_(where, where)]
+    over = contrasts(views)
+    off = over.T @ values
+    return float(off @ np.linalg.solve(over.T @ covariance @ over, off))
+
+
+def contrasts(views: int) -> Float[np.ndarray, "views unknowns"]:
+    """Return orthonormal directions in which views differ, one fewer than there are views."""
     others = np.column_stack([np.ones(views), np.eye(views)[:, 1:]])
-    contrasts = np.linalg.qr(others)[0][:, 1:]
-    off = contrasts.T @ values
-    return float(off @ np.linalg.solve(contrasts.T @ covariance @ contrasts, off))
+    return np.linalg.qr(others)[0][:, 1:]
 
 
 def _distances(fit: JointFit) -> tuple[float, ...]:

@@ -99,7 +99,19 @@ class Rigid:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A sheet on its way from drawings to cameras."""
+    """A sheet on its way from drawings to cameras.
+
+    Attributes:
+        views: the drawings.
+        surface: the mannequin, as the drawings have its height.
+        templates: its outlines from everywhere.
+        coarse: the drawings as they are searched with.
+        fine: the drawings as they are fitted.
+        sheet: the turns they may be of, their faces and paint.
+        known: what the user gave.
+        options: how hard to look.
+        progress: is told the step and the share of it that is done.
+    """
 
     views: Sequence[View]
     surface: Surface

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from jaxtyping import Float
 
@@ -27,6 +26,7 @@ from toonset.calib.ladder import (
     STRETCHED,
     TALLER,
     Rung,
+    contrasts,
 )
 from toonset.calib.result import Alternative, Calibration, ViewCalibration
 from toonset.calib.ties import Spreads
@@ -127,8 +127,7 @@ def _rungs(rich: JointFit, price: float, margin: float) -> tuple[Rung, Rung]:
         gain = off @ np.linalg.solve(over.T @ covariance @ over, off) - unknowns * price
         return Rung(name, float(gain), unknowns, margin)
 
-    others = np.column_stack([np.ones(views), np.eye(views)[:, 1:]])
-    apart = rung(STRETCHED, np.linalg.qr(others)[0][:, 1:], margin)
+    apart = rung(STRETCHED, contrasts(views), margin)
     if not apart.is_proven:
         return apart, rung(TALLER, np.full((views, 1), 1 / views), margin)
     middle = np.argsort(stretches)[(views - 1) // 2 : views // 2 + 1]
@@ -150,16 +149,7 @@ def unstretched(view: View, stretch: float) -> View:
         return view
     height, width = view.rgba.shape[:2]
     across, down = max(1.0, np.exp(stretch)), max(1.0, np.exp(-stretch))
-    size_wh = (round(width * across), round(height * down))
-    by = np.array(size_wh) / (width, height)
-    premultiplied = view.rgba.astype(np.float32)
-    premultiplied[..., :3] *= premultiplied[..., 3:] / 255
-    larger = cv2.resize(premultiplied, size_wh, interpolation=cv2.INTER_LINEAR)
-    larger[..., :3] *= 255 / np.maximum(larger[..., 3:], 1e-3)
-    rgba = np.clip(np.round(larger), 0, 255).astype(np.uint8)
-    left, top, right, bottom = np.array(view.ends) * np.tile(by, 2)
-    x, y, _, _ = view.box
-    return replace(view, rgba=rgba, box=(x, y, *size_wh), ends=(left, top, right, bottom))
+    return view.resized((round(width * across), round(height * down)))
 
 
 def as_drawn(found: Calibration, shown: Sequence[View], drawn: Sequence[View]) -> Calibration:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
@@ -56,3 +57,20 @@ class View:
     def mask(self) -> Bool[np.ndarray, "height width"]:
         """Return which pixels the figure covers by at least half."""
         return self.rgba[..., 3] >= 128
+
+    def resized(self, size_wh: tuple[int, int]) -> View:
+        """Return the drawing resampled to so many pixels; transparent ones lend no colour."""
+        height, width = self.rgba.shape[:2]
+        by = np.array(size_wh) / (width, height)
+        rgba = self.rgba.astype(np.float32)
+        rgba[..., :3] *= rgba[..., 3:] / 255
+        way = cv2.INTER_AREA if by.min() < 1 else cv2.INTER_LINEAR
+        rgba = cv2.resize(rgba, size_wh, interpolation=way)
+        rgba[..., :3] *= 255 / np.maximum(rgba[..., 3:], 1e-3)
+        left, top, right, bottom = np.array(self.ends) * np.tile(by, 2)
+        return replace(
+            self,
+            rgba=np.rint(rgba.clip(0, 255)).astype(np.uint8),
+            box=(*self.box[:2], *size_wh),
+            ends=(left, top, right, bottom),
+        )
