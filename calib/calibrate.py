@@ -28,7 +28,7 @@ from toonset.calib.judge import (
 )
 from toonset.calib.known import Known
 from toonset.calib.ladder import Rung
-from toonset.calib.problem import CalibrationOptions, Problem, Progress, Rigid
+from toonset.calib.problem import CalibrationOptions, Problem, Progress, SheetFit
 from toonset.calib.result import Calibration
 from toonset.calib.sheet_state import state_of
 from toonset.calib.stretch import as_drawn, nothing_stretched, stretched_mannequin, unstretched
@@ -93,7 +93,7 @@ class _Fitted:
     problem: Problem
     candidates: Sequence[Candidates]
     turn: Turn
-    rigid: Rigid
+    rigid: SheetFit
     cuts: tuple[CutOff, ...]
 
 
@@ -121,18 +121,19 @@ def _fitted(
 
 def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -> Calibration:
     """Return the calibration; `rungs` are what has been said about stretches."""
-    problem, rigid = fitted.problem, fitted.rigid
+    problem = fitted.problem
     with _timed(seconds, "joint"):
-        joint, model = problem.bent(rigid)
-        model = replace(model, rungs=(*rungs, *model.rungs))
+        bent = problem.bent(fitted.rigid)
+        joint, differs = bent.joint, bent.differs
+        model = replace(bent.model, rungs=(*rungs, *bent.model.rungs))
     with _timed(seconds, "judge"):
         problem.progress("judge", 0.0)
         observable = turns_visibly(problem.templates)
         state = state_of(problem.views, problem.cameras(joint), yaw_observable=observable)
         bare = [drawing.inset(joint.offset) for drawing in problem.fine]
-        final = problem.rivals(bare, joint, model, fitted.candidates, differs=rigid.differs)
+        final = problem.rivals(bare, joint, model, fitted.candidates, differs=differs)
         sure = problem.sheet.probabilities(final)
-        body, differs = joint.body.surface, rigid.differs
+        body = joint.body.surface
         each = [
             judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
             for i, v in enumerate(problem.views)

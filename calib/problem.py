@@ -30,7 +30,14 @@ from toonset.calib.hypotheses import (
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.judge import measured, typical_coverage
 from toonset.calib.known import Known, weighed_by_landmarks
-from toonset.calib.ladder import MODELS, ModelChoice, climb, with_proportions
+from toonset.calib.ladder import (
+    GLANCE_MARGIN,
+    GLANCE_WIDTHS,
+    MODELS,
+    ModelChoice,
+    climb,
+    with_proportions,
+)
 from toonset.calib.landmarks import landmark_starts
 from toonset.calib.match import Drawing
 from toonset.calib.paint import read_paint
@@ -39,7 +46,7 @@ from toonset.calib.proportions import as_it_is
 from toonset.calib.rim import Surface, prepare_surface
 from toonset.calib.shared import Sheet, possible_turns
 from toonset.calib.sheet_state import TELLING_VIEWS
-from toonset.calib.stretch import Stretches, find_stretches, nothing_stretched
+from toonset.calib.stretch import FEWEST_VIEWS, Stretches, find_stretches, nothing_stretched
 from toonset.calib.templates import Templates, find_hypotheses
 from toonset.calib.ties import Turn
 from toonset.calib.together import SKETCHED, TogetherSearch, with_k
@@ -81,8 +88,8 @@ SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
 
 
 @dataclass(frozen=True, eq=False)
-class Rigid:
-    """The sheet fitted with the mannequin as it is.
+class SheetFit:
+    """The sheet fitted.
 
     Attributes:
         problem: what was fitted.
@@ -184,7 +191,7 @@ class Problem:
         search = TogetherSearch(self.coarse, body, self.sheet, self._informed)
         return search.run(candidates, starts, self.options.rounds)
 
-    def rigid(self, sketch: JointFit, turn: Turn) -> Rigid:
+    def rigid(self, sketch: JointFit, turn: Turn) -> SheetFit:
         """Return the fit at full resolution, the mannequin as it is."""
         differs = typical_coverage(self.fine, sketch) < SAME_BODY_COVERAGE
         samples = ROUGH_POINTS if differs else WHITE_POINTS
@@ -192,17 +199,23 @@ class Problem:
         keep_fov = "fov" in self.known.locked
         starts = self.known.at_locked_yaws(sketch.poses, self.surface.middle)
         joint, model = climb(problem, sketch.body, starts, doubtful=differs, keep_fov=keep_fov)
-        return Rigid(problem, joint, model, differs)
+        return SheetFit(problem, joint, model, differs)
 
-    def bent(self, rigid: Rigid) -> tuple[JointFit, ModelChoice]:
-        """Return the fit, the mannequin bent where it is another body, and its model."""
-        joint, model = rigid.joint, rigid.model
-        if rigid.differs:
-            joint, model = with_proportions(self._level(rigid.problem, joint), joint, model)
-        factor = SIGMA_OF_ANOTHER_BODY if rigid.differs else SIGMA_OF_SAME_BODY
-        return replace(joint, covariance=factor**2 * joint.covariance), model
+    def bent(self, rigid: SheetFit) -> SheetFit:
+        """Return the fit with the mannequin bent, if that is proven, its covariance as judged."""
+        joint, model, differs = rigid.joint, rigid.model, rigid.differs
+        if not differs and len(self.views) >= FEWEST_VIEWS:
+            glance = (GLANCE_WIDTHS, GLANCE_MARGIN)
+            near, model = with_proportions(rigid.problem, joint, model, *glance)
+            differs = near is not joint
+        if differs:
+            level = self._level(rigid.problem, joint)
+            joint, model = with_proportions(level, joint, rigid.model)
+        factor = SIGMA_OF_ANOTHER_BODY if differs else SIGMA_OF_SAME_BODY
+        joint = replace(joint, covariance=factor**2 * joint.covariance)
+        return replace(rigid, joint=joint, model=model, differs=differs)
 
-    def cut_off(self, whole: Rigid, turn: Turn) -> tuple[Problem, Rigid, tuple[CutOff, ...]]:
+    def cut_off(self, whole: SheetFit, turn: Turn) -> tuple[Problem, SheetFit, tuple[CutOff, ...]]:
         """Return the problem with cuts taken for no outline, its fit, and which those are.
 
         Args:
@@ -225,7 +238,7 @@ class Problem:
             known += proven
         return ended, fitted, tuple(cut for _, cut in known)
 
-    def stretches(self, fitted: Rigid, cuts: Sequence[CutOff]) -> Stretches:
+    def stretches(self, fitted: SheetFit, cuts: Sequence[CutOff]) -> Stretches:
         """Return how drawings and mannequin are stretched.
 
         Not looked for where somebody has placed cameras, nor where feet are missing.
@@ -235,7 +248,7 @@ class Problem:
         problem, name = fitted.problem, fitted.model.model
         return find_stretches(problem, fitted.joint, name, doubtful=fitted.differs)
 
-    def _costs(self, fitted: Rigid) -> list[float]:
+    def _costs(self, fitted: SheetFit) -> list[float]:
         return [fit.cost for fit in measured(self.fine, fitted.joint)]
 
     def _ending_at(self, cuts: Cuts) -> Problem:
