@@ -36,7 +36,8 @@ AKAIKE = 2.0
 FREE_SCALE = 0.2  # relative spread of scales that are not tied
 WIDTHS = np.geomspace(0.02, 0.01, 8)
 WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
-BODY_WIDTHS = np.geomspace(0.04, 0.015, 8)
+BODY_WIDTHS = np.geomspace(0.04, 0.01, 10)
+BODY_ELEVATION = np.radians(1.5)  # expected spread: half as wide, for a bent body can look tilted
 # Where outlines nearly meet, a glance says whether proportions are worth a fit: drawing error of 1 to
 # 2 % gains up to 84 (74 sheets), arms 5 or 10 degrees higher 231 and more, heads 10 % larger 224 (4)
 GLANCE_WIDTHS, GLANCE_MARGIN = np.array([0.02, 0.015]), 120.0
@@ -161,7 +162,9 @@ def with_proportions(
         widths: robust widths over the height of the figure.
         margin: what the gain must exceed.
     """
-    model = replace(MODELS[choice.model], proportions=True)
+    model = MODELS[choice.model]
+    spreads = replace(model.spreads, elevation=BODY_ELEVATION)
+    model = replace(model, proportions=True, spreads=spreads)
     bent = problem.fit(fit.body, fit.poses, widths, model, offset=fit.offset)
     theta = bent.body.theta
     block = bent.covariance[-len(theta) :, -len(theta) :]

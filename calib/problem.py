@@ -206,8 +206,8 @@ class Problem:
         joint, model, differs = rigid.joint, rigid.model, rigid.differs
         if not differs and len(self.views) >= FEWEST_VIEWS:
             glance = (GLANCE_WIDTHS, GLANCE_MARGIN)
-            near, model = with_proportions(rigid.problem, joint, model, *glance)
-            differs = near is not joint
+            _, model = with_proportions(rigid.problem, joint, model, *glance)
+            differs = model.bends_mannequin
         if differs:
             level = self._level(rigid.problem, joint)
             joint, model = with_proportions(level, joint, rigid.model)
