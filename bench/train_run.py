@@ -37,7 +37,8 @@ from toonset.nerf.views import render
 
 CURVE_VIEWS = 4  # held-out views that every point of the curves is the mean of
 Look = Callable[[Job, TrainCase, TrainedField, Sequence[ScoredView]], None]
-FIRST_LOOK_S, LOOK_FACTOR = 1.0, 2**0.5  # seconds of the first snapshot, and from one to the next
+# Seconds of fitting before the first snapshot, and of a snapshot's over those of the one before
+FIRST_LOOK_S, LOOK_FACTOR = 0.25, 2**0.5
 
 
 @dataclass(frozen=True)
@@ -157,12 +158,12 @@ def _with_palette(scene: Scene, palette: PaletteChoice) -> Scene:
 
 @dataclass
 class Snapshots:
-    """Watches a training and keeps its parameters at 1, 1.4, 2, ... times the first look.
+    """Watches a training and keeps its parameters after 1, 1.4, 2, ... times the first look.
 
     Attributes:
         began: when the training's seconds began to count, as `time.perf_counter` says.
         cpu_began: and the processor's, as `time.process_time` says.
-        first_look_s: seconds of the first snapshot; infinite: none are kept.
+        first_look_s: of fitting before the first snapshot; infinite: none are kept.
         carved: the field fills a hull, not a whole box.
         kept: seconds, processor's seconds and parameters of each snapshot.
     """
@@ -180,15 +181,16 @@ class Snapshots:
     def begin(self, trained: TrainedField) -> FitState | None:
         """Take the field that will be fitted, from its beginning."""
         self._trained = trained
-        self._next = self.first_look_s
+        self._fits_from, self._next = self.spent()[0], self.first_look_s
         return None
 
     def look(self, moment: Moment) -> str:
         """Keep a snapshot when its time has come."""
         before = self.spent()
-        if before[0] >= self._next:
+        fitted_s = before[0] - self._fits_from
+        if fitted_s >= self._next:
             self.kept.append((before, _copied(moment.state().parameters)))
-            while self._next <= before[0]:
+            while self._next <= fitted_s:
                 self._next *= LOOK_FACTOR
             after = self.spent()  # what looking took is not the training's
             self.began += after[0] - before[0]

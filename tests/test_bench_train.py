@@ -181,8 +181,8 @@ def test_snapshots_are_the_field_as_it_was_and_cost_no_training_time() -> None:
 
 
 def test_looking_stops_the_clock() -> None:
-    watch = Snapshots(time.perf_counter(), time.process_time())
-    watch._next = 1e-6
+    watch = Snapshots(time.perf_counter(), time.process_time(), first_look_s=1e-6)
+    watch.begin(None)  # type: ignore[arg-type]
 
     class Moment:
         def state(self):
@@ -193,6 +193,23 @@ def test_looking_stops_the_clock() -> None:
     watch.look(Moment())  # type: ignore[arg-type]
     assert watch.spent()[0] - before < 0.2
     assert watch.kept[0][0][0] - before < 0.2
+
+
+def test_the_first_look_comes_after_some_fitting_however_long_the_preparation() -> None:
+    prepared_for_s = 10.0
+    began, cpu_began = time.perf_counter() - prepared_for_s, time.process_time()
+    watch = Snapshots(began, cpu_began, first_look_s=5.0)
+    watch.begin(None)  # type: ignore[arg-type]
+
+    class Moment:
+        def state(self):
+            return type("State", (), {"parameters": {}})
+
+    watch.look(Moment())  # type: ignore[arg-type]
+    assert watch.kept == []
+    watch.began -= 5.0
+    watch.look(Moment())  # type: ignore[arg-type]
+    assert watch.kept[0][0][0] > prepared_for_s + 5.0
 
 
 def test_what_had_nothing_to_do_is_not_left_out_by_training_again(
