@@ -12,11 +12,11 @@ from typing import cast
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
 from toonset.camera import Camera
-from toonset.view import View
+from toonset.view import View, premultiplied, straight
 
 Drawn = tuple[View, Camera]
 Nearest = tuple[Float[np.ndarray, "height width"], Int[np.ndarray, "2 height width"]]
@@ -44,7 +44,7 @@ def rolled(view: View, camera: Camera, roll: float) -> Drawn:
     middle = np.array(camera.size_wh) / 2
     at_integers = middle - 0.5  # OpenCV's pixel centres; ours are at .5
     affine = np.hstack([turn, (at_integers - turn @ at_integers)[:, None]])
-    rgba = _straight(cv2.warpAffine(_premultiplied(view.rgba), affine, camera.size_wh))
+    rgba = straight(cv2.warpAffine(premultiplied(view.rgba), affine, camera.size_wh))
     spin = np.eye(3)
     spin[:2, :2] = turn
     center = turn @ (camera.center - middle) + middle
@@ -162,8 +162,8 @@ def with_capsule(
     away = _distance_to_segment(camera.pixel_grid(), shown)
     cover = np.clip(radius_px - away + 0.5, 0, 1)[..., None]
     stick = np.array([*color, 255], dtype=np.float64)
-    below = _premultiplied(view.rgba)
-    return replace(view, rgba=_straight(cover * stick + (1 - cover) * below)), camera
+    below = premultiplied(view.rgba)
+    return replace(view, rgba=straight(cover * stick + (1 - cover) * below)), camera
 
 
 def _distance_to_segment(
@@ -178,15 +178,3 @@ def _distance_to_segment(
 def _rows(mask: Bool[np.ndarray, "height width"]) -> tuple[int, int]:
     rows = np.flatnonzero(mask.any(axis=1))
     return int(rows[0]), int(rows[-1]) + 1
-
-
-def _premultiplied(rgba: UInt8[np.ndarray, "h w 4"]) -> Float[np.ndarray, "h w 4"]:
-    values = rgba.astype(np.float64)
-    values[..., :3] *= values[..., 3:] / 255
-    return values
-
-
-def _straight(values: Float[np.ndarray, "h w 4"]) -> UInt8[np.ndarray, "h w 4"]:
-    alpha = values[..., 3:]
-    colors = np.where(alpha > 0, values[..., :3] * 255 / np.maximum(alpha, 1e-6), 0)
-    return np.clip(np.round(np.concatenate([colors, alpha], axis=-1)), 0, 255).astype(np.uint8)

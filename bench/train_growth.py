@@ -66,7 +66,7 @@ def _resident_bytes(which: str) -> int:
 def print_growth(rows: Iterable[Growth]) -> None:
     """Print trainings as a table, each as soon as it is done."""
     print("| px | figure, px | rays | samples | voxels |", end="")
-    print(" hull | rays | steps | whole | CPU | GB | said |")
+    print(" hull, s | rays, s | steps, s | whole, s | CPU, s | GB | said |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     for row in rows:
         numbers = [row.px, row.figure_px, *(row.counts[k] for k in ("rays", "samples", "voxels"))]
@@ -77,7 +77,7 @@ def print_growth(rows: Iterable[Growth]) -> None:
         ]
         sizes = " | ".join(f"{size / 1e9:.2f}" for size in (row.peak, row.estimate))
         print(f"| {' | '.join(map(str, numbers))} |", end="")
-        print(f" {' | '.join(f'{s:.1f} s' for s in stages)} | {sizes} |", flush=True)
+        print(f" {' | '.join(f'{s:.1f}' for s in stages)} | {sizes} |", flush=True)
 
 
 def _two_threads() -> None:

@@ -5,7 +5,8 @@
 2. contour alignment of every start at low resolution
 3. selections of one candidate per view, compared by a joint fit of the sheet
 4. the camera model, from orthography up; drawings that are stretched are begun anew without it
-   (`toonset.calib.stretch`); the mannequin's proportions where they are asked for
+   (`toonset.calib.stretch`); the mannequin's proportions where outlines
+   do not meet or a glance proves them
 5. rivals of the chosen cameras at full resolution: probabilities, uncertainties, verdicts
 """
 
@@ -123,7 +124,7 @@ def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -
     """Return the calibration; `rungs` are what has been said about stretches."""
     problem = fitted.problem
     with _timed(seconds, "joint"):
-        bent = problem.bent(fitted.rigid)
+        bent = problem.bent(fitted.rigid, fitted.turn)
         joint, differs = bent.joint, bent.differs
         model = replace(bent.model, rungs=(*rungs, *bent.model.rungs))
     with _timed(seconds, "judge"):

@@ -36,10 +36,11 @@ AKAIKE = 2.0
 FREE_SCALE = 0.2  # relative spread of scales that are not tied
 WIDTHS = np.geomspace(0.02, 0.01, 8)
 WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
-BODY_WIDTHS = np.geomspace(0.04, 0.01, 10)
-BODY_ELEVATION = np.radians(1.5)  # expected spread: half as wide, for a bent body can look tilted
-# Where outlines nearly meet, a glance says whether proportions are worth a fit: drawing error of 1 to
-# 2 % gains up to 84 (74 sheets), arms 5 or 10 degrees higher 231 and more, heads 10 % larger 224 (4)
+# Of bodies whose outlines lack something, hair or a bag, and of those that nearly meet
+BODY_WIDTHS, NEAR_BODY_WIDTHS = np.geomspace(0.04, 0.015, 8), np.geomspace(0.04, 0.01, 10)
+BODY_ELEVATION = np.radians(1.5)  # half of `Spreads.elevation`: a bent body can look tilted
+# Where outlines nearly meet, a glance says whether proportions are worth a fit: drawing error of 1
+# to 2 % gains up to 90 (75 sheets), arms 5 degrees higher or heads 10 % larger 218 and more (10)
 GLANCE_WIDTHS, GLANCE_MARGIN = np.array([0.02, 0.015]), 120.0
 
 ORTHOGRAPHIC, SCALES = "orthographic", "orthographic, a scale per view"
@@ -168,13 +169,19 @@ def with_proportions(
     bent = problem.fit(fit.body, fit.poses, widths, model, offset=fit.offset)
     theta = bent.body.theta
     block = bent.covariance[-len(theta) :, -len(theta) :]
-    unknowns = max(bent.freedom - fit.freedom, 1.0)
+    unknowns = len(theta) - float(np.trace(block @ bent.body.precision))  # beside their prior
     gain = theta @ np.linalg.solve(block, theta) - AKAIKE * unknowns
     rung = Rung(PROPORTIONS, float(gain), unknowns, margin)
     choice = replace(choice, rungs=(*choice.rungs, rung))
     if not rung.is_proven:
         return fit, choice
     return bent, replace(choice, distances=_distances(bent))
+
+
+def contrasts(views: int) -> Float[np.ndarray, "views unknowns"]:
+    """Return orthonormal directions in which views differ, one fewer than there are views."""
+    others = np.column_stack([np.ones(views), np.eye(views)[:, 1:]])
+    return np.linalg.qr(others)[0][:, 1:]
 
 
 def _differences(rich: JointFit, name: str) -> float:
@@ -190,12 +197,6 @@ def _differences(rich: JointFit, name: str) -> float:
     over = contrasts(views)
     off = over.T @ values
     return float(off @ np.linalg.solve(over.T @ covariance @ over, off))
-
-
-def contrasts(views: int) -> Float[np.ndarray, "views unknowns"]:
-    """Return orthonormal directions in which views differ, one fewer than there are views."""
-    others = np.column_stack([np.ones(views), np.eye(views)[:, 1:]])
-    return np.linalg.qr(others)[0][:, 1:]
 
 
 def _distances(fit: JointFit) -> tuple[float, ...]:

@@ -31,9 +31,11 @@ from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.judge import measured, typical_coverage
 from toonset.calib.known import Known, weighed_by_landmarks
 from toonset.calib.ladder import (
+    BODY_WIDTHS,
     GLANCE_MARGIN,
     GLANCE_WIDTHS,
     MODELS,
+    NEAR_BODY_WIDTHS,
     ModelChoice,
     climb,
     with_proportions,
@@ -46,7 +48,7 @@ from toonset.calib.proportions import as_it_is
 from toonset.calib.rim import Surface, prepare_surface
 from toonset.calib.shared import Sheet, possible_turns
 from toonset.calib.sheet_state import TELLING_VIEWS
-from toonset.calib.stretch import FEWEST_VIEWS, Stretches, find_stretches, nothing_stretched
+from toonset.calib.stretch import Stretches, find_stretches, nothing_stretched
 from toonset.calib.templates import Templates, find_hypotheses
 from toonset.calib.ties import Turn
 from toonset.calib.together import SKETCHED, TogetherSearch, with_k
@@ -79,23 +81,24 @@ COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
 COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held back may be far
-# Typical coverage below which the mannequin may be another body, whose proportions are then tried.
+# Typical coverage below which proportions are tried without a glance: it may be another body.
 # Right bodies with 1.2 % drawing error have 0.98 and more. On 144 synthetic sheets with another
 # body's mannequin rotations are 9.6 degrees off (p95), with 0.93 they were 13.7
 SAME_BODY_COVERAGE = 0.96
+FEWEST_TO_GLANCE = 3  # two drawings are explained by many bodies
 # Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them
 SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
 
 
 @dataclass(frozen=True, eq=False)
 class SheetFit:
-    """The sheet fitted.
+    """A fit of the sheet at full resolution.
 
     Attributes:
         problem: what was fitted.
         joint: the fit.
         model: of the cameras.
-        differs: the mannequin is another body than the drawn one.
+        differs: the mannequin is another body than the drawn one, visibly or by a glance's proof.
     """
 
     problem: JointProblem
@@ -191,9 +194,16 @@ class Problem:
         search = TogetherSearch(self.coarse, body, self.sheet, self._informed)
         return search.run(candidates, starts, self.options.rounds)
 
-    def rigid(self, sketch: JointFit, turn: Turn) -> SheetFit:
-        """Return the fit at full resolution, the mannequin as it is."""
-        differs = typical_coverage(self.fine, sketch) < SAME_BODY_COVERAGE
+    def rigid(self, sketch: JointFit, turn: Turn, *, differs: bool | None = None) -> SheetFit:
+        """Return the fit at full resolution, the mannequin as it is.
+
+        Args:
+            sketch: where to begin.
+            turn: where the views are meant to be seen from.
+            differs: the mannequin is another body; None: if the outlines visibly do not meet.
+        """
+        if differs is None:
+            differs = typical_coverage(self.fine, sketch) < SAME_BODY_COVERAGE
         samples = ROUGH_POINTS if differs else WHITE_POINTS
         problem = JointProblem(self.fine, turn, self._kept(), samples)
         keep_fov = "fov" in self.known.locked
@@ -201,19 +211,23 @@ class Problem:
         joint, model = climb(problem, sketch.body, starts, doubtful=differs, keep_fov=keep_fov)
         return SheetFit(problem, joint, model, differs)
 
-    def bent(self, rigid: SheetFit) -> SheetFit:
-        """Return the fit with the mannequin bent, if that is proven, its covariance as judged."""
-        joint, model, differs = rigid.joint, rigid.model, rigid.differs
-        if not differs and len(self.views) >= FEWEST_VIEWS:
-            glance = (GLANCE_WIDTHS, GLANCE_MARGIN)
-            _, model = with_proportions(rigid.problem, joint, model, *glance)
-            differs = model.bends_mannequin
-        if differs:
-            level = self._level(rigid.problem, joint)
-            joint, model = with_proportions(level, joint, rigid.model)
-        factor = SIGMA_OF_ANOTHER_BODY if differs else SIGMA_OF_SAME_BODY
+    def bent(self, rigid: SheetFit, turn: Turn) -> SheetFit:
+        """Return the fit with the mannequin bent, if that is proven, its sigmas made true."""
+        fit, widths = rigid, BODY_WIDTHS
+        if not rigid.differs and len(self.views) >= FEWEST_TO_GLANCE:
+            _, model = with_proportions(
+                rigid.problem, rigid.joint, rigid.model, GLANCE_WIDTHS, GLANCE_MARGIN
+            )
+            if model.bends_mannequin:
+                fit, widths = self.rigid(rigid.joint, turn, differs=True), NEAR_BODY_WIDTHS
+            else:
+                fit = replace(rigid, model=model)
+        joint, model = fit.joint, fit.model
+        if fit.differs:
+            joint, model = with_proportions(self._level(fit.problem, joint), joint, model, widths)
+        factor = SIGMA_OF_ANOTHER_BODY if fit.differs else SIGMA_OF_SAME_BODY
         joint = replace(joint, covariance=factor**2 * joint.covariance)
-        return replace(rigid, joint=joint, model=model, differs=differs)
+        return replace(fit, joint=joint, model=model)
 
     def cut_off(self, whole: SheetFit, turn: Turn) -> tuple[Problem, SheetFit, tuple[CutOff, ...]]:
         """Return the problem with cuts taken for no outline, its fit, and which those are.

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from toonset.dataset.messy_figure import Cast, Figure, Rgb, cut_figure, straight
+from toonset.dataset.messy_figure import Cast, Figure, Rgb, cut_figure
+from toonset.view import straight
 
 SAMPLES = 4  # per pixel and axis
 FLOAT_GAPS = (0.04, 0.08)  # over the head, to a hat in the air

@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Shaped, UInt8
 
+from toonset.view import premultiplied, straight
+
 Rgb = tuple[int, int, int]
 Stamp = UInt8[np.ndarray, "height width 4"]  # straight RGBA
 
@@ -71,19 +73,10 @@ def cut_figure(rgba: UInt8[np.ndarray, "h w 4"], ink: UInt8[np.ndarray, "h w"]) 
     return Figure(rgba[window], ink[window], np.zeros(rgba[window].shape[:2], np.float32))
 
 
-def straight(premultiplied: Float[np.ndarray, "height width 4"]) -> Stamp:
-    """Return bytes with straight alpha of premultiplied colours, 0 to 255 as alpha is."""
-    rgba = premultiplied.copy()
-    rgba[..., :3] *= 255 / np.maximum(rgba[..., 3:], 1e-3)
-    return np.rint(np.clip(rgba, 0, 255)).astype(np.uint8)
-
-
 def resized(figure: Figure, factor: float) -> Figure:
     """Return the figure drawn smaller (lines become thinner with it); factors up to 1."""
     size = max(round(figure.width * factor), 1), max(round(figure.height * factor), 1)
-    alpha = figure.rgba[..., 3:].astype(np.float32)
-    premultiplied = np.concatenate([figure.rgba[..., :3] * (alpha / 255), alpha], axis=-1)
-    rgba = straight(cv2.resize(premultiplied, size, interpolation=cv2.INTER_AREA))
+    rgba = straight(cv2.resize(premultiplied(figure.rgba), size, interpolation=cv2.INTER_AREA))
     ink, paper = (
         cv2.resize(layer, size, interpolation=cv2.INTER_AREA)
         for layer in (figure.ink, figure.paper)

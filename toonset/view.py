@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from toonset.errors import SheetError
 
@@ -62,15 +62,26 @@ class View:
         """Return the drawing resampled to so many pixels; transparent ones lend no colour."""
         height, width = self.rgba.shape[:2]
         by = np.array(size_wh) / (width, height)
-        rgba = self.rgba.astype(np.float32)
-        rgba[..., :3] *= rgba[..., 3:] / 255
         way = cv2.INTER_AREA if by.min() < 1 else cv2.INTER_LINEAR
-        rgba = cv2.resize(rgba, size_wh, interpolation=way)
-        rgba[..., :3] *= 255 / np.maximum(rgba[..., 3:], 1e-3)
+        rgba = straight(cv2.resize(premultiplied(self.rgba), size_wh, interpolation=way))
         left, top, right, bottom = np.array(self.ends) * np.tile(by, 2)
         return replace(
             self,
-            rgba=np.rint(rgba.clip(0, 255)).astype(np.uint8),
+            rgba=rgba,
             box=(*self.box[:2], *size_wh),
             ends=(left, top, right, bottom),
         )
+
+
+def premultiplied(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "height width 4"]:
+    """Return a picture with colours times alpha, 0 to 255 as they were."""
+    values = rgba.astype(np.float32)
+    values[..., :3] *= values[..., 3:] / 255
+    return values
+
+
+def straight(values: Float[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
+    """Return bytes with straight alpha of premultiplied colours, 0 to 255 as alpha is."""
+    rgba = values.copy()
+    rgba[..., :3] *= 255 / np.maximum(rgba[..., 3:], 1e-3)
+    return np.rint(np.clip(rgba, 0, 255)).astype(np.uint8)
