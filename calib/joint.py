@@ -72,7 +72,6 @@ class JointFit:
         spreads: estimated differences between the views.
         energy: -2 log likelihood of the drawings, up to a constant, at `noise`.
         covariance: (u, u) of (w, shift, log scale) per view in working pixels, k, offset, body.
-        freedom: number of unknowns that the drawings and not the priors determine.
         stretches: (views,) log of height over width of every drawing, over the camera's.
     """
 
@@ -83,7 +82,6 @@ class JointFit:
     spreads: Spreads
     energy: float
     covariance: Float[np.ndarray, "u u"]
-    freedom: float
     stretches: tuple[float, ...] = ()
 
 
@@ -104,7 +102,6 @@ class _State:
 class _System:
     """The linearised problem at a state."""
 
-    data: Float[np.ndarray, "u u"]
     normal: Float[np.ndarray, "u u"]
     gradient: Float[np.ndarray, " u"]
     energy: float
@@ -186,7 +183,6 @@ class JointProblem:
             system.spreads,
             system.energy,
             covariance,
-            float(np.einsum("ij,ji->", covariance, system.data)),
             tuple(state.stretches.tolist()),
         )
 
@@ -243,14 +239,13 @@ class JointProblem:
 
     def _system(self, state: _State, model: SheetModel, width: float, *, settled: bool) -> _System:
         size = self._size(state, model)
-        data, gradient = np.zeros((size, size)), np.zeros(size)
+        normal, gradient = np.zeros((size, size)), np.zeros(size)
         views = []
         for index in range(len(self.drawings)):
             where, view = self._view(state, model, index, width)
-            data[np.ix_(where, where)] += view.normal
+            normal[np.ix_(where, where)] += view.normal
             gradient[where] += view.gradient
             views.append(view)
-        normal = data.copy()
         spreads = self._add_ties(state, normal, gradient, model.spreads if settled else None)
         first = _first_shared(model, len(views))
         normal[first, first] += OFFSET_OF_HEIGHT**-2
@@ -266,7 +261,7 @@ class JointProblem:
         normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(size)
         energy = sum(view.energy for view in views)
         noise = next_noise(views, least_white(self.drawings), width)
-        return _System(data, normal, gradient, energy, noise, spreads)
+        return _System(normal, gradient, energy, noise, spreads)
 
     def _add_ties(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -180,17 +180,22 @@ def test_snapshots_are_the_field_as_it_was_and_cost_no_training_time() -> None:
     assert times == sorted(times)
 
 
+@dataclass
+class Moment:
+    """Of a training whose parameters take a while to be copied."""
+
+    takes_s: float = 0.0
+
+    def state(self):
+        time.sleep(self.takes_s)
+        return type("State", (), {"parameters": {}})
+
+
 def test_looking_stops_the_clock() -> None:
     watch = Snapshots(time.perf_counter(), time.process_time(), first_look_s=1e-6)
     watch.begin(None)  # type: ignore[arg-type]
-
-    class Moment:
-        def state(self):
-            time.sleep(0.3)
-            return type("State", (), {"parameters": {}})
-
     before = watch.spent()[0]
-    watch.look(Moment())  # type: ignore[arg-type]
+    watch.look(Moment(takes_s=0.3))  # type: ignore[arg-type]
     assert watch.spent()[0] - before < 0.2
     assert watch.kept[0][0][0] - before < 0.2
 
@@ -200,11 +205,6 @@ def test_the_first_look_comes_after_some_fitting_however_long_the_preparation() 
     began, cpu_began = time.perf_counter() - prepared_for_s, time.process_time()
     watch = Snapshots(began, cpu_began, first_look_s=5.0)
     watch.begin(None)  # type: ignore[arg-type]
-
-    class Moment:
-        def state(self):
-            return type("State", (), {"parameters": {}})
-
     watch.look(Moment())  # type: ignore[arg-type]
     assert watch.kept == []
     watch.began -= 5.0
