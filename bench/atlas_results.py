@@ -22,12 +22,13 @@ from toonset.bench.atlas_training import (
     TrainPage,
     Tried,
 )
+from toonset.bench.atlas_training import WARNED as TRAIN_WARNED
 from toonset.bench.chart import COLORS
 from toonset.bench.stability import SheetResult, StepResult
 from toonset.bench.stability_table import SOLVED_DEG, WRONG_DEG
 from toonset.nerf.verdict import WEAK
 
-BLUE, VERMILION, GREEN, _, ORANGE, SKY, BLACK, GREY = COLORS
+BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, BLACK, GREY = COLORS
 LOST_FINE_DB, LOST_FAILED_DB = 1.0, 3.0
 NONE_MISSED = 0.1  # %
 HUNDRED = 100.0
@@ -38,7 +39,10 @@ CALIBRATION = Kind(
 )
 TRAINING = Kind(
     *("training", "trainings", "loss of held-out PSNR", "dB", LOST_FINE_DB, LOST_FAILED_DB),
-    {SILENT: GREEN, REPAIRED: SKY, WEAK: ORANGE, REFUSED: VERMILION, CRASHED: BLACK},
+    {
+        **{SILENT: GREEN, REPAIRED: SKY, TRAIN_WARNED: PINK, WEAK: ORANGE},
+        **{REFUSED: VERMILION, CRASHED: BLACK},
+    },
     informs=(REPAIRED,),
 )
 PALETTE = Kind(

@@ -1,8 +1,8 @@
 """Trying a training: how near held-out views come, and what `toonset train` says of the run.
 
-It refuses, or calls the run weak; or it says what it did to drawings that disagreed: cameras
-turned, drawings moved, sized or bent back. That a repair was needed is no alarm: whether it was
-enough, the verdict says.
+It refuses, or calls the run weak; or it warns of the palette that it extracts; or it says what it
+did to drawings that disagreed: cameras turned, drawings moved, sized or bent back. That a repair
+was needed is no alarm: whether it was enough, the verdict says.
 """
 
 from __future__ import annotations
@@ -32,9 +32,11 @@ from toonset.nerf.threads import use_threads
 from toonset.nerf.trained import Training
 from toonset.nerf.training import train
 from toonset.nerf.verdict import WEAK, Picture, Verdict, verdict_of
+from toonset.palette.palette import Palette
 
 STEPS = TrainOptions().steps  # of the optimiser: the verdict is on what users get
 SILENT, REPAIRED, REFUSED, CRASHED = "silent", "repaired", "refused", "crashed"
+WARNED = "palette warned"
 
 
 @dataclass(frozen=True)
@@ -92,12 +94,12 @@ def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
     scene: DrawnScene | None = None
     try:
         scene = draw()
-        ready, _ = labelled(scene.train)
+        ready, palette = labelled(scene.train)
         training = train(ready, TrainOptions(steps=STEPS, seed=seed))
         views = pictures_of(training.result, scene.test)
         fitted = pictures_of(training.result, training.prepared.scene)
         verdict = verdict_of(training, fitted)
-        voice, words = _said(training, verdict)
+        voice, words = _said(training, verdict, palette)
         evidence = _evidence(scene.train, training, fitted) | _shares(verdict)
     except ToonsetError as error:
         views, voice, words, evidence = [], REFUSED, str(error), {}
@@ -123,8 +125,8 @@ def _psnr(scene: DrawnScene, index: int, view: UInt8[np.ndarray, "height width 4
     return psnr_of(float(error[counted].mean())) if counted.any() else math.nan
 
 
-def _said(training: Training, verdict: Verdict) -> tuple[str, str]:
-    """Return what `toonset train` said: why the run is weak, then what was set right."""
+def _said(training: Training, verdict: Verdict, palette: Palette) -> tuple[str, str]:
+    """Return what `toonset train` said: why the run is weak, of the palette, what was set right."""
     ready = training.prepared
     repairs = [
         f"{what}: outlines {step.apart_px[0]:.2f} px apart, {step.apart_px[1]:.2f} px after"
@@ -136,7 +138,9 @@ def _said(training: Training, verdict: Verdict) -> tuple[str, str]:
         if step is not None and step.applied
     ]
     calm = REPAIRED if repairs else SILENT
-    return WEAK if verdict.verdict == WEAK else calm, "; ".join([*verdict.reasons, *repairs])
+    loud = WARNED if palette.warnings else calm
+    words = "; ".join([*verdict.reasons, *palette.warnings, *repairs])
+    return WEAK if verdict.verdict == WEAK else loud, words
 
 
 def _shares(verdict: Verdict) -> dict[str, float]:

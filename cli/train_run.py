@@ -157,6 +157,8 @@ def _with_palette(scene: Scene, palette: bool, printer: Printer) -> Scene:
     scene, found = labelled(scene)
     colors = " ".join(hex_of(color.rgb) for color in found.colors)
     printer.say(f"palette, extracted: {colors}")
+    for warning in found.warnings:
+        printer.say(f"palette: {warning}")
     return scene
 
 

@@ -17,6 +17,7 @@ from toonset.errors import PaletteError
 from toonset.palette.areas import paint_areas
 from toonset.palette.choice import Amount, PaletteOptions, choose, measure, with_wanted
 from toonset.palette.labels import nearest_colors
+from toonset.palette.lone_spots import lone_spot_notes
 from toonset.palette.names import hex_of, name_of
 from toonset.palette.near_equal import near_equal_paints
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
@@ -48,7 +49,8 @@ def extract_palette(
 
     Left out, and listed, are paints under the rule, colours that look like another although much is
     painted with them (`near_equal`), and those of tiny features (`tiny_paints`). To keep one of
-    these takes it out of the paint that it counts for otherwise.
+    these takes it out of the paint that it counts for otherwise. Spots too small to show their
+    colour (`lone_spots`) are warned of.
 
     The result does not depend on the order or orientation of the pictures. If no colour reaches the
     least share, the largest one is kept and a warning says so.
@@ -72,6 +74,7 @@ def extract_palette(
     kept, left, warnings = choose(amounts, options)
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)
     warnings += wide_paint_notes(histogram, [a.paint for a in kept], options.min_share)
+    warnings += lone_spot_notes(histogram, [*found.paints, *tiny])
     contour = None if ink is None else _contour(amounts[ink])
     dropped = _dropped(left, hidden, histogram, colors)
     return Palette(colors, _rule(options, contour), dropped, warnings, contour, found.evidence)

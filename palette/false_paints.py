@@ -28,7 +28,7 @@ def false_paints(
         noise: levels; of the picture.
         ink: of the strokes.
     """
-    reach = max(LEAST_REACH, 1.5 * noise)
+    reach = reach_of(noise)
     false = rgb.mean(axis=1) <= (-1 if ink is None else ink.dark)
     for first, second in combinations(np.flatnonzero(solid), 2):
         way = rgb[second] - rgb[first]
@@ -37,3 +37,8 @@ def false_paints(
         inside = (along > NEAREST_END) & (along < 1 - NEAREST_END)
         false |= inside & (beside <= reach)
     return false & ~solid
+
+
+def reach_of(noise: int) -> float:
+    """Return how many levels from the straight line between two colours their blends may lie."""
+    return max(LEAST_REACH, 1.5 * noise)

@@ -98,8 +98,8 @@ def count_pixels(images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Histogram:
         [np.zeros(0, dtype=np.uint32), *(_middles(picture, noise) for picture in pictures)]
     )
     thin = np.bincount(np.searchsorted(codes, strokes), minlength=len(codes))
-    colors = np.stack([codes & 255, codes >> 8 & 255, codes >> 16], axis=1).astype(np.uint8)
-    return Histogram(colors, counts, flat if flat.any() else counts, thin, noise, tuple(pictures))
+    colors, flat = rgb_of_words(codes), flat if flat.any() else counts
+    return Histogram(colors, counts, flat, thin, noise, tuple(pictures))
 
 
 def distinct(
@@ -114,6 +114,11 @@ def distinct(
     rank = np.zeros(1 << 24, dtype=np.int32)
     rank[found] = np.arange(len(found))
     return found.astype(np.uint32), rank[codes]
+
+
+def rgb_of_words(words: UInt32[np.ndarray, "*n"]) -> UInt8[np.ndarray, "*n 3"]:
+    """Return the colours of words, whatever their alpha."""
+    return np.stack([words & 255, words >> 8 & 255, words >> 16 & 255], axis=-1).astype(np.uint8)
 
 
 def _total(place: Places, amounts: Places, n: int) -> Int[np.ndarray, " n"]:

@@ -187,3 +187,58 @@ def test_patches_are_what_squares_fit_into() -> None:
         assert not (slow & ~fast).any()
         areas = [width * height for _, _, width, height in (place.box for place in places)]
         assert areas[0] == max(areas)
+
+
+# ---- spots too small to show their colour
+
+
+def with_dots(color: tuple[int, int, int], *at: tuple[float, float], radius: float) -> np.ndarray:
+    """Return two stripes with round soft dots, as much of the colour as they cover."""
+    fine = 8
+    picture = block((SKIN, 200), (SHIRT, 60))
+    y, x = (np.mgrid[: 40 * fine, : 260 * fine] + 0.5) / fine
+    inside = np.any([(x - a) ** 2 + (y - b) ** 2 < radius**2 for a, b in at], axis=0)
+    share = inside.reshape(40, fine, 260, fine).mean(axis=(1, 3))[..., None]
+    picture[..., :3] = np.rint(picture[..., :3] * (1 - share) + share * np.array(color))
+    return picture
+
+
+@pytest.mark.parametrize("radius", [0.5, 0.8, 1.1])
+def test_spots_too_small_to_show_their_colour_are_warned_of(radius: float) -> None:
+    palette = extract_palette([with_dots(EYE, (50.3, 20.2), (80.4, 20.6), radius=radius)])
+    (warning,) = palette.warnings
+    assert warning.startswith("2 spots such as picture 0 at (")
+    assert "draw the sheet larger" in warning
+
+
+def test_a_single_small_spot_may_be_a_slip() -> None:
+    assert not extract_palette([with_dots(EYE, (50.3, 20.2), radius=0.8)]).warnings
+
+
+def test_small_spots_of_a_paint_are_no_unknown_colour() -> None:
+    palette = extract_palette([with_dots(SHIRT, (50.3, 20.2), (80.4, 20.6), radius=0.8)])
+    assert not palette.warnings
+
+
+def test_small_spots_across_a_border_are_blends() -> None:
+    soft = with_dots(SKIN, (199.7, 10.0), (200.4, 30.3), radius=0.8)
+    assert not extract_palette([soft]).warnings
+
+
+def test_spots_that_a_line_surrounds_are_blends_of_three() -> None:
+    ink = (20, 16, 24)
+    both = np.array(SHIRT) * 0.4 + np.array(ink) * 0.35 + np.array(SKIN) * 0.25
+    blend = (round(both[0]), round(both[1]), round(both[2]))
+    spots = with_spots(blend, (50, 20), (80, 20), px=1)
+    assert extract_palette([spots]).warnings  # without the ink it is no blend of what there is
+    spots[:, 100::8, :3] = ink
+    spots[:, 100:101, :3] = SKIN
+    assert not extract_palette([spots]).warnings
+
+
+def test_texture_is_soon_given_up() -> None:
+    picture = block((SKIN, 400), (SHIRT, 400))
+    picture = np.tile(picture, (10, 1, 1))
+    picture[2::5, 2::5, :3] = EYE
+    (warning,) = extract_palette([picture]).warnings
+    assert warning.startswith("at least 512 spots")

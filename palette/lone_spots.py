@@ -1,0 +1,103 @@
+"""Spots of a colour too small to show it: eyes and highlights of a pixel or two.
+
+A colour is read from flat paint. A spot narrower than that has only blends of it, with what lies
+around and with a line, and nothing says which colour they are blends of. But that there is another
+colour can be told where the spot lies alone in one paint: no known paint, blended with the paint
+around and with the lines' ink, gives what is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.palette.false_paints import reach_of
+from toonset.palette.names import hex_of
+from toonset.palette.oklab import even_oklab_from_rgb
+from toonset.palette.palette import Place
+from toonset.palette.pixels import OPAQUE_WORD, Histogram, Picture, rgb_of_words
+from toonset.palette.shades import UNLIKE, Paint
+
+WIDEST = 7  # pixels: what is wider has a flat pixel within it, even with a line around
+PLACES = 2  # at which there must be such spots: one may be a slip of the pen
+MOST = 512  # pixels unlike their surroundings that are looked at, or texture would take minutes
+ALL = 1e4  # weight, beside levels, of the demand that a blend's shares add up to one
+
+Rgb = UInt8[np.ndarray, " 3"]
+
+
+def lone_spot_notes(histogram: Histogram, paints: Sequence[Paint]) -> tuple[str, ...]:
+    """Return what a person should know of spots whose colour cannot be told.
+
+    Args:
+        histogram: of the character.
+        paints: all its known colours, those of tiny features included.
+    """
+    spots = [
+        (_apart(pixel, around, paints, histogram.noise), pixel, place)
+        for place, around, pixel in islice(_spots(histogram), MOST)
+    ]
+    found = [spot for spot in spots if spot[0] > 0]
+    places = {place for _, _, place in found}
+    if len(places) < PLACES:
+        return ()
+    _, (red, green, blue), place = max(found, key=lambda spot: spot[0])
+    x, y, width, height = place.box
+    seen = hex_of((int(red), int(green), int(blue)))
+    least = "at least " if len(spots) == MOST else ""
+    return (
+        f"{least}{len(places)} spots such as picture {place.view} at ({x}, {y}), "
+        f"{width} x {height} px, are too small to tell their colour: {seen} there is no blend of "
+        "the others; draw the sheet larger, or name all colours with --colors",
+    )
+
+
+def _spots(histogram: Histogram) -> Iterator[tuple[Place, Rgb, Rgb]]:
+    """Yield spots that lie alone in a paint, that paint's colour, and pixels unlike it."""
+    for view, picture in enumerate(histogram.pictures):
+        for x, y, width, height in _small(picture):
+            box = picture.words[y - 1 : y + height + 1, x - 1 : x + width + 1]
+            colors = rgb_of_words(box)
+            inside = np.zeros(box.shape, dtype=bool)
+            inside[1:-1, 1:-1] = True
+            even = np.ptp(colors[~inside], axis=0).max() <= 2 * histogram.noise
+            if not even or (box < OPAQUE_WORD).any():
+                continue
+            around = np.median(colors[~inside], axis=0).astype(np.uint8)
+            spot = np.unique(colors[inside], axis=0)
+            away = even_oklab_from_rgb(spot) - even_oklab_from_rgb(around)
+            place = Place(view, (x, y + picture.top, width, height))
+            for pixel in spot[np.linalg.norm(away, axis=1) >= UNLIKE]:
+                yield place, around, pixel
+
+
+def _small(picture: Picture) -> list[tuple[int, int, int, int]]:
+    """Return the boxes of small connected parts that are not flat, away from the border."""
+    height, width = picture.words.shape
+    rough = np.zeros((height, width), dtype=np.uint8)
+    rough.ravel()[picture.rough] = 1
+    stats = cv2.connectedComponentsWithStats(rough, connectivity=8)[2][1:]
+    x, y, wide, high = stats[:, :4].T
+    inside = (x > 0) & (y > 0) & (x + wide < width) & (y + high < height)
+    small = stats[inside & (np.maximum(wide, high) <= WIDEST), :4]
+    return [(x, y, wide, high) for x, y, wide, high in small.tolist()]
+
+
+def _apart(pixel: Rgb, around: Rgb, paints: Sequence[Paint], noise: int) -> float:
+    """Return how many levels a pixel is beyond all blends of what is around, a paint and the ink.
+
+    At most zero: it is a blend, but for rounding and noise.
+    """
+    from scipy.optimize import nnls
+
+    known = np.array([around, *(paint.rgb for paint in paints)], dtype=np.float64)
+    inks = [number for number, paint in enumerate(paints, start=1) if paint.is_ink]
+    always = [0, *inks]
+    seen = np.append(pixel.astype(np.float64), ALL)
+    blends = ([*always, number] for number in range(len(known)))
+    parts = (np.vstack([known[blend].T, np.full(len(blend), ALL)]) for blend in blends)
+    return min(float(nnls(part, seen)[1]) for part in parts) - reach_of(noise)
