@@ -1,16 +1,21 @@
-"""How many CPU threads training uses: as told, or as many as make it faster here and now."""
+"""How many CPU threads training uses: as told, or as many as make it faster here and now.
+
+Two threads that work side by side are faster than one even where other programs keep two cores
+busy. More share torch's operations, and wait for each other where others run: these are tried.
+"""
 
 from __future__ import annotations
 
 import os
 import time
+from statistics import median
 
 import typer
 
 AUTO = "auto"
 MOST_ASKED = 1024
 MOST = 8  # a step's work is too small for more
-TRIAL_S = 0.1  # per number of threads
+TRIALS, TRIAL_S = 5, 0.03  # in turns with the other number: what else runs here comes and goes
 WORTH = 1.15  # how much faster twice the threads must be
 
 
@@ -42,20 +47,20 @@ def most_threads() -> int:
 def measured(most: int) -> int:
     """Return how many threads do a training step's kind of work fastest; other programs count.
 
-    Numbers are doubled as long as that pays: on a machine that others use, threads wait for each
-    other, and one is faster than two.
+    From one per side on, numbers are doubled as long as that pays.
     """
     from toonset.nerf.threads import SIDES, use_threads
 
-    best, count = 1, 2
-    rate = _rate(1) if most > 1 else 0.0
-    while count <= most:
-        faster = _rate(count)
-        if faster < WORTH * rate:
-            break
-        best, rate, count = count, faster, 2 * count
+    best = min(SIDES, most)
+    while 2 * best <= most and _gain(best) > WORTH:
+        best *= 2
     use_threads(best, SIDES)
     return best
+
+
+def _gain(threads: int) -> float:
+    """Return how many times faster twice the threads are, the median of some comparisons."""
+    return median(_rate(2 * threads) / _rate(threads) for _ in range(TRIALS))
 
 
 def _rate(threads: int) -> float:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import torch
 
+from toonset.cli import train_threads
 from toonset.cli.train_run import RESUMED_AS
 from toonset.cli.train_stop import Stopper
 from toonset.cli.train_threads import measured
 from toonset.cli.train_voice import LOG_S, Pace
+from toonset.nerf.threads import use_threads
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
 RUN_FILES = {
@@ -162,9 +168,41 @@ def test_threads_are_a_number_or_auto(text: str, toonset, bundle: Path):
     assert "is neither auto nor a number" in said
 
 
-def test_auto_threads_never_exceed_what_there_is():
-    assert measured(1) == 1
-    assert measured(2) in (1, 2)
+def test_auto_is_a_thread_per_side_where_there_are_cores_and_tries_nothing(monkeypatch):
+    monkeypatch.setattr(train_threads, "_rate", lambda _: pytest.fail("nothing to try"))
+    with _threads_as_before():
+        assert [measured(most) for most in (1, 2, 3)] == [1, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("rates", "threads"),
+    [
+        ({2: 130, 4: 140, 8: 300}, 2),
+        ({2: 130, 4: 180, 8: 200}, 4),
+        ({2: 130, 4: 180, 8: 240}, 8),
+    ],
+)
+def test_auto_doubles_further_threads_while_that_pays(
+    monkeypatch: pytest.MonkeyPatch, rates: dict[int, float], threads: int
+) -> None:
+    disturbed = itertools.cycle([0.5, 1, 1, 1, 1, 0.5, 1])  # another program, now and then
+    monkeypatch.setattr(train_threads, "_rate", lambda count: rates[count] * next(disturbed))
+    with _threads_as_before():
+        assert measured(8) == threads
+
+
+def test_further_threads_are_really_tried() -> None:
+    with _threads_as_before():
+        assert measured(4) in (2, 4)
+
+
+@contextmanager
+def _threads_as_before() -> Iterator[None]:
+    count = torch.get_num_threads()
+    try:
+        yield
+    finally:
+        use_threads(count)
 
 
 def test_a_log_gets_a_line_now_and_then_and_a_terminal_a_live_one():
