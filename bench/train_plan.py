@@ -68,8 +68,12 @@ METHODS: dict[str, Method] = {
     NEAREST: Method(None, first_seed_only=True),
     MANNEQUIN: Method(None, first_seed_only=True, mannequin=True),
     "coloured hull": Method(TrainOptions(field="hull"), "no palette", first_seed_only=True),
-    "75 steps": Method(TrainOptions(steps=75), first_seed_only=True, most_views_only=True),
-    "600 steps": Method(TrainOptions(steps=600), first_seed_only=True, most_views_only=True),
+    **{
+        f"{steps} steps": Method(
+            TrainOptions(steps=steps), first_seed_only=True, most_views_only=True
+        )
+        for steps in (30, 75, 600)
+    },
     **{
         name: Method(TrainOptions(field="triplane"), first_seed_only=True, share=share)
         for name, share in PLANES.items()

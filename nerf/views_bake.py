@@ -12,8 +12,10 @@ costs 0.03 dB on new views.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import cv2
 import numpy as np
@@ -44,9 +46,9 @@ class Baked:
         trained: where it comes from.
         matter: slices of constant x, one voxel round each: what softplus makes a step's optical
             depth from, and the hull's support, here and in the next slice.
-        color: RGB in the same places; a fourth channel is read faster than none.
         leaps: (x, y, z) steps, in any direction, from anywhere in this voxel over what certainly
             holds no sample.
+        color: RGB in the same places as `matter`; a fourth channel is read faster than none.
         shell: (3, n) places of voxels that may hold a sample beside voxels that may not.
         labels: a palette label for every colour; None without palette.
         paints: (colors, 3) what the surface shows for each palette label, nan for one that it shows
@@ -55,8 +57,8 @@ class Baked:
 
     trained: TrainedField
     matter: Slices
-    color: Slices
     leaps: UInt8[Tensor, "x y z"]
+    color: Slices
     shell: Float[Tensor, "3 n"]
     labels: UInt8[Tensor, "red green blue"] | None
     paints: Float[Tensor, "colors 3"]
@@ -77,17 +79,29 @@ class Baked:
         depth, color = (torch.cat(parts) for parts in zip(*found, strict=True))
         surface = (hull.inside & grown(~hull.inside, 1)).reshape(-1)
         paints = _paints(trained.classifier, color[surface[cells]])
-        density = torch.zeros(read.numel()).index_copy_(0, cells, depth).view(read.shape)
-        here = (np.pad(density, 1, mode="edge"), np.pad(hull.support, 1))
-        beyond = (np.roll(part, -1, axis=0) for part in here)
-        matter = Slices.of(*(part[..., None] for part in (*here, *beyond)))
-        levels = torch.full((read.numel(), 4), 255, dtype=torch.uint8)
-        levels[cells, :3] = color.mul_(255).round_().byte()
-        padded = np.pad(levels.view(*read.shape, 4), [(1, 1)] * 3 + [(0, 0)], mode="edge")
-        colors = Slices.of(padded)
-        leaps = _leaps(hull, trained.step)
-        labels = None if trained.classifier is None else label_table(trained.classifier)
-        return cls(trained, matter, colors, leaps, _shell(hull.near), labels, paints)
+
+        def matter() -> Slices:
+            density = torch.zeros(read.numel()).index_copy_(0, cells, depth).view(read.shape)
+            here = (np.pad(density, 1, mode="edge"), np.pad(hull.support, 1))
+            beyond = (np.roll(part, -1, axis=0) for part in here)
+            return Slices.of(*(part[..., None] for part in (*here, *beyond)))
+
+        def colors() -> Slices:
+            levels = torch.full((read.numel(), 4), 255, dtype=torch.uint8)
+            levels[cells, :3] = color.mul_(255).round_().byte()
+            return Slices.of(
+                np.pad(levels.view(*read.shape, 4), [(1, 1)] * 3 + [(0, 0)], mode="edge")
+            )
+
+        def labels() -> UInt8[Tensor, "red green blue"] | None:
+            return None if trained.classifier is None else label_table(trained.classifier)
+
+        tasks: list[Callable[[], Any]] = [  # large ones first, in turn for either side
+            *(matter, partial(_leaps, hull, trained.step), colors),
+            *(partial(_shell, hull.near), labels),
+        ]
+        slices, leaps, shades, shell, table = side_by_side(tasks)
+        return cls(trained, slices, leaps, shades, shell, table, paints)
 
     def leap(self, place: Float[Tensor, "3 n"]) -> Float[Tensor, " n"]:
         """Return `leaps` at places; outside of the hull's box, of the nearest voxel."""
