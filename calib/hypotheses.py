@@ -36,6 +36,17 @@ class Candidates:
     fits: tuple[Fit, ...]
     energies: Float[np.ndarray, " n"]
 
+    @classmethod
+    def of(cls, fits: Sequence[Fit]) -> Candidates:
+        """Return the best of all fits that are the same, the outlines' distance their evidence."""
+        distinct: list[Fit] = []
+        for fit in sorted(fits, key=lambda fit: fit.cost):
+            apart = (rotation_distance(fit.pose.rotation, f.pose.rotation) for f in distinct)
+            if all(angle > SAME_POSE for angle in apart):
+                distinct.append(fit)
+        costs = np.array([fit.cost for fit in distinct])
+        return cls(tuple(distinct), 0.5 * INDEPENDENT_POINTS * np.log(costs / costs[0]))
+
 
 def refine(
     drawing: Drawing,
@@ -44,14 +55,7 @@ def refine(
     widths: Float[np.ndarray, " iterations"],
 ) -> Candidates:
     """Return the distinct optima that contour alignment reaches from `starts`."""
-    fits = align_all(drawing, surface, starts, widths)
-    distinct: list[Fit] = []
-    for fit in sorted(fits, key=lambda fit: fit.cost):
-        apart = (rotation_distance(fit.pose.rotation, f.pose.rotation) for f in distinct)
-        if all(angle > SAME_POSE for angle in apart):
-            distinct.append(fit)
-    costs = np.array([fit.cost for fit in distinct])
-    return Candidates(tuple(distinct), 0.5 * INDEPENDENT_POINTS * np.log(costs / costs[0]))
+    return Candidates.of(align_all(drawing, surface, starts, widths))
 
 
 def with_twins(poses: Sequence[Pose]) -> list[Pose]:

@@ -42,6 +42,9 @@ BODY_ELEVATION = np.radians(1.5)  # half of `Spreads.elevation`: a bent body can
 # Where outlines nearly meet, a glance says whether proportions are worth a fit: drawing error of 1
 # to 2 % gains up to 90 (75 sheets), arms 5 degrees higher or heads 10 % larger 218 and more (10)
 GLANCE_WIDTHS, GLANCE_MARGIN = np.array([0.02, 0.015]), 120.0
+# Drawings so far off a bent body look like another body to any: drawing error of 2 % leaves 1.0 to
+# 1.4 % and gains 21 to 198 (7 sheets of 16), other bodies drawn with 1.5 % leave 0.9 % at most
+UNSTEADY, UNSTEADY_MARGIN = 0.009, 200.0
 
 ORTHOGRAPHIC, SCALES = "orthographic", "orthographic, a scale per view"
 SHARED, PER_VIEW = "perspective", "perspective, a distance per view"
@@ -161,7 +164,7 @@ def with_proportions(
         fit: theirs, the mannequin as it is.
         choice: of its camera model.
         widths: robust widths over the height of the figure.
-        margin: what the gain must exceed.
+        margin: what the gain must exceed, at least UNSTEADY_MARGIN if the drawings stay UNSTEADY.
     """
     model = MODELS[choice.model]
     spreads = replace(model.spreads, elevation=BODY_ELEVATION)
@@ -171,6 +174,8 @@ def with_proportions(
     block = bent.covariance[-len(theta) :, -len(theta) :]
     unknowns = len(theta) - float(np.trace(block @ bent.body.precision))  # beside their prior
     gain = theta @ np.linalg.solve(block, theta) - AKAIKE * unknowns
+    if bent.noise.smooth > UNSTEADY:
+        margin = max(margin, UNSTEADY_MARGIN)
     rung = Rung(PROPORTIONS, float(gain), unknowns, margin)
     choice = replace(choice, rungs=(*choice.rungs, rung))
     if not rung.is_proven:

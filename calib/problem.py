@@ -46,6 +46,7 @@ from toonset.calib.paint import read_paint
 from toonset.calib.pose import Pose
 from toonset.calib.proportions import as_it_is
 from toonset.calib.rim import Surface, prepare_surface
+from toonset.calib.rivals import steadied
 from toonset.calib.shared import Sheet, possible_turns
 from toonset.calib.sheet_state import TELLING_VIEWS
 from toonset.calib.stretch import Stretches, find_stretches, nothing_stretched
@@ -296,6 +297,7 @@ class Problem:
         for i, (pose, view) in enumerate(zip(joint.poses, candidates, strict=True)):
             starts = _rivals(pose, view) + with_twins([half_turned(pose)]) * from_behind
             final = refine(drawings[i], bent, starts, FINE_WIDTHS)
+            final = steadied(drawings[i], joint, i, final)
             seen = pose if model.is_perspective else replace(pose, k=0.0)
             final = level_twins(final, bent, seen, always=differs, from_behind=from_behind)
             found.append(self._informed(final, i))
