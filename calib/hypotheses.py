@@ -19,6 +19,7 @@ from toonset.calib.rim import Surface, silhouette_mask
 from toonset.camera import rotation_distance
 
 SAME_POSE = np.radians(8.0)  # candidates nearer than this are one
+OTHER = np.radians(15.0)  # an alternative this far away is another camera
 MIRROR = np.radians(15.0)  # a candidate this near to the twin's rotation is the twin
 LOOK_PX = 192  # picture in which a pose and its twin are compared
 ALIKE = 0.99  # overlap from which two silhouettes are one; a bag at one side makes it 0.94

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.align import Fit, measure
-from toonset.calib.hypotheses import Candidates, is_twin
+from toonset.calib.hypotheses import OTHER, Candidates, is_twin
 from toonset.calib.joint import JointFit
 from toonset.calib.labels import Label
 from toonset.calib.match import Drawing
@@ -26,7 +26,6 @@ FAILED_COVERAGE = 0.70
 # Of the probability that faces are none: at most 0.2 on sheets with right cameras
 MOST_FACES_CONTRADICT = 0.5
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
-OTHER = np.radians(15.0)  # an alternative this far away is another camera
 # 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
 MOST_PULL = np.radians(5.0)
 FAR_FROM_LEVEL = np.radians(12.0)  # four times what the views of a sheet differ in elevation

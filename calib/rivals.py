@@ -11,20 +11,20 @@ from __future__ import annotations
 import numpy as np
 
 from toonset.calib.align import measure
-from toonset.calib.hypotheses import Candidates, is_twin
+from toonset.calib.hypotheses import OTHER, Candidates, is_twin
 from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.match import Drawing
 from toonset.camera import rotation_distance
 
 WIDTHS = np.full(5, 0.01)
-NEAR = np.radians(3.0)  # from the chosen camera: no rival
 WORTH = 6.0  # nats behind the best: rivals farther behind do not count
 
 
 def steadied(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -> Candidates:
     """Return a view's candidates, those that count refined under the sheet's drawing error.
 
-    The chosen camera is among them as it is. Its twin stays: errors of drawing do not make it.
+    The chosen camera is among them, as it is and refined like them. Its twin stays: no error of a
+    drawing makes it.
 
     Args:
         drawing: at full resolution, the sheet's offset taken off.
@@ -38,15 +38,14 @@ def steadied(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -
         for number, (fit, energy) in enumerate(zip(found.fits, found.energies, strict=True))
         if energy < WORTH
         and not is_twin(pose, fit.pose)
-        and rotation_distance(fit.pose.rotation, pose.rotation) > NEAR
+        and rotation_distance(fit.pose.rotation, pose.rotation) > OTHER
     ]
     if not doubtful:
         return found
     problem = JointProblem([drawing])
     kept = [fit for number, fit in enumerate(found.fits) if number not in doubtful]
     kept.append(measure(drawing, surface, drawing.pose_in(pose)))
-    for number in doubtful:
-        start = found.fits[number].pose
+    for start in [pose, *(found.fits[number].pose for number in doubtful)]:
         fit = problem.fit(joint.body, [start], WIDTHS, SheetModel("given"), joint.noise)
         kept.append(measure(drawing, surface, drawing.pose_in(fit.poses[0])))
     return Candidates.of(kept)
