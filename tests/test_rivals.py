@@ -1,0 +1,80 @@
+"""Drawings that are strongly off: their errors make no rival camera and no other body."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from toonset.bench.stability_draws import warped
+from toonset.bench.stability_sheet import DrawnSheet
+from toonset.calib import problem
+from toonset.calib.calibrate import Calibration, calibrate
+from toonset.calib.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates
+from toonset.calib.joint import JointFit
+from toonset.calib.ladder import PROPORTIONS, UNSTEADY, UNSTEADY_MARGIN
+from toonset.calib.match import Drawing
+from toonset.calib.pose import Pose
+from toonset.calib.rivals import WORTH, steadied
+from toonset.camera import rotation_distance
+
+
+def calibrated(sheet: DrawnSheet) -> Calibration:
+    return calibrate([view for view, _ in sheet.drawings], sheet.mesh)
+
+
+def test_a_rival_that_only_drawing_error_makes_is_none() -> None:
+    sheet = warped(2.0, 1012)
+    found = calibrated(sheet)
+    off = [
+        rotation_distance(view.camera.rotation, camera.rotation)
+        for view, (_, camera) in zip(found.views, sheet.drawings, strict=True)
+    ]
+    assert np.degrees(max(off)) < 5
+    assert [view.verdict for view in found.views] == ["ok"] * len(off)
+
+
+def test_unsteady_drawings_do_not_bend_the_mannequin_on_little_evidence() -> None:
+    found = calibrated(warped(2.0, 1003))
+    rung = next(rung for rung in found.model.rungs if rung.name == PROPORTIONS)
+    assert found.noise.smooth > UNSTEADY
+    assert (rung.margin, rung.is_proven) == (UNSTEADY_MARGIN, False)
+    assert rung.bic_gain > 100
+
+
+@pytest.mark.parametrize("percent", [0.0, 2.0])
+def test_the_chosen_camera_and_its_twin_stay_among_the_candidates(
+    monkeypatch: pytest.MonkeyPatch, percent: float
+) -> None:
+    seen: list[tuple[Candidates, Candidates, Pose]] = []
+
+    def watched(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -> Candidates:
+        steady = steadied(drawing, joint, index, found)
+        seen.append((found, steady, joint.poses[index]))
+        return steady
+
+    monkeypatch.setattr(problem, "steadied", watched)
+    calibrated(warped(percent, 1012))
+    assert len(seen) == 5
+    for found, steady, pose in seen:
+        twin = pose.twin()
+        assert nearest(steady, twin) <= max(nearest(found, twin), MIRROR)
+        assert steady.energies.min() == 0
+        if any(is_doubtful(found, pose)):
+            assert nearest(steady, pose) <= SAME_POSE
+        else:
+            assert steady is found
+    assert all(steady is found for found, steady, _ in seen) == (percent == 0)
+
+
+def nearest(candidates: Candidates, pose: Pose) -> float:
+    turns = [rotation_distance(fit.pose.rotation, pose.rotation) for fit in candidates.fits]
+    return float(min(turns))
+
+
+def is_doubtful(found: Candidates, pose: Pose) -> list[bool]:
+    turns = [rotation_distance(fit.pose.rotation, pose.rotation) for fit in found.fits]
+    mirrored = [rotation_distance(fit.pose.rotation, pose.twin().rotation) for fit in found.fits]
+    return [
+        energy < WORTH and turn > OTHER and twin > MIRROR
+        for energy, turn, twin in zip(found.energies, turns, mirrored, strict=True)
+    ]
