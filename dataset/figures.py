@@ -90,11 +90,13 @@ def with_blocks(
 
     It stands level with another view and has its colours, several of them; a swatch has one.
     """
+    if len(mains) < 2:
+        return mains
     fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
     blocks = np.setdiff1d(np.flatnonzero(fill >= RECTANGLE), mains)
     height, area = np.median(blobs.boxes[mains, 3]), np.median(blobs.areas[mains])
     blocks = blocks[(blobs.areas[blocks] >= LEAST_AREA * area)]
-    if not len(blocks) or len(mains) < 2:
+    if not len(blocks):
         return mains
     ends = np.stack([blobs.boxes[:, 1], blobs.boxes[:, 1] + blobs.boxes[:, 3]], axis=1)
     looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in mains])

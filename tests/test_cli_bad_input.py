@@ -16,6 +16,8 @@ from PIL import Image
 
 from toonset.dataset.mesh_file import load_mesh
 
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # numpy's are no clear line
+
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 PLY = "ply\nformat {kind} 1.0\nelement vertex {count}\n" + "".join(
     f"property float {axis}\n" for axis in "xyz"
