@@ -78,6 +78,8 @@ def _spots(histogram: Histogram) -> Iterator[tuple[Place, Rgb, Rgb]]:
 def _small(picture: Picture) -> list[tuple[int, int, int, int]]:
     """Return the boxes of small connected parts that are not flat, away from the border."""
     height, width = picture.words.shape
+    if min(height, width) < 3:  # nothing is away from the border; OpenCV wants a pixel at least
+        return []
     rough = np.zeros((height, width), dtype=np.uint8)
     rough.ravel()[picture.rough] = 1
     stats = cv2.connectedComponentsWithStats(rough, connectivity=8)[2][1:]

@@ -236,6 +236,13 @@ def test_spots_that_a_line_surrounds_are_blends_of_three() -> None:
     assert not extract_palette([spots]).warnings
 
 
+@pytest.mark.parametrize("other", [np.s_[:0], np.s_[:, :0], np.s_[:1], np.s_[:, :1], np.s_[:2]])
+def test_pictures_without_room_for_a_spot_have_none(other: tuple) -> None:
+    spots = with_dots(EYE, (50.3, 20.2), (80.4, 20.6), radius=0.8)
+    assert extract_palette([spots, np.zeros_like(spots), spots[other]]).warnings
+    assert not extract_palette([spots[:2], spots[:, :2]]).warnings
+
+
 def test_texture_is_soon_given_up() -> None:
     picture = block((SKIN, 400), (SHIRT, 400))
     picture = np.tile(picture, (10, 1, 1))
