@@ -24,7 +24,9 @@ from toonset.palette.shades import UNLIKE, Paint
 
 WIDEST = 7  # pixels: what is wider has a flat pixel within it, even with a line around
 PLACES = 2  # at which there must be such spots: one may be a slip of the pen
-MOST = 512  # pixels unlike their surroundings that are looked at, or texture would take minutes
+# That are looked at, or texture would take minutes: parts that are not flat, and pixels unlike what
+# is around
+MOST_PARTS, MOST = 4096, 512
 ALL = 1e4  # weight, beside levels, of the demand that a blend's shares add up to one
 
 Rgb = UInt8[np.ndarray, " 3"]
@@ -58,21 +60,22 @@ def lone_spot_notes(histogram: Histogram, paints: Sequence[Paint]) -> tuple[str,
 
 def _spots(histogram: Histogram) -> Iterator[tuple[Place, Rgb, Rgb]]:
     """Yield spots that lie alone in a paint, that paint's colour, and pixels unlike it."""
-    for view, picture in enumerate(histogram.pictures):
-        for x, y, width, height in _small(picture):
-            box = picture.words[y - 1 : y + height + 1, x - 1 : x + width + 1]
-            colors = rgb_of_words(box)
-            inside = np.zeros(box.shape, dtype=bool)
-            inside[1:-1, 1:-1] = True
-            even = np.ptp(colors[~inside], axis=0).max() <= 2 * histogram.noise
-            if not even or (box < OPAQUE_WORD).any():
-                continue
-            around = np.median(colors[~inside], axis=0).astype(np.uint8)
-            spot = np.unique(colors[inside], axis=0)
-            away = even_oklab_from_rgb(spot) - even_oklab_from_rgb(around)
-            place = Place(view, (x, y + picture.top, width, height))
-            for pixel in spot[np.linalg.norm(away, axis=1) >= UNLIKE]:
-                yield place, around, pixel
+    parts = ((v, *box) for v, p in enumerate(histogram.pictures) for box in _small(p))
+    for view, x, y, width, height in islice(parts, MOST_PARTS):
+        picture = histogram.pictures[view]
+        box = picture.words[y - 1 : y + height + 1, x - 1 : x + width + 1]
+        colors = rgb_of_words(box)
+        inside = np.zeros(box.shape, dtype=bool)
+        inside[1:-1, 1:-1] = True
+        even = np.ptp(colors[~inside], axis=0).max() <= 2 * histogram.noise
+        if not even or (box < OPAQUE_WORD).any():
+            continue
+        around = np.median(colors[~inside], axis=0).astype(np.uint8)
+        spot = np.unique(colors[inside], axis=0)
+        away = even_oklab_from_rgb(spot) - even_oklab_from_rgb(around)
+        place = Place(view, (x, y + picture.top, width, height))
+        for pixel in spot[np.linalg.norm(away, axis=1) >= UNLIKE]:
+            yield place, around, pixel
 
 
 def _small(picture: Picture) -> list[tuple[int, int, int, int]]:
