@@ -40,8 +40,12 @@ CALIBRATION = Kind(
 TRAINING = Kind(
     *("training", "trainings", "loss of held-out PSNR", "dB", LOST_FINE_DB, LOST_FAILED_DB),
     {
-        **{SILENT: GREEN, REPAIRED: SKY, TRAIN_WARNED: PINK, WEAK: ORANGE},
-        **{REFUSED: VERMILION, CRASHED: BLACK},
+        SILENT: GREEN,
+        REPAIRED: SKY,
+        TRAIN_WARNED: PINK,
+        WEAK: ORANGE,
+        REFUSED: VERMILION,
+        CRASHED: BLACK,
     },
     informs=(REPAIRED,),
 )

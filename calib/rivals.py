@@ -16,7 +16,7 @@ from toonset.calib.joint import JointFit, JointProblem, SheetModel
 from toonset.calib.match import Drawing
 from toonset.camera import rotation_distance
 
-WIDTHS = np.full(5, 0.01)
+WIDTHS = np.full(5, 0.01)  # robust ones over the figure's height: rivals are near an optimum
 WORTH = 6.0  # nats behind the best: rivals farther behind do not count
 
 
@@ -30,7 +30,7 @@ def steadied(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -
         drawing: at full resolution, the sheet's offset taken off.
         joint: the sheet's fit.
         index: of the view.
-        found: refined to the outline alone, and what to call the best evidence.
+        found: refined to the outline alone.
     """
     pose, surface = joint.poses[index], joint.body.surface
     doubtful = [
