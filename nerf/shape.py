@@ -13,7 +13,7 @@ from toonset.nerf.evidence import HullEvidence, choose_missing
 from toonset.nerf.fairing import faired
 from toonset.nerf.hull import Hull, carve
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.silhouette import alpha_of, figure_px
+from toonset.nerf.silhouette import alpha_of, figure_px, widened
 
 VOXELS_PER_PX, VOXELS = 1.8, (64, 300)
 LEVELS = 15  # of support above 0: a border lies within 0.03 px, in a quarter less of a saved model
@@ -44,7 +44,8 @@ def hull_of(
     missing = options.missing_views
     evidence = HullEvidence(missing, ()) if missing is not None else choose_missing(cameras, alphas)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
-    hull = carve(cameras, alphas, voxels, evidence.missing)
+    wide = [torch.as_tensor(widened(alpha_of(frame))) for frame in frames]
+    hull = carve(cameras, wide, voxels, evidence.missing)
     slack = SLACK * apart_px / (hull.voxel * max(camera.scale for camera in cameras))
     hull = faired(hull, cameras, alphas, slack) if options.fair else hull
     # Run folders hold bytes, deflated: train on exactly what will be loaded.

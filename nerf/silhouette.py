@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from toonset.dataset.scene import Frame
 
 OPAQUE = 128  # alpha from which a pixel belongs to the figure
+FAINT = 0.02  # coverage below which nothing is there
 
 
 def mask_of(
@@ -23,6 +25,36 @@ def mask_of(
 def alpha_of(frame: Frame) -> Float[np.ndarray, "height width"]:
     """Return a frame's coverage in [0, 1]."""
     return frame.rgba[..., 3] / np.float32(255)
+
+
+def widened(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    """Return the coverage with thin parts as wide as they cover pixels.
+
+    Interpolated between pixel centres, a line that covers the share a of its pixels is in the mask
+    (coverage 1/2) on a width of 2 - 1 / a, if at all; with 1 / (2 - a) instead of a it is a wide.
+    """
+    return np.where(thin(alpha), 1 / (2 - alpha), alpha)
+
+
+def thin(alpha: Float[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
+    """Return faint pixels that hang on the figure and are no border of it.
+
+    A cape's corner seen from its edge covers too little of any pixel to be in the mask. On a
+    border, what is on one side of a pixel covers more than the pixel does; on a ridge, both sides
+    together cover less.
+    """
+    height, width = alpha.shape
+    padded = np.pad(alpha, 1)
+    ridge = np.zeros(alpha.shape, dtype=bool)
+    for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        before = padded[1 - down :, 1 - across :][:height, :width]
+        after = padded[1 + down :, 1 + across :][:height, :width]
+        ridge |= before + after <= alpha
+    inside = alpha >= 0.5
+    thick = cv2.morphologyEx(alpha, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    _, parts = cv2.connectedComponents((alpha > FAINT).astype(np.uint8), connectivity=8)
+    hanging = (parts > 0) & np.isin(parts, np.unique(parts[inside]))
+    return ridge & hanging & ~inside & (thick < alpha / 2)
 
 
 def has_figure(frame: Frame) -> bool:

@@ -19,12 +19,13 @@ from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.nerf.bounds import box_of_masks
+from toonset.nerf.silhouette import FAINT, thin
 
 FIGURE_PX = 128  # larger figures are made this small; smaller ones stay as they are
 RIM_POINTS = 50.0  # rim points along a length as long as the figure
 ROOM = 1.12  # of the figure's longer side: the square on which it may move
 SHORTEST = 12  # rim points of a contour below which it is a speck
-SURE, SLOPE = 0.02, 0.3  # alpha that tells the rim's place; slope below which a ridge has none
+SLOPE = 0.3  # below which a ridge's slope has no direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,12 +129,16 @@ def sample(
 def signed_distance(
     alpha: Float[np.ndarray, "height width"],
 ) -> Float[np.ndarray, "height width"]:
-    """Return the distance to the rim (alpha 1/2) in pixels, > 0 inside."""
-    inside = (alpha >= 0.5).astype(np.uint8)
+    """Return the distance to the rim (alpha 1/2) in pixels, > 0 inside.
+
+    What is too thin to cover half a pixel, as a cape's corner seen from its edge, has no rim, but is
+    there: around it, distances are to its middle.
+    """
+    inside = ((alpha >= 0.5) | thin(alpha)).astype(np.uint8)
     distance = cv2.distanceTransform(inside, cv2.DIST_L2, 5)
     distance -= cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
     distance -= np.sign(distance) * np.float32(0.5)  # from pixel centres to the rim between them
-    known = (alpha > SURE) & (alpha < 1 - SURE) & (np.abs(distance) < 1)
+    known = (alpha > FAINT) & (alpha < 1 - FAINT) & (np.abs(distance) < 1)
     return np.where(known, alpha - 0.5, distance).astype(np.float32)
 
 

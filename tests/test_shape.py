@@ -39,3 +39,23 @@ def test_the_fair_surface_is_rounder_than_the_hull_as_carved() -> None:
     carved = 16 / 3 * RADIUS**3  # two cylinders that cross
     assert abs(volume(fair=False) / carved - 1) < 0.05
     assert abs(volume(fair=True) / true - 1) < 0.12
+
+
+def test_a_thin_plate_is_kept_where_it_is_seen_from_its_edge() -> None:
+    """A plate of a third of a pixel, standing through a ball, is in no mask from the side."""
+    frames = []
+    for frame in ball(8).frames:
+        fine = frame.camera.resized(8)
+        origins, directions = fine.rays(fine.pixel_grid())
+        away = np.linalg.norm(np.cross(origins, directions), axis=-1)
+        along = (origins[..., 2] / -directions[..., 2])[..., None]
+        x, y, _ = np.moveaxis(origins + along * directions, -1, 0)
+        drawn = (away < 0.5) | ((np.abs(x) < 0.8) & (np.abs(y) < 0.9))
+        if abs(directions[0, 0, 2]) < 1e-6:  # from its edge
+            drawn = (away < 0.5) | ((np.abs(origins[..., 2]) < 1 / 72) & (np.abs(y) < 0.9))
+        rgba = frame.rgba.copy()
+        rgba[..., 3] = 255 * drawn.reshape(SIDE, 8, SIDE, 8).mean(axis=(1, 3))
+        frames.append(Frame(frame.name, frame.camera, rgba))
+    hull, _ = hull_of(Scene(tuple(frames), None, "plate"), TrainOptions(missing_views=0))
+    places = np.stack(np.meshgrid([-0.7, 0.7], [-0.8, 0.8], [0.0]), axis=-1).reshape(-1, 3)
+    assert (hull.support_at(torch.as_tensor(places, dtype=torch.float32)) > 0.2).all()

@@ -39,12 +39,12 @@ def camera_at(yaw_deg: float, elevation_deg: float = 8.0, side: int = SIDE) -> C
     )
 
 
-def draw(camera: Camera) -> np.ndarray:
+def draw(camera: Camera, balls=BALLS) -> np.ndarray:
     """Return the balls' picture: coloured by place, so that what moves can be seen."""
     fine = camera.resized(4)
     origins, directions = fine.rays(fine.pixel_grid())
     hit = np.zeros(origins.shape[:2], dtype=bool)
-    for middle, axes in BALLS:
+    for middle, axes in balls:
         o, d = (origins - middle) / axes, directions / axes
         a, b, c = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
         hit |= b * b > a * c
@@ -102,4 +102,6 @@ def random_warp(seed: int, size: float = 0.01) -> Warp:
 def balls() -> SimpleNamespace:
     """Return the functions above by name."""
     shared = (camera_at, draw, sheet, bent_sheet, misplaced, random_warp)
-    return SimpleNamespace(SIDE=SIDE, **{function.__name__: function for function in shared})
+    return SimpleNamespace(
+        SIDE=SIDE, BALLS=BALLS, **{function.__name__: function for function in shared}
+    )

@@ -55,6 +55,18 @@ def test_rays_of_a_perfect_sheet_touch_every_figure(balls) -> None:
         assert touch(placed, view, outline.rim).apart.max() < 0.6
 
 
+def test_a_thin_part_is_there_where_it_is_seen_from_its_edge(balls) -> None:
+    """A cape's corner covers a third of a pixel from the side: no rim, but no disagreement."""
+    cape = ((0.0, -0.55, -0.5), (0.35, 0.45, 0.005))
+    frames = []
+    for frame in balls.sheet().frames:
+        frames.append(replace(frame, rgba=balls.draw(frame.camera, (*balls.BALLS, cape))))
+    found = outlines(replace(balls.sheet(), frames=tuple(frames)))
+    placed = Placed.of(found, ShiftAndScale.expected(), np.zeros((8, 3)))
+    apart = [touch(placed, view, outline.rim).apart for view, outline in enumerate(found.views)]
+    assert np.concatenate(apart).max() < 1.3  # 2.7 where only pixels covered by half count
+
+
 def test_gradient_of_the_disagreement(balls) -> None:
     """The fit's first step goes downhill as steeply as finite differences say."""
     from toonset.nerf.warp_fit import _normal, _touches
