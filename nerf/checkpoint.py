@@ -38,7 +38,7 @@ from toonset.reading import read_whole
 from toonset.schema_name import schema_version
 
 FILE, TENSORS = "checkpoint.json", "checkpoint-*.safetensors"
-SCHEMA, VERSION = "toonset-checkpoint", 2  # 1: a step's rays were one batch
+SCHEMA, VERSION = "toonset-checkpoint", 3  # 1: a step's rays were one batch; 2: borders were harder
 MAX_BYTES = 4 * 2**30
 GROUPS = ("parameters", "means", "squares", "rays")
 SINGLE = ("queue", "generator", "torch_generator", "history")

@@ -29,7 +29,7 @@ from toonset.dataset.picture import encode_grey_png, encode_png
 from toonset.errors import BundleError
 from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.fields import DENSITY_SHIFT
-from toonset.nerf.hull import LEVEL
+from toonset.nerf.hull import FULL
 from toonset.nerf.run_folder_tensors import rows_near
 from toonset.nerf.trained import TrainedField
 
@@ -123,7 +123,7 @@ def _about(
             "voxel": hull.voxel,
             "shape": list(hull.support.shape),
             "columns": columns,
-            "level": LEVEL,
+            "level": FULL,
         },
         "step": trained.step,
         "samples": trained.samples,
