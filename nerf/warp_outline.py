@@ -131,8 +131,8 @@ def signed_distance(
 ) -> Float[np.ndarray, "height width"]:
     """Return the distance to the rim (alpha 1/2) in pixels, > 0 inside.
 
-    What is too thin to cover half a pixel, as a cape's corner seen from its edge, has no rim, but is
-    there: around it, distances are to its middle.
+    What is too thin to cover half a pixel, as a cape's corner seen from its edge, has no rim, but
+    is there: around it, distances are to its middle.
     """
     inside = ((alpha >= 0.5) | thin(alpha)).astype(np.uint8)
     distance = cv2.distanceTransform(inside, cv2.DIST_L2, 5)
