@@ -16,6 +16,9 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import alpha_of, figure_px, widened
 
 VOXELS_PER_PX, VOXELS = 1.8, (64, 300)
+# Views that hold each other's thin parts back: with them as wide as they cover pixels, 8 views gain
+# 0.15 dB (mean of six), 4 lose 0.25 (thirteen)
+WIDE_FROM = 6
 LEVELS = 15  # of support above 0: a border lies within 0.03 px, in a quarter less of a saved model
 SLACK = 1.5  # times the outlines' disagreement: as far as the surface may leave the hull
 
@@ -44,8 +47,8 @@ def hull_of(
     missing = options.missing_views
     evidence = HullEvidence(missing, ()) if missing is not None else choose_missing(cameras, alphas)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
-    wide = [torch.as_tensor(widened(alpha_of(frame))) for frame in frames]
-    hull = carve(cameras, wide, voxels, evidence.missing)
+    wide = [torch.as_tensor(widened(alpha.numpy())) for alpha in alphas]
+    hull = carve(cameras, wide if len(frames) >= WIDE_FROM else alphas, voxels, evidence.missing)
     slack = SLACK * apart_px / (hull.voxel * max(camera.scale for camera in cameras))
     hull = faired(hull, cameras, alphas, slack) if options.fair else hull
     # Run folders hold bytes, deflated: train on exactly what will be loaded.
