@@ -98,8 +98,8 @@ PLOTS: dict[str, Plot] = {
     "paper": TRAINING,
     "palette": Plot(
         (COLORS_FOUND,),
-        *("seconds", "CPU seconds per sheet", "CPU s"),
-        *("", "drawn characters"),
+        *("CPU seconds", "CPU seconds per sheet", "CPU s"),
+        *("", "drawings of all sizes and kinds"),
         mean=True,
         told={
             "colorgram, true k": "told how many colours",
@@ -208,7 +208,7 @@ def _pooled(records: Sequence[Record]) -> list[Record]:
     for record in merits:
         own = {f"{record.group}: {case}": value for case, value in record.by_case.items()}
         found.setdefault(record.method, {}).update(own)
-    sizes = dict.fromkeys(r.group for r in records if r.metric == "seconds") if merits else {}
+    sizes = dict.fromkeys(r.group for r in records if r.metric == "CPU seconds") if merits else {}
     return [
         summarise(
             list(values.values()),

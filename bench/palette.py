@@ -21,6 +21,7 @@ from toonset.bench.record import Direction, Record, summarise
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
 
 SHEETS_WH = ((150, 150), (1200, 600), (4096, 2048))
+CPU_SECONDS = "CPU seconds"
 TIMED_CONDITION = "lines, png"
 REPEATS = 3  # the least counts; once for what takes over a second
 SLOW_S = 1.0
@@ -74,7 +75,13 @@ def bench_palette(
     records = [r for (group, name), of in scores.items() for r in _records(of, name, group, seed)]
     records += [
         summarise(
-            times, method=name, metric="seconds", unit="s", direction="lower", seed=seed, group=size
+            times,
+            method=name,
+            metric=CPU_SECONDS,
+            unit="s",
+            direction="lower",
+            seed=seed,
+            group=size,
         )
         for (size, name), times in seconds.items()
     ]

@@ -13,7 +13,7 @@ from itertools import islice
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, Int32, UInt8
 
 from toonset.palette.false_paints import reach_of
 from toonset.palette.names import hex_of
@@ -30,6 +30,7 @@ MOST_PARTS, MOST = 4096, 512
 ALL = 1e4  # weight, beside levels, of the demand that a blend's shares add up to one
 
 Rgb = UInt8[np.ndarray, " 3"]
+Boxes = Int32[np.ndarray, "n 4"]  # left, top, width, height
 
 
 def lone_spot_notes(histogram: Histogram, paints: Sequence[Paint]) -> tuple[str, ...]:
@@ -60,36 +61,50 @@ def lone_spot_notes(histogram: Histogram, paints: Sequence[Paint]) -> tuple[str,
 
 def _spots(histogram: Histogram) -> Iterator[tuple[Place, Rgb, Rgb]]:
     """Yield spots that lie alone in a paint, that paint's colour, and pixels unlike it."""
-    parts = ((v, *box) for v, p in enumerate(histogram.pictures) for box in _small(p))
-    for view, x, y, width, height in islice(parts, MOST_PARTS):
-        picture = histogram.pictures[view]
-        box = picture.words[y - 1 : y + height + 1, x - 1 : x + width + 1]
-        colors = rgb_of_words(box)
-        inside = np.zeros(box.shape, dtype=bool)
-        inside[1:-1, 1:-1] = True
-        even = np.ptp(colors[~inside], axis=0).max() <= 2 * histogram.noise
-        if not even or (box < OPAQUE_WORD).any():
-            continue
-        around = np.median(colors[~inside], axis=0).astype(np.uint8)
-        spot = np.unique(colors[inside], axis=0)
-        away = even_oklab_from_rgb(spot) - even_oklab_from_rgb(around)
-        place = Place(view, (x, y + picture.top, width, height))
-        for pixel in spot[np.linalg.norm(away, axis=1) >= UNLIKE]:
-            yield place, around, pixel
+    left = MOST_PARTS
+    for view, picture in enumerate(histogram.pictures):
+        boxes = _small(picture)[:left]
+        left -= len(boxes)
+        for x, y, width, height in boxes[_alone(boxes, picture, histogram.noise)].tolist():
+            colors = rgb_of_words(picture.words[y - 1 : y + height + 1, x - 1 : x + width + 1])
+            inside = _inside(width, height)
+            around = np.median(colors[~inside], axis=0).astype(np.uint8)
+            spot = np.unique(colors[inside], axis=0)
+            away = even_oklab_from_rgb(spot) - even_oklab_from_rgb(around)
+            place = Place(view, (x, y + picture.top, width, height))
+            for pixel in spot[np.linalg.norm(away, axis=1) >= UNLIKE]:
+                yield place, around, pixel
 
 
-def _small(picture: Picture) -> list[tuple[int, int, int, int]]:
+def _alone(boxes: Boxes, picture: Picture, noise: int) -> Bool[np.ndarray, " n"]:
+    """Return which boxes have one paint all round, and nothing transparent; equal sizes at once."""
+    alone = np.zeros(len(boxes), dtype=bool)
+    for width, height in np.unique(boxes[:, 2:], axis=0).tolist():
+        equal = np.flatnonzero((boxes[:, 2:] == (width, height)).all(axis=1))
+        x, y = boxes[equal, :2].T[..., None, None]
+        words = picture.words[y + np.arange(-1, height + 1)[:, None], x + np.arange(-1, width + 1)]
+        opaque = (words >= OPAQUE_WORD).all(axis=(1, 2))
+        around = rgb_of_words(words[:, ~_inside(width, height)])
+        alone[equal] = opaque & (np.ptp(around, axis=1).max(axis=1) <= 2 * noise)
+    return alone
+
+
+def _inside(width: int, height: int) -> Bool[np.ndarray, "rows columns"]:
+    """Return where a box is that has one more pixel on every side."""
+    return np.pad(np.ones((height, width), dtype=bool), 1)
+
+
+def _small(picture: Picture) -> Boxes:
     """Return the boxes of small connected parts that are not flat, away from the border."""
     height, width = picture.words.shape
     if min(height, width) < 3:  # nothing is away from the border; OpenCV wants a pixel at least
-        return []
+        return np.zeros((0, 4), dtype=np.int32)
     rough = np.zeros((height, width), dtype=np.uint8)
     rough.ravel()[picture.rough] = 1
     stats = cv2.connectedComponentsWithStats(rough, connectivity=8)[2][1:]
     x, y, wide, high = stats[:, :4].T
     inside = (x > 0) & (y > 0) & (x + wide < width) & (y + high < height)
-    small = stats[inside & (np.maximum(wide, high) <= WIDEST), :4]
-    return [(x, y, wide, high) for x, y, wide, high in small.tolist()]
+    return stats[inside & (np.maximum(wide, high) <= WIDEST), :4]
 
 
 def _apart(pixel: Rgb, around: Rgb, paints: Sequence[Paint], noise: int) -> float:

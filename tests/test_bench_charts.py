@@ -244,15 +244,15 @@ def test_colours_are_pooled_over_conditions_per_size_of_sheet() -> None:
     records = [
         record("F1 of colours", "default", {"a": 0.9, "b": 1.0}, "png"),
         record("F1 of colours", "default", {"a": 0.5, "b": 0.8}, "jpeg"),
-        record("seconds", "default", {"": 0.1}, "150 x 150"),
-        record("seconds", "default", {"": 0.4}, "1200 x 600"),
+        record("CPU seconds", "default", {"": 0.1}, "150 x 150"),
+        record("CPU seconds", "default", {"": 0.4}, "1200 x 600"),
     ]
     small, large = charts_of("palette", records, "seed 0")
     assert (small.group, large.group) == ("150 x 150", "1200 x 600")
     (only,) = large.points
     assert (only.cost, only.n) == (0.4, 4)
     assert only.merit == pytest.approx(0.8)
-    assert "n = 4 drawn characters; seed 0" in large.caption
+    assert "n = 4 drawings of all sizes and kinds; seed 0" in large.caption
 
 
 def test_a_second_chart_has_quality_against_model_size() -> None:

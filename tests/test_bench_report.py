@@ -79,7 +79,7 @@ def test_a_bench_writes_charts_in_four_forms_and_the_page(
         for method in ("default", "extcolors")
         for metric, by_case, group in (
             ("F1 of colours", {"a": 0.9}, "png"),
-            ("seconds", {"": 0.1}, "150 x 150"),
+            ("CPU seconds", {"": 0.1}, "150 x 150"),
         )
     ]
     monkeypatch.setattr("toonset.bench.palette.bench_palette", lambda *_, **__: (records, "table"))
