@@ -73,18 +73,20 @@ class InkStyle:
     borders: Pairs
 
 
-def without_ink(scene: Scene) -> tuple[Scene, InkStyle | None]:
+def without_ink(scene: Scene, as_drawn: Scene | None = None) -> tuple[Scene, InkStyle | None]:
     """Return the scene with paint under its contour lines, and the lines' style.
 
     Alpha is kept. A scene without outlines is returned as it is, with None.
 
     Args:
         scene: posed drawings of one character; colour borders are known only with labels.
+        as_drawn: the same before drawings were bent, if they were: bending blurs outlines, which
+            then look up to five times as wide.
 
     Raises:
         BundleError: the views share no volume.
     """
-    widths = [outline_width(frame.rgba) for frame in scene.frames]
+    widths = [outline_width(frame.rgba) for frame in (as_drawn or scene).frames]
     outlined = [width for width in widths if width > 0]
     if not outlined or len(outlined) < FEWEST_OUTLINED * len(widths):
         return scene, None

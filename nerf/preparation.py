@@ -100,11 +100,11 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
         scene: posed drawings; without labels the contour lines stay.
         options: its `turn`, `register`, `unbend` and `ink` switch the steps.
     """
-    scene, turning, registration, unbending = _agreeing(scene, options)
+    straight, turning, registration, unbending = _agreeing(scene, options)
     ink = None
     if options.ink and scene.palette is not None:
-        scene, ink = without_ink(scene)
-    return Prepared(scene, turning, registration, unbending, ink)
+        straight, ink = without_ink(straight, scene)
+    return Prepared(straight, turning, registration, unbending, ink)
 
 
 def _agreeing(

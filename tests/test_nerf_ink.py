@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 
@@ -113,6 +114,16 @@ def test_an_eye_that_hangs_free_stays_though_its_border_has_a_line() -> None:
     first = replace(scene.frames[0], rgba=rgba, labels=labels)
     bare, _ = without_ink(replace(scene, frames=(first, *scene.frames[1:])))
     assert (bare.frames[0].rgba[eye] == rgba[eye]).all()
+
+
+def test_lines_are_as_wide_as_drawn_where_drawings_are_bent_first() -> None:
+    drawn = scene_of(sheet(2, 2.0))
+    bent = [cv2.GaussianBlur(frame.rgba, (5, 5), 1.0) for frame in drawn.frames]
+    pairs = zip(drawn.frames, bent, strict=True)
+    scene = replace(drawn, frames=tuple(replace(frame, rgba=rgba) for frame, rgba in pairs))
+    styles = [without_ink(*given)[1] for given in ((drawn,), (scene, drawn), (scene,))]
+    true, found, blurred = [style and style.views_px for style in styles]
+    assert found == true != blurred
 
 
 def test_black_cloth_stays() -> None:
