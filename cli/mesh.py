@@ -20,7 +20,11 @@ def mesh(
     ],
     faces: Annotated[
         int | None,
-        typer.Option("--faces", min=100, help="Triangles at most (default: as fine as the run)."),
+        typer.Option(
+            "--faces",
+            min=100,
+            help="Triangles at most, if they can close it (default: as fine as the run).",
+        ),
     ] = None,
     recolor: Annotated[
         list[str] | None,
@@ -54,8 +58,9 @@ def mesh(
     write_mesh_files(files, out)
     sizes = {name: len(data) for name, data in files.items()}
     count = len(surface.faces)
+    fewest = " (fewer would open it)" if faces is not None and count > faces else ""
     printer.result(
         {"out": out, "faces": count, "vertices": len(surface.vertices), "bytes": sizes},
-        f"{out}: {count} faces; "
+        f"{out}: {count} faces{fewest}; "
         + ", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes.items()),
     )

@@ -26,7 +26,9 @@ QuietFlag = Annotated[
         "--quiet", "-q", help="Print results and reasons only.", rich_help_panel=OUTPUT_PANEL
     ),
 ]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
+SeedOption = Annotated[
+    int, typer.Option("--seed", help="Seed of everything random.", min=0, max=2**63 - 1)
+]
 ForceFlag = Annotated[
     bool, typer.Option("--force", help="Replace an existing output.", rich_help_panel=OUTPUT_PANEL)
 ]

@@ -23,6 +23,7 @@ from toonset.cli.train_threads import AUTO, checked
 DEVICES = ("auto", "cpu", "cuda")
 INKS = ("paint", "redraw")
 WHILE_PANEL = "While it runs"
+MOST_BUDGET_S = 1e9
 
 
 def train(
@@ -40,7 +41,15 @@ def train(
         typer.Option("--steps", min=1, help="Optimiser steps (default: 400)."),
     ] = None,
     budget: Annotated[
-        float | None, typer.Option("--budget", min=0.1, help="Train for at most SECONDS.")
+        float | None,
+        typer.Option(
+            "--budget",
+            metavar="SECONDS",
+            min=0.1,
+            max=MOST_BUDGET_S,
+            help="Stop after this time, drawings and hull included, but not before 30 steps; "
+            "finer and coarser planes are not tried then.",
+        ),
     ] = None,
     preset: Annotated[
         str,

@@ -72,6 +72,7 @@ def run(request: Request, printer: Printer) -> int:
     """Train, write the run and print the result; return the exit code."""
     from toonset.dataset.transforms import read_scene
     from toonset.nerf.gaps import guesses
+    from toonset.nerf.silhouette import check_cut_out, has_figure
     from toonset.nerf.symmetry import with_all_mirrored
 
     place = request.place
@@ -79,6 +80,10 @@ def run(request: Request, printer: Printer) -> int:
     checkpoint = place.checkpoint() if request.resume else None
     options = _options(request, checkpoint)
     scene = read_scene(request.bundle)
+    check_cut_out(scene)
+    for frame in scene.frames:
+        if not has_figure(frame):
+            printer.say(f"{frame.name} shows no figure")
     held_out = None if request.test is None else read_scene(request.test)
     scene = _prepared(scene, request, options, checkpoint, printer)
     stopper = Stopper(printer)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,6 +24,7 @@ from toonset.nerf.trained import Step, TrainedField
 TABLES_RATE = 0.2
 BETAS = (0.9, 0.99)  # a few hundred steps are too few for a memory of a thousand
 LAST_RATE = 0.1  # of the first: exponential decay over the training
+LEAST_STEPS = 30  # that a budget leaves: fewer show nothing
 HALF_FROM = 4096  # values: tables of this size and more are stored in half precision
 
 Progress = Callable[[str], None]
@@ -62,6 +64,7 @@ def fit(
     generator: torch.Generator,
     watch: Watch | None = None,
     start: FitState | None = None,
+    spent_s: float = 0.0,
 ) -> tuple[list[Step], str]:
     """Fit `model` in place; return the history and why it ended.
 
@@ -76,8 +79,9 @@ def fit(
         generator: shuffles the batches.
         watch: looks on after every step, and may end the training.
         start: go on from here; None: from the model as it is.
+        spent_s: seconds of the budget that are over.
     """
-    loop = _Loop(model, rays, weights, options, generator)
+    loop = _Loop(model, rays, weights, options, generator, spent_s)
     if start is not None:
         loop.restore(start)
     good = LastGood(model, [step.loss for step in loop.history])
@@ -135,9 +139,10 @@ class _Loop:
         weights: Weights,
         options: TrainOptions,
         generator: torch.Generator,
+        spent_s: float,
     ) -> None:
         self._model, self._rays, self._weights = model, rays, weights
-        self._options, self._generator = options, generator
+        self._options, self._generator, self._spent_s = options, generator, spent_s
         tables = {id(values) for values in model.field.tables()}
         named = sorted(model.named_parameters(), key=lambda pair: id(pair[1]) not in tables)
         self._parameters: dict[str, Tensor] = dict(named)  # tables first, as in the groups
@@ -150,15 +155,20 @@ class _Loop:
         self.clock = _Clock()
 
     def out_of_time(self) -> bool:
-        """Return whether the budget is spent; one step is always taken."""
-        budget = self._options.budget_s
-        return budget is not None and bool(self.history) and self.clock.seconds >= budget
+        """Return whether the budget is spent; a few steps are always taken."""
+        return len(self.history) >= LEAST_STEPS and self._by_clock() >= 1
 
     def progress(self) -> float:
         """Return how much of the training is over, by steps or by the clock if that is further."""
-        budget = self._options.budget_s
-        by_clock = 0.0 if budget is None else self.clock.seconds / budget
-        return max(len(self.history) / self._options.steps, min(by_clock, 1.0))
+        steps = len(self.history)
+        return max(steps / self._options.steps, min(self._by_clock(), steps / LEAST_STEPS, 1.0))
+
+    def _by_clock(self) -> float:
+        """Return which share of the budget's seconds for steps is over."""
+        if self._options.budget_s is None:
+            return 0.0
+        left_s = self._options.budget_s - self._spent_s
+        return self.clock.seconds / left_s if left_s > 0 else math.inf
 
     def step(self, good: LastGood) -> str:
         """Take a step, unless something is wrong: then return what."""

@@ -7,6 +7,7 @@ from jaxtyping import Float, UInt8
 
 from toonset.errors import PaletteError
 from toonset.nerf.ink_redraw import inked
+from toonset.nerf.trained import NO_PALETTE
 from toonset.nerf.views import Rendering
 
 
@@ -28,7 +29,7 @@ def palette_picture(
         PaletteError: the run was trained without palette.
     """
     if rendering.shares is None or palette is None:
-        raise PaletteError("run: was trained without palette; train again without --no-palette")
+        raise PaletteError(NO_PALETTE)
     color = rendering.shares @ (palette / 255.0)
     if rendering.ink is not None and rendering.ink_rgb is not None:
         color = inked(color, rendering.alpha, rendering.ink, rendering.ink_rgb)
@@ -65,7 +66,7 @@ def label_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width"]:
         PaletteError: the run was trained without palette.
     """
     if rendering.labels is None:
-        raise PaletteError("run: was trained without palette; train again without --no-palette")
+        raise PaletteError(NO_PALETTE)
     return rendering.labels
 
 

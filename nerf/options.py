@@ -15,7 +15,8 @@ class TrainOptions:
 
     Attributes:
         steps: optimiser steps; half as many again give 0.1 dB more on eight views of 150 px.
-        budget_s: stop after this many seconds of training; results then depend on the machine.
+        budget_s: stop after this many seconds, drawings and hull included, but not before 30 steps;
+            results then depend on the machine.
         seed: of initial weights and ray order. Same seed, same result, bit for bit, on a CPU.
         device: "auto" (a GPU where there is one), "cpu" or "cuda".
         resolution: cells of the planes along the character's longest side; None: one cell per

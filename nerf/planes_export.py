@@ -48,7 +48,7 @@ def planes_files(trained: TrainedField) -> dict[str, bytes]:
     field = trained.field
     if not isinstance(field, TriplaneField):
         raise BundleError(
-            f"run: its field is {field.spec.kind!r}, which has no planes; train a triplane"
+            f"run: its field has no planes ({field.spec.kind}); train again without --field"
         )
     used = rows_near(field, trained.hull)
     sizes = [field.shape[a] * field.shape[b] for a, b in PLANES]

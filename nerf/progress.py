@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from toonset.nerf.fitting import Moment
+from toonset.nerf.trained import HeldOut
 
 RECENT = 50  # steps whose mean loss is shown: single batches differ
 
@@ -19,7 +20,7 @@ class Status:
         loss: mean of the last steps.
         seconds: of training so far.
         left_s: seconds that are still to come, by steps or budget, whichever ends first.
-        psnr: of held-out views when they were last looked at, dB; None without.
+        held_out: held-out views when they were last looked at; None: they were not.
     """
 
     steps: int
@@ -27,20 +28,22 @@ class Status:
     loss: float
     seconds: float
     left_s: float
-    psnr: float | None
+    held_out: HeldOut | None
 
 
-def status_of(moment: Moment, of: int, psnr: float | None) -> Status:
+def status_of(moment: Moment, of: int, held_out: HeldOut | None) -> Status:
     """Return where a training stands."""
     recent = [step.loss for step in moment.history[-RECENT:]]
     last = moment.history[-1]
     left_s = last.seconds * (1 / max(moment.progress, 1e-9) - 1)
-    return Status(len(moment.history), of, sum(recent) / len(recent), last.seconds, left_s, psnr)
+    loss = sum(recent) / len(recent)
+    return Status(len(moment.history), of, loss, last.seconds, left_s, held_out)
 
 
 def line_of(status: Status) -> str:
     """Return a status as one line."""
-    held_out = "" if status.psnr is None else f", held-out {status.psnr:.2f} dB"
+    seen = status.held_out
+    held_out = "" if seen is None else f", held-out {seen.psnr:.2f} dB (step {seen.step})"
     return (
         f"training: step {status.steps} of {status.of}, loss {status.loss:.4f}{held_out}, "
         f"{duration(status.left_s)} left"

@@ -103,8 +103,8 @@ class Onlooker:
             self._show(moment)
         if spent - self._saved_at >= CHECKPOINT_S:
             self._save(moment)
-        psnr = self.held_out[-1].psnr if self.held_out else None
-        self.looking.tell(status_of(moment, self.options.steps, psnr))
+        seen = self.held_out[-1] if self.held_out else None
+        self.looking.tell(status_of(moment, self.options.steps, seen))
         return ""
 
     def _save(self, moment: Moment) -> bool:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from toonset.errors import PaletteError
-from toonset.nerf.trained import TrainedField
+from toonset.nerf.trained import NO_PALETTE, TrainedField
 from toonset.palette.files import parse_colors
 from toonset.palette.labels import nearest_colors
-from toonset.palette.names import hex_of
+from toonset.palette.named import RGB
+from toonset.palette.names import hex_of, name_of
+from toonset.palette.typed import is_color, rgb_of_typed
 
 
 def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
@@ -19,7 +22,8 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
 
     Args:
         trained: the run.
-        changes: "OLD=NEW", each a hex colour; OLD must be a colour of the run's palette.
+        changes: "OLD=NEW", hex colours; OLD must be a colour of the run's palette, or the name
+            that `toonset palette` gives one of them and no other.
 
     Raises:
         PaletteError: no palette, no such colour, or text that is no such pair.
@@ -27,18 +31,21 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
     if not changes:
         return trained
     if trained.palette is None:
-        raise PaletteError("run: was trained without palette; train again without --no-palette")
-    old = [tuple(color) for color in trained.palette.tolist()]
+        raise PaletteError(NO_PALETTE)
+    old: list[RGB] = [(r, g, b) for r, g, b in trained.palette.tolist()]
+    called = Counter(name_of(color) for color in old)
+    names = {name_of(color): color for color in old if called[name_of(color)] == 1}
     palette = trained.palette.copy()
     for change in changes:
         words = change.split("=")
         if len(words) != 2:
             raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
-        source, wanted = (_color(word, change) for word in words)
-        if source not in old:
-            known = ", ".join(hex_of((r, g, b)) for r, g, b in old)
-            raise PaletteError(f"--recolor {change!r}: the palette has {known}; choose one of them")
-        palette[old.index(source)] = wanted
+        source, where = words[0].strip().lower(), f"--recolor {change!r}"
+        known = names.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
+        if known not in old:
+            has = ", ".join(f"{hex_of(color)} ({name_of(color)})" for color in old)
+            raise PaletteError(f"{where}: the palette has {has}; choose one of them")
+        palette[old.index(known)] = rgb_of_typed(words[1].strip(), where)
     return replace(trained, palette=palette)
 
 
@@ -55,7 +62,7 @@ def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> 
         PaletteError: no palette in the run, none in the file, or by order and other in number.
     """
     if trained.palette is None:
-        raise PaletteError("run: was trained without palette; train again without --no-palette")
+        raise PaletteError(NO_PALETTE)
     colors = np.asarray(parse_colors(palette))
     if nearest:
         place = nearest_colors(trained.palette, colors, space="oklab")
@@ -66,10 +73,3 @@ def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> 
             "give as many in the same order, or pass --nearest"
         )
     return replace(trained, palette=colors)
-
-
-def _color(word: str, change: str) -> tuple[int, int, int]:
-    colors = np.asarray(parse_colors(word.strip()))
-    if len(colors) != 1:
-        raise PaletteError(f"--recolor {change!r}: {word!r} is not one colour")
-    return int(colors[0, 0]), int(colors[0, 1]), int(colors[0, 2])

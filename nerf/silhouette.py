@@ -8,8 +8,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.errors import BundleError
+
 if TYPE_CHECKING:
-    from toonset.dataset.scene import Frame
+    from toonset.dataset.scene import Frame, Scene
 
 OPAQUE = 128  # alpha from which a pixel belongs to the figure
 FAINT = 0.02  # coverage below which nothing is there
@@ -55,6 +57,20 @@ def thin(alpha: Float[np.ndarray, "height width"]) -> Bool[np.ndarray, "height w
     _, parts = cv2.connectedComponents((alpha > FAINT).astype(np.uint8), connectivity=8)
     hanging = (parts > 0) & np.isin(parts, np.unique(parts[inside]))
     return ridge & hanging & ~inside & (thick < alpha / 2)
+
+
+def check_cut_out(scene: Scene) -> None:
+    """Refuse drawings whose background is not transparent.
+
+    Raises:
+        BundleError: a picture is opaque all over: the whole of it would be the figure.
+    """
+    for frame in scene.frames:
+        if (frame.rgba[..., 3] == 255).all():
+            raise BundleError(
+                f"{scene.name}: {frame.name} has no transparent background; training needs figures "
+                "cut out (RGBA): `toonset split` does that"
+            )
 
 
 def has_figure(frame: Frame) -> bool:

@@ -14,7 +14,7 @@ from toonset.nerf.hull import occupancy
 from toonset.nerf.losses import straight
 from toonset.nerf.march import Rays, march
 from toonset.nerf.rendering import compositing_weights, padded
-from toonset.nerf.trained import TrainedField
+from toonset.nerf.trained import NO_PALETTE, TrainedField
 
 STEEPEST = math.radians(30)  # drawings are seen from about level; from above they say nothing
 BEFORE = 1.5  # voxels in front of the surface at which a look begins
@@ -40,7 +40,7 @@ def label_probabilities(
         PaletteError: the run was trained without palette.
     """
     if trained.classifier is None or trained.palette is None:
-        raise PaletteError("run: was trained without palette; train again without --no-palette")
+        raise PaletteError(NO_PALETTE)
     directions = _looks(vertices, faces)
     parts = []
     for start in range(0, len(vertices), POINTS_PER_CHUNK):

@@ -18,6 +18,10 @@ from toonset.nerf.preparation import Prepared
 from toonset.nerf.symmetry import Symmetry
 from toonset.nerf.warp_back import KeyWarps
 
+NO_PALETTE = (
+    "run: was trained without palette; train again without --no-palette and without --field hull"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class TrainedField:

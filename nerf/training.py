@@ -42,6 +42,7 @@ from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import prepared
 from toonset.nerf.shape import hull_of, per_px
+from toonset.nerf.silhouette import check_cut_out
 from toonset.nerf.symmetry import completed
 from toonset.nerf.threads import SIDES
 from toonset.nerf.trained import TrainedField, Training
@@ -74,12 +75,14 @@ def train(
         watch: looks on while the field is fitted.
 
     Raises:
-        BundleError: fewer than two usable views, or cameras that do not belong to the pictures.
+        BundleError: fewer than two usable views, a picture that is opaque all over, or cameras that
+            do not belong to the pictures.
         SetupError: a GPU was asked for and there is none.
     """
     tell = progress or (lambda _: None)
     clock = [time.perf_counter()]
     options, device = _resolved(options), device_of(options.device)
+    check_cut_out(scene)
     keep_freed_memory()
     torch.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
@@ -105,7 +108,8 @@ def train(
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)
     begin = watch.begin(start) if watch else None
-    history, stopped = fit(model, rays, weights, options, generator, watch, begin)
+    spent_s = clock[-1] - clock[0]
+    history, stopped = fit(model, rays, weights, options, generator, watch, begin, spent_s)
     model.to("cpu")
     seconds = dict(zip(PARTS, np.diff(clock).tolist(), strict=True))
     seconds["steps"] = history[-1].seconds if history else 0.0  # without what the watch has taken

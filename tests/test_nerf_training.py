@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +18,11 @@ from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError, PaletteError
 from toonset.nerf import field_gradients, field_loss
+from toonset.nerf import training as training_module
 from toonset.nerf.animation import encode_gif
 from toonset.nerf.batches import Batch
 from toonset.nerf.evaluation import evaluate
+from toonset.nerf.fitting import LEAST_STEPS
 from toonset.nerf.labelling import labelled
 from toonset.nerf.layers import alpha_picture, color_picture, depth_picture, palette_picture
 from toonset.nerf.metrics import compare
@@ -30,6 +34,7 @@ from toonset.nerf.trained import Training
 from toonset.nerf.training import train
 from toonset.nerf.turntable import turntable
 from toonset.nerf.views import render
+from toonset.palette.names import name_of
 
 SIDE, FINE = 48, 3
 PARTS = (  # middle, half axes, colour: body, head, a pack on one side of the back
@@ -146,7 +151,29 @@ def test_a_loss_that_is_no_number_keeps_the_last_good_state(
 def test_a_budget_ends_training() -> None:
     training = train(train_scene(), replace(QUICK, steps=100_000, budget_s=0.5))
     assert training.stopped == "budget"
-    assert 1 <= len(training.history) < 100_000
+    assert LEAST_STEPS <= len(training.history) < 100_000
+
+
+def test_a_budget_counts_what_comes_before_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = training_module.hull_of
+
+    def slow(*given: Any) -> Any:
+        time.sleep(1.0)
+        return real(*given)
+
+    monkeypatch.setattr(training_module, "hull_of", slow)
+    training = train(train_scene(), replace(QUICK, steps=100_000, budget_s=0.9))
+    assert training.stopped == "budget"
+    assert len(training.history) == LEAST_STEPS  # none of it was left
+
+
+def test_pictures_without_a_background_are_refused() -> None:
+    scene = train_scene()
+    rgba = scene.frames[2].rgba.copy()
+    rgba[..., 3] = 255
+    frames = (*scene.frames[:2], replace(scene.frames[2], rgba=rgba), *scene.frames[3:])
+    with pytest.raises(BundleError, match="no transparent background"):
+        train(replace(scene, frames=frames), QUICK)
 
 
 def test_one_view_is_refused() -> None:
@@ -206,6 +233,10 @@ def test_recolor_replaces_one_colour_and_nothing_else(training: Training) -> Non
     assert np.abs(b[full][:, :3].astype(int) - [0, 255, 0]).max() <= 3
     with pytest.raises(PaletteError, match="choose one of them"):
         recolored(training.result, ["#123456=#000000"])
+    by_name = recolored(training.result, [f"{name_of(tuple(palette[index].tolist()))}=#00ff00"])
+    assert by_name.palette is not None
+    assert changed.palette is not None
+    assert (by_name.palette == changed.palette).all()
     with pytest.raises(PaletteError, match="OLD=NEW"):
         recolored(training.result, ["#123456"])
     with pytest.raises(PaletteError, match="without palette"):
