@@ -138,6 +138,9 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
     first = merits.get(DEFAULT) or next(iter(merits.values()))
     cases = f"{len(first.by_case)} {plot.cases}"
     n = f"n = {first.n} {plot.samples} of {cases}" if plot.samples else f"n = {cases}"
+    fewest = min((p.n for p in points if not p.aside), default=first.n)
+    if plot.samples and fewest < first.n:  # slow methods have one seed
+        n += f", {fewest} of some methods"
     return Chart(
         subject=subject,
         group=f"{group}{plot.of}",

@@ -22,6 +22,7 @@ from toonset.bench.chart_labels import Box, Label, place_labels
 from toonset.bench.chart_points import PLOTS, SECOND, charts_of, points_of
 from toonset.bench.palette_methods import METHODS as PALETTE_METHODS
 from toonset.bench.pareto import Point, Standing, pareto_front, standing_of
+from toonset.bench.record import Record
 from toonset.bench.sfm import METHODS as SFM_METHODS
 from toonset.bench.train_plan import METHODS as TRAIN_METHODS
 
@@ -253,6 +254,18 @@ def test_colours_are_pooled_over_conditions_per_size_of_sheet() -> None:
     assert (only.cost, only.n) == (0.4, 4)
     assert only.merit == pytest.approx(0.8)
     assert "n = 4 drawings of all sizes and kinds; seed 0" in large.caption
+
+
+def test_captions_say_where_methods_have_fewer_trainings_than_the_default() -> None:
+    def records(seeds: int) -> list[Record]:
+        psnr = [record("held-out PSNR", name, {"a": 30.0, "b": 31.0}) for name in ("default", "mlp")]
+        seconds = [record("CPU seconds", name, {"a": 3.0, "b": 3.0}) for name in ("default", "mlp")]
+        return [replace(psnr[0], n=2 * seeds), psnr[1], *seconds]
+
+    (chart, *_) = charts_of("train", records(3), "seeds 0, 1, 2")
+    assert "n = 6 trainings of 2 characters, 2 of some methods; seeds 0, 1, 2" in chart.caption
+    (chart, *_) = charts_of("train", records(1), "seed 0")
+    assert "n = 2 trainings of 2 characters; seed 0" in chart.caption
 
 
 def test_a_second_chart_has_quality_against_model_size() -> None:
