@@ -258,7 +258,9 @@ def test_colours_are_pooled_over_conditions_per_size_of_sheet() -> None:
 
 def test_captions_say_where_methods_have_fewer_trainings_than_the_default() -> None:
     def records(seeds: int) -> list[Record]:
-        psnr = [record("held-out PSNR", name, {"a": 30.0, "b": 31.0}) for name in ("default", "mlp")]
+        psnr = [
+            record("held-out PSNR", name, {"a": 30.0, "b": 31.0}) for name in ("default", "mlp")
+        ]
         seconds = [record("CPU seconds", name, {"a": 3.0, "b": 3.0}) for name in ("default", "mlp")]
         return [replace(psnr[0], n=2 * seeds), psnr[1], *seconds]
 
