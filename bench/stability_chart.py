@@ -12,9 +12,10 @@ import numpy as np
 
 from toonset.bench.chart import COLORS
 from toonset.bench.stability_sweeps import SWEEPS
-from toonset.bench.stability_table import SOLVED_DEG, Row
+from toonset.bench.stability_table import SOLVED_DEG, WRONG_DEG, Row
 
 COLUMNS = 3
+LEGEND_COLUMNS = (2, 4, 6)  # by the columns of panels: what is as wide as they are
 ROW_HEIGHTS = (1.0, 1.0, 0.55)  # share solved, error, verdicts
 BLUE, VERMILION, GREEN, _, ORANGE, SKY, BLACK, GREY = COLORS
 VERDICTS = {"ok": GREEN, "weak": ORANGE, "ambiguous": SKY, "failed": VERMILION, "crashed": BLACK}
@@ -35,7 +36,13 @@ def draw_stability(rows: Sequence[Row], caption: str) -> bytes:
     frames = figure.subfigures(lines, columns, squeeze=False, wspace=0.03, hspace=0.03)
     for frame, panel in zip(frames.ravel(), panels, strict=False):  # the last row may have room
         _draw_panel(frame, panel)
-    figure.legend(handles=_legend(), loc="outside upper center", ncols=5, fontsize=8, frameon=False)
+    figure.legend(
+        handles=_legend(),
+        loc="outside upper center",
+        ncols=LEGEND_COLUMNS[columns - 1],
+        fontsize=8,
+        frameon=False,
+    )
     figure.supxlabel(caption, fontsize=8, color="#555555")
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
@@ -55,7 +62,8 @@ def _draw_panel(frame: Any, rows: Sequence[Row]) -> None:
     tail = np.clip([r.p95_deg for r in rows], LEAST_ERROR_DEG, MOST_ERROR_DEG)
     error.vlines(at, median, tail, color=GREY, lw=3)
     error.plot(at, median, "D-", color=BLACK, ms=4)
-    error.axhline(SOLVED_DEG, color=GREY, lw=0.8, ls=":")
+    for bound in (SOLVED_DEG, WRONG_DEG):
+        error.axhline(bound, color=GREY, lw=0.8, ls=":")
     error.set(yscale="log", ylim=(LEAST_ERROR_DEG, MOST_ERROR_DEG), yticks=(0.01, 0.1, 1, 10, 100))
     error.set_yticklabels(("", "0.1", "1", "10", "100"))
     error.minorticks_off()
@@ -97,6 +105,7 @@ def _legend() -> list[Any]:
         Line2D([], [], color=VERMILION, marker="s", ls="--", mfc="white", label="within 5°"),
         Line2D([], [], color=BLACK, marker="D", label="median error modulo twin"),
         Line2D([], [], color=GREY, lw=3, label="to its 95th percentile"),
+        Line2D([], [], color=GREY, lw=0.8, ls=":", label="5° (solved) and 15° (wrong)"),
         Line2D([], [], ls="", marker="$3!$", color=BLACK, ms=11, label="wrong views called ok"),
         *(Patch(color=color, label=name) for name, color in VERDICTS.items()),
     ]

@@ -123,6 +123,7 @@ def _write_results(
     write_bytes(folder / "stability.csv", as_csv(rows, key.seed))
     write_json(folder / "records.json", as_dicts(as_records(sheets, key.seed)))
     if rows:
-        caption = f"n = {key.counts.sheets} sheets per step, seed {key.seed}, {machine()}"
+        seeds = f"seeds {key.seed} to {key.seed + key.counts.sheets - 1}"
+        caption = f"n = {key.counts.sheets} sheets per step, {seeds}, {machine()}"
         write_bytes(folder / "stability.png", draw_stability(rows, caption))
     return rows, pages
