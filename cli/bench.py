@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -99,10 +101,12 @@ def bench(
     chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed)
     chosen.check()
     if subject is Subject.stability:
-        _stability(out, only, seed, count, quick, force, printer)
+        with kept(printer):
+            _stability(out, only, seed, count, quick, force, printer)
         return
     if subject in (Subject.train, Subject.paper):
-        _training(out, chosen, force, printer)
+        with kept(printer):
+            _training(out, chosen, force, printer)
         return
     check_output(out, [cases, sprites], WRITTEN, force=force)
     measured = measure(chosen, printer)
@@ -113,6 +117,16 @@ def bench(
     printer.say(f"machine: {machine()}, seed {seed}")
     printer.say(f"look at {out / REPORT}")
     printer.result({"records": as_dicts(measured.records)}, measured.text)
+
+
+@contextmanager
+def kept(printer: Printer) -> Iterator[None]:
+    """Say of a bench that is interrupted that it goes on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        printer.doubt("what is done is kept; the same command goes on")
+        raise
 
 
 def _training(out: Path, chosen: Chosen, force: bool, printer: Printer) -> None:

@@ -22,6 +22,8 @@ from toonset.bench.stability_sheet import BASE, draw_sheet
 from toonset.bench.stability_sweeps import SWEEPS, Sweep
 from toonset.bench.stability_table import as_csv, as_records, row
 from toonset.bench.workers import THREADS, in_order
+from toonset.cli.bench import kept
+from toonset.cli.output import Printer
 from toonset.dataset.bodies import random_body
 from toonset.errors import BundleError, SheetError
 
@@ -248,3 +250,9 @@ def test_mistakes_are_refused_before_any_work(toonset, tmp_path):
 def test_a_body_of_a_seed_is_the_sheets_body():
     np.testing.assert_array_equal(draw_sheet(3, PLAIN).mesh.vertices, random_body(3).vertices)
     assert [step for _, step in chosen("mirror", SWEEPS, quick=True)] == [0, 1, 2]
+
+
+def test_an_interrupted_bench_says_that_it_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyboardInterrupt), kept(Printer(as_json=False, quiet=True)):
+        raise KeyboardInterrupt
+    assert capsys.readouterr().err == "what is done is kept; the same command goes on\n"
