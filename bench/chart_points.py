@@ -7,6 +7,7 @@ their difference for other merits.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -157,16 +158,16 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
 
 
 def _same_as_default(points: Sequence[Point], switches: Sequence[str]) -> tuple[str, ...]:
-    """Return the switches whose runs are the default's to the bit."""
-    default = next((p for p in points if p.method == DEFAULT), None)
-    if default is None:
-        return ()
-    return tuple(
-        p.method
-        for p in points
-        if p.method in switches
-        and (p.cost, p.merit, p.by_case) == (default.cost, default.merit, default.by_case)
-    )
+    """Return the switches that had nothing to do: their runs are the default's to the bit.
+
+    Where the default has more seeds than they, they are those that share one run among them.
+    """
+
+    def figures(point: Point) -> tuple[float, float, tuple[tuple[str, float], ...]]:
+        return point.cost, point.merit, tuple(point.by_case.items())
+
+    runs = Counter(figures(p) for p in points if p.method in (DEFAULT, *switches))
+    return tuple(p.method for p in points if p.method in switches and runs[figures(p)] > 1)
 
 
 def points_of(records: Sequence[Record], plot: Plot) -> list[Point]:

@@ -291,6 +291,15 @@ def test_a_second_chart_has_quality_against_model_size() -> None:
     assert set(SECOND["train"].only) <= set(TRAIN_METHODS)
 
 
+def test_what_left_out_nothing_is_told_by_the_run_that_is_shared() -> None:
+    figures = {"default": 30.2, "without symmetry": 30.0, "without both": 30.0, "voxel": 30.0}
+    records = [record("held-out PSNR", name, {"a": psnr}) for name, psnr in figures.items()]
+    records += [record("CPU seconds", name, {"a": 9.0}) for name in figures]
+    chart = charts_of("train", records, "seeds 0, 1, 2")[0]
+    assert chart.same == ("without symmetry", "without both")
+    assert [p.method for p in chart.points] == ["default", "voxel"]
+
+
 def test_what_left_out_nothing_is_named_and_not_drawn() -> None:
     figures = {"default": 30.0, "without symmetry": 30.0, "without fairing": 29.0, "voxel": 30.0}
     records = [record("held-out PSNR", name, {"a": psnr}) for name, psnr in figures.items()]
