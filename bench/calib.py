@@ -13,8 +13,9 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from types import ModuleType
 
 import numpy as np
 from jaxtyping import Float
@@ -41,6 +42,7 @@ from toonset.bench.cases import CalibCase
 from toonset.bench.record import Record
 from toonset.bench.sfm import METHODS as SFM_METHODS
 from toonset.bench.sfm import SfmResult, aligned_errors, reconstruct
+from toonset.calib import ladder, templates
 from toonset.calib.bank import load_bank
 from toonset.calib.calibrate import calibrate
 from toonset.calib.known import Known
@@ -65,11 +67,15 @@ class Method:
         options: search effort.
         labels: the views' directions are told, to the nearest 45 degrees.
         cached: the mannequin's templates are there already.
+        alone: every drawing is a sheet of its own.
+        constants: what is no option, changed for this method: module, name and value.
     """
 
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     labels: bool = False
     cached: bool = True
+    alone: bool = False
+    constants: tuple[tuple[ModuleType, str, float], ...] = ()
 
 
 METHODS: dict[str, Method] = {
@@ -80,6 +86,10 @@ METHODS: dict[str, Method] = {
     "coarse 64, fine 120": Method(CalibrationOptions(coarse_height_px=64, fine_height_px=120)),
     "fine 500 px": Method(CalibrationOptions(fine_height_px=500)),
     "no cached templates": Method(cached=False),
+    "templates every 5 deg": Method(constants=((templates, "YAW_STEP", math.radians(5)),)),
+    "templates every 20 deg": Method(constants=((templates, "YAW_STEP", math.radians(20)),)),
+    "each drawing alone": Method(alone=True),
+    "orthographic, one scale": Method(constants=((ladder, "BIC_MARGIN", math.inf),)),
 }
 QUICK = ("default", "labels", "no cached templates")
 QUICK_SFM = ("COLMAP", "COLMAP 1000 px")
@@ -101,10 +111,11 @@ def bench_calibration(
             found = measured_baseline(case, place(case, seed))
             sheets.setdefault((case.group, method), []).append(found)
         with own_cache():
-            load_bank(prepare_surface(case.mesh))  # fills the cache
             for method in QUICK if quick else METHODS:
                 progress(f"{case.name}: {method}")
-                measured = _calibrated(case, METHODS[method])
+                with changed(METHODS[method].constants):
+                    load_bank(prepare_surface(case.mesh))
+                    measured = _calibrated(case, METHODS[method])
                 sheets.setdefault((case.group, method), []).append(measured)
     return [
         record
@@ -156,6 +167,16 @@ def own_cache() -> Iterator[None]:
                 os.environ["TOONSET_CACHE"] = before
 
 
+@contextmanager
+def changed(constants: Iterable[tuple[ModuleType, str, float]]) -> Iterator[None]:
+    """Give constants of modules other values for a while."""
+    with ExitStack() as stack:
+        for module, name, value in constants:
+            stack.callback(setattr, module, name, getattr(module, name))
+            setattr(module, name, value)
+        yield
+
+
 def measured_baseline(case: CalibCase, placed: Placed) -> MeasuredSheet:
     """Return the errors of rotations that nothing judges; views without one are counted."""
     views = []
@@ -184,6 +205,8 @@ def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
     if not method.cached:
         with own_cache():
             return _calibrated(case, replace(method, cached=True))
+    if method.alone:
+        return _calibrated_alone(case, replace(method, alone=False))
     yaws = [angles_from_rotation(rotation)[0] for rotation in case.rotations]
     known = Known(labels=named_directions(yaws)) if method.labels else None
     wall, cpu = time.perf_counter(), time.process_time()
@@ -194,6 +217,18 @@ def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
         for view, truth in zip(result.views, case.rotations, strict=True)
     )
     return MeasuredSheet(views, seconds, case.name, cpu_seconds)
+
+
+def _calibrated_alone(case: CalibCase, method: Method) -> MeasuredSheet:
+    """Return every view's errors as a sheet of one drawing, and all their seconds."""
+    pairs = zip(case.views, case.rotations, strict=True)
+    sheets = [
+        _calibrated(replace(case, views=(view,), rotations=rotation[None]), method)
+        for view, rotation in pairs
+    ]
+    views = tuple(view for sheet in sheets for view in sheet.views)
+    seconds, cpu = (sum(getattr(s, name) for s in sheets) for name in ("seconds", "cpu_seconds"))
+    return MeasuredSheet(views, seconds, case.name, cpu)
 
 
 def _measured(

@@ -25,6 +25,7 @@ from toonset.bench.calib_figures import (
 from toonset.bench.calib_table import sheets_table
 from toonset.bench.cases import CONDITIONS, CalibCase, calib_cases
 from toonset.bench.record import Record
+from toonset.calib import templates
 from toonset.calib.result import SEVERITY
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.bodies import random_body
@@ -168,6 +169,36 @@ def test_methods_get_their_labels_and_their_cache(monkeypatch: pytest.MonkeyPatc
     for method in calib.QUICK:
         own = by_metric([r for r in records if r.method == method])
         assert own["within 5 deg"].value == own["ok"].value == 1
+
+
+def test_a_drawing_alone_is_a_sheet_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    case, seen = even_case(), []
+
+    def watched(views, mesh, options, known=None):
+        seen.append(len(views))
+        return answer(case.rotations[len(seen) - 1][None])
+
+    monkeypatch.setattr(calib, "QUICK", ("each drawing alone",))
+    monkeypatch.setattr(calib, "calibrate", watched)
+    records = bench_calibration([case], 0, quick=True)
+    own = by_metric([r for r in records if r.method == "each drawing alone"])
+    assert seen == [1, 1, 1, 1]
+    assert (own["rotation error"].n, own["within 5 deg"].value) == (4, 1)
+
+
+def test_constants_are_other_for_a_method_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen, usual = [], templates.YAW_STEP
+
+    def watched(views, mesh, options, known=None):
+        seen.append((len(templates.grid()), len(os.listdir(os.environ["TOONSET_CACHE"]))))
+        raise KeyError
+
+    monkeypatch.setattr(calib, "QUICK", ("templates every 20 deg",))
+    monkeypatch.setattr(calib, "calibrate", watched)
+    with pytest.raises(KeyError):
+        bench_calibration([even_case()], 0, quick=True)
+    assert seen == [(len(templates.grid()) // 2, 1)]
+    assert usual == templates.YAW_STEP
 
 
 def test_the_users_cache_is_left_alone_whatever_happens(
