@@ -14,13 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.bench.record import Direction, Record, summarise
+from toonset.bench.record import CPU_SECONDS, Direction, Record, summarise
 from toonset.calib.result import SEVERITY
 from toonset.camera import Camera, rotation_distance
 
 WRONG = math.radians(15.0)
 SUCCESS = math.radians(5.0)
-CPU_SECONDS = "CPU seconds"
 NOT_PLACED = "views not placed"
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from toonset.bench.calib_figures import CPU_SECONDS, NOT_PLACED
-from toonset.bench.record import Record
+from toonset.bench.calib_figures import NOT_PLACED
+from toonset.bench.record import CPU_SECONDS, Record
 from toonset.calib.result import SEVERITY
 
 MISSING = "-"

@@ -15,7 +15,7 @@ import numpy as np
 
 from toonset.bench.chart import Chart
 from toonset.bench.pareto import DEFAULT, Point
-from toonset.bench.record import Record, summarise
+from toonset.bench.record import CPU_SECONDS, Record, summarise
 from toonset.bench.train_plan import MANNEQUIN, METHODS
 
 PARAMETERS = "parameters"
@@ -60,7 +60,7 @@ class Plot:
 
 TRAINING = Plot(
     ("held-out PSNR",),
-    *("CPU seconds", "CPU seconds of training", "CPU s"),
+    *(CPU_SECONDS, "CPU seconds of training", "CPU s"),
     *("trainings", "characters"),
     mean=True,
     switches=tuple(name for name, method in METHODS.items() if method.leaves_out),
@@ -99,7 +99,7 @@ PLOTS: dict[str, Plot] = {
     "paper": TRAINING,
     "palette": Plot(
         (COLORS_FOUND,),
-        *("CPU seconds", "CPU seconds per sheet", "CPU s"),
+        *(CPU_SECONDS, "CPU seconds per sheet", "CPU s"),
         *("", "drawings of all sizes and kinds"),
         mean=True,
         told={
@@ -212,7 +212,7 @@ def _pooled(records: Sequence[Record]) -> list[Record]:
     for record in merits:
         own = {f"{record.group}: {case}": value for case, value in record.by_case.items()}
         found.setdefault(record.method, {}).update(own)
-    sizes = dict.fromkeys(r.group for r in records if r.metric == "CPU seconds") if merits else {}
+    sizes = dict.fromkeys(r.group for r in records if r.metric == CPU_SECONDS) if merits else {}
     return [
         summarise(
             list(values.values()),

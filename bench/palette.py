@@ -17,11 +17,10 @@ from jaxtyping import UInt8
 
 from toonset.bench.palette_cases import PaletteCase, palette_cases
 from toonset.bench.palette_methods import LEAST_SHARE, METHODS, RGB
-from toonset.bench.record import Direction, Record, summarise
+from toonset.bench.record import CPU_SECONDS, Direction, Record, summarise
 from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
 
 SHEETS_WH = ((150, 150), (1200, 600), (4096, 2048))
-CPU_SECONDS = "CPU seconds"
 TIMED_CONDITION = "lines, png"
 REPEATS = 3  # the least counts; once for what takes over a second
 SLOW_S = 1.0

@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from toonset.bench.chart import DEFAULT
-from toonset.bench.record import Direction, Record, aligned, summarise
+from toonset.bench.record import CPU_SECONDS, Direction, Record, aligned, summarise
 from toonset.bench.train_plan import METHODS, Job
 from toonset.bench.train_run import Look, RunResult, Seen, reached, run_job
 from toonset.nerf.metrics_view import load_judges
@@ -162,7 +162,7 @@ def _quality(
 
 COLUMNS = (
     Column("seconds", "s", "lower", "s", "{:.1f}", lambda run: run.seconds),
-    Column("CPU seconds", "s", "lower", "CPU s", "{:.1f}", lambda run: run.cpu_seconds),
+    Column(CPU_SECONDS, "s", "lower", "CPU s", "{:.1f}", lambda run: run.cpu_seconds),
     Column(
         *("seconds to 0.5 dB below the end", "s", "lower", "s to -0.5 dB", "{:.1f}"),
         _near_end(lambda seen: seen.seconds),

@@ -100,13 +100,12 @@ def bench(
         raise typer.BadParameter(f"say what to measure: {', '.join(Subject)}; or --check")
     chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed)
     chosen.check()
-    if subject is Subject.stability:
-        with kept(printer):
-            _stability(out, only, seed, count, quick, force, printer)
-        return
-    if subject in (Subject.train, Subject.paper):
-        with kept(printer):
-            _training(out, chosen, force, printer)
+    if subject in (Subject.stability, Subject.train, Subject.paper):
+        with resumable(printer):
+            if subject is Subject.stability:
+                _stability(out, only, seed, count, quick, force, printer)
+            else:
+                _training(out, chosen, force, printer)
         return
     check_output(out, [cases, sprites], WRITTEN, force=force)
     measured = measure(chosen, printer)
@@ -120,7 +119,7 @@ def bench(
 
 
 @contextmanager
-def kept(printer: Printer) -> Iterator[None]:
+def resumable(printer: Printer) -> Iterator[None]:
     """Say of a bench that is interrupted that it goes on."""
     try:
         yield

@@ -47,7 +47,10 @@ def render(
     ] = None,
     recolor: Annotated[
         list[str] | None,
-        typer.Option("--recolor", help="OLD=NEW, e.g. '#aa0000=#00aa00'; repeatable; palette."),
+        typer.Option(
+            "--recolor",
+            help="OLD=NEW, e.g. '#aa0000=#00aa00' or 'teal=#00aa00'; repeatable; palette.",
+        ),
     ] = None,
     palette: Annotated[
         str | None,

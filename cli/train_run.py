@@ -80,7 +80,7 @@ def run(request: Request, printer: Printer) -> int:
     checkpoint = place.checkpoint() if request.resume else None
     options = _options(request, checkpoint)
     scene = read_scene(request.bundle)
-    check_cut_out(scene)
+    check_cut_out(scene)  # as `train` does, but before a background's colours are a palette
     for frame in scene.frames:
         if not has_figure(frame):
             printer.say(f"{frame.name} shows no figure")

@@ -63,6 +63,8 @@ def _spots(histogram: Histogram) -> Iterator[tuple[Place, Rgb, Rgb]]:
     """Yield spots that lie alone in a paint, that paint's colour, and pixels unlike it."""
     left = MOST_PARTS
     for view, picture in enumerate(histogram.pictures):
+        if not left:
+            return
         boxes = _small(picture)[:left]
         left -= len(boxes)
         for x, y, width, height in boxes[_alone(boxes, picture, histogram.noise)].tolist():

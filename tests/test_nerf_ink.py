@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-import cv2
 import numpy as np
 import pytest
 
@@ -18,6 +17,8 @@ from toonset.nerf.ink import InkStyle, without_ink
 from toonset.nerf.ink_nearest import depth_inside
 from toonset.nerf.ink_record import InkRecord
 from toonset.nerf.ink_redraw import draw_ink, ink_scale, inked
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.preparation import prepared
 from toonset.nerf.views import Rendering
 
 INK = 128
@@ -117,13 +118,16 @@ def test_an_eye_that_hangs_free_stays_though_its_border_has_a_line() -> None:
 
 
 def test_lines_are_as_wide_as_drawn_where_drawings_are_bent_first() -> None:
-    drawn = scene_of(sheet(2, 2.0))
-    bent = [cv2.GaussianBlur(frame.rgba, (5, 5), 1.0) for frame in drawn.frames]
-    pairs = zip(drawn.frames, bent, strict=True)
-    scene = replace(drawn, frames=tuple(replace(frame, rgba=rgba) for frame, rgba in pairs))
-    styles = [without_ink(*given)[1] for given in ((drawn,), (scene, drawn), (scene,))]
-    true, found, blurred = [style and style.views_px for style in styles]
-    assert found == true != blurred
+    options = SynthOptions(cell_px=120, outline_px=2.0, warp_percent=1.5)
+    drawn = scene_of(make_turnaround(random_body(2), options, 2))
+    ready, bent = (prepared(drawn, TrainOptions(ink=ink)) for ink in (True, False))
+    (_, true), (_, blurred) = (without_ink(scene) for scene in (drawn, bent.scene))
+    assert ready.unbending is not None
+    assert ready.unbending.applied
+    assert ready.ink is not None
+    assert true is not None
+    assert ready.ink.views_px == true.views_px
+    assert blurred is None or blurred.views_px != true.views_px  # bending changes what is seen
 
 
 def test_black_cloth_stays() -> None:

@@ -22,7 +22,7 @@ from toonset.bench.stability_sheet import BASE, draw_sheet
 from toonset.bench.stability_sweeps import SWEEPS, Sweep
 from toonset.bench.stability_table import as_csv, as_records, row
 from toonset.bench.workers import THREADS, in_order
-from toonset.cli.bench import kept
+from toonset.cli.bench import resumable
 from toonset.cli.output import Printer
 from toonset.dataset.bodies import random_body
 from toonset.errors import BundleError, SheetError
@@ -253,6 +253,6 @@ def test_a_body_of_a_seed_is_the_sheets_body():
 
 
 def test_an_interrupted_bench_says_that_it_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(KeyboardInterrupt), kept(Printer(as_json=False, quiet=True)):
+    with pytest.raises(KeyboardInterrupt), resumable(Printer(as_json=False, quiet=True)):
         raise KeyboardInterrupt
     assert capsys.readouterr().err == "what is done is kept; the same command goes on\n"
