@@ -22,7 +22,7 @@ from toonset.plain_text import one_line
 
 VERBS = (  # in the order in which they are used
     *("split", "calibrate", "palette", "train", "render", "evaluate", "mesh", "planes"),
-    *("consistency", "info", "check", "export", "import", "mannequin", "synth", "bench"),
+    *("consistency", "info", "check", "export", "import", "mannequin", "synth"),
 )
 
 INTERRUPTED, REFUSED = 130, 2
@@ -67,16 +67,21 @@ for _verb in VERBS:
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    run(app, "toonset")
+
+
+def run(program: typer.Typer, name: str) -> None:
+    """Run a program of verbs and leave with its exit code; mistakes are one line on stderr."""
     # Waiting threads that spin cost a loaded machine an order of magnitude; must precede torch.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     # NumPy's matrices are small here, and torch has threads of its own; must precede numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        code = app(prog_name="toonset", standalone_mode=False)
+        code = program(prog_name=name, standalone_mode=False)
     except ToonsetError as error:
-        _refuse(one_line(error))
+        _refuse(name, one_line(error))
     except UsageError as error:
-        _refuse(one_line(_usage(error)))
+        _refuse(name, one_line(_usage(error)))
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -84,11 +89,11 @@ def main() -> None:
         if error.errno not in PLACES_AT_FAULT or not isinstance(error.filename, str):
             raise
         place, reason = one_line(error.filename), error.strerror
-        _refuse(f"{place}: {reason}; free or choose another place")
+        _refuse(name, f"{place}: {reason}; free or choose another place")
     except MemoryError as error:
-        _refuse(f"out of memory ({one_line(error)}); use smaller input")
+        _refuse(name, f"out of memory ({one_line(error)}); use smaller input")
     if code == INTERRUPTED:  # typer has caught Ctrl-C
-        _say("interrupted")
+        _say(name, "interrupted")
     if code:
         sys.exit(code)
 
@@ -99,11 +104,11 @@ def _usage(error: Any) -> str:
     return f"{said}; see `{error.ctx.command_path} -h`" if error.ctx is not None else said
 
 
-def _refuse(text: str) -> NoReturn:
-    _say(text)
+def _refuse(name: str, text: str) -> NoReturn:
+    _say(name, text)
     sys.exit(REFUSED)
 
 
-def _say(text: str) -> None:
+def _say(name: str, text: str) -> None:
     over_progress = "\r\x1b[K" if sys.stderr.isatty() else ""
-    print(f"{over_progress}toonset: {text}", file=sys.stderr)
+    print(f"{over_progress}{name}: {text}", file=sys.stderr)

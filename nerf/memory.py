@@ -18,7 +18,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.shape import VOXELS, VOXELS_PER_PX, per_px
 from toonset.nerf.training import MOST_SAMPLES
 
-# Measured by `python -m toonset.bench.train_floor`: peak resident memory over that before.
+# Measured by `python -m bench.train.floor`: peak resident memory over that before.
 CARVED_BYTES = 40  # of a voxel of the hull's grid, while it is carved and faired
 VOXEL_BYTES = 12  # and later
 SAMPLE_BYTES = 265  # interpolation both ways, and its pruned copy

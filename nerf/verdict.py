@@ -30,8 +30,8 @@ from toonset.palette.labels import UNLABELLED
 
 OK, WEAK = "ok", "weak"
 # A pixel out of place in a figure of 830. Of three bodies' scenes that are drawn wrong in fifteen
-# ways, ever so little or a lot (`toonset bench stability --seed 1000`), 1 of 107 leaves more whose
-# new views are within 1 dB of those from exact drawings; of those that lose 3 dB, twice the error's
+# ways, ever so little or a lot (`bench stability --seed 1000`), 1 of 107 leaves more whose new
+# views are within 1 dB of those from exact drawings; of those that lose 3 dB, twice the error's
 # power, 91 of 98 leave more or are refused.
 MOST_OFF = 0.0012
 BLENDS = 0.3  # of the figures' pixels; clean drawings of 80 px have 0.2, larger ones fewer

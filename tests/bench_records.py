@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toonset.bench.record import Record, summarise
+from bench.records.record import Record, summarise
 
 
 def record(metric: str, method: str, by_case: dict[str, float], group: str = "exact") -> Record:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 import json
 import os
@@ -26,6 +27,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of libraries that are loaded from no
 threadpool_limits(1, user_api="blas")  # of those that are loaded already
 
 VIEWS, CELL, SEED = 5, 120, 11
+MAINS = {"toonset": "toonset.cli.main", "bench": "bench.__main__"}
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -52,22 +54,22 @@ class Outcome:
         """Return the one line of a refusal."""
         assert self.code == 2, self
         assert self.out == "", self
-        assert self.err.startswith("toonset: "), self
+        program, _, reason = self.err.partition(": ")
+        assert program in ("toonset", "bench"), self
         assert self.err.count("\n") == 1, self
         assert self.err.endswith("\n"), self
         assert self.err[:-1].isprintable(), self
-        return self.err.removeprefix("toonset: ").strip()
+        return reason.strip()
 
 
 Command = Callable[..., Outcome]
 
 
-def run_here(*arguments: object) -> Outcome:
-    """Run the program's main function in this process: no second import of heavy libraries."""
-    from toonset.cli.main import main
-
+def run_here(*arguments: object, program: str = "toonset") -> Outcome:
+    """Run a program's main function in this process: no second import of heavy libraries."""
+    main = importlib.import_module(MAINS[program]).main
     out, err, code, before = io.StringIO(), io.StringIO(), 0, sys.argv
-    sys.argv = ["toonset", *map(str, arguments)]
+    sys.argv = [program, *map(str, arguments)]
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             main()
@@ -120,6 +122,12 @@ def toonset() -> Command:
 
 
 @pytest.fixture(scope="session")
+def bench() -> Command:
+    """Return the bench's command line, run in this process."""
+    return partial(run_here, program="bench")
+
+
+@pytest.fixture(scope="session")
 def shell() -> Command:
     """Return the command line, run as a process."""
     return run_shell
@@ -140,7 +148,7 @@ def snapshot() -> Callable[[Path], dict[str, str]]:
 @pytest.fixture(scope="session")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a drawn sheet.png, its first figure single.png, and mannequin.obj."""
-    from toonset.dataset.bodies import random_body
+    from bench.cases.bodies import random_body
     from toonset.dataset.mesh_file import save_obj
     from toonset.dataset.picture import encode_png
     from toonset.dataset.synth_options import SynthOptions

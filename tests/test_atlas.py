@@ -9,9 +9,11 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from toonset.bench import atlas_palette, atlas_scenes, atlas_training
-from toonset.bench.atlas_chart import draw_page
-from toonset.bench.atlas_figures import (
+from bench.atlas import palette as atlas_palette
+from bench.atlas import scenes as atlas_scenes
+from bench.atlas import training as atlas_training
+from bench.atlas.chart import draw_page
+from bench.atlas.figures import (
     Trial,
     TriedPage,
     TriedStep,
@@ -21,8 +23,8 @@ from toonset.bench.atlas_figures import (
     summary_rows,
     tally,
 )
-from toonset.bench.atlas_pages import PALETTE_PAGES, TRAIN_PAGES
-from toonset.bench.atlas_palette import (
+from bench.atlas.pages import PALETTE_PAGES, TRAIN_PAGES
+from bench.atlas.palette import (
     EYE,
     SKIN_AND_HAIR,
     color_away,
@@ -30,12 +32,13 @@ from toonset.bench.atlas_palette import (
     tiny_feature,
     try_palette,
 )
-from toonset.bench.atlas_report import atlas_html
-from toonset.bench.atlas_results import CALIBRATION, TRAINING, tried_pages
-from toonset.bench.atlas_run import TriedStepResult
-from toonset.bench.atlas_scenes import draw_scene, misscaled, misturned, shifted, squashed
-from toonset.bench.atlas_training import REFUSED, REPAIRED, SILENT, Tried, try_training
-from toonset.bench.stability_bodies import (
+from bench.atlas.report import atlas_html
+from bench.atlas.results import CALIBRATION, TRAINING, tried_pages
+from bench.atlas.run import TriedStepResult
+from bench.atlas.scenes import draw_scene, misscaled, misturned, shifted, squashed
+from bench.atlas.training import REFUSED, REPAIRED, SILENT, Tried, try_training
+from bench.cases.bodies import random_body
+from bench.stability.bodies import (
     EARS,
     vase,
     with_arms_raised,
@@ -44,9 +47,8 @@ from toonset.bench.stability_bodies import (
     with_eyes,
     with_head_grown,
 )
-from toonset.bench.stability_draws import squashed as squashed_sheet
-from toonset.bench.stability_sweeps import SWEEPS
-from toonset.dataset.bodies import random_body
+from bench.stability.draws import squashed as squashed_sheet
+from bench.stability.sweeps import SWEEPS
 from toonset.nerf import verdict
 from toonset.nerf.verdict import MOST_OFF, WEAK
 from toonset.palette.names import hex_of
@@ -313,12 +315,12 @@ def test_every_word_of_a_chart_stands_apart_from_the_others():
 def test_a_report_names_the_worst_case_and_needs_nothing_else():
     page = page_of([FINE, ALARM], [SAID, SAID], [UNSAID])
     pictures = {("warp", str(step)): b"\x89PNG" for step in PAGE.steps[:3]}
-    html = atlas_html("toonset bench stability", "1", "seed 0", [page], pictures)
+    html = atlas_html("python -m bench stability", "1", "seed 0", [page], pictures)
     worst = "Worst case: outline warp, % of cell: 1; rotation error 20.0 degrees; ok"
     assert worst in html  # failed in silence: worse than what is farther off
     assert "Fails from 0.5 on: there 2 of 2 views fail, 2 of them announced." in html
     assert "67 % (2 of 3)" in html
     assert html.count("data:image/png") == 4
     assert not re.search(r"<script|src=\"(?!data:)|https?://(?!www.w3.org)", html)
-    without = atlas_html("toonset bench stability", "1", "seed 0", [page], {})
+    without = atlas_html("python -m bench stability", "1", "seed 0", [page], {})
     assert "<img" not in without

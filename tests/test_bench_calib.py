@@ -11,10 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from toonset.bench import calib, cases
-from toonset.bench.calib import METHODS, SOFT, bench_calibration, named_directions, own_cache
-from toonset.bench.calib_baselines import BASELINES
-from toonset.bench.calib_figures import (
+from bench.calib import measure as calib
+from bench.calib.baselines import BASELINES
+from bench.calib.figures import (
     MeasuredSheet,
     MeasuredView,
     Recorder,
@@ -22,13 +21,15 @@ from toonset.bench.calib_figures import (
     angle_between,
     sheet_records,
 )
-from toonset.bench.calib_table import sheets_table
-from toonset.bench.cases import CONDITIONS, CalibCase, calib_cases
-from toonset.bench.record import Record
+from bench.calib.measure import METHODS, SOFT, bench_calibration, named_directions, own_cache
+from bench.calib.table import sheets_table
+from bench.cases import cases
+from bench.cases.bodies import random_body
+from bench.cases.cases import CONDITIONS, CalibCase, calib_cases
+from bench.records.record import Record
 from toonset.calib import templates
 from toonset.calib.result import SEVERITY
 from toonset.camera import Camera, rotation_from_angles
-from toonset.dataset.bodies import random_body
 from toonset.view import View
 
 RECORDER = Recorder("default", "drawn", 0)
@@ -308,6 +309,6 @@ def test_what_is_missing_is_a_dash_and_failed_runs_are_told() -> None:
         ["stability", "--cases", "x"],
     ],
 )
-def test_options_that_do_not_go_together_are_refused(toonset, tmp_path, wrong):
-    assert toonset("bench", *wrong, "-o", tmp_path / "out").code == 2
+def test_options_that_do_not_go_together_are_refused(bench, tmp_path, wrong):
+    assert bench(*wrong, "-o", tmp_path / "out").code == 2
     assert not (tmp_path / "out").exists()

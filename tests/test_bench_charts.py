@@ -13,18 +13,18 @@ import pytest
 from matplotlib.text import Text
 from PIL import Image
 
+from bench.calib.baselines import BASELINES
+from bench.calib.measure import METHODS as CALIB_METHODS
+from bench.calib.sfm import METHODS as SFM_METHODS
+from bench.charts.chart import Chart
+from bench.charts.drawing import chart_figure, draw_chart
+from bench.charts.labels import Box, Label, place_labels
+from bench.charts.points import PLOTS, SECOND, charts_of, points_of
+from bench.palette.methods import METHODS as PALETTE_METHODS
+from bench.records.pareto import Point, Standing, pareto_front, standing_of
+from bench.records.record import Record
+from bench.train.plan import METHODS as TRAIN_METHODS
 from tests.bench_records import record
-from toonset.bench.calib import METHODS as CALIB_METHODS
-from toonset.bench.calib_baselines import BASELINES
-from toonset.bench.chart import Chart
-from toonset.bench.chart_drawing import chart_figure, draw_chart
-from toonset.bench.chart_labels import Box, Label, place_labels
-from toonset.bench.chart_points import PLOTS, SECOND, charts_of, points_of
-from toonset.bench.palette_methods import METHODS as PALETTE_METHODS
-from toonset.bench.pareto import Point, Standing, pareto_front, standing_of
-from toonset.bench.record import Record
-from toonset.bench.sfm import METHODS as SFM_METHODS
-from toonset.bench.train_plan import METHODS as TRAIN_METHODS
 
 
 def point(method: str, cost: float, merit: float, **given: float) -> Point:

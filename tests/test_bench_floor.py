@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from toonset.bench import train_floor
+from bench.train import floor as train_floor
 from toonset.nerf.options import TrainOptions
 
 

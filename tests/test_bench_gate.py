@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from toonset.bench.gate import (
+from bench.commands import check as bench_check
+from bench.records.gate import (
     Guard,
     as_plain,
     as_text,
@@ -17,8 +18,7 @@ from toonset.bench.gate import (
     guards_of,
     yardstick_s,
 )
-from toonset.bench.record import Record, summarise
-from toonset.cli import bench_check
+from bench.records.record import Record, summarise
 from toonset.cli.output import Printer
 from toonset.errors import BundleError
 
@@ -128,7 +128,12 @@ def test_check_ends_with_3_where_something_is_worse(
 
 
 @pytest.mark.parametrize("other", [["calib"], ["--quick"], ["--only", "exact"], ["--renew"]])
-def test_check_takes_no_other_option(toonset, other: list[str]) -> None:
-    found = toonset("bench", "--check", *other)
+def test_check_takes_no_other_option(bench, other: list[str]) -> None:
+    found = bench("--check", *other)
     assert found.code == 2
     assert "stand alone" in found.err
+
+
+def test_a_wrong_subject_is_one_line(bench) -> None:
+    said = bench("nerf").reason
+    assert all(word in said for word in ("nerf", "calib", "train", "see `bench -h`")), said

@@ -7,9 +7,9 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
-from toonset.bench import labels as bench
-from toonset.bench.labels import bench_labels
-from toonset.bench.labels_cases import LabelCase, label_cases, with_hard_rim
+from bench.palette import labels as bench
+from bench.palette.labels import bench_labels
+from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
 from toonset.palette.labels import UNLABELLED
 
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toonset.bench import mannequin_views
-from toonset.bench.cases import TrainCase, train_cases
-from toonset.bench.mannequin_fit import fitted_mannequin
-from toonset.bench.mannequin_views import mannequin_view, paint_mannequin
-from toonset.bench.train import run_jobs, table_of
-from toonset.bench.train_chart import draw_curves
-from toonset.bench.train_plan import MANNEQUIN, METHODS, NEAREST, SCOPES, Job, plan
+from bench.cases.bodies import random_body
+from bench.cases.cases import TrainCase, train_cases
+from bench.train import mannequin_views
+from bench.train.chart import draw_curves
+from bench.train.mannequin_fit import fitted_mannequin
+from bench.train.mannequin_views import mannequin_view, paint_mannequin
+from bench.train.measure import run_jobs, table_of
+from bench.train.plan import MANNEQUIN, METHODS, NEAREST, SCOPES, Job, plan
 from toonset.camera import Camera
-from toonset.dataset.bodies import random_body
 from toonset.dataset.gl_render import render_labels
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
@@ -196,7 +196,7 @@ def test_folders_may_have_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "with-exact" / "mannequin.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
     )
-    monkeypatch.setattr("toonset.bench.cases.read_scene", lambda place: case().train)
+    monkeypatch.setattr("bench.cases.cases.read_scene", lambda place: case().train)
     found = {made.name: made.mannequin for made in train_cases(tmp_path, 0, 0)}
     assert found["without-exact"] is None
     mannequin = found["with-exact"]

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toonset.bench.palette import bench_palette, f1, score, sheet_of_size
-from toonset.bench.palette_cases import LEAST_APART, PaletteCase, palette_cases, random_paints
-from toonset.bench.palette_methods import METHODS
+from bench.palette.cases import LEAST_APART, PaletteCase, palette_cases, random_paints
+from bench.palette.measure import bench_palette, f1, score, sheet_of_size
+from bench.palette.methods import METHODS
 from toonset.errors import BundleError
 from toonset.palette.oklab import oklab_from_rgb
 

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.bench.cases import TrainCase
-from toonset.bench.paper import as_csv, as_text, outdone, outdone_text, paper_rows
-from toonset.bench.paper_picture import drawn_strip, figure_of, shown_frames
-from toonset.bench.paper_plan import CASES, QUICK_CASES, SEEDS, paper_plan
-from toonset.bench.train_plan import METHODS, PAPER, Job, Method
-from toonset.bench.train_run import RunResult, Seen, run_job
+from bench.cases.cases import TrainCase
+from bench.paper.picture import drawn_strip, figure_of, shown_frames
+from bench.paper.plan import CASES, QUICK_CASES, SEEDS, paper_plan
+from bench.paper.table import as_csv, as_text, outdone, outdone_text, paper_rows
+from bench.train.plan import METHODS, PAPER, Job, Method
+from bench.train.run import RunResult, Seen, run_job
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.evaluation_picture import TILE_PX
@@ -157,15 +157,15 @@ def short_methods() -> Iterator[None]:
 
 
 def test_the_command_writes_table_and_figure_and_goes_on(
-    short_methods: None, toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    short_methods: None, bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import toonset.bench.cases as cases
+    import bench.cases.cases as cases
 
     two = [replace(case(), name=name) for name in ("block-exact", "brick-exact")]
     monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter(two))
     out = tmp_path / "paper"
-    command = ("bench", "paper", "--quick", "-o", out)
-    first = toonset(*command, "--json")
+    command = ("paper", "--quick", "-o", out)
+    first = bench(*command, "--json")
     assert first.code == 0, first
     written = json.loads((out / "table1.json").read_text())
     assert {name: written[name] for name in first.json} == first.json
@@ -183,19 +183,19 @@ def test_the_command_writes_table_and_figure_and_goes_on(
     drawn = {name: (out / name).read_bytes() for name in names - {"report.html"}}  # has the command
     for name in names - {"runs.json"}:
         (out / name).unlink()
-    again = toonset(*command)
+    again = bench(*command)
     assert {name: (out / name).read_bytes() for name in drawn} == drawn
     assert "0 trainings, 6 are there already" in again.err
     assert "Does a palette help?" in again.out
     (out / "mine.txt").write_text("mine")
-    assert "holds 'mine.txt'" in toonset(*command, "--force").reason
+    assert "holds 'mine.txt'" in bench(*command, "--force").reason
 
 
 def test_a_stopped_run_has_the_table_of_what_it_has_found(
-    short_methods: None, toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    short_methods: None, bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import toonset.bench.cases as cases
-    import toonset.bench.train as bench
+    import bench.cases.cases as cases
+    import bench.train.measure as measure
 
     count = 0
 
@@ -207,9 +207,9 @@ def test_a_stopped_run_has_the_table_of_what_it_has_found(
         return run_job(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter([case()]))
-    monkeypatch.setattr(bench, "run_job", stopping)
-    command = ("bench", "paper", "--quick", "-o", tmp_path / "paper")
-    assert toonset(*command).code != 0
+    monkeypatch.setattr(measure, "run_job", stopping)
+    command = ("paper", "--quick", "-o", tmp_path / "paper")
+    assert bench(*command).code != 0
     rows = json.loads((tmp_path / "paper" / "table1.json").read_text())["rows"]
     assert [row["palette"] for row in rows] == ["no palette"] + ["automatic palette"] * 2
-    assert "1 trainings, 2 are there already" in toonset(*command).err
+    assert "1 trainings, 2 are there already" in bench(*command).err

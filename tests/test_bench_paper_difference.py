@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toonset.bench.paper_chart import draw_differences
-from toonset.bench.paper_difference import (
+from bench.paper.chart import draw_differences
+from bench.paper.difference import (
     Difference,
     as_csv,
     as_table,
@@ -18,7 +18,7 @@ from toonset.bench.paper_difference import (
     differences_of,
     student_interval,
 )
-from toonset.bench.train_run import RunResult
+from bench.train.run import RunResult
 
 GROUP = "exact 150 px 8 views"
 

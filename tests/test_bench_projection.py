@@ -1,6 +1,6 @@
 """The projection benchmark compares ways that agree."""
 
-from toonset.bench.projection import compare
+from bench.calib.projection import compare
 
 
 def test_the_compared_ways_give_the_same_pixels():

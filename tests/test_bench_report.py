@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from bench.charts.chart import Chart
+from bench.charts.drawing import draw_chart
+from bench.records.pareto import Point
+from bench.records.report import Picture, inlined, report_html
 from tests.bench_records import record
-from toonset.bench.chart import Chart
-from toonset.bench.chart_drawing import draw_chart
-from toonset.bench.pareto import Point
-from toonset.bench.report import Picture, inlined, report_html
 
 
 class Page(HTMLParser):
@@ -53,7 +53,7 @@ def test_the_page_holds_all_and_needs_nothing_else() -> None:
     picture = Picture(draw_chart(shown, "svg"), 'what "it" shows')
     records = [record("held-out PSNR", "default", {"a": 30.25}), record("GMSD", "other", {"a": 2})]
     page = report_html(
-        "toonset bench train -o 'a b'", "1.2", [(shown, picture), (shown, picture)], [], records
+        "python -m bench train -o 'a b'", "1.2", [(shown, picture), (shown, picture)], [], records
     )
     found = Page(page)
     tags = [tag for tag, _ in found.seen]
@@ -64,7 +64,7 @@ def test_the_page_holds_all_and_needs_nothing_else() -> None:
     targets = {v for _, attrs in found.seen for k, v in attrs.items() if k == "xlink:href" and v}
     assert targets
     assert {target[1:] for target in targets} <= set(found.ids)
-    assert {"toonset bench train -o 'a b'", "fast & <small>", "30.25", "GMSD (dB)"} <= set(
+    assert {"python -m bench train -o 'a b'", "fast & <small>", "30.25", "GMSD (dB)"} <= set(
         found.words
     )
     assert any("toonset 1.2; first seed 0" in word for word in found.words)
@@ -72,7 +72,7 @@ def test_the_page_holds_all_and_needs_nothing_else() -> None:
 
 
 def test_a_bench_writes_charts_in_four_forms_and_the_page(
-    toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     records = [
         record(metric, method, by_case, group)
@@ -82,9 +82,9 @@ def test_a_bench_writes_charts_in_four_forms_and_the_page(
             ("CPU seconds", {"": 0.1}, "150 x 150"),
         )
     ]
-    monkeypatch.setattr("toonset.bench.palette.bench_palette", lambda *_, **__: (records, "table"))
+    monkeypatch.setattr("bench.palette.measure.bench_palette", lambda *_, **__: (records, "table"))
     out = tmp_path / "out"
-    done = toonset("bench", "palette", "-o", out)
+    done = bench("palette", "-o", out)
     assert done.code == 0, done
     assert f"look at {out / 'report.html'}" in done.err
     assert {path.name for path in out.iterdir()} == {
@@ -94,5 +94,5 @@ def test_a_bench_writes_charts_in_four_forms_and_the_page(
     }
     kept = json.loads((out / "records.json").read_text())
     assert kept[0]["by_case"] == {"a": 0.9}
-    assert f"toonset bench palette -o {out}" in Page((out / "report.html").read_text()).words
-    assert toonset("bench", "palette", "-o", out, "--force", "--quiet").code == 0
+    assert f"python -m bench palette -o {out}" in Page((out / "report.html").read_text()).words
+    assert bench("palette", "-o", out, "--force", "--quiet").code == 0

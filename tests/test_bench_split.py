@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toonset.bench.split import bench_split
-from toonset.bench.split_cases import (
+from bench.messy.options import DIFFICULTIES
+from bench.split.cases import (
     MIXED,
     Drawn,
     SplitCase,
@@ -18,10 +18,10 @@ from toonset.bench.split_cases import (
     sheet_cases,
     sprite_sheet_cases,
 )
-from toonset.bench.split_methods import METHODS, Found, by_corner_color, by_toonset
-from toonset.bench.split_picture import COLUMNS, TILE_WH, contact_sheet, tile
-from toonset.bench.split_score import mask_iou, same_box, score
-from toonset.dataset.messy_options import DIFFICULTIES
+from bench.split.measure import bench_split
+from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
+from bench.split.picture import COLUMNS, TILE_WH, contact_sheet, tile
+from bench.split.score import mask_iou, same_box, score
 from toonset.dataset.picture import encode_png
 from toonset.dataset.sheet import LeftOut, Sheet
 from toonset.errors import BundleError, SheetError
@@ -137,7 +137,7 @@ def test_our_views_keep_their_place_and_their_warnings(monkeypatch: pytest.Monke
     rgba[4:44, 4:64] = 255
     view = View(rgba, (6, 6, 68, 48), 0.0, "000.png")
     sheet = Sheet((view,), None, 1.0, ("look at this",), (LeftOut((1, 2, 3, 4), "speck"),))
-    monkeypatch.setattr("toonset.bench.split_methods.split_sheet", lambda rgba: sheet)
+    monkeypatch.setattr("bench.split.methods.split_sheet", lambda rgba: sheet)
     result = by_toonset(rgba)
     assert [figure.box for figure in result.figures] == [(10, 10, 60, 40)]
     assert result.warned
@@ -148,7 +148,7 @@ def test_a_refusal_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(rgba: np.ndarray) -> Sheet:
         raise SheetError("blank")
 
-    monkeypatch.setattr("toonset.bench.split_methods.split_sheet", refuse)
+    monkeypatch.setattr("bench.split.methods.split_sheet", refuse)
     result = by_toonset(np.zeros((5, 5, 4), np.uint8))
     assert result.warned
     assert result.figures == ()
@@ -193,7 +193,7 @@ def test_there_are_sheets_of_every_difficulty_and_mixtures(monkeypatch: pytest.M
         asked.append((seed, difficulties))
         return Made
 
-    monkeypatch.setattr("toonset.bench.split_cases.make_messy_sheet", make)
+    monkeypatch.setattr("bench.split.cases.make_messy_sheet", make)
     groups = [made.group for made in messy_cases(0, 2)]
     assert set(groups) == {*DIFFICULTIES, MIXED}
     assert groups.count("jpeg") == 2
@@ -243,18 +243,18 @@ def test_sprites_are_enlarged_and_their_shadows_cut(
 
 
 def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
-    toonset, rendered, tmp_path, monkeypatch
+    bench, rendered, tmp_path, monkeypatch
 ):
     monkeypatch.setitem(METHODS, "default", lambda rgba: found(*FIGURES[:1]))
     out = tmp_path / "out"
-    done = toonset("bench", "split", "--cases", rendered, "-o", out, "--quiet")
+    done = bench("split", "--cases", rendered, "-o", out, "--quiet")
     assert done.code == 0, done
     assert "rendered sheets" in done.out
     assert {path.name for path in out.iterdir()} == {"records.json", "report.html", "wrong.png"}
     records = json.loads((out / "records.json").read_text())
     assert {record["method"] for record in records} == set(METHODS)
-    again = ("bench", "split", "--cases", rendered, "-o", out, "--force", "--only", "dog")
-    assert "'dog'" in toonset(*again).reason
+    again = ("split", "--cases", rendered, "-o", out, "--force", "--only", "dog")
+    assert "'dog'" in bench(*again).reason
 
 
 @pytest.mark.parametrize(
@@ -268,6 +268,6 @@ def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
         ["labels", "--only", "x"],
     ],
 )
-def test_options_of_other_subjects_are_refused(toonset, tmp_path, wrong):
-    assert toonset("bench", *wrong, "-o", tmp_path / "out").code == 2
+def test_options_of_other_subjects_are_refused(bench, tmp_path, wrong):
+    assert bench(*wrong, "-o", tmp_path / "out").code == 2
     assert not (tmp_path / "out").exists()

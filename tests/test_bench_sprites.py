@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from toonset.bench.calib_table import sprites_table
-from toonset.bench.sprites import MANNEQUIN, OWN_MESH, bench_sprites, sprite_cases
+from bench.calib.table import sprites_table
+from bench.cases.bodies import random_body
+from bench.cases.sprites import MANNEQUIN, OWN_MESH, bench_sprites, sprite_cases
 from toonset.camera import Camera
-from toonset.dataset.bodies import random_body
 from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.picture import encode_png
 from toonset.dataset.synth_options import SynthOptions
@@ -76,7 +76,7 @@ def test_sprites_without_a_mesh_are_asked_for_their_bin(
     sprites: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = calibration_at(20, 70, 0, 0)
-    monkeypatch.setattr("toonset.bench.sprites.calibrate", lambda *_, **__: found)
+    monkeypatch.setattr("bench.cases.sprites.calibrate", lambda *_, **__: found)
     records = bench_sprites(sprite_cases(sprites), 0)
     free = {r.metric: r for r in records if (r.group, r.method) == (MANNEQUIN, "default")}
     assert (free["right 45 deg bin"].value, free["right 45 deg bin"].n) == (0.5, 4)
@@ -96,13 +96,13 @@ def test_sprites_that_do_not_say_their_yaws_are_refused(tmp_path: Path, info: ob
 
 
 def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
-    toonset, sprites, tmp_path, monkeypatch
+    bench, sprites, tmp_path, monkeypatch
 ):
     out = tmp_path / "out"
     found = calibration_at(1, 88, 180, 9)
-    monkeypatch.setattr("toonset.bench.sprites.calibrate", lambda *_, **__: found)
-    command = ("bench", "calib", "--sprites", sprites, "--quiet", "-o", out)
-    done = toonset(*command, "--only", "exact")
+    monkeypatch.setattr("bench.cases.sprites.calibrate", lambda *_, **__: found)
+    command = ("calib", "--sprites", sprites, "--quiet", "-o", out)
+    done = bench(*command, "--only", "exact")
     assert done.code == 0, done
     assert "right bin" in done.out
     assert {p.name for p in out.iterdir()} == {
@@ -114,4 +114,4 @@ def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
         "default",
         "labels",
     }
-    assert "'dog'" in toonset(*command, "--force", "--only", "dog").reason
+    assert "'dog'" in bench(*command, "--force", "--only", "dog").reason

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import torch
 
-from toonset.bench import train_run
-from toonset.bench.cases import TrainCase
-from toonset.bench.train import in_order, records_of, run_jobs, table_of
-from toonset.bench.train_files import as_plain, from_plain, missing
-from toonset.bench.train_plan import (
+from bench.cases.cases import TrainCase
+from bench.train import run as train_run
+from bench.train.files import as_plain, from_plain, missing
+from bench.train.measure import in_order, records_of, run_jobs, table_of
+from bench.train.plan import (
     MANNEQUIN,
     METHODS,
     NEAREST,
@@ -28,7 +28,7 @@ from toonset.bench.train_plan import (
     subset,
     view_counts,
 )
-from toonset.bench.train_run import Look, RunResult, Seen, Snapshots, curve_frames, reached
+from bench.train.run import Look, RunResult, Seen, Snapshots, curve_frames, reached
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
@@ -302,15 +302,15 @@ def test_other_options_are_another_job(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stopped_bench_goes_on(
-    short_methods: dict[str, Method], toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    short_methods: dict[str, Method], bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import toonset.bench.cases as cases
-    import toonset.bench.train as bench
+    import bench.cases.cases as cases
+    import bench.train.measure as measure
 
     monkeypatch.setattr(cases, "train_cases", lambda *a, **k: iter([case()]))
     monkeypatch.setitem(SCOPES, ("train", True), Scope(tuple(short_methods)))
     done: list[str] = []
-    honest, stop = bench.run_job, True
+    honest, stop = measure.run_job, True
 
     def counted(job: Job, judges: Judges, look: Look) -> RunResult:
         if stop and done:
@@ -318,10 +318,10 @@ def test_a_stopped_bench_goes_on(
         done.append(job.method)
         return honest(job, judges, look)
 
-    monkeypatch.setattr(bench, "run_job", counted)
+    monkeypatch.setattr(measure, "run_job", counted)
     out = tmp_path / "bench"
-    command = ("bench", "train", "--quick", "-o", out)
-    assert toonset(*command).code != 0
+    command = ("train", "--quick", "-o", out)
+    assert bench(*command).code != 0
     written = {path.name for path in out.iterdir()}
     names = ("chart-exact-32-px-8-views", "chart-exact-32-px-8-views-model-size")
     charts = {f"{name}.{form}" for name in names for form in ("png", "svg", "csv")}
@@ -335,7 +335,7 @@ def test_a_stopped_bench_goes_on(
         *charts,
     }
     stop = False
-    again = toonset(*command, "--json")
+    again = bench(*command, "--json")
     assert again.code == 0, again
     assert done == ["default", NEAREST]  # each once
     assert "1 trainings, 1 are there already" in again.err
@@ -344,9 +344,9 @@ def test_a_stopped_bench_goes_on(
     drawn = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
     for name in drawn.keys() - {"runs.json"}:
         (out / name).unlink()
-    assert toonset(*command, "--json").json == again.json  # redrawn, not trained again
+    assert bench(*command, "--json").json == again.json  # redrawn, not trained again
     assert done == ["default", NEAREST]
     assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == drawn
-    assert toonset(*command, "--only", "hat").reason.startswith("no training's name contains 'hat'")
+    assert bench(*command, "--only", "hat").reason.startswith("no training's name contains 'hat'")
     (out / "drawing.png").write_bytes(b"mine")
-    assert "holds 'drawing.png'" in toonset(*command, "--force").reason
+    assert "holds 'drawing.png'" in bench(*command, "--force").reason

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.bench.train_chart import draw_curves, mean_curve
-from toonset.bench.train_plan import NEAREST
-from toonset.bench.train_run import RunResult, Seen
+from bench.train.chart import draw_curves, mean_curve
+from bench.train.plan import NEAREST
+from bench.train.run import RunResult, Seen
 
 
 def result(method: str, *curve: Seen) -> RunResult:

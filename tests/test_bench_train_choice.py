@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from toonset.bench.train_choice import choices_of, choices_text
-from toonset.bench.train_plan import METHODS, PLANES
-from toonset.bench.train_run import RunResult
+from bench.train.choice import choices_of, choices_text
+from bench.train.plan import METHODS, PLANES
+from bench.train.run import RunResult
 from toonset.nerf.field_choice import COARSE, FINE, USUAL
 
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toonset.bench.stability_bodies import with_arms_raised, with_head_grown
+from bench.cases.bodies import random_body
+from bench.stability.bodies import with_arms_raised, with_head_grown
 from toonset.calib import problem
 from toonset.calib.calibrate import calibrate
 from toonset.calib.ladder import BIC_MARGIN, GLANCE_MARGIN, PROPORTIONS, Rung
 from toonset.calib.problem import SAME_BODY_COVERAGE
 from toonset.calib.result import Calibration
 from toonset.camera import rotation_distance
-from toonset.dataset.bodies import random_body
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.picture import load_rgba
 from toonset.dataset.sheet import split_sheet

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
 from toonset.calib.align import Fit
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hypotheses import (
@@ -16,7 +17,6 @@ from toonset.calib.hypotheses import (
 from toonset.calib.pose import Pose
 from toonset.calib.rim import prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
-from toonset.dataset.bodies import random_body
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround

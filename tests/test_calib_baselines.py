@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from toonset.bench.calib import measured_baseline
-from toonset.bench.calib_baselines import (
+from bench.calib.baselines import (
     BASELINES,
     LANDMARKS,
     Placed,
@@ -23,8 +22,9 @@ from toonset.bench.calib_baselines import (
     track,
     tracked,
 )
-from toonset.bench.calib_figures import Recorder, sheet_records
-from toonset.bench.calib_soft import (
+from bench.calib.figures import Recorder, sheet_records
+from bench.calib.measure import measured_baseline
+from bench.calib.soft_silhouette import (
     GRID,
     by_soft_silhouette,
     coarse,
@@ -33,11 +33,11 @@ from toonset.bench.calib_soft import (
     picture_of,
     soft_silhouette,
 )
-from toonset.bench.cases import CalibCase
-from toonset.bench.chart_points import CLICKED, PLOTS
+from bench.cases.bodies import random_body
+from bench.cases.cases import CalibCase
+from bench.charts.points import CLICKED, PLOTS
 from toonset.calib.rim import silhouette_mask
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
-from toonset.dataset.bodies import random_body
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from toonset.bench.calib import view_error
+from bench.calib.measure import view_error
+from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.contour import drawn_contour
 from toonset.calib.known import Known
@@ -20,7 +21,6 @@ from toonset.calib.pose import Pose
 from toonset.calib.report import calibration_dict
 from toonset.calib.rim import prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
-from toonset.dataset.bodies import random_body
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround

@@ -11,8 +11,8 @@ import pytest
 import torch
 from safetensors.torch import save
 
-from toonset.bench.cases import train_cases
-from toonset.bench.train_growth import growths
+from bench.cases.cases import train_cases
+from bench.train.growth import growths
 from toonset.camera import Camera
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError

@@ -91,7 +91,6 @@ def test_no_arguments_show_the_help_and_a_wrong_verb_the_right_one(shell):
         (["render", "run", "-o", "x", "--turntable", "0"], ["--turntable", "1"]),
         (["render", "run", "-o", "x", "--turntable", "2", "--layer", "z"], ["'z'", "palette"]),
         (["evaluate", "run"], ["Missing option '--test'"]),
-        (["bench", "nerf"], ["nerf", "calib", "train"]),
     ],
 )
 def test_usage_mistakes_name_the_argument(
@@ -284,7 +283,7 @@ def test_ctrl_c_leaves_nothing_behind(drawn: Path, tmp_path, interrupted, snapsh
 def test_one_process_can_draw_and_then_train():
     """Mesa's LLVM used to crash the import of Triton's, which torch's optimisers bring along."""
     program = """
-from toonset.dataset.bodies import random_body
+from bench.cases.bodies import random_body
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
 make_turnaround(random_body(0), SynthOptions(views=1, cell_px=32), 0)

@@ -12,9 +12,9 @@ import numpy as np
 import pycolmap
 import pytest
 
+from bench.cases.bodies import random_body
 from tests.exported_views import camera_at
 from toonset.camera import Camera
-from toonset.dataset.bodies import random_body
 from toonset.dataset.colmap import write_colmap
 from toonset.dataset.colmap_points import depth_map, sample_surface, track_points
 from toonset.dataset.colmap_read import read_colmap

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.dataset.bodies import random_body
+from bench.cases.bodies import random_body
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
 from toonset.palette import contour as contour_module

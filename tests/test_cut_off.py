@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.contour import drawn_contour
 from toonset.calib.cut_off import at_cuts, ending_at, flat_sides
 from toonset.calib.match import Drawing
 from toonset.camera import Camera
-from toonset.dataset.bodies import random_body
 from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.sheet import split_sheet

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from toonset.dataset.messy import make_messy_sheet
+from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.sheet import split_sheet
 
 

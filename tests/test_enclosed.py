@@ -7,10 +7,10 @@ from typing import cast
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
 from toonset.calib.enclosed import without_false_holes
 from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
-from toonset.dataset.bodies import random_body
 from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.sheet import split_sheet

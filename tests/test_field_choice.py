@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import torch
 
+from bench.cases.cases import train_cases
 from tests.test_train_summary import metrics
-from toonset.bench.cases import train_cases
 from toonset.cli.train_summary import summary
 from toonset.dataset.scene import Scene
 from toonset.nerf import field_trials

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.bodies import random_body
+from bench.cases.bodies import random_body
 from toonset.dataset.palette_files import write_palette
 from toonset.dataset.picture import encode_indexed_png, load_indexed_png
 from toonset.dataset.synth_options import SynthOptions

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
 from toonset.calib.landmarks_alone import calibrate_by_landmarks
 from toonset.calib.result import Calibration
 from toonset.calib.rim import silhouette_mask
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
-from toonset.dataset.bodies import random_body
 from toonset.dataset.landmark_file import Landmarks
 from toonset.errors import LandmarkError
 from toonset.mesh import Mesh

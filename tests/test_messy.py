@@ -8,9 +8,8 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from toonset.dataset.messy import MessySheet, make_messy_sheet
-from toonset.dataset.messy_cartoon import cartoon_cast
-from toonset.dataset.messy_figure import (
+from bench.messy.cartoon import cartoon_cast
+from bench.messy.figure import (
     Figure,
     as_line_art,
     resized,
@@ -18,9 +17,9 @@ from toonset.dataset.messy_figure import (
     with_colored_lines,
     with_gaps,
 )
-from toonset.dataset.messy_ground import through_jpeg
-from toonset.dataset.messy_layout import reach
-from toonset.dataset.messy_options import (
+from bench.messy.ground import through_jpeg
+from bench.messy.layout import reach
+from bench.messy.options import (
     DIFFICULTIES,
     EXCLUSIVE,
     GROUNDS,
@@ -28,7 +27,8 @@ from toonset.dataset.messy_options import (
     checked,
     mixture,
 )
-from toonset.dataset.messy_solids import solid_cast
+from bench.messy.sheet import MessySheet, make_messy_sheet
+from bench.messy.solids import solid_cast
 from toonset.errors import SheetError
 
 SMALL = MessyOptions(figure_px=(70, 90))

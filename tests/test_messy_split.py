@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
+from bench.messy.options import DIFFICULTIES
+from bench.messy.sheet import make_messy_sheet
 from toonset.dataset import survey
 from toonset.dataset.background import find_background
-from toonset.dataset.bodies import random_body
-from toonset.dataset.messy import make_messy_sheet
-from toonset.dataset.messy_options import DIFFICULTIES
 from toonset.dataset.sheet import Sheet, SheetOptions, split_sheet
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
@@ -18,7 +18,7 @@ from toonset.errors import SheetError
 
 WHITE, RED, BLUE, SKIN = (255, 255, 255), (200, 30, 40), (20, 60, 180), (236, 188, 155)
 GREY, BLACK = (80, 80, 80), (10, 10, 10)
-HARD = ("touching", "overlap")  # not always right: see `toonset bench split`
+HARD = ("touching", "overlap")  # not always right: see `python -m bench split`
 
 
 def paper(width: int, height: int) -> np.ndarray:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bench.palette.cases import palette_cases, random_paints
 from tests.palette_pictures import as_set, block, soft_stripes
-from toonset.bench.palette_cases import palette_cases, random_paints
 from toonset.cli.palette_report import palette_lines
 from toonset.palette.choice import PaletteOptions
 from toonset.palette.extract import LEAST_LISTED, extract_palette

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from toonset.bench.views_speed import compare, plain
+from bench.train.views_speed import compare, plain
 from toonset.camera import Camera
 from toonset.errors import PaletteError
 from toonset.nerf.hull import EDGE, Hull, occupancy

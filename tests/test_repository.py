@@ -209,15 +209,18 @@ def steps_of_the_demo() -> list[list[str]]:
 
 
 def complaint(words: list[str]) -> str:
-    """Return what toonset would not understand in a command line; empty if it is fine."""
+    """Return what toonset, or the bench, would not understand in a command line; empty if fine."""
+    from bench.__main__ import app as bench
     from toonset.cli.main import VERBS, app
 
     verb = next((word for word in words if not word.startswith("-")), None)
     if verb is None or verb in RUN_COMMANDS:
         return ""
-    if verb not in VERBS:
+    if verb not in (*VERBS, "bench"):
         return f"no verb {verb}"
-    command = typer.main.get_group(app).commands[verb]
+    of_bench = verb == "bench"
+    command = typer.main.get_command(bench if of_bench else app)
+    command = command if of_bench else command.commands[verb]
     known = {name for parameter in command.params for name in parameter.opts} | {"-h", "--help"}
     known |= {name for parameter in command.params for name in parameter.secondary_opts}
     used = {word.split("=")[0] for word in words if re.match(r"--?[a-z]", word)}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.background import difference, find_background, with_final_tolerance
-from toonset.dataset.messy import make_messy_sheet
 from toonset.dataset.ripples import has_jpeg_grid
 
 WHITE = np.full((1, 1, 3), 255, np.uint8)

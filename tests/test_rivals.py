@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toonset.bench.stability_draws import warped
-from toonset.bench.stability_sheet import DrawnSheet
+from bench.stability.draws import warped
+from bench.stability.sheet import DrawnSheet
 from toonset.calib import problem
 from toonset.calib.calibrate import Calibration, calibrate
 from toonset.calib.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates

@@ -11,9 +11,9 @@ import trimesh
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial.transform import Rotation
 
-from toonset.bench.calib import bench_colmap
-from toonset.bench.cases import CalibCase
-from toonset.bench.sfm import SfmOptions, aligned_errors, pictures, reconstruct
+from bench.calib.measure import bench_colmap
+from bench.calib.sfm import SfmOptions, aligned_errors, pictures, reconstruct
+from bench.cases.cases import CalibCase
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.colmap_points import depth_map
 from toonset.mesh import Mesh

@@ -2,10 +2,10 @@
 
 import pytest
 
-from toonset.bench.split_cases import Drawn, SplitCase
-from toonset.bench.split_methods import by_toonset
-from toonset.bench.split_score import score
-from toonset.dataset.messy import make_messy_sheet
+from bench.messy.sheet import make_messy_sheet
+from bench.split.cases import Drawn, SplitCase
+from bench.split.methods import by_toonset
+from bench.split.score import score
 from toonset.dataset.sheet import split_sheet
 
 

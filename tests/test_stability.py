@@ -10,21 +10,21 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from toonset.bench import stability
-from toonset.bench.atlas_run import Counts, TriedStepResult, all_pages, run_steps
-from toonset.bench.atlas_training import Tried
-from toonset.bench.calib import ViewError
-from toonset.bench.stability import SheetResult, StepResult, align_from, run_sheet
-from toonset.bench.stability_chart import draw_stability
-from toonset.bench.stability_files import RunKey, as_plain, from_plain, in_table_order, name_of
-from toonset.bench.stability_page import chosen
-from toonset.bench.stability_sheet import BASE, draw_sheet
-from toonset.bench.stability_sweeps import SWEEPS, Sweep
-from toonset.bench.stability_table import as_csv, as_records, row
-from toonset.bench.workers import THREADS, in_order
-from toonset.cli.bench import resumable
+from bench.__main__ import resumable
+from bench.atlas.run import Counts, TriedStepResult, all_pages, run_steps
+from bench.atlas.training import Tried
+from bench.calib.measure import ViewError
+from bench.cases.bodies import random_body
+from bench.cases.workers import THREADS, in_order
+from bench.stability import steps as stability
+from bench.stability.chart import draw_stability
+from bench.stability.files import RunKey, as_plain, from_plain, in_table_order, name_of
+from bench.stability.page import chosen
+from bench.stability.sheet import BASE, draw_sheet
+from bench.stability.steps import SheetResult, StepResult, align_from, run_sheet
+from bench.stability.sweeps import SWEEPS, Sweep
+from bench.stability.table import as_csv, as_records, row
 from toonset.cli.output import Printer
-from toonset.dataset.bodies import random_body
 from toonset.errors import BundleError, SheetError
 
 PLAIN = replace(BASE, outline_px=0, cell_px=120, views=3)
@@ -50,8 +50,8 @@ def test_every_quick_step_is_one_of_the_full_run():
 @pytest.mark.parametrize("sweep", [s for s in SWEEPS if s.base is not None], ids=lambda s: s.name)
 def test_the_base_step_is_the_base_sheet(sweep, monkeypatch):
     small = replace(BASE, cell_px=60, views=1, supersample=1)
-    for place in ("stability_sheet", "stability_draws"):
-        monkeypatch.setattr(f"toonset.bench.{place}.BASE", small)
+    for place in ("sheet", "draws"):
+        monkeypatch.setattr(f"bench.stability.{place}.BASE", small)
     step = 60 if sweep.name == "resolution" else sweep.base
     for (view, camera), (plain, same) in zip(
         sweep.draw(step, 5).drawings, draw_sheet(5, small).drawings, strict=True
@@ -63,8 +63,8 @@ def test_the_base_step_is_the_base_sheet(sweep, monkeypatch):
 @pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
 def test_the_worst_step_can_be_drawn_twice_alike(sweep, monkeypatch):
     small = replace(BASE, cell_px=80, views=2, supersample=1)
-    for place in ("stability_sheet", "stability_draws"):
-        monkeypatch.setattr(f"toonset.bench.{place}.BASE", small)
+    for place in ("sheet", "draws"):
+        monkeypatch.setattr(f"bench.stability.{place}.BASE", small)
     first, second = (sweep.draw(sweep.steps[-1], 5) for _ in range(2))
     for (view, camera), (again, same) in zip(first.drawings, second.drawings, strict=True):
         np.testing.assert_array_equal(view.rgba, again.rgba)
@@ -206,14 +206,14 @@ def test_a_picture_is_drawn_of_one_sweep_and_of_many():
 # ---- the command
 
 
-def test_a_second_run_takes_the_first_ones_steps(toonset, tmp_path, monkeypatch):
+def test_a_second_run_takes_the_first_ones_steps(bench, tmp_path, monkeypatch):
     sweep = Sweep("start", "x", (0, 5), (0,), "", None, tiny, from_start=True)
-    for place in ("atlas_run.SWEEPS", "stability_chart.SWEEPS"):
-        monkeypatch.setattr(f"toonset.bench.{place}", (sweep,))
-    monkeypatch.setattr("toonset.bench.workers.usable_workers", lambda: 1)
+    for place in ("atlas.run.SWEEPS", "stability.chart.SWEEPS"):
+        monkeypatch.setattr(f"bench.{place}", (sweep,))
+    monkeypatch.setattr("bench.cases.workers.usable_workers", lambda: 1)
     out = tmp_path / "out"
-    command = ("bench", "stability", "-o", out, "--count", 1, "--json", "--quiet")
-    first = toonset(*command, "--quick", "--only", "start")
+    command = ("stability", "-o", out, "--count", 1, "--json", "--quiet")
+    first = bench(*command, "--quick", "--only", "start")
     assert first.code == 0, first
     assert [found["step"] for found in first.json["rows"]] == ["0"]
     assert {path.name for path in out.iterdir()} == {
@@ -226,25 +226,25 @@ def test_a_second_run_takes_the_first_ones_steps(toonset, tmp_path, monkeypatch)
         "report.html",
     }
     kept = json.loads((out / "steps.json").read_text())["steps"][0]
-    more = toonset(*command, "--only", "start")
+    more = bench(*command, "--only", "start")
     assert [found["step"] for found in more.json["rows"]] == ["0", "5"]
     assert {path.name for path in (out / "pictures").iterdir()} == {"start-0.png", "start-5.png"}
     page = (out / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 3  # two steps, and the worst of them again
     assert page.count('<section id="') == 1
     assert json.loads((out / "steps.json").read_text())["steps"][0] == kept  # seconds, too
-    assert "seed=0" in toonset(*command, "--seed", 1).reason
-    afresh = toonset(*command, "--seed", 1, "--quick", "--only", "start", "--force")
+    assert "seed=0" in bench(*command, "--seed", 1).reason
+    afresh = bench(*command, "--seed", 1, "--quick", "--only", "start", "--force")
     assert [found["step"] for found in afresh.json["rows"]] == ["0"]
 
 
-def test_mistakes_are_refused_before_any_work(toonset, tmp_path):
-    wrong = toonset("bench", "stability", "--only", "hat", "-o", tmp_path / "out")
+def test_mistakes_are_refused_before_any_work(bench, tmp_path):
+    wrong = bench("stability", "--only", "hat", "-o", tmp_path / "out")
     assert "takes one of start, views" in wrong.reason
     (tmp_path / "drawing.png").write_bytes(b"x")
-    assert "--force" in toonset("bench", "stability", "-o", tmp_path).reason
-    assert "drawing.png" in toonset("bench", "stability", "-o", tmp_path, "--force").reason
-    assert toonset("bench", "stability", "--cases", tmp_path).code == 2
+    assert "--force" in bench("stability", "-o", tmp_path).reason
+    assert "drawing.png" in bench("stability", "-o", tmp_path, "--force").reason
+    assert bench("stability", "--cases", tmp_path).code == 2
 
 
 def test_a_body_of_a_seed_is_the_sheets_body():

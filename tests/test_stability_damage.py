@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.bench.stability_damage import (
+from bench.stability.damage import (
     MIRROR,
     mirrored,
     padded,
@@ -19,8 +19,8 @@ from toonset.bench.stability_damage import (
     without_feet,
     without_pieces,
 )
-from toonset.bench.stability_draws import LOSSLESS, blurred, compressed
-from toonset.bench.stability_sheet import BASE, DrawnSheet, draw_sheet
+from bench.stability.draws import LOSSLESS, blurred, compressed
+from bench.stability.sheet import BASE, DrawnSheet, draw_sheet
 from toonset.calib.rim import silhouette_mask
 from toonset.camera import Camera
 from toonset.mesh import Mesh

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.bench.stability_damage import stretched
+from bench.cases.bodies import random_body
+from bench.stability.damage import stretched
 from toonset.calib.calibrate import calibrate
 from toonset.calib.contour import drawn_contour
 from toonset.calib.cut_off import CutOff, FlatSide
@@ -17,7 +18,6 @@ from toonset.calib.match import Drawing
 from toonset.calib.result import Calibration
 from toonset.calib.stretch import Stretches, as_drawn, stretched_mannequin, unstretched
 from toonset.camera import rotation_distance
-from toonset.dataset.bodies import random_body
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
 from toonset.view import View

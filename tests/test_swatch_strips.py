@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.figures import find_blobs
-from toonset.dataset.messy import make_messy_sheet
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.swatch_strips import strip_seams
 

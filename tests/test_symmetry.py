@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
 from toonset.camera import Camera
-from toonset.dataset.bodies import random_body
 from toonset.dataset.scene import Frame, Scene
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround

@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 import torch
 
-from toonset.bench.cases import train_cases
+from bench.cases.cases import train_cases
 from toonset.nerf.labelling import labelled
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.threads import SIDES, side_by_side, threads_in_use, use_threads

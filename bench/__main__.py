@@ -1,0 +1,176 @@
+"""`python -m bench`: speed against accuracy, as a table, a chart and records.
+
+`./run bench` runs it in toonset's own environment. It is no part of the installed package: what it
+compares toonset with are development dependencies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bench.commands.charts import REPORT, result_files
+from bench.commands.charts import WRITTEN as RESULTS
+from bench.commands.check import check
+from bench.commands.chosen import Baseline, Chosen, Subject
+from bench.commands.measure import WRONG_SPLITS, measure
+from toonset.cli.help import Verb
+from toonset.cli.main import run
+from toonset.cli.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    SeedOption,
+    check_output,
+)
+
+WRITTEN = (*RESULTS, WRONG_SPLITS)
+
+app = typer.Typer(
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.command(cls=Verb)
+def bench(
+    subject: Annotated[Subject | None, typer.Argument(help="What to measure.")] = None,
+    cases: Annotated[
+        Path | None,
+        typer.Option("--cases", help="Folders with ground truth (default: synthetic ones)."),
+    ] = None,
+    sprites: Annotated[
+        Path | None,
+        typer.Option(
+            "--sprites", help="Calib, split: folders of game sprites with their yaws, boxes."
+        ),
+    ] = None,
+    only: Annotated[
+        str, typer.Option("--only", help="Cases (or sweeps) whose name contains this, e.g. exact.")
+    ] = "",
+    count: Annotated[
+        int | None,
+        typer.Option(
+            "--count",
+            min=1,
+            help="Synthetic cases per condition (without --cases); default 4. "
+            "Paper: characters; default 8, with --quick 3. "
+            "Stability: sheets per step; default 8 (training: 3), with --quick 2 (1). "
+            "Split: sheets per difficulty, 15 times as many mixtures; with --quick 1.",
+        ),
+    ] = None,
+    half: Annotated[
+        bool, typer.Option("--half", help="Train on the cases' pictures at half size.")
+    ] = False,
+    baseline: Annotated[
+        Baseline | None,
+        typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer settings or cases.")] = False,
+    against_committed: Annotated[
+        bool,
+        typer.Option("--check", help="No subject: is anything worse than the committed figures?"),
+    ] = False,
+    renew: Annotated[
+        bool, typer.Option("--renew", help="No subject: commit to the figures of now.")
+    ] = False,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Output folder.", rich_help_panel=OUTPUT_PANEL)
+    ] = Path("bench-results"),
+    force: ForceFlag = False,
+    seed: SeedOption = 0,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Measure one stage: seconds against accuracy, per setting, beside a baseline.
+
+    Prints a table and writes records.json, report.html and, for `calib`, `train` and `palette`, a
+    chart of seconds against accuracy per condition (PNG, SVG, CSV). `split` draws the wrongly
+    split sheets. `stability` sweeps what a sheet may have wrong, to where it fails; `train` draws
+    held-out PSNR against seconds; `paper` makes the plain method's table and figure, for hours, and
+    says whether palettes help it. Of these three, the same command again continues a stopped run,
+    or draws all that is there.
+    `--check` runs a quick bench of every stage and ends with 3 where one has got worse.
+    """
+    from bench.records.record import as_dicts, machine
+    from toonset.files import new_folder, write_bytes
+
+    printer = Printer(as_json, quiet)
+    if against_committed or renew:
+        others = (subject, cases, sprites, only, count, half, baseline, quick, force)
+        if any(others) or (against_committed and renew):
+            raise typer.BadParameter("--check and --renew stand alone, without a subject")
+        check(seed, printer, renew=renew)
+        return
+    if subject is None:
+        raise typer.BadParameter(f"say what to measure: {', '.join(Subject)}; or --check")
+    chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed)
+    chosen.check()
+    if subject in (Subject.stability, Subject.train, Subject.paper):
+        with resumable(printer):
+            if subject is Subject.stability:
+                _stability(out, only, seed, count, quick, force, printer)
+            else:
+                _training(out, chosen, force, printer)
+        return
+    check_output(out, [cases, sprites], WRITTEN, force=force)
+    measured = measure(chosen, printer)
+    files = result_files(subject.value, measured.records, f"seed {seed}")
+    with new_folder(out, force=force) as folder:
+        for name, content in (files | measured.pictures).items():
+            write_bytes(folder / name, content)
+    printer.say(f"machine: {machine()}, seed {seed}")
+    printer.say(f"look at {out / REPORT}")
+    printer.result({"records": as_dicts(measured.records)}, measured.text)
+
+
+@contextmanager
+def resumable(printer: Printer) -> Iterator[None]:
+    """Say of a bench that is interrupted that it goes on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        printer.doubt("what is done is kept; the same command goes on")
+        raise
+
+
+def _training(out: Path, chosen: Chosen, force: bool, printer: Printer) -> None:
+    from bench.commands.paper import paper_into
+    from bench.commands.train import train_into
+    from bench.records.record import machine
+
+    into = paper_into if chosen.subject is Subject.paper else train_into
+    text, found = into(out, chosen, printer, force=force)
+    printer.say(f"machine: {machine()}, seeds from {chosen.seed}; pictures in {out}")
+    printer.result(found, text)
+
+
+def _stability(
+    out: Path, only: str, seed: int, count: int | None, quick: bool, force: bool, printer: Printer
+) -> None:
+    from dataclasses import asdict
+
+    from bench.atlas.figures import as_plain, summary_text
+    from bench.commands.stability import sweep_into
+
+    progress = printer.progress
+    rows, pages = sweep_into(out, only, seed, count, quick=quick, force=force, progress=progress)
+    printer.say(f"seed {seed}; look at {out / REPORT}")
+    plain = {"rows": [asdict(row) for row in rows], "pages": as_plain(pages)}
+    printer.result({"folder": out, **plain}, summary_text(pages))
+
+
+def main() -> None:
+    """Run the bench and leave with its exit code."""
+    run(app, "bench")
+
+
+if __name__ == "__main__":
+    main()

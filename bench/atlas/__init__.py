@@ -1,0 +1,1 @@
+"""The atlas of failures: pages, figures, report."""

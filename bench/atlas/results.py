@@ -1,0 +1,110 @@
+"""Results of steps as the trials of pages: views by error, trainings by what they lost.
+
+A calibrated view is fine within 5 degrees of the truth and has failed beyond 15. A training has
+failed where held-out views have lost more than 3 dB against those of the same body's clean scene:
+twice the error's power; within 1 dB of it is fine. A palette has failed that lacks a colour.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from bench.atlas.figures import Kind, Trial, TriedPage, TriedStep
+from bench.atlas.palette import CLOSE, LISTED, PalettePage
+from bench.atlas.palette import WARNED as PALETTE_WARNED
+from bench.atlas.run import AnyPage, Result, TriedStepResult, all_pages
+from bench.atlas.training import (
+    CRASHED,
+    REFUSED,
+    REPAIRED,
+    SILENT,
+    TrainPage,
+    Tried,
+)
+from bench.atlas.training import WARNED as TRAIN_WARNED
+from bench.charts.chart import COLORS
+from bench.stability.steps import SheetResult, StepResult
+from bench.stability.table import SOLVED_DEG, WRONG_DEG
+from toonset.nerf.verdict import WEAK
+
+BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, BLACK, GREY = COLORS
+LOST_FINE_DB, LOST_FAILED_DB = 1.0, 3.0
+NONE_MISSED = 0.1  # %
+HUNDRED = 100.0
+CALIBRATION = Kind(
+    *("calibration", "views", "rotation error", "degrees", SOLVED_DEG, WRONG_DEG),
+    {"ok": GREEN, "weak": ORANGE, "ambiguous": SKY, "failed": VERMILION, "crashed": BLACK},
+    logarithmic=True,
+)
+TRAINING = Kind(
+    *("training", "trainings", "loss of held-out PSNR", "dB", LOST_FINE_DB, LOST_FAILED_DB),
+    {
+        SILENT: GREEN,
+        REPAIRED: SKY,
+        TRAIN_WARNED: PINK,
+        WEAK: ORANGE,
+        REFUSED: VERMILION,
+        CRASHED: BLACK,
+    },
+    informs=(REPAIRED,),
+)
+PALETTE = Kind(
+    *("palette", "palettes", "colours missed", "%", NONE_MISSED, NONE_MISSED),
+    {SILENT: GREEN, CLOSE: ORANGE, LISTED: SKY, PALETTE_WARNED: VERMILION, REFUSED: BLACK},
+)
+
+
+def tried_pages(results: Sequence[Result]) -> list[TriedPage]:
+    """Return the pages of which there are results, steps as listed.
+
+    A page about training without its clean step has nothing to compare with, and is left out.
+    """
+    found = []
+    for page in all_pages():
+        own = [result for result in results if _page_of(result) == page.name]
+        steps = _steps(page, own)
+        if steps:
+            found.append(TriedPage(page, _kind(page), steps))
+    return found
+
+
+def _page_of(result: Result) -> str:
+    return result.sweep if isinstance(result, StepResult) else result.page
+
+
+def _kind(page: AnyPage) -> Kind:
+    if isinstance(page, TrainPage):
+        return TRAINING
+    return PALETTE if isinstance(page, PalettePage) else CALIBRATION
+
+
+def _steps(page: AnyPage, results: Sequence[Result]) -> tuple[TriedStep, ...]:
+    sheets = [result for result in results if isinstance(result, StepResult)]
+    if sheets:
+        return tuple(TriedStep(result.step, _views(result.sheets)) for result in sheets)
+    tried = [result for result in results if isinstance(result, TriedStepResult)]
+    best = dict.fromkeys((one.seed for result in tried for one in result.tried), HUNDRED)
+    if isinstance(page, TrainPage):
+        clean = [result for result in tried if result.step == str(page.reference)]
+        best = {one.seed: one.figure for result in clean for one in result.tried}
+    if not best:
+        return ()
+    return tuple(
+        TriedStep(result.step, tuple(_lost(one, best[one.seed]) for one in result.tried))
+        for result in tried
+    )
+
+
+def _views(sheets: Sequence[SheetResult]) -> tuple[Trial, ...]:
+    return tuple(
+        Trial(number, math.degrees(view.raw), view.verdict, words)
+        for number, sheet in enumerate(sheets)
+        for view, words in zip(
+            sheet.views, sheet.reasons or (sheet.note,) * len(sheet.views), strict=True
+        )
+    )
+
+
+def _lost(one: Tried, best: float) -> Trial:
+    return Trial(one.seed, best - one.figure, one.voice, one.words)

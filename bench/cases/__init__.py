@@ -1,0 +1,1 @@
+"""Where test sheets come from: folders, sprites, random bodies."""

@@ -1,0 +1,1 @@
+"""Charts of cost against merit."""

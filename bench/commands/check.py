@@ -1,0 +1,88 @@
+"""`python -m bench --check`: a quick bench of every stage against the committed figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from bench.commands.chosen import Chosen, Subject
+from toonset.cli.output import Printer
+from toonset.errors import BundleError
+
+if TYPE_CHECKING:
+    from bench.records.gate import Guard
+    from bench.records.record import Record
+
+COMMITTED = Path(__file__).parents[1] / "committed.json"
+SUBJECTS = {  # synthetic cases of each: what fits five minutes
+    Subject.calib: 1,
+    Subject.palette: None,
+    Subject.labels: None,
+    Subject.splitting: 1,
+    Subject.train: 1,
+}
+WORSE = 3
+
+
+def check(seed: int, printer: Printer, *, renew: bool) -> None:
+    """Print what has got worse; exit code 3 if anything has.
+
+    Args:
+        seed: of everything random; that of the committed figures.
+        printer: of table and progress.
+        renew: write the figures instead of comparing them.
+
+    Raises:
+        ToonsetError: the committed figures cannot be read, or written.
+    """
+    from bench.records.gate import as_plain, as_text, compared, from_plain
+    from toonset.dataset.json_file import read_json
+    from toonset.files import write_json
+
+    committed = [] if renew else from_plain(read_json(COMMITTED), str(COMMITTED))
+    if known := {guard.seed for guard in committed} - {seed}:
+        raise BundleError(
+            f"{COMMITTED}: figures of seed {known.pop()}, not {seed}; pass that --seed"
+        )
+    now = measured(seed, printer)
+    if renew:
+        write_json(COMMITTED, as_plain(now))
+        printer.result({"figures": len(now)}, f"{len(now)} figures written to {COMMITTED}")
+        return
+    rows = compared(committed, now)
+    worse = [row for row in rows if row.fails]
+    plain = [{"key": row.committed.key, "lost": row.lost, "now": row.now} for row in worse]
+    printer.result({"figures": len(rows), "worse": plain}, as_text(rows))
+    if worse:
+        raise typer.Exit(WORSE)
+
+
+def measured(seed: int, printer: Printer) -> list[Guard]:
+    """Return the figures of all subjects, as they are now."""
+    from bench.records.gate import guards_of, yardstick_s
+
+    guards = []
+    for subject, count in SUBJECTS.items():
+        printer.say(f"{subject.value} ...")
+        yard_s = yardstick_s()
+        guards += guards_of(subject.value, _records(_chosen(subject, count, seed), printer), yard_s)
+    return guards
+
+
+def _chosen(subject: Subject, count: int | None, seed: int) -> Chosen:
+    return Chosen(subject, None, None, "", count, half=False, baseline=None, quick=True, seed=seed)
+
+
+def _records(chosen: Chosen, printer: Printer) -> list[Record]:
+    if chosen.subject is Subject.train:
+        from bench.charts.chart import DEFAULT
+        from bench.commands.train import jobs_of
+        from bench.train.measure import records_of, run_jobs
+
+        jobs = [job for job in jobs_of(chosen) if job.method == DEFAULT]
+        return records_of([found for _, found in run_jobs(jobs, printer.progress)], chosen.seed)
+    from bench.commands.measure import measure
+
+    return measure(chosen, printer).records

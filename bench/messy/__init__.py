@@ -1,0 +1,1 @@
+"""Draw messy sheets with their truth."""

@@ -1,0 +1,135 @@
+"""Who stands on a messy sheet: how many figures, how tall, drawn in which style."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.messy.cartoon import cartoon_cast
+from bench.messy.figure import (
+    Cast,
+    Figure,
+    Rgb,
+    as_line_art,
+    resized,
+    shaded,
+    with_colored_lines,
+    with_gaps,
+)
+from bench.messy.ground import DARK, LIGHT, clothes, luma
+from bench.messy.options import MessyOptions
+from bench.messy.solids import MOST_VIEWS, solid_cast
+
+UNLINED = 0.15  # of coloured sheets have figures without lines
+COLORED_LINES = 0.25  # of them have lines of a dark colour
+BLACK: Rgb = (0, 0, 0)
+CHALK: Rgb = (238, 238, 240)
+PENCIL: Rgb = (112, 112, 116)
+SHADED = 0.3  # of coloured sheets are lit softly
+CHARACTERS = 1_000  # numbers to choose from
+Style = Callable[[Figure], Figure]
+
+
+@dataclass(frozen=True)
+class Brief:
+    """What is to be drawn.
+
+    Attributes:
+        rows: figures in each row.
+        figure_px: height of the figures.
+        outline_px: width of the contour; 0 = none.
+    """
+
+    rows: tuple[int, ...]
+    figure_px: int
+    outline_px: float
+
+
+def brief_of(chosen: frozenset[str], options: MessyOptions, rng: np.random.Generator) -> Brief:
+    """Return how many figures in which rows, and how large."""
+    rows: tuple[int, ...] = (int(rng.integers(2, 9)),)
+    if "one" in chosen:
+        rows = (1,)
+    elif "rows" in chosen:
+        across = int(rng.integers(2, 7))
+        most = min(options.most_figures, 4 * across)
+        rows = _filled(int(rng.integers(across + 1, most + 1)), across)
+    low, high = options.figure_px
+    high = max(low, round(high / math.sqrt(max(1, sum(rows) / 4))))
+    figure_px = round(math.exp(rng.uniform(math.log(low), math.log(high))))
+    lined = bool(chosen & {"line art", "open contour"}) or rng.random() > UNLINED
+    pen = max(figure_px * float(rng.uniform(0.006, 0.014)), 1.2) if lined else 0.0
+    return Brief(rows, figure_px, round(pen, 1))
+
+
+def cast_of(
+    brief: Brief, chosen: frozenset[str], ground: tuple[Rgb, ...], rng: np.random.Generator
+) -> Cast:
+    """Return the figures of all rows in reading order, in the sheet's style."""
+    colors = clothes(ground, brief.outline_px > 0, rng)
+    make = solid_cast if rng.random() < 0.5 else cartoon_cast
+    count = sum(brief.rows)
+    number = int(rng.integers(CHARACTERS))
+    casts = [
+        make(
+            number + i,
+            min(count, MOST_VIEWS),
+            brief.figure_px,
+            brief.outline_px,
+            colors,
+            floats="floating" in chosen,
+            heads="heads" in chosen and i == 0,
+        )
+        for i in range(math.ceil(count / MOST_VIEWS))
+    ]
+    figures = [figure for cast in casts for figure in cast.figures][:count]
+    if "sizes" in chosen:
+        figures = [resized(figure, float(rng.uniform(0.9, 1.0))) for figure in figures]
+    whole = replace(casts[0], figures=tuple(figures))
+    if chosen & {"line art", "open contour"}:
+        return _inked(whole, min(map(luma, ground)), "open contour" in chosen, rng)
+    return _painted(whole, min(map(luma, ground)), rng)
+
+
+def _painted(cast: Cast, ground_luma: float, rng: np.random.Generator) -> Cast:
+    """Return the cast in its colours, at times with coloured lines or lit softly."""
+    colored, lit = rng.random(2) < (COLORED_LINES, SHADED)
+    red, green, blue = (int(v) for v in rng.integers(20, 90, size=3))
+    strength = float(rng.uniform(0.1, 0.3))
+    if colored and ground_luma >= LIGHT:
+        cast = _styled(cast, lambda figure: with_colored_lines(figure, (red, green, blue)))
+    return _styled(cast, lambda figure: shaded(figure, strength)) if lit else cast
+
+
+def _inked(cast: Cast, ground_luma: float, is_open: bool, rng: np.random.Generator) -> Cast:
+    """Return the cast as line art, some contours of it interrupted."""
+    inks: tuple[Rgb, ...] = (BLACK, (40, 36, 48), (70, 44, 30), PENCIL)
+    if ground_luma < LIGHT:
+        inks = (CHALK if ground_luma < DARK else BLACK,)
+    ink = inks[int(rng.integers(len(inks)))]
+    drawn = _styled(cast, lambda figure: as_line_art(figure, ink))
+    if not is_open:
+        return drawn
+    figures = list(drawn.figures)
+    opened = rng.permutation(len(figures))[: max(1, len(figures) // 2)]
+    for i in opened:
+        gaps, width = int(rng.integers(1, 4)), float(rng.uniform(1, 2))
+        figures[i] = with_gaps(figures[i], gaps, width, cast.outline_px, rng)
+    return replace(drawn, figures=tuple(figures))
+
+
+def _styled(cast: Cast, style: Style) -> Cast:
+    return replace(
+        cast,
+        figures=tuple(style(figure) for figure in cast.figures),
+        heads=tuple(style(head) for head in cast.heads),
+    )
+
+
+def _filled(count: int, across: int) -> tuple[int, ...]:
+    """Return full rows and what remains."""
+    full, rest = divmod(count, across)
+    return (across,) * full + ((rest,) if rest else ())

@@ -1,0 +1,123 @@
+"""What stands round the rows of a messy sheet: title, swatches, signature, and arrows between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from bench.messy.canvas import Canvas
+from bench.messy.cast import Brief
+from bench.messy.figure import Cast, Rgb, Stamp
+from bench.messy.layout import Layout, Placed, Spacing
+from bench.messy.props import arrow, swatches
+from bench.messy.rules import frame_px
+from bench.messy.text import faded, signature, title_block
+
+LEAST_ARROW_PX = 16
+INK: Rgb = (0, 0, 0)
+RED: Rgb = (200, 40, 40)
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """The sheet's spacing, and the stamps that its bands are made for; None = not there."""
+
+    spacing: Spacing
+    title: Stamp | None
+    swatches: Stamp | None
+    signature: Stamp | None
+
+
+def plan_margins(
+    cast: Cast, brief: Brief, chosen: frozenset[str], rgb: Rgb, rng: np.random.Generator
+) -> Margins:
+    """Return distances, with room for what stands in the bands."""
+    unit = brief.figure_px
+    title = strip = name = None
+    upright = bool(rng.integers(2))
+    if "title" in chosen:
+        title = title_block(max(unit * float(rng.uniform(0.08, 0.16)), 14), rgb, rng)
+    if "swatches" in chosen:
+        size = max(round(unit * float(rng.uniform(0.06, 0.15))), 10)
+        strip = swatches(cast.colors, size, rng, upright=upright)
+    if "signature" in chosen:
+        name = signature(max(unit * float(rng.uniform(0.05, 0.12)), 12), rgb, rng)
+        name = faded(name, float(rng.choice([1.0, rng.uniform(0.25, 0.6)])))
+    pad = round(0.06 * unit) + 4
+    below = [len(s) + pad for s in (None if upright else strip, name) if s is not None]
+    widths = [s.shape[1] for s in (title, None if upright else strip, name) if s is not None]
+    return Margins(
+        Spacing(
+            margin=round(unit * float(rng.uniform(0.06, 0.25))) + frame_px("frame" in chosen),
+            gap=max(round(unit * _gap(chosen, rng)), 4),
+            leading=max(round(unit * float(rng.uniform(0.08, 0.3))), 8),
+            text_gap=max(round(unit * float(rng.uniform(0.025, 0.08))), 4),
+            centred=bool(rng.integers(2)),
+            cells="cells" in chosen,
+            header=0 if title is None else len(title) + pad,
+            footer=sum(below),
+            side=strip.shape[1] + pad if strip is not None and upright else 0,
+            least=max(widths, default=0),
+        ),
+        title,
+        strip,
+        name,
+    )
+
+
+def furnish(
+    canvas: Canvas,
+    layout: Layout,
+    margins: Margins,
+    chosen: frozenset[str],
+    rgb: Rgb,
+    rng: np.random.Generator,
+) -> None:
+    """Paint the bands' stamps, and arrows between figures."""
+    width, height = layout.size_wh
+    margin = margins.spacing.margin
+    y = height - margin
+    if margins.title is not None:
+        free = width - 2 * margin - margins.title.shape[1]
+        canvas.over(margins.title, margin + round(free * float(rng.choice([0, 0.5]))), margin)
+    if margins.signature is not None:
+        y -= len(margins.signature)
+        free = width - 2 * margin - margins.signature.shape[1]
+        canvas.over(margins.signature, margin + round(free * float(rng.choice([0, 1]))), y)
+    if margins.swatches is not None and margins.spacing.side:
+        canvas.over(margins.swatches, width - margin - margins.swatches.shape[1], margin)
+    elif margins.swatches is not None:
+        top = height - margin - margins.spacing.footer + round(0.5 * margin)
+        top = min(top, y - len(margins.swatches) - 4)
+        free = width - 2 * margin - margins.swatches.shape[1]
+        canvas.over(margins.swatches, margin + round(free * float(rng.choice([0, 0.5, 1]))), top)
+    if "arrows" in chosen:
+        _arrows(canvas, layout, rgb, rng)
+
+
+def _gap(chosen: frozenset[str], rng: np.random.Generator) -> float:
+    """Return the distance between figures as a share of their height."""
+    least, most = (0.3, 0.5) if "arrows" in chosen else (0.08, 0.4)
+    return float(rng.uniform(max(least, 0.15) if "cells" in chosen else least, most))
+
+
+def _arrows(canvas: Canvas, layout: Layout, rgb: Rgb, rng: np.random.Generator) -> None:
+    """Draw an arrow between neighbouring figures wherever there is room."""
+    color = (rgb, rgb, RED)[int(rng.integers(3))]
+    curved, leftwards = bool(rng.integers(2)), bool(rng.integers(2))
+    level, pen = float(rng.uniform(0.15, 0.8)), float(rng.uniform(1, 4))
+    for row in layout.rows:
+        for left, right in pairwise(row.items):
+            free = right.x - left.right
+            length = round(0.7 * free)
+            if length < LEAST_ARROW_PX or not _both_views(left, right):
+                continue
+            stamp = arrow(length, color, pen, curved=curved, leftwards=leftwards)
+            y = row.top + round(level * (row.ground - row.top)) - len(stamp) // 2
+            canvas.over(stamp, left.right + (free - length) // 2, y)
+
+
+def _both_views(left: Placed, right: Placed) -> bool:
+    return left.item.is_view and right.item.is_view

@@ -1,0 +1,1 @@
+"""Palettes and labels beside other tools."""

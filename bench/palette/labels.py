@@ -1,0 +1,141 @@
+"""Labels and contours, measured against drawings whose truth is known.
+
+Right: of the pixels that are one colour, how many got it; one that was marked mixed counts as
+wrong. Mixed: pixels whose bytes are no colour's own. "Rim" counts the silhouette's soft pixels too,
+cut out without alpha. A contour's pixel is one that ink covers by half or more.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
+from bench.records.record import Record, summarise, table
+from toonset.palette.contour import find_contour
+from toonset.palette.labels import UNLABELLED, label_image, nearest_labels
+from toonset.palette.mixed import opaque_pixels
+
+Labeller = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+LABELLERS: dict[str, Labeller] = {
+    "default": lambda rgba, palette: label_image(rgba, palette),
+    "nearest colour": lambda rgba, palette: nearest_labels(rgba, palette),
+}
+CONTOURS: dict[str, Callable[[LabelCase], np.ndarray]] = {
+    "default": lambda case: find_contour(case.rgba, case.outline_px),
+    "width unknown": lambda case: find_contour(case.rgba),
+    "dark pixels": lambda case: _dark(case.rgba),
+}
+HALF = 128
+REPEATS = 3
+TIMED_WH = (2048, 1024)
+
+Samples = dict[tuple[str, str, str], list[float]]  # by group, method, metric
+
+
+def bench_labels(
+    cases: Path | None,
+    seed: int,
+    *,
+    quick: bool = False,
+    progress: Callable[[str], None] = lambda text: None,
+) -> tuple[list[Record], str]:
+    """Return records and their table: per condition and method, over all views.
+
+    Args:
+        cases: character folders with known colours; None for synthetic ones.
+        seed: of synthetic characters and drawing errors.
+        quick: two characters at 150 px.
+        progress: told what is measured.
+    """
+    samples: Samples = defaultdict(list)
+    last: LabelCase | None = None
+    for case in label_cases(cases, seed, quick=quick):
+        if last is None or case.group != last.group:
+            progress(f"labels {case.group}")
+        last = case
+        for name, labeller in LABELLERS.items():
+            _score_labels(samples, case, name, labeller)
+        if case.outline_px:
+            for name, contour in CONTOURS.items():
+                _score_contour(samples, case, name, contour(case))
+    assert last is not None
+    _time(samples, last)
+    records = [
+        summarise(
+            values,
+            method=method,
+            metric=metric,
+            unit="s/MP" if metric.startswith("seconds") else "%",
+            direction="lower" if metric.startswith("seconds") else "higher",
+            seed=seed,
+            group=group,
+        )
+        for (group, method, metric), values in samples.items()
+    ]
+    return records, table(records)
+
+
+def _score_labels(samples: Samples, case: LabelCase, method: str, labeller: Labeller) -> None:
+    found = labeller(case.rgba, case.palette)
+    pure = case.truth != UNLABELLED
+    # two entries of one colour are the same answer
+    colors = np.concatenate([case.palette, np.zeros((256 - len(case.palette), 3), np.uint8)])
+    right = (colors[found] == colors[case.truth]).all(axis=-1) & (found != UNLABELLED)
+    samples[case.group, method, "right"].append(_percent(pure & right, pure))
+    labelled = pure & (found != UNLABELLED)
+    samples[case.group, method, "right of those labelled"].append(_percent(right, labelled))
+    _score_mixed(samples, case, method, found, "mixed")
+    hard = with_hard_rim(case)
+    _score_mixed(samples, hard, method, labeller(hard.rgba, hard.palette), "mixed with rim")
+
+
+def _score_mixed(
+    samples: Samples, case: LabelCase, method: str, found: np.ndarray, metric: str
+) -> None:
+    opaque = opaque_pixels(case.rgba)
+    marked, mixed = opaque & (found == UNLABELLED), opaque & (case.truth == UNLABELLED)
+    samples[case.group, method, f"{metric}, recall"].append(_percent(marked & mixed, mixed))
+    if marked.any():
+        samples[case.group, method, f"{metric}, precision"].append(_percent(marked & mixed, marked))
+
+
+def _score_contour(samples: Samples, case: LabelCase, method: str, found: np.ndarray) -> None:
+    line, truth = found >= HALF, case.ink >= HALF
+    samples[case.group, method, "contour recall"].append(_percent(line & truth, truth))
+    if line.any():
+        samples[case.group, method, "contour precision"].append(_percent(line & truth, line))
+
+
+def _percent(part: np.ndarray, whole: np.ndarray) -> float:
+    return 100 * int((part & whole).sum()) / max(int(whole.sum()), 1)
+
+
+def _dark(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width"]:
+    """Return as ink whatever is dark: what a threshold makes of a drawing."""
+    dark = (rgba[..., :3].max(axis=-1) < HALF) & (rgba[..., 3] >= HALF)
+    return np.where(dark, np.uint8(255), np.uint8(0))
+
+
+def _time(samples: Samples, case: LabelCase) -> None:
+    """Add processor seconds per megapixel on a sheet of the case's drawing, repeated."""
+    width, height = TIMED_WH
+    times = -(-height // case.rgba.shape[0]), -(-width // case.rgba.shape[1]), 1
+    sheet = np.ascontiguousarray(np.tile(case.rgba, times)[:height, :width])
+    group = f"{width} x {height}"
+    for _ in range(REPEATS):
+        for name, labeller in LABELLERS.items():
+            start = time.process_time()
+            labeller(sheet, case.palette)
+            taken = (time.process_time() - start) / (width * height / 1e6)
+            samples[group, name, "seconds, labels"].append(taken)
+        start = time.process_time()
+        find_contour(sheet, max(case.outline_px, 1.0))
+        taken = (time.process_time() - start) / (width * height / 1e6)
+        samples[group, "default", "seconds, contour"].append(taken)

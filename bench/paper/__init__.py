@@ -1,0 +1,1 @@
+"""The plain method's table and figure."""

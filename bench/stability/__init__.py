@@ -1,0 +1,1 @@
+"""Sweeps of what a sheet may have wrong."""

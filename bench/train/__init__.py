@@ -1,0 +1,1 @@
+"""Trainings: methods, switches, their cost."""
