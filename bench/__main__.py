@@ -100,7 +100,7 @@ def bench(
     `--check` runs a quick bench of every stage and ends with 3 where one has got worse.
     """
     from bench.records.record import as_dicts, machine
-    from toonset.files import new_folder, write_bytes
+    from toonset.write import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
     if against_committed or renew:

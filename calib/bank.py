@@ -24,7 +24,7 @@ from toonset.calib import templates
 from toonset.calib.surface import Surface
 from toonset.calib.templates import Templates, build_templates
 from toonset.errors import OutputError
-from toonset.files import write_bytes
+from toonset.write import write_bytes
 
 VERSION = 1  # of the file, and of anything in `build_templates` that is no setting
 MOST_FILES = 100

@@ -66,7 +66,7 @@ def _problems(path: Path) -> list[Problem]:
 
 def _check_run(log: ProblemLog, run: Path) -> None:
     """Read a run as rendering would."""
-    from toonset.dataset.json_file import read_json
+    from toonset.json_file import read_json
     from toonset.nerf.manifest import check_manifest
     from toonset.nerf.run_folder import read_field
 

@@ -33,9 +33,9 @@ def consistency(
     from toonset.cli.output import check_output
     from toonset.dataset.picture import encode_png
     from toonset.dataset.transforms import read_scene
-    from toonset.files import new_folder, write_bytes, write_json
     from toonset.nerf.consistency import consistency_of
     from toonset.nerf.consistency_picture import consistency_picture
+    from toonset.write import new_folder, write_bytes, write_json
 
     printer = Printer(as_json, quiet)
     folder = out or (bundle if bundle.is_dir() else bundle.parent) / "consistency"

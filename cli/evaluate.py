@@ -99,8 +99,8 @@ def _write(
     force: bool,
 ) -> None:
     from toonset.dataset.picture import encode_png
-    from toonset.files import new_folder, write_bytes, write_json
     from toonset.nerf.evaluation_picture import contact_sheet
+    from toonset.write import new_folder, write_bytes, write_json
 
     errors_are = "mean difference" if "flip" in result["absent"] else "FLIP"
     with new_folder(out, force=force) as folder:
@@ -110,9 +110,9 @@ def _write(
 
 def _training_scene(run: Path, bundle: Path | None) -> tuple[Scene | None, str | None]:
     """Return the frames that the run was trained on, or why they are not known."""
-    from toonset.dataset.json_file import read_json
     from toonset.dataset.transforms import read_scene
     from toonset.errors import BundleError, ToonsetError
+    from toonset.json_file import read_json
     from toonset.nerf.evaluation import chosen_frames
 
     place = bundle or run.resolve().parent

@@ -15,7 +15,7 @@ def summarise_run(folder: Path) -> dict[str, Any]:
         BundleError: config.json or metrics.json cannot be read.
     """
     from toonset.dataset.bundle_summary import sizes
-    from toonset.dataset.json_file import read_json
+    from toonset.json_file import read_json
 
     config = _table(read_json(folder / "config.json"))
     metrics = _table(read_json(folder / "metrics.json"))

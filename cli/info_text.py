@@ -7,7 +7,7 @@ from itertools import zip_longest
 from typing import Any
 
 from toonset.cli.info_folders import run_line
-from toonset.plain_text import printable
+from toonset.errors import printable
 
 NAME_WIDTH = 10  # of the left column below the table
 MOST_COLORS, MOST_VIEWS, MOST_FILES = 16, 40, 10

@@ -17,8 +17,7 @@ import typer
 
 from toonset import __version__
 from toonset.cli.help import Verb, Verbs
-from toonset.errors import ToonsetError
-from toonset.plain_text import one_line
+from toonset.errors import ToonsetError, one_line
 
 VERBS = (  # in the order in which they are used
     *("split", "calibrate", "palette", "train", "render", "evaluate", "mesh", "planes"),

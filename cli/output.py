@@ -55,7 +55,7 @@ def check_output(
         OutputError: the folder exists and `force` is off, or it holds anything but earlier results
             of this verb, or an input, or the current folder, or it cannot be written.
     """
-    from toonset.files import check_new_folder
+    from toonset.write import check_new_folder
 
     check_new_folder(out, force=force)
     if not out.is_dir():

@@ -118,7 +118,7 @@ def palette(
     those of an earlier run; for images and other folders, or with -o, into a folder of their own.
     """
     from toonset.cli.palette_inputs import bundle_of, load_drawn
-    from toonset.files import new_folder
+    from toonset.write import new_folder
 
     printer = Printer(as_json, quiet)
     places = inputs or [BUNDLE]

@@ -26,9 +26,9 @@ def planes(
 
     Planes and hull are PNGs with a byte per feature; planes.json holds the weights and every size.
     """
-    from toonset.files import new_folder, write_bytes
     from toonset.nerf.planes_export import planes_files
     from toonset.nerf.run_folder import read_field
+    from toonset.write import new_folder, write_bytes
 
     check_output(out, [run], WRITTEN, force=force)
     files = planes_files(read_field(run))

@@ -131,11 +131,11 @@ def _write(
     force: bool,
 ) -> tuple[list[str], dict[str, int]]:
     """Write all pictures and files of the first layer; return names, and the latter's kB."""
-    from toonset.files import new_folder, write_bytes, write_json
     from toonset.nerf.depth_levels import DepthLevels
     from toonset.nerf.turntable_files import turntable_files
     from toonset.nerf.views import render as render_view
     from toonset.nerf.views_bake import Baked
+    from toonset.write import new_folder, write_bytes, write_json
 
     baked, files, turning = Baked.of(trained), [], []
     cameras = [camera for _, camera in named]

@@ -147,7 +147,7 @@ def _of_sheet(path: Path, options: SheetOptions) -> Drawings:
     from toonset.dataset.sheet import split_sheet
     from toonset.dataset.split import split_of_sheet
     from toonset.errors import PictureError, SheetError
-    from toonset.reading import read_whole
+    from toonset.read import read_whole
 
     data = read_whole(path, "picture", PictureError)
     picture = decode_rgba(data, path)

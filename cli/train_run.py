@@ -223,9 +223,9 @@ def _leave(request: Request, training: Training, onlooker: Onlooker, printer: Pr
 
 def _write(place: Place, training: Training, onlooker: Onlooker) -> dict[str, Any]:
     """Write the finished run; return the content of metrics.json."""
-    from toonset.files import new_folder
     from toonset.nerf.memory import memory_errors
     from toonset.nerf.report import write_run
+    from toonset.write import new_folder
 
     with new_folder(place.run, force=place.force) as folder, memory_errors():
         test = onlooker.looking.test

@@ -21,8 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from toonset.errors import SheetError
-from toonset.reading import describe, read_whole
-from toonset.strict_json import BOM, parse_json
+from toonset.read import BOM, describe, parse_json, read_whole
 from toonset.view import Box
 
 COLUMNS = ("x", "y", "width", "height")

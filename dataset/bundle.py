@@ -30,9 +30,9 @@ from toonset.dataset.mesh_file import load_mesh, save_obj
 from toonset.dataset.picture import encode_png
 from toonset.dataset.transforms import transforms_dict
 from toonset.errors import BundleError
-from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
 from toonset.view import View
+from toonset.write import new_folder, write_bytes, write_json
 
 MANNEQUIN, OVERLAY, CALIBRATION = "mannequin.obj", "overlay.png", "calibration.json"
 LABELS, CONTOURS, IMAGES = "labels", "contours", "images"

@@ -8,9 +8,9 @@ from typing import Any
 
 from toonset.dataset.calibration_schema import SCHEMA, VERSION, CalibrationFile
 from toonset.dataset.calibration_upgrade import upgraded
-from toonset.dataset.json_file import read_json, validated
 from toonset.errors import BundleError, CameraError
-from toonset.schema_name import schema_version
+from toonset.json_file import read_json, validated
+from toonset.read import schema_version
 from toonset.view import View
 
 RUN_ONLY = ("seconds",)  # of this run, not of the result: the same input gives the same bytes

@@ -27,8 +27,8 @@ from toonset.dataset.background import flattened
 from toonset.dataset.colmap_points import TrackedPoints
 from toonset.dataset.export_views import ExportView, write_beside
 from toonset.dataset.picture import encode_png
-from toonset.files import new_folder, write_bytes
 from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes
 
 NEW_ONLY = ("rigs", "frames")  # files of COLMAP 3.12 and later
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from toonset.errors import BundleError
-from toonset.reading import read_whole
+from toonset.read import read_whole
 
 MAX_BYTES = 2**30
 # of each camera model by its number, as COLMAP lists them

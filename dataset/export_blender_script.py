@@ -22,8 +22,8 @@ from toonset import frames as conventions
 from toonset.dataset.blender_script import SCRIPT
 from toonset.dataset.export_planes import clip_range, plane_corners, scene_views, stand, window_wh
 from toonset.dataset.export_views import ExportView, write_views
-from toonset.files import new_folder, write_bytes
 from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes
 
 SCRIPT_NAME = "import_cameras.py"
 

@@ -22,8 +22,8 @@ from toonset.dataset.export_lens import common_lens
 from toonset.dataset.export_points import encode_ply
 from toonset.dataset.export_transforms import transform_matrix
 from toonset.dataset.export_views import ExportView, write_views
-from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes, write_json
 
 SPLITS = ("train", "val", "test")
 

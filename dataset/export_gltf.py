@@ -33,8 +33,8 @@ from toonset.dataset.export_views import ExportView, write_views
 from toonset.dataset.gltf_mesh import add_mannequin, add_plane
 from toonset.dataset.gltf_write import Gltf
 from toonset.dataset.native_camera import NativeCamera
-from toonset.files import new_folder, write_bytes
 from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes
 
 SCENE = "scene.glb"
 

@@ -20,8 +20,8 @@ import numpy as np
 
 from toonset import frames as conventions
 from toonset.dataset.export_views import ExportView, write_views
-from toonset.files import new_folder, write_bytes
 from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes
 
 VERSION = 1  # of the layout of the file
 

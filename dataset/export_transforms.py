@@ -25,8 +25,8 @@ from toonset import frames as conventions
 from toonset.dataset.colmap_points import TrackedPoints
 from toonset.dataset.export_points import encode_ply
 from toonset.dataset.export_views import ExportView, write_views
-from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes, write_json
 
 POINTS = "sparse_pc.ply"
 BOX_MARGIN = 1.1  # of the character's largest extent: drawn hair and hats exceed the mannequin

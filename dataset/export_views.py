@@ -23,15 +23,15 @@ from jaxtyping import UInt8
 from toonset import frames as conventions
 from toonset.camera import Camera
 from toonset.dataset.bundle import MANNEQUIN
-from toonset.dataset.json_file import read_json
 from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.native_camera import NativeCamera
 from toonset.dataset.picture import encode_png
 from toonset.dataset.scene import Frame
 from toonset.dataset.transforms import read_scene, transforms_file
 from toonset.errors import BundleError
-from toonset.files import write_bytes, write_json
+from toonset.json_file import read_json
 from toonset.mesh import Mesh
+from toonset.write import write_bytes, write_json
 
 SCHEMA = "toonset-export/1"
 NATIVE = "toonset.json"

@@ -17,8 +17,8 @@ from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.transforms import FAR_HEIGHTS, transforms_dict
 from toonset.dataset.transforms_read import check_total
 from toonset.errors import BundleError
-from toonset.files import new_folder, write_bytes, write_json
 from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes, write_json
 
 
 @dataclass(frozen=True)

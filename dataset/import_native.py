@@ -9,12 +9,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from toonset.dataset.export_views import NATIVE
 from toonset.dataset.import_place import ImportView, find_picture
-from toonset.dataset.json_file import read_json, validated
 from toonset.dataset.native_camera import NativeCamera
 from toonset.dataset.transforms_camera import shows_same_view
 from toonset.dataset.transforms_schema import MAX_FRAMES
 from toonset.errors import BundleError, CameraError
-from toonset.schema_name import schema_version
+from toonset.json_file import read_json, validated
+from toonset.read import schema_version
 
 NAME, VERSION = "toonset-export", 1
 

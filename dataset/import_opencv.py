@@ -19,7 +19,7 @@ from toonset.dataset.native_camera import check_numbers
 from toonset.dataset.picture import picture_size
 from toonset.dataset.transforms_schema import MAX_FRAMES
 from toonset.errors import BundleError, CameraError
-from toonset.reading import read_whole
+from toonset.read import read_whole
 
 SUFFIXES = (".yml", ".yaml", ".xml")
 MAX_BYTES = 32 * 2**20

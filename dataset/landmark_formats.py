@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from toonset.errors import LandmarkError
-from toonset.reading import read_whole
+from toonset.read import read_whole
 
 SCHEMA = "toonset-landmarks/1"
 KEYS = ("schema", "units", "pixels", "points", "views")

@@ -10,7 +10,7 @@ from toonset.dataset.landmark_formats import SCHEMA
 from toonset.dataset.mannequin import Mannequin
 from toonset.dataset.mesh_file import save_obj
 from toonset.errors import OutputError
-from toonset.files import write_bytes, write_json
+from toonset.write import write_bytes, write_json
 
 
 def landmarks_path(mesh_path: Path) -> Path:

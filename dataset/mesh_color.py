@@ -11,7 +11,7 @@ from jaxtyping import Float, Int, UInt8
 
 from toonset.dataset.picture import load_rgba
 from toonset.errors import MeshError
-from toonset.reading import read_whole
+from toonset.read import read_whole
 
 UNKNOWN_COLOR = (204, 204, 204)  # a face whose material is not described; trimesh's and Blender's
 MAX_LIBRARY_BYTES = 4 * 2**20

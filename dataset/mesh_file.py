@@ -18,7 +18,7 @@ from toonset.dataset.mesh_scan import read_scan
 from toonset.dataset.mesh_soup import Soup, mesh_of_soup
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
-from toonset.reading import describe, read_whole
+from toonset.read import describe, read_whole
 
 MAX_BYTES = 256 * 2**20
 MAX_FACES = 5_000_000

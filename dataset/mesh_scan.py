@@ -13,7 +13,7 @@ import numpy as np
 
 from toonset.dataset.mesh_soup import Soup, check_counts
 from toonset.errors import MeshError
-from toonset.reading import describe
+from toonset.read import describe
 
 PLY_ELEMENT = re.compile(rb"^element\s+(\w+)\s+(\d+)\s*$", re.MULTILINE)
 OFF_COUNTS = re.compile(rb"^\s*(\d+)[ \t]+(\d+)[ \t]+\d+\s*$", re.MULTILINE)

@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.picture import encode_grey_png, encode_indexed_png, encode_png
-from toonset.files import new_folder, write_bytes
 from toonset.palette.files import encode_palette
 from toonset.palette.palette import Palette
 from toonset.palette.swatch import draw_swatches
+from toonset.write import new_folder, write_bytes
 
 PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
 COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs

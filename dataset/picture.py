@@ -21,7 +21,7 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 from toonset.dataset.pixel_modes import rgba_of
 from toonset.errors import PictureError
 from toonset.palette.labels import UNLABELLED
-from toonset.reading import describe, read_whole
+from toonset.read import describe, read_whole
 
 FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF")
 MAX_PIXELS = 80_000_000  # 16,384 x 4,096 and a margin; beyond 89 million Pillow suspects a bomb

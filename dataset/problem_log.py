@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from toonset.dataset.json_file import SchemaProblems
-from toonset.errors import ToonsetError
-from toonset.plain_text import one_line
+from toonset.errors import ToonsetError, one_line
+from toonset.json_file import SchemaProblems
 
 Found = TypeVar("Found")
 

@@ -18,17 +18,15 @@ from jaxtyping import UInt8
 from pydantic import BaseModel, Field, ValidationError
 
 from toonset import __version__
-from toonset.dataset.json_file import SchemaProblems
 from toonset.dataset.picture import encode_png
 from toonset.dataset.sheet import LeftOut
 from toonset.dataset.split import Source, Split
 from toonset.errors import SheetError
-from toonset.files import new_folder, write_bytes, write_json
+from toonset.json_file import SchemaProblems
 from toonset.palette.format_hex import rgb_of_hex
 from toonset.palette.names import hex_of
-from toonset.reading import read_whole
-from toonset.schema_name import schema_version
-from toonset.strict_json import parse_json
+from toonset.read import parse_json, read_whole, schema_version
+from toonset.write import new_folder, write_bytes, write_json
 
 NAME, VERSION = "toonset-split", 1
 SPLIT_FILE, IMAGES, OVERLAY = "split.json", "images", "overlay.png"

@@ -28,7 +28,7 @@ from toonset.dataset.sheet import split_sheet
 from toonset.dataset.split import Source, Split, numbered
 from toonset.dataset.split_files import IMAGES, SPLIT_FILE, ViewRecord, read_records
 from toonset.errors import PictureError, SheetError
-from toonset.reading import read_whole
+from toonset.read import read_whole
 from toonset.view import View
 
 OPAQUE = 128  # alpha from which a pixel is the figure's

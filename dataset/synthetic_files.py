@@ -21,8 +21,8 @@ from toonset.dataset.native_camera import NativeCamera
 from toonset.dataset.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.dataset.synthetic import Turnaround
 from toonset.dataset.transforms import transforms_dict
-from toonset.files import new_folder, write_bytes, write_json
 from toonset.palette.names import hex_of
+from toonset.write import new_folder, write_bytes, write_json
 
 TRUTH_VERSION = 1
 

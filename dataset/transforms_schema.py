@@ -10,10 +10,10 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from toonset.dataset.json_file import read_json, validated
 from toonset.dataset.native_camera import NativeCamera
 from toonset.errors import BundleError
-from toonset.schema_name import schema_version
+from toonset.json_file import read_json, validated
+from toonset.read import schema_version
 
 SCHEMA, VERSION = "toonset-transforms", 1
 MAX_FRAMES = 10_000

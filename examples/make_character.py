@@ -20,8 +20,8 @@ from toonset.dataset.picture import encode_png
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
 from toonset.dataset.synthetic_files import truth_dict
-from toonset.files import write_bytes, write_json
 from toonset.mesh import Mesh
+from toonset.write import write_bytes, write_json
 
 OPTIONS = SynthOptions(elevation_deg=8.0, warp_percent=0.8)
 SEED = 7

@@ -25,17 +25,16 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from toonset import __version__
-from toonset.dataset.json_file import read_json, validated, validation_reason
 from toonset.dataset.scene import Scene
 from toonset.errors import BundleError
-from toonset.files import write_bytes, write_json
+from toonset.json_file import read_json, validated, validation_reason
 from toonset.nerf.checkpoint_state import FitState
 from toonset.nerf.manifest import entry_of
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.threads import threads_in_use
 from toonset.nerf.trained import Step
-from toonset.reading import read_whole
-from toonset.schema_name import schema_version
+from toonset.read import read_whole, schema_version
+from toonset.write import write_bytes, write_json
 
 FILE, TENSORS = "checkpoint.json", "checkpoint-*.safetensors"
 SCHEMA, VERSION = "toonset-checkpoint", 3  # 1: a step's rays were one batch; 2: borders were harder

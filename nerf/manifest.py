@@ -13,12 +13,10 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from toonset.dataset.json_file import read_json, validated
-from toonset.errors import BundleError
-from toonset.files import write_json
-from toonset.plain_text import one_line
-from toonset.reading import read_whole
-from toonset.schema_name import schema_version
+from toonset.errors import BundleError, one_line
+from toonset.json_file import read_json, validated
+from toonset.read import read_whole, schema_version
+from toonset.write import write_json
 
 FILE = "manifest.json"
 SCHEMA, VERSION = "toonset-run", 1

@@ -18,9 +18,9 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.dataset.picture import encode_png
 from toonset.errors import OutputError
-from toonset.files import write_bytes
 from toonset.nerf.surface import Surface
 from toonset.palette.names import hex_of
+from toonset.write import write_bytes
 
 KINDS = (".glb", ".obj", ".ply")
 CELL_PX = 8  # of the palette's texture: neighbours do not bleed into a colour's middle

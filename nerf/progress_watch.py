@@ -18,7 +18,6 @@ import torch
 from toonset.dataset.picture import encode_png
 from toonset.dataset.scene import Frame, Scene
 from toonset.errors import BundleError
-from toonset.files import write_bytes
 from toonset.nerf.checkpoint import write_checkpoint
 from toonset.nerf.checkpoint_state import FitState
 from toonset.nerf.field_loss import Model
@@ -30,6 +29,7 @@ from toonset.nerf.progress import Status, status_of
 from toonset.nerf.report import preview
 from toonset.nerf.trained import HeldOut, TrainedField
 from toonset.nerf.views import render
+from toonset.write import write_bytes
 
 SHARE = 0.1  # of the training's seconds that looking at held-out views may take
 MOST_VIEWS, MOST_PX = 4, 200  # held-out views looked at in between, and their longest side

@@ -16,7 +16,6 @@ from jaxtyping import UInt8
 from toonset import __version__
 from toonset.dataset.picture import encode_png
 from toonset.dataset.scene import Scene
-from toonset.files import write_bytes, write_json
 from toonset.nerf.layers import color_picture
 from toonset.nerf.manifest import write_manifest
 from toonset.nerf.metrics import compare, means, over_white
@@ -27,6 +26,7 @@ from toonset.nerf.turntable import turntable
 from toonset.nerf.verdict import verdict_of
 from toonset.nerf.views import render
 from toonset.nerf.views_bake import Baked
+from toonset.write import write_bytes, write_json
 
 PREVIEW_VIEWS, PREVIEW_ELEVATION = 4, math.radians(10)
 

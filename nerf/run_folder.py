@@ -23,9 +23,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from toonset.dataset.json_file import read_json, validation_reason
 from toonset.errors import BundleError
-from toonset.files import write_bytes
+from toonset.json_file import read_json, validation_reason
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.field_kinds import build_field
 from toonset.nerf.fields import FieldSpec
@@ -35,6 +34,7 @@ from toonset.nerf.manifest import check_manifest
 from toonset.nerf.run_folder_tensors import packed, unpack
 from toonset.nerf.trained import TrainedField
 from toonset.nerf.warp_record import KeysRecord
+from toonset.write import write_bytes
 
 CONFIG, MODEL = "config.json", "model.safetensors"
 FORMAT = 2

@@ -24,7 +24,7 @@ from toonset.palette.named import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.palette.text import without_mark
 from toonset.palette.typed import is_color, rgb_of_typed
-from toonset.reading import describe, read_whole
+from toonset.read import describe, read_whole
 
 __all__ = [
     "FORMATS",

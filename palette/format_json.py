@@ -10,8 +10,7 @@ from toonset.palette.format_hex import rgb_of_hex
 from toonset.palette.named import NamedColor, clean_name
 from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette
-from toonset.reading import read_whole
-from toonset.strict_json import parse_json
+from toonset.read import parse_json, read_whole
 
 NAME, VERSION = "toonset-palette", 1  # toonset.palette.palette_schema says what may change
 MAX_BYTES = 2**20

@@ -1,6 +1,6 @@
 """The content of palette.json, as pydantic checks it.
 
-Within a version keys may be added (see `toonset.schema_name`): readers ignore keys that they do not
+Within a version keys may be added (see `toonset.read`): readers ignore keys that they do not
 know. To add one, give it a default here, write it in `format_json.to_json`, and leave the version
 as it is. Whatever would make an older reader draw a wrong conclusion needs the next one.
 """
@@ -24,7 +24,7 @@ from toonset.palette.palette import (
     PaletteColor,
     Place,
 )
-from toonset.schema_name import schema_version
+from toonset.read import schema_version
 
 Name = Annotated[str, AfterValidator(clean_name)]
 Line = Annotated[str, AfterValidator(one_line)]

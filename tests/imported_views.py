@@ -17,8 +17,8 @@ from toonset.dataset.export_gltf import write_gltf
 from toonset.dataset.export_opencv import write_opencv
 from toonset.dataset.export_transforms import write_transforms
 from toonset.dataset.export_views import ExportView
-from toonset.files import write_json
 from toonset.mesh import Mesh
+from toonset.write import write_json
 
 Writer = Callable[[Path, tuple[ExportView, ...], Mesh], object]
 WRITERS: dict[str, Writer] = {

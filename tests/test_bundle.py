@@ -19,7 +19,7 @@ from toonset.dataset.scene_read import read_contour
 from toonset.dataset.transforms import read_scene
 from toonset.dataset.transforms_read import read_frames
 from toonset.errors import BundleError, ToonsetError
-from toonset.strict_json import parse_json
+from toonset.read import parse_json
 
 Edit = Callable[[dict[str, Any]], Any]
 

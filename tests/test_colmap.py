@@ -24,8 +24,8 @@ from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.scene import Frame
 from toonset.dataset.transforms import transforms_dict
 from toonset.errors import BundleError
-from toonset.files import write_json
 from toonset.mesh import Mesh
+from toonset.write import write_json
 
 RADIUS = 1.1
 

@@ -17,9 +17,9 @@ from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
-from toonset.files import write_bytes
 from toonset.mesh import Mesh
 from toonset.view import View
+from toonset.write import write_bytes
 
 OPTIONS = SynthOptions(views=5, cell_px=220, outline_px=0, elevation_deg=8)
 LOST = 14  # px of the figures' feet, of about 190

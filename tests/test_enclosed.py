@@ -16,8 +16,8 @@ from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.sheet import split_sheet
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
-from toonset.files import write_bytes
 from toonset.view import View
+from toonset.write import write_bytes
 
 SIZE = (60, 100)
 WHITE, RED = (255, 255, 255), (200, 40, 30)

@@ -33,8 +33,8 @@ from toonset.dataset.mesh_file import save_obj
 from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.transforms import transforms_dict
 from toonset.errors import BundleError
-from toonset.files import write_bytes, write_json
 from toonset.mesh import Mesh
+from toonset.write import write_bytes, write_json
 
 
 def where_is_spot(rgba: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from toonset.errors import OutputError
-from toonset.files import check_new_folder, new_folder, write_bytes, write_json
+from toonset.write import check_new_folder, new_folder, write_bytes, write_json
 
 
 def names(folder):

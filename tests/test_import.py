@@ -23,7 +23,7 @@ from toonset.dataset.import_views import read_import, turned
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.picture import encode_png, load_rgba
 from toonset.dataset.transforms import read_scene
-from toonset.files import write_bytes, write_json
+from toonset.write import write_bytes, write_json
 
 EVERY = pytest.mark.parametrize("kind", WRITERS)
 

@@ -20,7 +20,7 @@ from toonset.dataset.import_bundle import write_imported
 from toonset.dataset.import_views import read_import
 from toonset.dataset.picture import encode_png
 from toonset.errors import BundleError, ToonsetError
-from toonset.files import write_bytes
+from toonset.write import write_bytes
 
 
 @pytest.fixture

@@ -14,8 +14,8 @@ from toonset.cli.split import split
 from toonset.dataset.picture import encode_png, load_indexed_png
 from toonset.dataset.transforms import read_scene, transforms_dict
 from toonset.errors import ToonsetError
-from toonset.files import write_bytes, write_json
 from toonset.palette.palette import Evidence, Palette, PaletteColor
+from toonset.write import write_bytes, write_json
 
 RED, BLUE = (200, 30, 40), (20, 60, 180)
 

@@ -218,9 +218,10 @@ def complaint(words: list[str]) -> str:
         return ""
     if verb not in (*VERBS, "bench"):
         return f"no verb {verb}"
-    of_bench = verb == "bench"
-    command = typer.main.get_command(bench if of_bench else app)
-    command = command if of_bench else command.commands[verb]
+    if verb == "bench":
+        command = typer.main.get_command(bench)
+    else:
+        command = typer.main.get_group(app).commands[verb]
     known = {name for parameter in command.params for name in parameter.opts} | {"-h", "--help"}
     known |= {name for parameter in command.params for name in parameter.secondary_opts}
     used = {word.split("=")[0] for word in words if re.match(r"--?[a-z]", word)}

@@ -10,7 +10,7 @@ from toonset.camera import Camera
 from toonset.dataset.picture import encode_png
 from toonset.dataset.transforms import read_cameras, read_scene, transforms_dict
 from toonset.errors import BundleError
-from toonset.files import write_bytes, write_json
+from toonset.write import write_bytes, write_json
 
 SIZE = (60, 80)
 

@@ -12,7 +12,10 @@ ToonsetError            exit code 2: bad input or usage, one line says where, wh
 |- SetupError           a missing system library; the message holds the install line
 
 Numeric doubt is never an exception: it is returned as data (verdicts, probabilities, residuals).
+Foreign text in messages (a file's content, a name) is shown on one printable line.
 """
+
+from __future__ import annotations
 
 
 class ToonsetError(Exception):
@@ -53,3 +56,13 @@ class OutputError(ToonsetError):
 
 class SetupError(ToonsetError):
     """A missing system library; the message holds the install line."""
+
+
+def printable(text: str) -> str:
+    """Return the text with "?" for every control character and line end."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def one_line(message: object) -> str:
+    """Return a message on one printable line, runs of white space as one space."""
+    return printable(" ".join(str(message).split()))

@@ -26,8 +26,8 @@ from jaxtyping import Float, UInt8
 from toonset.camera import rotation_distance
 from toonset.dataset.background import flattened
 from toonset.dataset.picture import encode_png
-from toonset.files import write_bytes, write_json
 from toonset.view import View
+from toonset.write import write_bytes, write_json
 
 ROOT = Path(__file__).parents[2]
 MARGIN = 0.1  # of the largest drawing: features at the outline need ground around them

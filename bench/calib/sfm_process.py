@@ -14,7 +14,7 @@ from typing import Any
 import pycolmap
 
 from toonset.dataset.picture import picture_size
-from toonset.files import write_json
+from toonset.write import write_json
 
 ONLY_FATAL = 3  # pycolmap's log level
 FEWEST = 8  # matches: the least from which an epipolar geometry is estimated with any check

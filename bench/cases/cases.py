@@ -17,7 +17,6 @@ from jaxtyping import Float
 
 from bench.cases.bodies import random_body
 from toonset import frames
-from toonset.dataset.json_file import read_json
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.picture import load_rgba
 from toonset.dataset.scene import Frame, Scene
@@ -26,6 +25,7 @@ from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
 from toonset.dataset.transforms import read_scene
 from toonset.errors import BundleError
+from toonset.json_file import read_json
 from toonset.mesh import Mesh
 from toonset.view import View
 

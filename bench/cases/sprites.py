@@ -25,12 +25,12 @@ from toonset.calib.bank import load_bank
 from toonset.calib.calibrate import calibrate
 from toonset.calib.known import Known
 from toonset.calib.rim import prepare_surface
-from toonset.dataset.json_file import read_json
 from toonset.dataset.line_width import contour_width_px
 from toonset.dataset.mannequin import default_mannequin
 from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.picture import load_rgba
 from toonset.errors import BundleError
+from toonset.json_file import read_json
 from toonset.mesh import Mesh
 from toonset.view import View
 

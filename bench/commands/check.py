@@ -38,8 +38,8 @@ def check(seed: int, printer: Printer, *, renew: bool) -> None:
         ToonsetError: the committed figures cannot be read, or written.
     """
     from bench.records.gate import as_plain, as_text, compared, from_plain
-    from toonset.dataset.json_file import read_json
-    from toonset.files import write_json
+    from toonset.json_file import read_json
+    from toonset.write import write_json
 
     committed = [] if renew else from_plain(read_json(COMMITTED), str(COMMITTED))
     if known := {guard.seed for guard in committed} - {seed}:

@@ -75,7 +75,7 @@ def _write(folder: Path, jobs: list[Job], runs: list[RunResult], seed: int) -> N
     from bench.paper.difference import differences_of
     from bench.paper.table import as_csv
     from bench.records.record import machine
-    from toonset.files import write_bytes, write_json
+    from toonset.write import write_bytes, write_json
 
     found, differences = _found(runs), differences_of(runs)
     write_json(folder / f"{TABLE}.json", found | {"seed": seed, "machine": machine()})
@@ -105,7 +105,7 @@ def _strips_into(folder: Path, seed: int) -> Look:
     def look(job: Job, case: TrainCase, trained: TrainedField, _: Sequence[ScoredView]) -> None:
         from bench.paper.picture import strip_of
         from toonset.dataset.picture import encode_png
-        from toonset.files import write_bytes
+        from toonset.write import write_bytes
 
         if trained.palette is not None and job.seed == seed:
             write_bytes(folder / _strip(job), encode_png(strip_of(trained, case)))
@@ -123,7 +123,7 @@ def _draw(folder: Path, case: TrainCase, jobs: list[Job]) -> None:
     from bench.paper.picture import drawn_strip, figure_of
     from bench.train.plan import side_px
     from toonset.dataset.picture import encode_png, load_rgba
-    from toonset.files import write_bytes
+    from toonset.write import write_bytes
 
     ordered = sorted(jobs, key=lambda job: job.method == DEFAULT)
     files = {job.method: folder / _strip(job) for job in ordered}

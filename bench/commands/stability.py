@@ -50,7 +50,7 @@ def sweep_into(
     from bench.cases.workers import usable_workers
     from bench.stability.files import RunKey, name_of
     from bench.stability.page import chosen
-    from toonset.files import write_bytes
+    from toonset.write import write_bytes
 
     pages = all_pages()
     plan = chosen(only, pages, quick=quick)
@@ -74,7 +74,7 @@ def sweep_into(
 def _finished_steps(folder: Path, key: RunKey, *, force: bool) -> list[Result]:
     """Return the steps of an earlier run in `folder`; none if it is new or to be replaced."""
     from bench.stability.files import from_plain
-    from toonset.dataset.json_file import read_json
+    from toonset.json_file import read_json
 
     kept = folder / STEPS
     if kept.is_file() and not force:
@@ -86,7 +86,7 @@ def _finished_steps(folder: Path, key: RunKey, *, force: bool) -> list[Result]:
 
 def _keep_steps(folder: Path, key: RunKey, steps: Sequence[Result]) -> None:
     from bench.stability.files import as_plain
-    from toonset.files import write_json
+    from toonset.write import write_json
 
     write_json(folder / STEPS, as_plain(key, steps))
 
@@ -106,7 +106,7 @@ def _write_results(
     from bench.stability.files import in_table_order, name_of
     from bench.stability.steps import StepResult
     from bench.stability.table import as_csv, as_records, row
-    from toonset.files import write_bytes, write_json
+    from toonset.write import write_bytes, write_json
 
     ordered = in_table_order(steps)
     pages = tried_pages(ordered)

@@ -130,8 +130,8 @@ def _views_into(folder: Path) -> Look:
     def look(job: Job, _: TrainCase, trained: TrainedField, views: Sequence[ScoredView]) -> None:
         from bench.charts.chart import DEFAULT
         from toonset.dataset.picture import encode_png
-        from toonset.files import write_bytes
         from toonset.nerf.evaluation_picture import contact_sheet
+        from toonset.write import write_bytes
 
         if job.method == DEFAULT:
             heading = f"{job.name}, seed {job.seed}, held-out views"
@@ -173,7 +173,7 @@ def _finished(
 ) -> list[tuple[dict[str, Any], RunResult]]:
     """Return the trainings of an earlier run in `folder`; none if it is new or to be replaced."""
     from bench.train.files import from_plain
-    from toonset.dataset.json_file import read_json
+    from toonset.json_file import read_json
 
     kept = folder / RUNS
     if kept.is_file() and not force:
@@ -185,7 +185,7 @@ def _finished(
 
 def _keep(folder: Path, done: list[tuple[dict[str, Any], RunResult]]) -> None:
     from bench.train.files import as_plain
-    from toonset.files import write_json
+    from toonset.write import write_json
 
     write_json(folder / RUNS, as_plain(done, __version__))
 
@@ -197,7 +197,7 @@ def _write(folder: Path, runs: list[RunResult], chosen: Chosen) -> None:
     from bench.records.report import Picture
     from bench.train.chart import draw_curves
     from bench.train.measure import in_order, records_of
-    from toonset.files import write_bytes
+    from toonset.write import write_bytes
 
     files, pictures = {}, []
     numbers = sorted({run.seed for run in runs})

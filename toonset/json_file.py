@@ -1,6 +1,6 @@
 """JSON files of a bundle: read strictly, named by a schema, checked against it.
 
-A file says what it is in `schema` (see `toonset.schema_name`): readers ignore keys that they do not
+A file says what it is in `schema` (see `toonset.read`): readers ignore keys that they do not
 know, for later versions may add some. A camera is the exception: a number more could change where
 it looks, so its keys must all be known.
 """
@@ -13,10 +13,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from toonset.errors import BundleError
-from toonset.plain_text import one_line
-from toonset.reading import read_whole
-from toonset.strict_json import parse_json
+from toonset.errors import BundleError, one_line
+from toonset.read import parse_json, read_whole
 
 MAX_JSON_BYTES = 32 * 2**20
 MOST_PROBLEMS = 20  # of one file; the rest is counted
@@ -44,7 +42,7 @@ def read_json(file: Path) -> Any:
 
     Raises:
         BundleError: the file cannot be read, is too large, or is no JSON (see
-            `toonset.strict_json`).
+            `toonset.read`).
     """
     data = read_whole(file, "JSON", BundleError, MAX_JSON_BYTES)
     return parse_json(data, str(file), BundleError)
