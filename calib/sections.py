@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
 from toonset.view import View
 
 THIN = 1 / 40  # of the figure's height: what an opening with this radius removes is no body

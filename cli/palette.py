@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from jaxtyping import UInt8
 
     from toonset.cli.palette_inputs import Drawn
-    from toonset.palette.choice import PaletteOptions
+    from toonset.palette.paints.select import PaletteOptions
     from toonset.palette.palette import Palette
 
     Map = UInt8[np.ndarray, "_ _"]
@@ -140,7 +140,7 @@ def palette(
 
 
 def _options(min_share: float, max_colors: int, keep: str, contour: bool) -> PaletteOptions:
-    from toonset.palette.choice import PaletteOptions
+    from toonset.palette.paints.select import PaletteOptions
 
     kept = _typed("--keep", keep).tolist() if keep else []
     return PaletteOptions(min_share, max_colors, tuple((r, g, b) for r, g, b in kept), contour)
@@ -149,7 +149,7 @@ def _options(min_share: float, max_colors: int, keep: str, contour: bool) -> Pal
 def _typed(option: str, text: str) -> UInt8[np.ndarray, "colors 3"]:
     """Return the colours of an option, which messages name."""
     from toonset.errors import PaletteError
-    from toonset.palette.files import parse_colors
+    from toonset.palette.formats.registry import parse_colors
 
     try:
         return parse_colors(text)
@@ -158,7 +158,7 @@ def _typed(option: str, text: str) -> UInt8[np.ndarray, "colors 3"]:
 
 
 def _contours(drawn: Drawn) -> list[Map]:
-    from toonset.palette.contour import find_contour
+    from toonset.palette.pixels.ink_lines import find_contour
 
     return [find_contour(picture) for picture in drawn.pictures]
 
@@ -166,9 +166,9 @@ def _contours(drawn: Drawn) -> list[Map]:
 def _choose(
     drawn: Drawn, contours: list[Map], colors: str | None, options: PaletteOptions, method: Method
 ) -> Palette:
-    from toonset.palette.extcolors_palette import extcolors_palette
-    from toonset.palette.extract import extract_palette, pick_palette
-    from toonset.palette.patches import with_places
+    from toonset.palette.paints.extcolors import extcolors_palette
+    from toonset.palette.paints.extract import extract_palette, pick_palette
+    from toonset.palette.paints.places import with_places
 
     if colors is not None and (options.keep or method is not Method.toonset):
         raise typer.BadParameter("--colors is the whole palette; leave --keep and --method away")
@@ -184,7 +184,7 @@ def _choose(
 
 def _labels(drawn: Drawn, contours: list[Map], found: Palette, space: ColorSpace) -> list[Map]:
     """Return the label maps; lines whose colour is not in the palette are unlabelled."""
-    from toonset.palette.labels import UNLABELLED, label_image
+    from toonset.palette.pixels.labels import UNLABELLED, label_image
 
     labels = [label_image(p, found.rgb, space=space.value) for p in drawn.pictures]
     ink = found.contour
@@ -205,7 +205,7 @@ def _write(
 
 def _report(found: Palette, target: Path, printer: Printer) -> None:
     from toonset.cli.palette_report import palette_lines
-    from toonset.palette.files import to_json
+    from toonset.palette.formats.registry import to_json
 
     for warning in found.warnings:
         printer.say(warning)

@@ -67,9 +67,9 @@ def _like(color: DroppedColor, found: Palette) -> str:
     """Return what colour of the palette a left-out one looks like; "" if it does not."""
     import numpy as np
 
-    from toonset.palette.labels import nearest_colors
+    from toonset.palette.colors import JUST_NOTICEABLE
     from toonset.palette.names import hex_of
-    from toonset.palette.oklab import JUST_NOTICEABLE
+    from toonset.palette.pixels.labels import nearest_colors
 
     if color.cost > JUST_NOTICEABLE:
         return ""

@@ -66,7 +66,7 @@ def _in_colors(
 ) -> Picture:
     import numpy as np
 
-    from toonset.palette.labels import UNLABELLED
+    from toonset.palette.pixels.labels import UNLABELLED
 
     colors = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[labels]
     return np.dstack([colors, np.where(labels == UNLABELLED, 0, 255).astype(np.uint8)])

@@ -89,7 +89,7 @@ class Cutting:
     def background_rgb(self) -> tuple[int, int, int] | None:
         """Return the colour of --background; None to find it."""
         from toonset.errors import PaletteError, SheetError
-        from toonset.palette.typed import rgb_of_typed
+        from toonset.palette.formats.typed import rgb_of_typed
 
         word = self.background.strip().lower()
         if not word:

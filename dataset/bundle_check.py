@@ -33,7 +33,7 @@ from toonset.dataset.scene_read import (
 )
 from toonset.dataset.transforms_read import PosedPicture, check_total, frame_of, transforms_file
 from toonset.dataset.transforms_schema import read_records
-from toonset.palette.files import parse_colors
+from toonset.palette.formats.registry import parse_colors
 
 PICTURES = {IMAGES: load_rgba, LABELS: load_indexed_png, CONTOURS: load_rgba}
 SAME_CAMERA = 1e-6  # relative: both files are written from the same numbers

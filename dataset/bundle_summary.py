@@ -17,7 +17,8 @@ from toonset.dataset.mesh_file import load_mesh
 from toonset.dataset.problem_log import ProblemLog
 from toonset.dataset.scene_read import label_name, member
 from toonset.dataset.transforms_read import PosedPicture, read_frames, transforms_file
-from toonset.palette.files import read_palette_json, to_json
+from toonset.palette.formats.registry import to_json
+from toonset.palette.formats.schema import read_palette_json
 
 RUN_FILES = ("config.json", "model.safetensors")
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Shaped, UInt8
 
 from toonset.dataset.ink import Lines
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 HALF_WAVES = 3
 

@@ -24,7 +24,7 @@ from jaxtyping import Float, Int, UInt8
 from toonset.camera import MIN_RELATIVE_DEPTH, Camera
 from toonset.errors import CameraError, SetupError
 from toonset.mesh import Mesh
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 MAX_SIDE_PX = 4096  # the 4-fold multisampled buffers of a larger picture need over half a GiB
 DEPTH_MARGIN = 0.01  # of the depth range, in front of and behind the mesh

@@ -9,7 +9,7 @@ from toonset.dataset.export_views import ExportView
 from toonset.dataset.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.dataset.picture import encode_png
 from toonset.mesh import Mesh
-from toonset.palette.srgb import linear_from_srgb
+from toonset.palette.colors import linear_from_srgb
 
 GREY = [0.6, 0.6, 0.6, 1.0]  # linear, of a mannequin without colours
 PLANE_UV = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])  # glTF's v runs down the picture

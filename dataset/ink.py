@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.gl_render import LabelPicture
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 INNER_LINE = 0.6  # of the silhouette line's width: inner lines are drawn thinner
 

@@ -10,7 +10,7 @@ from jaxtyping import Int, UInt8
 from toonset.dataset.mesh_color import face_colors_from_texture
 from toonset.dataset.mesh_gltf_file import GltfFile, data_of_uri
 from toonset.dataset.picture import decode_rgba
-from toonset.palette.srgb import linear_from_srgb, srgb_from_linear
+from toonset.palette.colors import linear_from_srgb, srgb_from_linear
 
 
 def primitive_colors(

@@ -16,9 +16,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.picture import encode_grey_png, encode_indexed_png, encode_png
-from toonset.palette.files import encode_palette
+from toonset.palette.formats.registry import encode_palette
 from toonset.palette.palette import Palette
-from toonset.palette.swatch import draw_swatches
+from toonset.palette.swatch_image import draw_swatches
 from toonset.write import new_folder, write_bytes
 
 PALETTE_JSON, SWATCHES = "palette.json", "palette.png"

@@ -16,8 +16,8 @@ from toonset.dataset.picture import load_indexed_png, load_rgba
 from toonset.dataset.scene import Frame, Scene
 from toonset.dataset.transforms_read import PosedPicture, is_inside, read_frames, transforms_file
 from toonset.errors import BundleError
-from toonset.palette.files import read_palette_json
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.pixels.labels import UNLABELLED
 
 Labels = UInt8[np.ndarray, "height width"]
 

@@ -23,7 +23,7 @@ from toonset.dataset.sheet import LeftOut
 from toonset.dataset.split import Source, Split
 from toonset.errors import SheetError
 from toonset.json_file import SchemaProblems
-from toonset.palette.format_hex import rgb_of_hex
+from toonset.palette.formats.hex import rgb_of_hex
 from toonset.palette.names import hex_of
 from toonset.read import parse_json, read_whole, schema_version
 from toonset.write import new_folder, write_bytes, write_json

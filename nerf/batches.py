@@ -17,7 +17,7 @@ from toonset.nerf.fields import Constants, Field
 from toonset.nerf.hull import Hull, occupancy
 from toonset.nerf.march import Rays, Samples, march, rays_of
 from toonset.nerf.threads import side_by_side
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 RAYS_PER_STEP = 2048  # activations stay in a core's cache
 MOST_RAYS = 200_000  # drawn by lot from larger scenes; bounds memory at about 2 GB

@@ -19,7 +19,7 @@ from toonset.nerf.metrics_view import Judges, figures_of, load_judges
 from toonset.nerf.trained import TrainedField
 from toonset.nerf.views import Rendering, render
 from toonset.nerf.views_bake import Baked
-from toonset.palette.labels import label_image
+from toonset.palette.pixels.labels import label_image
 
 LAYERS = ("rgb", "palette")  # the field's own colour; in palette colours
 Progress = Callable[[str], None]

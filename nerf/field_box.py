@@ -23,7 +23,7 @@ from toonset.nerf.fields import Field, Places
 from toonset.nerf.hull import Hull
 from toonset.nerf.march import Rays, clip, rays_of
 from toonset.nerf.silhouette import OPAQUE, has_figure, mask_of
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 VOXELS = 96  # of the box, in the map of empty space that rendering skips
 BINS = 96  # along a ray through the box

@@ -40,7 +40,7 @@ from toonset.nerf.ink_strokes import (
     strokes_of,
     strokes_px,
 )
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 FEWEST_OUTLINED = 0.5  # of the views must have an outline
 EXPLAINED = 0.5  # of a stroke's pixels, for the stroke to be a contour

@@ -15,7 +15,7 @@ from toonset.nerf.hull import LEVEL, Hull, carve
 from toonset.nerf.ink_nearest import distance_to
 from toonset.nerf.ink_strokes import Lines, Strokes
 from toonset.nerf.march import march, pixels_near, rays_of
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 VOXELS = 96  # along the hull's longest side: a hint needs no more
 JUMP = 0.04  # of the figure's height: smaller steps of the hull are the voxels' own

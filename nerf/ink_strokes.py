@@ -12,7 +12,7 @@ from skimage.measure import perimeter
 from skimage.morphology import skeletonize
 
 from toonset.nerf.ink_nearest import depth_inside, nearest, parts
-from toonset.palette.contour import find_contour, rim_line_px
+from toonset.palette.pixels.ink_lines import find_contour, rim_line_px
 
 INK = 128  # coverage from which a pixel is a line's
 SOFT = 16  # coverage from which a pixel beside a line holds some of it

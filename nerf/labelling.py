@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.scene import Scene
-from toonset.palette.extract import extract_palette
-from toonset.palette.labels import label_image
+from toonset.palette.paints.extract import extract_palette
 from toonset.palette.palette import Palette
+from toonset.palette.pixels.labels import label_image
 
 
 def labelled(scene: Scene) -> tuple[Scene, Palette]:

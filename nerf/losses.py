@@ -11,7 +11,7 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 BACKDROP = 0.5  # grey behind the figure in training: neither white nor black parts hide holes
 OPACITY_WEIGHT = 0.1

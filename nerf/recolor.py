@@ -10,11 +10,11 @@ import numpy as np
 
 from toonset.errors import PaletteError
 from toonset.nerf.trained import NO_PALETTE, TrainedField
-from toonset.palette.files import parse_colors
-from toonset.palette.labels import nearest_colors
+from toonset.palette.formats.registry import parse_colors
+from toonset.palette.formats.typed import is_color, rgb_of_typed
 from toonset.palette.named import RGB
 from toonset.palette.names import hex_of, name_of
-from toonset.palette.typed import is_color, rgb_of_typed
+from toonset.palette.pixels.labels import nearest_colors
 
 
 def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:

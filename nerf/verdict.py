@@ -26,7 +26,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.silhouette import figure_px
 from toonset.nerf.symmetry import with_mirrored
 from toonset.nerf.trained import Training
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 OK, WEAK = "ok", "weak"
 # A pixel out of place in a figure of 830. Of three bodies' scenes that are drawn wrong in fifteen

@@ -23,7 +23,7 @@ from toonset.nerf.views_bake import Baked
 from toonset.nerf.views_cast import cast
 from toonset.nerf.views_labels import NONE, labels_of, palette_shares
 from toonset.nerf.views_rays import Sight
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
 

@@ -18,7 +18,7 @@ from toonset.dataset.scene import Frame, Scene
 from toonset.nerf.alignment import Alignment, alignment_of
 from toonset.nerf.warp_moves import CONTROLS, Bends
 from toonset.nerf.warp_outline import Square
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 ROUNDS = 8  # of Gauss-Newton
 MOST = 0.03  # of the figure's square: the longest displacement; more is another pose

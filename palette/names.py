@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
 
 NAMED = {
     "black": (14, 14, 14),

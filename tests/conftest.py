@@ -204,7 +204,7 @@ def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from toonset.dataset.bundle import write_bundle
     from toonset.dataset.mesh_file import load_mesh
     from toonset.dataset.picture import encode_indexed_png
-    from toonset.palette.files import to_gpl, to_json
+    from toonset.palette.formats.registry import to_gpl, to_json
     from toonset.palette.palette import Palette, PaletteColor
     from toonset.view import View
     from toonset.write import write_bytes, write_json

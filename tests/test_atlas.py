@@ -51,8 +51,8 @@ from bench.stability.draws import squashed as squashed_sheet
 from bench.stability.sweeps import SWEEPS
 from toonset.nerf import verdict
 from toonset.nerf.verdict import MOST_OFF, WEAK
+from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
-from toonset.palette.oklab import oklab_from_rgb
 
 
 def part(body, *names):

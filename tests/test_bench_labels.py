@@ -10,7 +10,7 @@ import pytest
 from bench.palette import labels as bench
 from bench.palette.labels import bench_labels
 from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from bench.palette.cases import LEAST_APART, PaletteCase, palette_cases, random_
 from bench.palette.measure import bench_palette, f1, score, sheet_of_size
 from bench.palette.methods import METHODS
 from toonset.errors import BundleError
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
 
 COLORS = np.array([(200, 30, 40), (20, 60, 180), (30, 160, 60)], dtype=np.uint8)
 

@@ -11,8 +11,8 @@ import pytest
 from bench.cases.bodies import random_body
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
-from toonset.palette import contour as contour_module
-from toonset.palette.contour import find_contour
+from toonset.palette.pixels import ink_lines as contour_module
+from toonset.palette.pixels.ink_lines import find_contour
 
 BLACK = (8, 8, 10)
 

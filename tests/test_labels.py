@@ -19,10 +19,10 @@ from toonset.dataset.picture import encode_indexed_png, load_indexed_png
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import make_turnaround
 from toonset.errors import PictureError
-from toonset.palette import labels as labels_module
-from toonset.palette.labels import UNLABELLED, label_image, nearest_colors, nearest_labels
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.palette import Palette, PaletteColor
+from toonset.palette.pixels import labels as labels_module
+from toonset.palette.pixels.labels import UNLABELLED, label_image, nearest_colors, nearest_labels
 
 RED, BLUE, INK, GREY = (200, 30, 40), (20, 60, 180), (0, 0, 0), (128, 128, 128)
 PALETTE = np.array([RED, BLUE, INK], dtype=np.uint8)

@@ -10,12 +10,12 @@ from PIL import Image
 
 from tests.palette_pictures import as_set, block, soft_stripes
 from toonset.errors import PaletteError
-from toonset.palette.extcolors_palette import extcolors_palette
-from toonset.palette.extract import extract_palette
-from toonset.palette.labels import label_image, nearest_colors
+from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import NAMED, name_of
-from toonset.palette.oklab import oklab_from_rgb
-from toonset.palette.pixels import count_pixels
+from toonset.palette.paints.extcolors import extcolors_palette
+from toonset.palette.paints.extract import extract_palette
+from toonset.palette.paints.histogram import count_pixels
+from toonset.palette.pixels.labels import label_image, nearest_colors
 
 FINE = 8
 COLORS = np.array(
@@ -144,8 +144,8 @@ def test_counts_are_the_pixels() -> None:
 
 def test_large_and_small_pictures_are_counted_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     once = count_pixels([RGBA])
-    monkeypatch.setattr("toonset.palette.pixels.TABLE_RUNS", 1)
-    monkeypatch.setattr("toonset.palette.pixels.BAND_PIXELS", 500)
+    monkeypatch.setattr("toonset.palette.paints.histogram.TABLE_RUNS", 1)
+    monkeypatch.setattr("toonset.palette.paints.histogram.BAND_PIXELS", 500)
     again = count_pixels([RGBA])
     for name in ("colors", "counts", "flat", "thin"):
         assert np.array_equal(getattr(once, name), getattr(again, name)), name

@@ -5,12 +5,12 @@ import pytest
 
 from tests.palette_pictures import as_set, block, soft_stripes
 from toonset.errors import PaletteError
-from toonset.palette.choice import PaletteOptions
-from toonset.palette.extract import extract_palette, pick_palette
-from toonset.palette.labels import nearest_colors
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.paints.extract import extract_palette, pick_palette
+from toonset.palette.paints.places import with_places
+from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette, PaletteColor, Place
-from toonset.palette.patches import with_places
+from toonset.palette.pixels.labels import nearest_colors
 
 
 def test_the_five_percent_rule_and_what_it_costs() -> None:

@@ -8,7 +8,7 @@ import pytest
 from PIL.GimpPaletteFile import GimpPaletteFile
 
 from toonset.errors import PaletteError
-from toonset.palette.files import (
+from toonset.palette.formats.registry import (
     WRITTEN,
     encode_palette,
     parse_colors,

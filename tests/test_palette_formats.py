@@ -9,12 +9,12 @@ import pytest
 from PIL import Image, ImageCms
 
 from toonset.errors import PaletteError
-from toonset.palette.cie_lab import rgb_from_lab, rgb_from_linear
-from toonset.palette.format_aco import read_aco
-from toonset.palette.format_ase import read_ase, to_ase
-from toonset.palette.format_gpl import read_gpl, to_gpl
-from toonset.palette.format_kpl import read_kpl
-from toonset.palette.format_pal import read_pal
+from toonset.palette.formats.aco import read_aco
+from toonset.palette.formats.ase import read_ase, to_ase
+from toonset.palette.formats.cie_lab import rgb_from_lab, rgb_from_linear
+from toonset.palette.formats.gpl import read_gpl, to_gpl
+from toonset.palette.formats.kpl import read_kpl
+from toonset.palette.formats.pal import read_pal
 from toonset.palette.named import NamedColor
 from toonset.palette.palette import Palette, PaletteColor
 

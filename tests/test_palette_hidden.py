@@ -9,13 +9,13 @@ from PIL import Image
 from bench.palette.cases import palette_cases, random_paints
 from tests.palette_pictures import as_set, block, soft_stripes
 from toonset.cli.palette_report import palette_lines
-from toonset.palette.choice import PaletteOptions
-from toonset.palette.extract import LEAST_LISTED, extract_palette
-from toonset.palette.labels import label_image
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.paints.extract import LEAST_LISTED, extract_palette
+from toonset.palette.paints.histogram import count_pixels
+from toonset.palette.paints.places import patches_of, pixels_of
+from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette, Place
-from toonset.palette.patches import patches_of, pixels_of
-from toonset.palette.pixels import count_pixels
+from toonset.palette.pixels.labels import label_image
 
 SKIN, HAIR, SHIRT, EYE = (242, 190, 150), (238, 187, 147), (30, 90, 160), (20, 190, 180)
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toonset.errors import PaletteError
-from toonset.palette.files import parse_colors, read_palette_json, to_json
+from toonset.palette.formats.registry import parse_colors, to_json
+from toonset.palette.formats.schema import palette_of, read_palette_json
 from toonset.palette.palette import (
     ContourColor,
     DroppedColor,
@@ -19,7 +20,6 @@ from toonset.palette.palette import (
     PaletteColor,
     Place,
 )
-from toonset.palette.palette_schema import palette_of
 
 PALETTE = Palette(
     (PaletteColor((200, 30, 40), 0.75, "red"), PaletteColor((1, 2, 3), 0.2, "black")),

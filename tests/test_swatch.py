@@ -5,7 +5,7 @@ import pytest
 
 from toonset.palette.named import RGB
 from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
-from toonset.palette.swatch import LARGE, PAGE, SMALL, broken, draw_swatches, drawable
+from toonset.palette.swatch_image import LARGE, PAGE, SMALL, broken, draw_swatches, drawable
 
 LONG = "Hair shadow under the left ear, in the light of the evening"
 

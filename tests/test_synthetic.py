@@ -26,7 +26,7 @@ from toonset.dataset.synthetic_files import write_turnaround
 from toonset.dataset.transforms import read_cameras
 from toonset.errors import CameraError, MeshError, SetupError, SheetError
 from toonset.mesh import Mesh
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 SIDES = np.array(

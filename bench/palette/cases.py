@@ -25,8 +25,8 @@ from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
-from toonset.palette.labels import UNLABELLED
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.pixels.labels import UNLABELLED
 
 SIZES_PX = (150, 600)
 OUTLINE = 0.01  # of the cell: 1.5 px at 150, 6 px at 600

@@ -17,9 +17,9 @@ from jaxtyping import UInt8
 
 from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
 from bench.records.record import Record, summarise, table
-from toonset.palette.contour import find_contour
-from toonset.palette.labels import UNLABELLED, label_image, nearest_labels
-from toonset.palette.mixed import opaque_pixels
+from toonset.palette.pixels.antialias import opaque_pixels
+from toonset.palette.pixels.ink_lines import find_contour
+from toonset.palette.pixels.labels import UNLABELLED, label_image, nearest_labels
 
 Labeller = Callable[[np.ndarray, np.ndarray], np.ndarray]
 

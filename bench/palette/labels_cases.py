@@ -20,7 +20,7 @@ from toonset.dataset.flat_colors import flat_palette
 from toonset.dataset.synth_options import SynthOptions
 from toonset.dataset.synthetic import Turnaround, make_turnaround
 from toonset.mesh import Mesh
-from toonset.palette.labels import UNLABELLED
+from toonset.palette.pixels.labels import UNLABELLED
 
 SIZES_PX = (150, 300, 600)
 OUTLINE = 0.01  # of the cell

@@ -18,7 +18,7 @@ from jaxtyping import UInt8
 from bench.palette.cases import PaletteCase, palette_cases
 from bench.palette.methods import LEAST_SHARE, METHODS, RGB
 from bench.records.record import CPU_SECONDS, Direction, Record, summarise
-from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 
 SHEETS_WH = ((150, 150), (1200, 600), (4096, 2048))
 TIMED_CONDITION = "lines, png"

@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.palette.choice import PaletteOptions
-from toonset.palette.contour import find_contour
-from toonset.palette.extract import extract_palette
+from toonset.palette.paints.extract import extract_palette
+from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.pixels.ink_lines import find_contour
 
 LEAST_SHARE = PaletteOptions().min_share
 GUESS = 8  # colours, where nobody knows

@@ -2,15 +2,14 @@
 
 Lightness L in [0, 1], a (green to red) and b (blue to yellow) within about +-0.3. A distance of
 0.02 is just noticeable side by side. Source: B. Ottosson, "A perceptual color space for image
-processing" (2020), https://bottosson.github.io/posts/oklab/.
+processing" (2020), https://bottosson.github.io/posts/oklab/. sRGB's curve between levels and linear
+light: IEC 61966-2-1.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float, UInt8
-
-from toonset.palette.srgb import linear_from_srgb
 
 LMS_FROM_LINEAR = np.array(
     [
@@ -28,6 +27,20 @@ LAB_FROM_ROOTS = np.array(
 )
 JUST_NOTICEABLE = 0.02  # Source: CSS Color 4 (W3C), 13.2: "JND" of its gamut mapping in OKLab
 TOE = (0.206, 0.03)
+
+
+def linear_from_srgb(srgb: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    """Return linear light of sRGB in [0, 1]."""
+    value = np.asarray(srgb, dtype=np.float64)
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_from_linear(linear: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    """Return sRGB in [0, 1] of linear light, clipped; what is no number is 0."""
+    value = np.clip(np.nan_to_num(linear), 0, 1)
+    return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
+
+
 LINEAR_OF_LEVEL = linear_from_srgb(np.arange(256) / 255)
 
 

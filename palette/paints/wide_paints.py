@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
-from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
-from toonset.palette.pixels import Histogram
-from toonset.palette.shades import Paint
+from toonset.palette.paints.clusters import Paint
+from toonset.palette.paints.histogram import Histogram
 
 WIDE = 10 * JUST_NOTICEABLE  # in OKLab: a fifth of the way from black to white
 

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Int
 
-from toonset.palette.false_paints import LEAST_FLAT, false_paints
-from toonset.palette.ink_color import rounded
-from toonset.palette.oklab import JUST_NOTICEABLE, even_oklab_from_rgb
-from toonset.palette.patches import THIN, Members, Pixels, patches_of, pixels_of
-from toonset.palette.pixels import LEAST_NOISE, Histogram
-from toonset.palette.shades import UNLIKE, Paint
+from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.paints.blends import LEAST_FLAT, false_paints
+from toonset.palette.paints.clusters import UNLIKE, Paint
+from toonset.palette.paints.histogram import LEAST_NOISE, Histogram
+from toonset.palette.paints.line_color import rounded
+from toonset.palette.paints.places import THIN, Members, Pixels, patches_of, pixels_of
 
 PLACES = 2  # at which a colour is, or it may be a slip
 THICK = 5  # pixels: blends are thinner in a JPEG, too, which smears chroma over two

@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.errors import PaletteError
-from toonset.palette.areas import Areas
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
-from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.paints.areas import Areas
+from toonset.palette.paints.clusters import Paint
 from toonset.palette.palette import MAX_COLORS
-from toonset.palette.shades import Paint
 
 KEEP_REACH = (
     4 * JUST_NOTICEABLE

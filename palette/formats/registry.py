@@ -12,18 +12,18 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
-from toonset.palette.format_aco import read_aco
-from toonset.palette.format_ase import read_ase, to_ase
-from toonset.palette.format_gpl import read_gpl, to_gpl
-from toonset.palette.format_hex import read_hex, to_hex
-from toonset.palette.format_json import read_json, read_palette_json, to_json
-from toonset.palette.format_kpl import MAX_BYTES as MAX_KPL_BYTES
-from toonset.palette.format_kpl import read_kpl
-from toonset.palette.format_pal import read_pal
+from toonset.palette.formats.aco import read_aco
+from toonset.palette.formats.ase import read_ase, to_ase
+from toonset.palette.formats.gpl import read_gpl, to_gpl
+from toonset.palette.formats.hex import read_hex, to_hex
+from toonset.palette.formats.json import read_json, to_json
+from toonset.palette.formats.kpl import MAX_BYTES as MAX_KPL_BYTES
+from toonset.palette.formats.kpl import read_kpl
+from toonset.palette.formats.pal import read_pal
+from toonset.palette.formats.text import without_mark
+from toonset.palette.formats.typed import is_color, rgb_of_typed
 from toonset.palette.named import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette
-from toonset.palette.text import without_mark
-from toonset.palette.typed import is_color, rgb_of_typed
 from toonset.read import describe, read_whole
 
 __all__ = [
@@ -32,7 +32,6 @@ __all__ = [
     "encode_palette",
     "parse_colors",
     "parse_named_colors",
-    "read_palette_json",
     "to_ase",
     "to_gpl",
     "to_hex",

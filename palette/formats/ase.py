@@ -13,7 +13,7 @@ import struct
 from collections.abc import Iterator
 
 from toonset.errors import PaletteError
-from toonset.palette.cie_lab import rgb_from_lab
+from toonset.palette.formats.cie_lab import rgb_from_lab
 from toonset.palette.named import RGB, NamedColor, clean_name, level, no_cmyk, within
 from toonset.palette.palette import Palette
 

@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int32, UInt8
 
-from toonset.palette.false_paints import reach_of
+from toonset.palette.colors import even_oklab_from_rgb
 from toonset.palette.names import hex_of
-from toonset.palette.oklab import even_oklab_from_rgb
+from toonset.palette.paints.blends import reach_of
+from toonset.palette.paints.clusters import UNLIKE, Paint
+from toonset.palette.paints.histogram import OPAQUE_WORD, Histogram, Picture, rgb_of_words
 from toonset.palette.palette import Place
-from toonset.palette.pixels import OPAQUE_WORD, Histogram, Picture, rgb_of_words
-from toonset.palette.shades import UNLIKE, Paint
 
 WIDEST = 7  # pixels: what is wider has a flat pixel within it, even with a line around
 PLACES = 2  # at which there must be such spots: one may be a slip of the pen

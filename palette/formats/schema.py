@@ -1,19 +1,21 @@
 """The content of palette.json, as pydantic checks it.
 
-Within a version keys may be added (see `toonset.read`): readers ignore keys that they do not
-know. To add one, give it a default here, write it in `format_json.to_json`, and leave the version
-as it is. Whatever would make an older reader draw a wrong conclusion needs the next one.
+Within a version keys may be added (see `toonset.read`): readers ignore keys that they do not know.
+To add one, give it a default here, write it in `toonset.palette.formats.json.to_json`, and leave
+the version as it is. Whatever would make an older reader draw a wrong conclusion needs the next
+one.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from toonset.errors import PaletteError
-from toonset.palette.format_hex import rgb_of_hex
-from toonset.palette.format_json import NAME, VERSION
+from toonset.palette.formats.hex import rgb_of_hex
+from toonset.palette.formats.json import NAME, VERSION
 from toonset.palette.named import RGB, clean_name, one_line
 from toonset.palette.palette import (
     MAX_COLORS,
@@ -24,7 +26,9 @@ from toonset.palette.palette import (
     PaletteColor,
     Place,
 )
-from toonset.read import schema_version
+from toonset.read import parse_json, read_whole, schema_version
+
+MAX_BYTES = 2**20
 
 Name = Annotated[str, AfterValidator(clean_name)]
 Line = Annotated[str, AfterValidator(one_line)]
@@ -90,6 +94,16 @@ class PaletteRecord(Record):
     warnings: list[Line] = []
     contour: ContourRecord | None = None
     evidence: EvidenceRecord | None = None
+
+
+def read_palette_json(path: Path) -> Palette:
+    """Return the palette of a palette.json.
+
+    Raises:
+        PaletteError: the file is missing, damaged, of another schema or of a newer toonset.
+    """
+    data = read_whole(path, "palette", PaletteError, MAX_BYTES)
+    return palette_of(parse_json(data, str(path), PaletteError), str(path))
 
 
 def palette_of(content: Any, where: str) -> Palette:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 
 from toonset.errors import PaletteError
+from toonset.palette.formats.text import lines_of
 from toonset.palette.named import RGB, NamedColor
 from toonset.palette.palette import Palette
-from toonset.palette.text import lines_of
 
 HEX = re.compile(r"#?([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 WITH_ALPHA = re.compile(r"#?([0-9a-fA-F]{2})([0-9a-fA-F]{6})")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int, UInt8, UInt32
 
-from toonset.palette.mixed import OPAQUE
+from toonset.palette.pixels.antialias import OPAQUE
 
 COVERED = 128  # of 255: a pixel of the rim counts if the figure covers half of it
 LEAST_NOISE = 2  # levels: a painted gradient's step from one pixel to the next

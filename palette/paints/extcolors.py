@@ -18,9 +18,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
-from toonset.palette.choice import PaletteOptions
+from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import name_of
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import DroppedColor, Palette, PaletteColor
 
 TOLERANCE = 32  # extcolors' default

@@ -11,8 +11,8 @@ from __future__ import annotations
 import struct
 
 from toonset.errors import PaletteError
+from toonset.palette.formats.text import lines_of
 from toonset.palette.named import NamedColor, levels_of
-from toonset.palette.text import lines_of
 
 JASC, RIFF = b"JASC-PAL", b"RIFF"
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from toonset.errors import PaletteError
-from toonset.palette.format_hex import rgb_of_hex
+from toonset.palette.formats.hex import rgb_of_hex
 from toonset.palette.named import NamedColor, clean_name
 from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette
-from toonset.read import parse_json, read_whole
+from toonset.read import parse_json
 
-NAME, VERSION = "toonset-palette", 1  # toonset.palette.palette_schema says what may change
-MAX_BYTES = 2**20
+NAME, VERSION = "toonset-palette", 1  # toonset.palette.formats.schema says what may change
 
 
 def read_json(data: bytes, where: str) -> list[NamedColor]:
@@ -59,18 +57,6 @@ def to_json(palette: Palette) -> dict[str, Any]:
             "one_more": round(evidence.one_more, 3),
         },
     }
-
-
-def read_palette_json(path: Path) -> Palette:
-    """Return the palette of a palette.json.
-
-    Raises:
-        PaletteError: the file is missing, damaged, of another schema or of a newer toonset.
-    """
-    from toonset.palette.palette_schema import palette_of  # pydantic, only when it is needed
-
-    data = read_whole(path, "palette", PaletteError, MAX_BYTES)
-    return palette_of(parse_json(data, str(path), PaletteError), str(path))
 
 
 def _entry(entry: Any, where: str) -> NamedColor:

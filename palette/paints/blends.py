@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float
 
-from toonset.palette.ink_color import Ink
+from toonset.palette.paints.line_color import Ink
 
 LEAST_FLAT = 0.3  # of a paint's pixels are flat; of a blend's, next to none
 NEAREST_END = 0.1  # of the way between two paints: nearer to one of them it is that one

@@ -1,9 +1,9 @@
 """The paper's palette: the colours that make up at least 5 % of the character's pixels.
 
-Which colours there are is read from flat paint (`toonset.palette.pixels`, `shades`); how much of
-each, from all of the figure's (`areas`). Where the drawn lines are given, they count to their ink,
-and the rule weighs the other colours without them, so that an outline does not push a colour under
-5 %. The ink itself is in the palette like any colour that makes up 5 %.
+Which colours there are is read from flat paint (`histogram`, `clusters`); how much of each, from
+all of the figure's (`areas`). Where the drawn lines are given, they count to their ink, and the
+rule weighs the other colours without them, so that an outline does not push a colour under 5 %. The
+ink itself is in the palette like any colour that makes up 5 %.
 """
 
 from __future__ import annotations
@@ -14,13 +14,17 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError
-from toonset.palette.areas import paint_areas
-from toonset.palette.choice import Amount, PaletteOptions, choose, measure, with_wanted
-from toonset.palette.labels import nearest_colors
-from toonset.palette.lone_spots import lone_spot_notes
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of, name_of
-from toonset.palette.near_equal import near_equal_paints
-from toonset.palette.oklab import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.paints.areas import paint_areas
+from toonset.palette.paints.clusters import Paint, find_paints
+from toonset.palette.paints.histogram import Histogram, count_pixels
+from toonset.palette.paints.lone_spots import lone_spot_notes
+from toonset.palette.paints.near_equal import near_equal_paints
+from toonset.palette.paints.places import patches_of, pixels_of
+from toonset.palette.paints.select import Amount, PaletteOptions, choose, measure, with_wanted
+from toonset.palette.paints.tiny_paints import tiny_paints
+from toonset.palette.paints.wide_paints import wide_paint_notes
 from toonset.palette.palette import (
     MAX_COLORS,
     ContourColor,
@@ -29,11 +33,7 @@ from toonset.palette.palette import (
     PaletteColor,
     Place,
 )
-from toonset.palette.patches import patches_of, pixels_of
-from toonset.palette.pixels import Histogram, count_pixels
-from toonset.palette.shades import Paint, find_paints
-from toonset.palette.tiny_paints import tiny_paints
-from toonset.palette.wide_paints import wide_paint_notes
+from toonset.palette.pixels.labels import nearest_colors
 
 PICKED = "picked by hand; what is not among these colours counts for the nearest"
 LEAST_LISTED = 0.002  # of the pixels: a rarer paint is not worth a line among the dropped

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.palette.description import evidence_for, merge_peaks
-from toonset.palette.false_paints import LEAST_FLAT, false_paints
-from toonset.palette.ink_color import Ink, find_ink, rounded
-from toonset.palette.oklab import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.paints.blends import LEAST_FLAT, false_paints
+from toonset.palette.paints.histogram import Histogram, distinct
+from toonset.palette.paints.line_color import Ink, find_ink, rounded
+from toonset.palette.paints.mdl import evidence_for, merge_peaks
 from toonset.palette.palette import Evidence
-from toonset.palette.pixels import Histogram, distinct
 
 CELL = 4  # levels per side of a counting cell
 EXACT = 0.2  # of a paint: so frequent an exact colour is the paint itself

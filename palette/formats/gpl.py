@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 
 from toonset.errors import PaletteError
+from toonset.palette.formats.text import lines_of
 from toonset.palette.named import NamedColor, clean_name, levels_of
 from toonset.palette.palette import Palette
-from toonset.palette.text import lines_of
 
 MAGIC = "GIMP Palette"
 HEADER = re.compile(r"\s*(#|Name:|Columns:|Channels:|$)", re.IGNORECASE)

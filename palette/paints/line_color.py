@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from toonset.palette.pixels import Histogram
+from toonset.palette.paints.histogram import Histogram
 
 LEAST_SHARE = 0.03  # of the pixels are middles of strokes, or there are no lines worth a colour
 EXACT = 0.2  # of the middles: so frequent an exact colour is the ink itself

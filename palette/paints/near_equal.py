@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Int
 
-from toonset.palette.ink_color import rounded
-from toonset.palette.labels import nearest_colors
-from toonset.palette.oklab import JUST_NOTICEABLE, even_oklab_from_rgb
-from toonset.palette.pixels import Histogram
-from toonset.palette.shades import Paint
+from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.paints.clusters import Paint
+from toonset.palette.paints.histogram import Histogram
+from toonset.palette.paints.line_color import rounded
+from toonset.palette.pixels.labels import nearest_colors
 
 VALLEY = 0.25  # of what a colour must cover: so much joins the levels of noise and of gradients
 

@@ -2,7 +2,7 @@
 
 Colours repeat, so each is looked up once: a table over all 2^24 colours holds the nearest palette
 colour of those that occur. What lies inside an area of one label is done; only the pixels along
-borders are looked at more closely (`toonset.palette.mixed`).
+borders are looked at more closely (`toonset.palette.pixels.antialias`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.palette.mixed import OPAQUE, settle_borders
-from toonset.palette.oklab import oklab_from_rgb
+from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.pixels.antialias import OPAQUE, settle_borders
 
 Space = Literal["rgb", "oklab"]
 

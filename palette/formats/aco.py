@@ -12,7 +12,7 @@ import colorsys
 import struct
 
 from toonset.errors import PaletteError
-from toonset.palette.cie_lab import rgb_from_lab
+from toonset.palette.formats.cie_lab import rgb_from_lab
 from toonset.palette.named import RGB, NamedColor, clean_name, level, no_cmyk, within
 
 CMYK_SPACES = (2, 9)

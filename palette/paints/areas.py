@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int, UInt16, UInt32
 
-from toonset.palette.pixels import OPAQUE_WORD, RGB, Histogram, Picture
-from toonset.palette.shades import Paint
+from toonset.palette.paints.clusters import Paint
+from toonset.palette.paints.histogram import OPAQUE_WORD, RGB, Histogram, Picture
 
 SETTLED = np.uint16(1 << 15)  # marks a colour that flat pixels have, too
 NONE = np.uint16(SETTLED - 1)  # no paint

@@ -5,7 +5,7 @@ Other words do not: nobody's "red" is #ff0000, and the drawing's own is in the p
 
 from __future__ import annotations
 
-from toonset.palette.format_hex import HEX, rgb_of_hex
+from toonset.palette.formats.hex import HEX, rgb_of_hex
 from toonset.palette.named import RGB
 
 WORDS = {"white": (255, 255, 255), "black": (0, 0, 0)}

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from toonset.errors import PaletteError
-from toonset.palette.cie_lab import rgb_from_lab, rgb_from_linear
+from toonset.palette.formats.cie_lab import rgb_from_lab, rgb_from_linear
 from toonset.palette.named import RGB, NamedColor, clean_name, level, no_cmyk, one_line, within
 
 COLORSET = "colorset.xml"

@@ -20,7 +20,7 @@ from collections.abc import Iterable
 import numpy as np
 from jaxtyping import Float, Int
 
-from toonset.palette.oklab import JUST_NOTICEABLE
+from toonset.palette.colors import JUST_NOTICEABLE
 from toonset.palette.palette import Evidence
 
 PIXELS = 4096  # independent ones

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.palette.labels import nearest_labels
+from toonset.palette.paints.histogram import OPAQUE_WORD, RGB, Histogram
 from toonset.palette.palette import MAX_COLORS, Palette, Place
-from toonset.palette.pixels import OPAQUE_WORD, RGB, Histogram
+from toonset.palette.pixels.labels import nearest_labels
 
 THIN = 2  # pixels: blends along an edge are thinner
 BITS = 8  # of a byte: so many kinds of colours are looked for at once

@@ -1,0 +1,1 @@
+"""Find a palette: count colours, cluster them, choose those that are paints."""

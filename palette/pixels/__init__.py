@@ -1,0 +1,1 @@
+"""Label pixels: nearest paint, blends along borders, drawn lines."""
