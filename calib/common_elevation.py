@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.carving import Silhouette, contradiction, cut_rays, middle_of
 from toonset.camera import Camera, rotation_from_angles
+from toonset.dataset.silhouettes.hull_rays import Silhouette, contradiction, cut_rays, middle_of
 from toonset.errors import CameraError
 from toonset.view import View
 

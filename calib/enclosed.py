@@ -1,9 +1,9 @@
 """Holes that the drawing from the other side contradicts: they are paint in the paper's colour.
 
 One drawing cannot always tell a gap between arm and body from a white buckle on white paper; the
-splitter assumes (`toonset.dataset.holes`). Once cameras are known, a second drawing can tell: what
-is open towards one side is open towards the other. A hole is filled if a drawing from about the
-opposite side shows paint there, in another colour than paper, and round that place no patch of
+splitter assumes (`toonset.dataset.split.holes`). Once cameras are known, a second drawing can tell:
+what is open towards one side is open towards the other. A hole is filled if a drawing from about
+the opposite side shows paint there, in another colour than paper, and round that place no patch of
 paper that could be the same gap.
 """
 
@@ -19,8 +19,8 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
-from toonset.dataset.background import difference
-from toonset.dataset.holes import CLEAR, LEAST_HOLE_PX
+from toonset.dataset.split.background import difference
+from toonset.dataset.split.holes import CLEAR, LEAST_HOLE_PX
 from toonset.view import Box, View
 
 Rgb = tuple[int, int, int]

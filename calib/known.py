@@ -12,7 +12,7 @@ from toonset.calib.hypotheses import Candidates
 from toonset.calib.labels import Label
 from toonset.calib.pose import Pose, project
 from toonset.camera import Camera, angles_from_rotation, rotation_from_angles
-from toonset.dataset.landmark_file import Landmarks
+from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.errors import CameraError
 from toonset.view import View
 

@@ -17,7 +17,7 @@ from toonset.calib.landmark_models import MARGIN, Explanation, choose
 from toonset.calib.landmark_pose import Points, on_a_line, squared_error
 from toonset.calib.pose import PARAMETERS, Pose, project_with_jacobian
 from toonset.calib.rim import Surface
-from toonset.dataset.landmark_file import Landmarks
+from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.errors import LandmarkError
 
 CLICK_OF_HEIGHT = 0.01  # error of a click or of the mannequin's proportions, before looking

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from toonset.calib.align import measure
-from toonset.calib.contour import drawn_contour
 from toonset.calib.drawing_error import Noise
 from toonset.calib.hypotheses import is_twin
 from toonset.calib.judge import (
@@ -30,7 +29,8 @@ from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, View
 from toonset.calib.rim import Surface, prepare_surface
 from toonset.calib.sheet_state import state_of
 from toonset.camera import angles_from_rotation
-from toonset.dataset.landmark_file import Landmarks
+from toonset.dataset.mannequin.landmark_file import Landmarks
+from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import LandmarkError
 from toonset.mesh import Mesh
 from toonset.view import View

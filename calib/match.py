@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.calib.contour import Contour
 from toonset.calib.pose import Pose, project
 from toonset.calib.rim import Rim, Surface, rim_at
+from toonset.dataset.silhouettes.contour import Contour
 
 FAR = 10.0  # heights
 SUBPIXEL_HEIGHT = 90.0  # px of a figure's height per subpixel of the visibility test

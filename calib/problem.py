@@ -14,7 +14,6 @@ from jaxtyping import Float
 from toonset.calib.align import ElevationPrior, tilt
 from toonset.calib.bank import load_bank
 from toonset.calib.common_elevation import common_elevation
-from toonset.calib.contour import drawn_contour
 from toonset.calib.cut_off import CutOff, ending_at
 from toonset.calib.cut_proof import Cuts, possible_cuts, proven_cuts
 from toonset.calib.drawing_error import ROUGH_POINTS, WHITE_POINTS
@@ -55,6 +54,7 @@ from toonset.calib.ties import Turn
 from toonset.calib.together import SKETCHED, TogetherSearch, with_k
 from toonset.calib.turns import TurnStart, likely_turns
 from toonset.camera import Camera, rotation_distance
+from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from toonset.calib.result import Calibration, ViewCalibration
 from toonset.camera import Camera
-from toonset.dataset.calibration_schema import SCHEMA, VERSION
+from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION
 
 STRETCHED_BY = 0.005  # of height over width: less is how pictures are rounded to pixels
 
@@ -16,8 +16,8 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
     """Return the JSON form; angles in degrees, lengths in world units or pixels of the view.
 
     Callers add what only they know: options, seed, versions, input hashes. `seconds` is for the
-    screen: `toonset.dataset.calibration_file` writes the rest, so that a bundle's bytes depend on
-    its input alone.
+    screen: `toonset.dataset.bundle.calibration_file` writes the rest, so that a bundle's bytes
+    depend on its input alone.
     """
     model = calibration.model
     return {

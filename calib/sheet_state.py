@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toonset.calib.coherence import coherence
 from toonset.camera import Camera
+from toonset.dataset.silhouettes.coherence import coherence
 from toonset.view import View
 
 # Sheets with cameras that are right contradict themselves by 0.4 to 0.9 %, wrong ones by 1.8 % on

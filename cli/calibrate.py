@@ -234,7 +234,7 @@ def _write(
     force: bool,
 ) -> None:
     from toonset.calib.overlay import draw_overlay
-    from toonset.dataset.bundle import write_bundle
+    from toonset.dataset.bundle.bundle import write_bundle
 
     fitted = replace(mesh, vertices=found.mannequin)
     cameras = [view.camera for view in found.views]

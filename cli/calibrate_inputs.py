@@ -16,8 +16,8 @@ from toonset.cli.sheet_options import Cutting
 if TYPE_CHECKING:
     from toonset.calib.known import Known
     from toonset.camera import Camera
-    from toonset.dataset.landmark_file import Landmarks
-    from toonset.dataset.mannequin_options import MannequinOptions
+    from toonset.dataset.mannequin.landmark_file import Landmarks
+    from toonset.dataset.mannequin.options import MannequinOptions
     from toonset.mesh import Mesh
     from toonset.view import View
 
@@ -110,7 +110,7 @@ def load_body(path: Path | None) -> Body:
     """
     if path is None:
         return _default_body()
-    from toonset.dataset.mesh_file import load_mesh
+    from toonset.dataset.mesh.load import load_mesh
 
     mesh = load_mesh(path)
     _check_upright(mesh)
@@ -163,7 +163,7 @@ def load_known(hints: Hints, views: Sequence[View], body: Body) -> Known:
     from toonset.calib.known import Known
     from toonset.calib.labels import parse_labels
     from toonset.calib.landmarks_alone import landmarks_of_every_view
-    from toonset.dataset.landmark_file import read_known_points, read_landmarks
+    from toonset.dataset.mannequin.landmark_file import read_known_points, read_landmarks
 
     labels = parse_labels(hints.labels, len(views)) if hints.labels else ()
     landmarks: tuple[Landmarks | None, ...] = ()
@@ -190,8 +190,8 @@ def _check_upright(mesh: Mesh) -> None:
 
 
 def _default_body() -> Body:
-    from toonset.dataset.mannequin import default_mannequin
-    from toonset.dataset.mannequin_options import MannequinOptions
+    from toonset.dataset.mannequin.make import default_mannequin
+    from toonset.dataset.mannequin.options import MannequinOptions
 
     looks, made = MannequinOptions(), default_mannequin()
     points = {name: tuple(point.tolist()) for name, point in made.landmarks.items()}
@@ -200,7 +200,7 @@ def _default_body() -> Body:
 
 def _cameras(path: Path, views: Sequence[View]) -> tuple[Camera, ...]:
     """Return the cameras of --init; in the views' order where their names are the views'."""
-    from toonset.dataset.transforms import read_cameras
+    from toonset.dataset.bundle.transforms import read_cameras
     from toonset.errors import CameraError
 
     named = [(Path(name).name, camera) for name, camera in read_cameras(path)]

@@ -42,8 +42,8 @@ def _files(
     drawings: Sequence[tuple[str, Path]], body: Body, hints: Hints
 ) -> list[tuple[str, Path]]:
     """Return (role, path) of every file that the cameras depend on."""
-    from toonset.dataset.mannequin_files import landmarks_path
-    from toonset.dataset.transforms import transforms_file
+    from toonset.dataset.bundle.transforms import transforms_file
+    from toonset.dataset.mannequin.files import landmarks_path
 
     files = list(drawings)
     if body.path is not None:

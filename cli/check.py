@@ -11,7 +11,7 @@ from toonset.cli.folder_kind import RUN, SPLIT, kind_of
 from toonset.cli.output import JsonFlag, Printer, QuietFlag
 
 if TYPE_CHECKING:
-    from toonset.dataset.problem_log import Problem, ProblemLog
+    from toonset.dataset.bundle.problem_log import Problem, ProblemLog
 
 BAD = 2  # exit code, as of any other bad input
 
@@ -44,7 +44,7 @@ def check(
 
 
 def _problems(path: Path) -> list[Problem]:
-    from toonset.dataset.problem_log import ProblemLog
+    from toonset.dataset.bundle.problem_log import ProblemLog
 
     kind = kind_of(path)
     if kind == RUN:
@@ -52,11 +52,11 @@ def _problems(path: Path) -> list[Problem]:
         _check_run(log, path)
         return log.problems
     if kind == SPLIT:
-        from toonset.dataset.split_check import split_problems
+        from toonset.dataset.split_folder.checks import split_problems
 
         return split_problems(path)
-    from toonset.dataset.bundle_check import bundle_problems
-    from toonset.dataset.bundle_summary import runs_of
+    from toonset.dataset.bundle.check import bundle_problems
+    from toonset.dataset.bundle.summary import runs_of
 
     log = ProblemLog(path if path.is_dir() else path.parent)
     for run in runs_of(log.root):

@@ -31,8 +31,8 @@ def consistency(
     from yellow to red. Exit code 3 where a drawing stands out.
     """
     from toonset.cli.output import check_output
-    from toonset.dataset.picture import encode_png
-    from toonset.dataset.transforms import read_scene
+    from toonset.dataset.bundle.transforms import read_scene
+    from toonset.dataset.images.picture import encode_png
     from toonset.nerf.consistency import consistency_of
     from toonset.nerf.consistency_picture import consistency_picture
     from toonset.write import new_folder, write_bytes, write_json

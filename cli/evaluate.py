@@ -17,7 +17,7 @@ from toonset.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from toonset.dataset.scene import Scene
+    from toonset.dataset.bundle.scene import Scene
     from toonset.nerf.evaluation import ScoredView
 
 WRITTEN = ("evaluation.json", "evaluation.png")
@@ -68,7 +68,7 @@ def evaluate(
     within 2 px. "-": the run or the picture has no such thing, or a package is missing; the JSON
     says why.
     """
-    from toonset.dataset.transforms import read_scene
+    from toonset.dataset.bundle.transforms import read_scene
     from toonset.nerf.evaluation import report, score_views
     from toonset.nerf.metrics_view import load_judges
     from toonset.nerf.run_folder import read_field
@@ -98,7 +98,7 @@ def _write(
     *,
     force: bool,
 ) -> None:
-    from toonset.dataset.picture import encode_png
+    from toonset.dataset.images.picture import encode_png
     from toonset.nerf.evaluation_picture import contact_sheet
     from toonset.write import new_folder, write_bytes, write_json
 
@@ -110,7 +110,7 @@ def _write(
 
 def _training_scene(run: Path, bundle: Path | None) -> tuple[Scene | None, str | None]:
     """Return the frames that the run was trained on, or why they are not known."""
-    from toonset.dataset.transforms import read_scene
+    from toonset.dataset.bundle.transforms import read_scene
     from toonset.errors import BundleError, ToonsetError
     from toonset.json_file import read_json
     from toonset.nerf.evaluation import chosen_frames

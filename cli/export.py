@@ -21,8 +21,8 @@ from toonset.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from toonset.dataset.colmap_points import TrackedPoints
-    from toonset.dataset.export_views import ExportView
+    from toonset.dataset.exporters.common import ExportView
+    from toonset.dataset.exporters.points import TrackedPoints
     from toonset.mesh import Mesh
 
 COLMAP_PANEL = "COLMAP"
@@ -82,10 +82,10 @@ def export(
     """
     if to != Format.colmap and (text or centre or layout != Layout.new):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
-    from toonset.dataset.bundle import mannequin_of
-    from toonset.dataset.export_lens import centred
-    from toonset.dataset.export_views import read_views
-    from toonset.dataset.transforms import transforms_file
+    from toonset.dataset.bundle.bundle import mannequin_of
+    from toonset.dataset.bundle.transforms import transforms_file
+    from toonset.dataset.exporters.common import read_views
+    from toonset.dataset.exporters.pinhole import centred
 
     printer, target = Printer(as_json, quiet), TARGETS[to]
     check_output(out, [bundle, mesh], target.written, force=force)
@@ -117,7 +117,7 @@ def _points(
 
 
 def _report(printer: Printer, to: Format, job: Job, views: Sequence[ExportView]) -> None:
-    from toonset.dataset.export_views import largest_error_px
+    from toonset.dataset.exporters.common import largest_error_px
 
     error_px = 0.0 if TARGETS[to].is_exact else largest_error_px(views)
     printer.say("\n".join(_summary(to, job, views, error_px)))

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from toonset.dataset.colmap_points import TrackedPoints
-    from toonset.dataset.export_views import ExportView
+    from toonset.dataset.exporters.common import ExportView
+    from toonset.dataset.exporters.points import TrackedPoints
     from toonset.mesh import Mesh
 
 BESIDE = ("images", "toonset.json", "mannequin.obj")
@@ -62,7 +62,7 @@ class Target:
 
 
 def _colmap(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.colmap import write_colmap
+    from toonset.dataset.exporters.colmap import write_colmap
 
     how = {"text": job.text, "old_layout": job.old_layout, "force": job.force}
     write_colmap(job.out, job.views, job.points, job.mesh, **how)
@@ -70,46 +70,46 @@ def _colmap(job: Job) -> Sequence[ExportView]:
 
 
 def _nerfstudio(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.export_transforms import write_transforms
+    from toonset.dataset.exporters.nerfstudio import write_transforms
 
     write_transforms(job.out, job.views, job.points, job.mesh, force=job.force)
     return job.views
 
 
 def _instant_ngp(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.export_transforms import write_transforms
+    from toonset.dataset.exporters.nerfstudio import write_transforms
 
     write_transforms(job.out, job.views, None, job.mesh, instant_ngp=True, force=job.force)
     return job.views
 
 
 def _blender_synthetic(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.export_blender_synthetic import write_blender_synthetic
+    from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
 
     return write_blender_synthetic(job.out, job.views, job.points, job.mesh, force=job.force)
 
 
 def _blender(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.export_blender_script import write_blender_script
+    from toonset.dataset.exporters.blender import write_blender_script
 
     return write_blender_script(job.out, job.views, job.mesh, force=job.force)
 
 
 def _gltf(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.export_gltf import write_gltf
+    from toonset.dataset.exporters.gltf import write_gltf
 
     return write_gltf(job.out, job.views, job.mesh, force=job.force)
 
 
 def _opencv(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.export_opencv import write_opencv
+    from toonset.dataset.exporters.opencv import write_opencv
 
     write_opencv(job.out, job.views, job.mesh, force=job.force)
     return job.views
 
 
 def _opencv_xml(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.export_opencv import write_opencv
+    from toonset.dataset.exporters.opencv import write_opencv
 
     write_opencv(job.out, job.views, job.mesh, xml=True, force=job.force)
     return job.views

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from toonset.calib.rim import find_rim, prepare_surface
 from toonset.camera import Camera
-from toonset.dataset.colmap_points import TrackedPoints, sample_surface, track_points
-from toonset.dataset.export_views import ExportView
+from toonset.dataset.exporters.common import ExportView
+from toonset.dataset.exporters.points import TrackedPoints, sample_surface, track_points
 from toonset.mesh import Mesh
 
 RIM_SPACING_PX = 2.0

@@ -16,8 +16,8 @@ def kind_of(path: Path) -> str:
     Raises:
         BundleError: it is none of them.
     """
-    from toonset.dataset.picture_folder import ENDINGS
-    from toonset.dataset.transforms_read import NAMES
+    from toonset.dataset.bundle.transforms_read import NAMES
+    from toonset.dataset.images.folder import ENDINGS
 
     if not path.exists():
         raise BundleError(f"{path}: does not exist; name a bundle, a run or a split folder")

@@ -18,8 +18,8 @@ from toonset.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from toonset.dataset.import_bundle import ImportReport
-    from toonset.dataset.import_views import Imported
+    from toonset.dataset.importers.detect import Imported
+    from toonset.dataset.importers.to_bundle import ImportReport
 
 WRITTEN = ("transforms.json", "images", "mannequin.obj")
 
@@ -67,9 +67,9 @@ def import_(
     Pictures become RGBA: a mask becomes their alpha. Lens distortion is refused: undistort first.
     Of toonset's own exports the exact cameras beside them are taken.
     """
-    from toonset.dataset.bundle import mannequin_of
-    from toonset.dataset.import_bundle import write_imported
-    from toonset.dataset.import_views import read_import
+    from toonset.dataset.bundle.bundle import mannequin_of
+    from toonset.dataset.importers.detect import read_import
+    from toonset.dataset.importers.to_bundle import write_imported
 
     printer = Printer(as_json, quiet)
     check_output(out, [path, images, masks, mesh], WRITTEN, force=force)

@@ -44,7 +44,7 @@ def info(
 
 def _summarise_bundle(path: Path) -> dict[str, Any]:
     from toonset.cli.info_folders import summarise_run
-    from toonset.dataset.bundle_summary import runs_of, summarise
+    from toonset.dataset.bundle.summary import runs_of, summarise
     from toonset.errors import ToonsetError
 
     found = summarise(path) | {"runs": []}

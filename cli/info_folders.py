@@ -14,7 +14,7 @@ def summarise_run(folder: Path) -> dict[str, Any]:
     Raises:
         BundleError: config.json or metrics.json cannot be read.
     """
-    from toonset.dataset.bundle_summary import sizes
+    from toonset.dataset.bundle.summary import sizes
     from toonset.json_file import read_json
 
     config = _table(read_json(folder / "config.json"))
@@ -71,9 +71,10 @@ def summarise_split(folder: Path) -> dict[str, Any]:
     Raises:
         SheetError: split.json cannot be read.
     """
-    from toonset.dataset.bundle_summary import sizes
-    from toonset.dataset.picture_folder import picture_files
-    from toonset.dataset.split_files import IMAGES, read_records
+    from toonset.dataset.bundle.summary import sizes
+    from toonset.dataset.images.folder import picture_files
+    from toonset.dataset.split_folder.places import IMAGES
+    from toonset.dataset.split_folder.write import read_records
 
     sheets, views = read_records(folder)
     place = folder / IMAGES

@@ -15,7 +15,7 @@ HUNDRED = 100.0
 
 
 def bundle_text(found: dict[str, Any]) -> str:
-    """Return the facts of `toonset.dataset.bundle_summary.summarise` for people."""
+    """Return the facts of `toonset.dataset.bundle.summary.summarise` for people."""
     views = found["views"]
     rows = [_judged_row(view) if "verdict" in view else _plain_row(view) for view in views]
     head = _JUDGED if any("verdict" in view for view in views) else _PLAIN

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
-from toonset.dataset.mannequin_options import HEADS_TALL, SCALES, MannequinOptions, Pose
+from toonset.dataset.mannequin.options import HEADS_TALL, SCALES, MannequinOptions, Pose
 
 DEFAULT = MannequinOptions()
 LOW, HIGH = SCALES
@@ -44,10 +44,10 @@ def mannequin(
     Writes an OBJ with named parts and, beside it, NAME.landmarks.json with its joints and face.
     """
     options = MannequinOptions(heads, pose, head, torso, limbs)
-    from toonset.dataset.mannequin_files import check_files, landmarks_path, write_mannequin
+    from toonset.dataset.mannequin.files import check_files, landmarks_path, write_mannequin
 
     check_files(out, force=force)
-    from toonset.dataset.mannequin import make_mannequin
+    from toonset.dataset.mannequin.make import make_mannequin
 
     made = make_mannequin(options)
     write_mannequin(made, out)

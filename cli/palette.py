@@ -197,7 +197,7 @@ def _labels(drawn: Drawn, contours: list[Map], found: Palette, space: ColorSpace
 def _write(
     folder: Path, drawn: Drawn, found: Palette, labels: list[Map], contours: list[Map]
 ) -> None:
-    from toonset.dataset.palette_files import write_palette
+    from toonset.dataset.bundle.palette_files import write_palette
 
     named = list(zip(drawn.names, labels, strict=True))
     write_palette(folder, found, named, list(zip(drawn.names, contours, strict=True)))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toonset.cli.output import Printer
-from toonset.cli.sheet_places import is_split_folder, sheet_places
+from toonset.dataset.split_folder.places import is_split_folder, sheet_places
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,7 +51,7 @@ def bundle_of(places: Sequence[Path]) -> Path | None:
 
 
 def _is_meant_as_bundle(place: Path) -> bool:
-    from toonset.dataset.transforms_read import NAMES
+    from toonset.dataset.bundle.transforms_read import NAMES
 
     if place.is_dir():
         marks = (*NAMES, "calibration.json")  # a bundle that has lost its cameras is broken
@@ -73,7 +73,10 @@ def load_drawn(places: list[Path], printer: Printer) -> Drawn:
     if bundle is not None:
         return _bundled(places[0], bundle, printer)
     pictures: list[Picture] = []
-    for place in sheet_places([_inner(place) for place in places], printer):
+    found, notes = sheet_places([_inner(place) for place in places])
+    for note in notes:
+        printer.say(note)
+    for place in found:
         pictures += _views(place, printer) if place.is_dir() else [_loaded(place, printer)]
     names = tuple(f"{number:03d}.png" for number in range(len(pictures)))
     return Drawn(names, tuple(pictures), None)
@@ -86,7 +89,7 @@ def _inner(place: Path) -> Path:
 
 
 def _bundled(place: Path, bundle: Path, printer: Printer) -> Drawn:
-    from toonset.dataset.transforms_read import picture_paths
+    from toonset.dataset.bundle.transforms_read import picture_paths
     from toonset.errors import BundleError
 
     paths = picture_paths(place)
@@ -97,7 +100,7 @@ def _bundled(place: Path, bundle: Path, printer: Printer) -> Drawn:
 
 
 def _views(folder: Path, printer: Printer) -> list[Picture]:
-    from toonset.dataset.split_read import read_split
+    from toonset.dataset.split_folder.read import read_split
 
     split, notes = read_split(folder)
     for note in notes:
@@ -106,7 +109,7 @@ def _views(folder: Path, printer: Printer) -> list[Picture]:
 
 
 def _loaded(path: Path, printer: Printer) -> Picture:
-    from toonset.dataset.picture import load_rgba
+    from toonset.dataset.images.picture import load_rgba
 
     return _foreground(load_rgba(path), path, printer)
 
@@ -115,7 +118,7 @@ def _foreground(picture: Picture, path: Path, printer: Printer) -> Picture:
     """Return the picture with its plain background made transparent, if it is opaque."""
     import numpy as np
 
-    from toonset.dataset.sheet import split_sheet
+    from toonset.dataset.split.sheet import split_sheet
     from toonset.errors import SheetError
 
     if (picture[..., 3] < 255).any():

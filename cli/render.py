@@ -215,7 +215,7 @@ def _cameras(
     elevation: float,
     size: int | None,
 ) -> Named:
-    from toonset.dataset.transforms import read_cameras
+    from toonset.dataset.bundle.transforms import read_cameras
     from toonset.errors import BundleError
     from toonset.nerf.turntable import turntable
 

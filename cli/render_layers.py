@@ -28,7 +28,7 @@ def encoded(
 
     Labels are an indexed PNG, depth is grey of 16 bits on the scale of `levels`; all else is RGBA.
     """
-    from toonset.dataset.picture import encode_grey_png, encode_indexed_png, encode_png
+    from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 
     picture = _layer(trained, view, camera, layer)
     if layer == "depth":

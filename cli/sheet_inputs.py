@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 from toonset.cli.output import Printer
 from toonset.cli.sheet_options import Cutting
-from toonset.cli.sheet_places import sheet_places
+from toonset.dataset.split_folder.places import sheet_places
 
 if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import UInt8
 
-    from toonset.dataset.sheet import SheetOptions
-    from toonset.dataset.split import Split
+    from toonset.dataset.split.sheet import SheetOptions
+    from toonset.dataset.split_folder.views import Split
 
     Picture = UInt8[np.ndarray, "height width 4"]
 
@@ -71,9 +71,11 @@ def load_drawings(paths: Sequence[Path], cutting: Cutting, printer: Printer) -> 
         PictureError, SheetError: a file is no picture or shows no figure, is given twice, a split
             folder is broken, or an option does not fit the sheets.
     """
-    from toonset.dataset.split_doubts import odd_files
+    from toonset.dataset.split_folder.checks import odd_files
 
-    places = sheet_places(paths, printer)
+    places, notes = sheet_places(paths)
+    for note in notes:
+        printer.say(note)
     options = _options_per_sheet(places, cutting)
     parts = [
         _of_split_folder(place) if sheet_options is None else _of_sheet(place, sheet_options)
@@ -105,7 +107,7 @@ def check_label_count(text: str, drawings: Drawings) -> None:
 
 def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOptions | None]:
     """Return how every sheet is cut; None for a split folder, which is cut already."""
-    from toonset.dataset.sheet import SheetOptions
+    from toonset.dataset.split.sheet import SheetOptions
     from toonset.errors import SheetError
 
     is_cut = [place.is_dir() for place in places]
@@ -118,7 +120,7 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOp
     options = [None if cut else common for cut in is_cut]
     if cutting.boxes is None:
         return options
-    from toonset.dataset.boxes_file import read_boxes
+    from toonset.dataset.split_folder.boxes import read_boxes
 
     boxes = read_boxes(cutting.boxes)
     if len(boxes) != len(places):
@@ -130,9 +132,9 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOp
 
 
 def _of_split_folder(folder: Path) -> Drawings:
-    from toonset.dataset.picture_folder import picture_files
-    from toonset.dataset.split_files import IMAGES, SPLIT_FILE
-    from toonset.dataset.split_read import read_split
+    from toonset.dataset.images.folder import picture_files
+    from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE
+    from toonset.dataset.split_folder.read import read_split
 
     split, notes = read_split(folder)
     views = [("view", path) for path in picture_files(folder / IMAGES)[0]]
@@ -142,10 +144,10 @@ def _of_split_folder(folder: Path) -> Drawings:
 
 
 def _of_sheet(path: Path, options: SheetOptions) -> Drawings:
-    from toonset.dataset.boxes_file import check_boxes
-    from toonset.dataset.picture import decode_rgba
-    from toonset.dataset.sheet import split_sheet
-    from toonset.dataset.split import split_of_sheet
+    from toonset.dataset.images.picture import decode_rgba
+    from toonset.dataset.split.sheet import split_sheet
+    from toonset.dataset.split_folder.boxes import check_boxes
+    from toonset.dataset.split_folder.views import split_of_sheet
     from toonset.errors import PictureError, SheetError
     from toonset.read import read_whole
 
@@ -175,7 +177,7 @@ def _uneven_cells(
 
 
 def _joined(parts: Sequence[Drawings]) -> Drawings:
-    from toonset.dataset.split import joined
+    from toonset.dataset.split_folder.views import joined
 
     split = joined([part.split for part in parts])
     return Drawings(
@@ -188,7 +190,7 @@ def _joined(parts: Sequence[Drawings]) -> Drawings:
 
 
 def _dropped(drawings: Drawings, dropped: frozenset[int]) -> Drawings:
-    from toonset.dataset.split import without
+    from toonset.dataset.split_folder.views import without
     from toonset.errors import SheetError
 
     unknown = [number for number in sorted(dropped) if number >= drawings.found]

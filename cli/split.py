@@ -28,8 +28,8 @@ from toonset.cli.sheet_options import (
 )
 
 if TYPE_CHECKING:
-    from toonset.dataset.split import Source, Split
-    from toonset.dataset.split_panel import Panel
+    from toonset.dataset.split_folder.panel import Panel
+    from toonset.dataset.split_folder.views import Source, Split
 
 WRITTEN = ("images", "split.json", "overlay.png")
 DOUBTFUL = 3  # exit code: files are written, but a person should look
@@ -106,8 +106,8 @@ def _write(
     *,
     force: bool,
 ) -> None:
-    from toonset.dataset.split_files import write_split
-    from toonset.dataset.split_overlay import draw_split
+    from toonset.dataset.split_folder.overlay import draw_split
+    from toonset.dataset.split_folder.write import write_split
 
     overlay = draw_split(_panels(named, drawings), doubts)
     write_split(out, named, overlay, cutting.as_options(), force=force)
@@ -117,7 +117,7 @@ def _panels(named: Split, drawings: Drawings) -> list[Panel]:
     """Return the sheets for the overlay; a view whose sheet is not at hand stands alone."""
     from dataclasses import replace
 
-    from toonset.dataset.split_panel import Panel
+    from toonset.dataset.split_folder.panel import Panel
 
     panels = []
     for index, (source, picture) in enumerate(zip(named.sources, drawings.pictures, strict=True)):
@@ -138,7 +138,7 @@ def _panels(named: Split, drawings: Drawings) -> list[Panel]:
 def _say(
     named: Split, cutting: Cutting, doubts: tuple[str, ...], out: Path, printer: Printer
 ) -> None:
-    from toonset.dataset.split_files import split_dict
+    from toonset.dataset.split_folder.write import split_dict
 
     for index, source in enumerate(named.sources):
         printer.say(_source_line(source))

@@ -16,7 +16,7 @@ from toonset.cli.output import (
     SeedOption,
     check_output,
 )
-from toonset.dataset.synth_options import SynthOptions
+from toonset.dataset.synthetic.options import SynthOptions
 
 WRITTEN = ("sheet.png", "views", "labels", "ink", "mannequin.obj", "truth.json")
 DEFAULT = SynthOptions()
@@ -81,9 +81,9 @@ def synth(
         following_parts=tuple(following or ()),
         background=background,
     )
-    from toonset.dataset.mesh_file import load_mesh
-    from toonset.dataset.synthetic import make_turnaround
-    from toonset.dataset.synthetic_files import write_turnaround
+    from toonset.dataset.mesh.load import load_mesh
+    from toonset.dataset.synthetic.files import write_turnaround
+    from toonset.dataset.synthetic.turnaround import make_turnaround
 
     printer = Printer(as_json, quiet)
     check_output(out, [mesh], WRITTEN, force=force)

@@ -17,7 +17,7 @@ from toonset.cli.train_voice import Voice
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:
-    from toonset.dataset.scene import Scene
+    from toonset.dataset.bundle.scene import Scene
     from toonset.nerf.checkpoint import Checkpoint
     from toonset.nerf.options import TrainOptions
     from toonset.nerf.progress_watch import Onlooker
@@ -70,9 +70,9 @@ class Request:
 
 def run(request: Request, printer: Printer) -> int:
     """Train, write the run and print the result; return the exit code."""
-    from toonset.dataset.transforms import read_scene
+    from toonset.dataset.bundle.transforms import read_scene
+    from toonset.dataset.silhouettes.mask import check_cut_out, has_figure
     from toonset.nerf.gaps import guesses
-    from toonset.nerf.silhouette import check_cut_out, has_figure
     from toonset.nerf.symmetry import with_all_mirrored
 
     place = request.place

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from character import character, mannequin
 
-from toonset.dataset.mesh_file import save_obj
-from toonset.dataset.picture import encode_png
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
-from toonset.dataset.synthetic_files import truth_dict
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.load import save_obj
+from toonset.dataset.synthetic.files import truth_dict
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
 from toonset.write import write_bytes, write_json
 

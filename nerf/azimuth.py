@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from toonset.dataset.scene import Scene
-from toonset.nerf.alignment import FEWEST_VIEWS, Alignment
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.alignment import FEWEST_VIEWS, Alignment
+from toonset.dataset.silhouettes.mask import alpha_of, has_figure
+from toonset.dataset.silhouettes.outlines import Square, outlines_of
 from toonset.nerf.azimuth_fit import PLACE, YAW, camera_moved, fit_turns
 from toonset.nerf.registration import ViewMove
-from toonset.nerf.silhouette import alpha_of, has_figure
-from toonset.nerf.warp_outline import Square, outlines_of
 
 ROUNDS = 6  # of Gauss-Newton
 PLACED = 0.003  # of the figure's square: how far a fit misplaces a drawing, as a first guess

@@ -5,8 +5,9 @@ Minimised over each camera's shift, growth and yaw and the common perspective, b
     sum over rim points and other views of rho(r / sigma)^2 / CORRELATED
       + |shift, growth|^2 / tau^2 + (yaw / its sigma)^2 + (log k / its sigma)^2
 
-with r of `toonset.nerf.warp_coherence`, noise and tau as in `toonset.nerf.warp_fit`. What outlines
-cannot tell is left as it was: the mean yaw, and the body's place and size.
+with r of `toonset.dataset.silhouettes.tangency`, noise and tau as in
+`toonset.dataset.silhouettes.register`. What outlines cannot tell is left as it was: the mean yaw,
+and the body's place and size.
 
 Source: Hernandez, Schmitt, Cipolla, "Silhouette coherence for camera calibration under circular
 motion", PAMI 2007, with distances instead of overlaps and a prior on every number.
@@ -21,9 +22,9 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.camera import Camera, rotation_from_angles
-from toonset.nerf.registration import moved
-from toonset.nerf.warp_coherence import Placed, Touch, pixels_of, touch
-from toonset.nerf.warp_fit import (
+from toonset.dataset.silhouettes.displacement import ShiftAndScale
+from toonset.dataset.silhouettes.outlines import Outline, Outlines, Square
+from toonset.dataset.silhouettes.register import (
     AFRESH,
     CORRELATED,
     FOREIGN,
@@ -35,8 +36,8 @@ from toonset.nerf.warp_fit import (
     Fit,
     common,
 )
-from toonset.nerf.warp_moves import ShiftAndScale
-from toonset.nerf.warp_outline import Outline, Outlines, Square
+from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
+from toonset.nerf.registration import moved
 
 PLACE, YAW, OWN = slice(0, 3), 3, 4  # a camera's numbers: shift x, shift y, growth; yaw
 STEP = 1e-3  # of central differences: of the square, radians, or log k

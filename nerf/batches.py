@@ -12,7 +12,7 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.fields import Constants, Field
 from toonset.nerf.hull import Hull, occupancy
 from toonset.nerf.march import Rays, Samples, march, rays_of

@@ -25,7 +25,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from toonset import __version__
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.errors import BundleError
 from toonset.json_file import read_json, validated, validation_reason
 from toonset.nerf.checkpoint_state import FitState

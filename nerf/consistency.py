@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.alignment import FEWEST_VIEWS
+from toonset.dataset.silhouettes.displacement import ShiftAndScale
+from toonset.dataset.silhouettes.mask import alpha_of, has_figure
+from toonset.dataset.silhouettes.outlines import Outlines, outlines_of
+from toonset.dataset.silhouettes.tangency import Placed, touch
 from toonset.errors import BundleError
-from toonset.nerf.alignment import FEWEST_VIEWS
 from toonset.nerf.preparation import aligned
 from toonset.nerf.registration import Registration
-from toonset.nerf.silhouette import alpha_of, has_figure
 from toonset.nerf.warp import Unbending, Warp
-from toonset.nerf.warp_coherence import Placed, touch
-from toonset.nerf.warp_moves import ShiftAndScale
-from toonset.nerf.warp_outline import Outlines, outlines_of
 
 UNEXPLAINED = 0.01  # of the figure's size: a ray that misses the shared shape by more is a fault
 ODD = 0.03  # share of a figure that may still be so after shift, size and bend

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from toonset.dataset.scene import Frame
+from toonset.dataset.bundle.scene import Frame
 from toonset.nerf.consistency import Consistency, ViewReport
 
 CELL = 300  # px a side of a view's cell

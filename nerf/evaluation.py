@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.flip import PIXELS_PER_DEGREE
 from toonset.nerf.layers import color_picture, palette_picture
 from toonset.nerf.metrics import MOST_SHIFT_PX, Figures, means

@@ -12,9 +12,10 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.bounds import Box, box_of_masks
+from toonset.dataset.silhouettes.mask import OPAQUE, has_figure, mask_of
 from toonset.nerf.batches import Batch
-from toonset.nerf.bounds import Box, box_of_masks
 from toonset.nerf.field import TriplaneField
 from toonset.nerf.field_loss import Model, Weights
 from toonset.nerf.field_mlp import MlpField
@@ -22,7 +23,6 @@ from toonset.nerf.field_voxel import VoxelField
 from toonset.nerf.fields import Field, Places
 from toonset.nerf.hull import Hull
 from toonset.nerf.march import Rays, clip, rays_of
-from toonset.nerf.silhouette import OPAQUE, has_figure, mask_of
 from toonset.palette.pixels.labels import UNLABELLED
 
 VOXELS = 96  # of the box, in the map of empty space that rendering skips

@@ -16,7 +16,7 @@ from scipy import ndimage
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.field_voxel import VoxelField
 from toonset.nerf.hull import LEVEL, Hull
 from toonset.nerf.hull_views import project

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toonset.nerf.bounds import Box
+from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.field import TriplaneField
 from toonset.nerf.field_mlp import MlpField
 from toonset.nerf.field_voxel import VoxelField

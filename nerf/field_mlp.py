@@ -14,7 +14,7 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from toonset.nerf.bounds import Box
+from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.fields import DENSITY_SHIFT, Constants, Field, FieldSpec, Places
 
 CELLS = 64  # of the box: density is per cell of this size, as in the other fields

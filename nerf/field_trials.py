@@ -13,7 +13,8 @@ from functools import partial
 
 import torch
 
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.mask import figure_px
 from toonset.nerf.batches import Batch, make_batches
 from toonset.nerf.field_choice import (
     FEWEST_VIEWS,
@@ -29,7 +30,6 @@ from toonset.nerf.fields import Field
 from toonset.nerf.fitting import fit
 from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.silhouette import figure_px
 from toonset.nerf.threads import side_by_side
 
 SEEN_RAYS, UNSEEN_RAYS = 32_000, 8_000  # drawn by lot; a trial goes through the first four times

@@ -10,8 +10,8 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf import losses
-from toonset.nerf.bounds import Box
 from toonset.nerf.fields import DENSITY_SHIFT, Constants, Field, FieldSpec, Places, shape_of
 from toonset.nerf.interpolation import Operator
 

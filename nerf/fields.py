@@ -17,7 +17,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from toonset.nerf.bounds import Box
+from toonset.dataset.silhouettes.bounds import Box
 
 Kind = Literal["triplane", "mlp", "voxel"]
 OPAQUE_AT_START = 0.1  # optical depth of one cell before training: space starts as a mist

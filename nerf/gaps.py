@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass, replace
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Scene
-from toonset.nerf.silhouette import figure_px
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.mask import figure_px
 
 # Between neighbouring drawings: a third of the turn. Three even drawings lose 5 dB by that; 100 to
 # 115 degrees among eight drawings lose nothing.

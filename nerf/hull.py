@@ -25,8 +25,8 @@ from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
 from toonset.camera import Camera
+from toonset.dataset.silhouettes.bounds import Box, box_of_masks
 from toonset.errors import BundleError
-from toonset.nerf.bounds import Box, box_of_masks
 from toonset.nerf.hull_views import agreement, agreement_within
 from toonset.nerf.threads import side_by_side
 

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.hull import LEVEL, Hull, carve
 from toonset.nerf.ink_nearest import distance_to
 from toonset.nerf.ink_strokes import Lines, Strokes

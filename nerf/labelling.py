@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.palette.paints.extract import extract_palette
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import label_image

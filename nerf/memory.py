@@ -10,7 +10,7 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.errors import BundleError
 from toonset.nerf.batches import MOST_RAYS
 from toonset.nerf.field_box import BINS, RAYS_PER_STEP

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from toonset.dataset.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
-from toonset.dataset.picture import encode_png
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.errors import OutputError
 from toonset.nerf.surface import Surface
 from toonset.palette.names import hex_of

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.nerf.silhouette import mask_of
+from toonset.dataset.silhouettes.mask import mask_of
 
 BEST_PSNR = 120.0  # reported for identical pictures, which have no finite value
 MOST_SHIFT_PX = 2  # of the whole picture that the shift-tolerant PSNR forgives

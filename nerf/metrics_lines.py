@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
+from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.metrics import over_white
-from toonset.nerf.silhouette import mask_of
 
 TOLERANCE_PX = 2
 DARK = 110 / 255  # luma of ink, over white

@@ -25,7 +25,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
-from toonset.dataset.picture import encode_grey_png, encode_png
+from toonset.dataset.images.picture import encode_grey_png, encode_png
 from toonset.errors import BundleError
 from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.fields import DENSITY_SHIFT

@@ -11,13 +11,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.bounds import box_of_masks
+from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.azimuth import Turning, turned
-from toonset.nerf.bounds import box_of_masks
 from toonset.nerf.ink import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.registration import Registration, registered
-from toonset.nerf.silhouette import mask_of
 from toonset.nerf.warp import Unbending, unbent
 from toonset.nerf.warp_back import KeyWarps
 

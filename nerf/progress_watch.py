@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from toonset.dataset.picture import encode_png
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.images.picture import encode_png
 from toonset.errors import BundleError
 from toonset.nerf.checkpoint import write_checkpoint
 from toonset.nerf.checkpoint_state import FitState

@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Scene
-from toonset.nerf.alignment import Alignment, alignment_of
-from toonset.nerf.warp_moves import ShiftAndScale
-from toonset.nerf.warp_outline import Square
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.alignment import Alignment, alignment_of
+from toonset.dataset.silhouettes.displacement import ShiftAndScale
+from toonset.dataset.silhouettes.outlines import Square
 
 ROUNDS = 6  # of Gauss-Newton
 

@@ -14,8 +14,8 @@ import torch
 from jaxtyping import UInt8
 
 from toonset import __version__
-from toonset.dataset.picture import encode_png
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.images.picture import encode_png
 from toonset.nerf.layers import color_picture
 from toonset.nerf.manifest import write_manifest
 from toonset.nerf.metrics import compare, means, over_white

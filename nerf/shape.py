@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.mask import alpha_of, figure_px, widened
 from toonset.errors import BundleError
 from toonset.nerf.evidence import HullEvidence, choose_missing
 from toonset.nerf.fairing import faired
 from toonset.nerf.hull import Hull, carve
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.silhouette import alpha_of, figure_px, widened
 
 VOXELS_PER_PX, VOXELS = 1.8, (64, 300)
 # Views that hold each other's thin parts back: with them as wide as they cover pixels, 8 views gain

@@ -17,8 +17,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from toonset.camera import Camera, rotation_distance
-from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.silhouette import mask_of
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.mask import mask_of
 
 FACING = math.radians(10)  # between the mirror plane and a drawing that shows both sides
 NEW = math.radians(20)  # a mirrored drawing this near to a drawn one adds nothing

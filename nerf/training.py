@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.mask import check_cut_out
 from toonset.errors import BundleError, SetupError
 from toonset.nerf import losses
 from toonset.nerf.allocator import keep_freed_memory
@@ -42,7 +43,6 @@ from toonset.nerf.hull import Hull
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import prepared
 from toonset.nerf.shape import hull_of, per_px
-from toonset.nerf.silhouette import check_cut_out
 from toonset.nerf.symmetry import completed
 from toonset.nerf.threads import SIDES
 from toonset.nerf.trained import TrainedField, Training

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 
 from toonset.camera import Camera
-from toonset.dataset.picture import encode_png
+from toonset.dataset.images.picture import encode_png
 from toonset.nerf.animation import Pictures, encode_gif, encode_mp4, encode_webp
 from toonset.nerf.sprite_sheet import feet, sprite_json, sprite_sheet
 from toonset.nerf.trained import TrainedField

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.mask import figure_px
 from toonset.nerf.gaps import guesses
 from toonset.nerf.metrics import over_white
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.silhouette import figure_px
 from toonset.nerf.symmetry import with_mirrored
 from toonset.nerf.trained import Training
 from toonset.palette.pixels.labels import UNLABELLED

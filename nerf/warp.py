@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.alignment import Alignment, alignment_of
-from toonset.nerf.warp_moves import CONTROLS, Bends
-from toonset.nerf.warp_outline import Square
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.alignment import Alignment, alignment_of
+from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
+from toonset.dataset.silhouettes.outlines import Square
 from toonset.palette.pixels.labels import UNLABELLED
 
 ROUNDS = 8  # of Gauss-Newton

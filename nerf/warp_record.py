@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from toonset.dataset.native_camera import NativeCamera
+from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.nerf.warp import Warp
 from toonset.nerf.warp_back import KeyWarps
 

@@ -149,10 +149,10 @@ def snapshot() -> Callable[[Path], dict[str, str]]:
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a drawn sheet.png, its first figure single.png, and mannequin.obj."""
     from bench.cases.bodies import random_body
-    from toonset.dataset.mesh_file import save_obj
-    from toonset.dataset.picture import encode_png
-    from toonset.dataset.synth_options import SynthOptions
-    from toonset.dataset.synthetic import make_turnaround
+    from toonset.dataset.images.picture import encode_png
+    from toonset.dataset.mesh.load import save_obj
+    from toonset.dataset.synthetic.options import SynthOptions
+    from toonset.dataset.synthetic.turnaround import make_turnaround
 
     folder = tmp_path_factory.mktemp("drawn")
     options = SynthOptions(views=VIEWS, cell_px=CELL, outline_px=0, elevation_deg=8)
@@ -201,9 +201,9 @@ def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from PIL import Image
 
     from toonset.camera import Camera
-    from toonset.dataset.bundle import write_bundle
-    from toonset.dataset.mesh_file import load_mesh
-    from toonset.dataset.picture import encode_indexed_png
+    from toonset.dataset.bundle.bundle import write_bundle
+    from toonset.dataset.images.picture import encode_indexed_png
+    from toonset.dataset.mesh.load import load_mesh
     from toonset.palette.formats.registry import to_gpl, to_json
     from toonset.palette.palette import Palette, PaletteColor
     from toonset.view import View
@@ -240,7 +240,7 @@ def calibration_report(names: list[str], cameras: list[Any]) -> dict[str, Any]:
     """Return what `toonset.calib.report` would say of these cameras."""
     import math
 
-    from toonset.dataset.calibration_schema import SCHEMA, VERSION
+    from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION
 
     def plain(camera: Any) -> dict[str, Any]:
         angles = zip(("yaw_deg", "elevation_deg", "roll_deg"), camera.angles, strict=True)

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from toonset.camera import Camera
-from toonset.dataset.export_views import ExportView
+from toonset.dataset.exporters.common import ExportView
 from toonset.mesh import Mesh
 
 TARGET = np.array([0.1, 0.9, -0.05])

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from tests.exported_views import camera_at
-from toonset.dataset.colmap import write_colmap
-from toonset.dataset.export_blender_script import write_blender_script
-from toonset.dataset.export_blender_synthetic import write_blender_synthetic
-from toonset.dataset.export_gltf import write_gltf
-from toonset.dataset.export_opencv import write_opencv
-from toonset.dataset.export_transforms import write_transforms
-from toonset.dataset.export_views import ExportView
+from toonset.dataset.exporters.blender import write_blender_script
+from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
+from toonset.dataset.exporters.colmap import write_colmap
+from toonset.dataset.exporters.common import ExportView
+from toonset.dataset.exporters.gltf import write_gltf
+from toonset.dataset.exporters.nerfstudio import write_transforms
+from toonset.dataset.exporters.opencv import write_opencv
 from toonset.mesh import Mesh
 from toonset.write import write_json
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.mesh.load import load_mesh
 from toonset.mesh import Mesh
 
 CUBE = trimesh.creation.box(extents=(1, 2, 3)).subdivide()

@@ -17,8 +17,8 @@ from bench.train.mannequin_views import mannequin_view, paint_mannequin
 from bench.train.measure import run_jobs, table_of
 from bench.train.plan import MANNEQUIN, METHODS, NEAREST, SCOPES, Job, plan
 from toonset.camera import Camera
-from toonset.dataset.gl_render import render_labels
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.nerf.metrics import compare, silhouette_iou

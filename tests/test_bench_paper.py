@@ -20,7 +20,7 @@ from bench.paper.table import as_csv, as_text, outdone, outdone_text, paper_rows
 from bench.train.plan import METHODS, PAPER, Job, Method
 from bench.train.run import RunResult, Seen, run_job
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.evaluation_picture import TILE_PX
 from toonset.nerf.metrics_view import Judges
 from toonset.nerf.options import TrainOptions

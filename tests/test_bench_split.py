@@ -22,8 +22,8 @@ from bench.split.measure import bench_split
 from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
 from bench.split.picture import COLUMNS, TILE_WH, contact_sheet, tile
 from bench.split.score import mask_iou, same_box, score
-from toonset.dataset.picture import encode_png
-from toonset.dataset.sheet import LeftOut, Sheet
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.split.sheet import LeftOut, Sheet
 from toonset.errors import BundleError, SheetError
 from toonset.view import View
 

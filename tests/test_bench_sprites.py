@@ -14,10 +14,10 @@ from bench.calib.table import sprites_table
 from bench.cases.bodies import random_body
 from bench.cases.sprites import MANNEQUIN, OWN_MESH, bench_sprites, sprite_cases
 from toonset.camera import Camera
-from toonset.dataset.mesh_file import save_obj
-from toonset.dataset.picture import encode_png
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.load import save_obj
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import BundleError
 
 

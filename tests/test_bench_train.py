@@ -30,7 +30,7 @@ from bench.train.plan import (
 )
 from bench.train.run import Look, RunResult, Seen, Snapshots, curve_frames, reached
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
 from toonset.nerf import field_box
 from toonset.nerf.labelling import without_palette

@@ -17,11 +17,11 @@ from toonset.calib.ladder import BIC_MARGIN, GLANCE_MARGIN, PROPORTIONS, Rung
 from toonset.calib.problem import SAME_BODY_COVERAGE
 from toonset.calib.result import Calibration
 from toonset.camera import rotation_distance
-from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.picture import load_rgba
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import Turnaround, make_turnaround
+from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 OPTIONS = SynthOptions(views=5, cell_px=200, outline_px=0, elevation_deg=8, yaw_jitter_deg=8)

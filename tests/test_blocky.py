@@ -17,9 +17,9 @@ from toonset.calib.hypotheses import (
 from toonset.calib.pose import Pose
 from toonset.calib.rim import prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
 
 RED, BLUE, SKIN = (200, 40, 30), (40, 60, 180), (240, 190, 150)

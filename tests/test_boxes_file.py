@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from toonset.dataset.boxes_file import check_boxes, read_boxes
+from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
 from toonset.errors import SheetError
 
 BOXES = ((12, 8, 120, 300), (140, 8, 118, 301))

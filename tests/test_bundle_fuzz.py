@@ -20,9 +20,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.bundle_check import bundle_problems
-from toonset.dataset.bundle_summary import summarise
-from toonset.dataset.transforms import read_scene
+from toonset.dataset.bundle.check import bundle_problems
+from toonset.dataset.bundle.summary import summarise
+from toonset.dataset.bundle.transforms import read_scene
 from toonset.errors import ToonsetError
 
 JSON_FILES = ("transforms.json", "calibration.json", "palette.json")

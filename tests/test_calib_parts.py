@@ -9,7 +9,6 @@ import torch
 import trimesh
 
 from toonset.calib.align import ElevationPrior, Fit, align, tilt, upright_prior
-from toonset.calib.contour import drawn_contour
 from toonset.calib.face import FaceEvidence
 from toonset.calib.hypotheses import Candidates
 from toonset.calib.match import Drawing
@@ -18,6 +17,7 @@ from toonset.calib.rim import find_rim, prepare_surface, silhouette_mask
 from toonset.calib.shared import Sheet, possible_turns
 from toonset.calib.templates import build_templates, find_hypotheses
 from toonset.camera import rotation_distance, rotation_from_angles
+from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import SheetError
 from toonset.mesh import Mesh
 from toonset.projection import project as torch_project

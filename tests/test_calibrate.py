@@ -12,7 +12,6 @@ import trimesh
 from bench.calib.measure import view_error
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
-from toonset.calib.contour import drawn_contour
 from toonset.calib.known import Known
 from toonset.calib.labels import parse_labels
 from toonset.calib.match import Drawing, match
@@ -21,9 +20,10 @@ from toonset.calib.pose import Pose
 from toonset.calib.report import calibration_dict
 from toonset.calib.rim import prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.silhouettes.contour import drawn_contour
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
 
 CLEAN = SynthOptions(views=5, cell_px=220, outline_px=0, elevation_deg=8)

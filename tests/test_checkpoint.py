@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
 from toonset.nerf import fitting
 from toonset.nerf.checkpoint import check_scene, read_checkpoint, scene_digest, write_checkpoint

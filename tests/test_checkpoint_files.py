@@ -14,7 +14,7 @@ from safetensors.torch import save
 from bench.cases.cases import train_cases
 from bench.train.growth import growths
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
 from toonset.nerf import memory
 from toonset.nerf.classifier import PaletteClassifier

@@ -15,8 +15,8 @@ import pytest
 from PIL import Image
 
 from toonset.cli.main import VERBS
-from toonset.dataset.mesh_file import load_mesh, save_obj
-from toonset.dataset.transforms import read_cameras
+from toonset.dataset.bundle.transforms import read_cameras
+from toonset.dataset.mesh.load import load_mesh, save_obj
 
 BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"}
 VIEWS = 5
@@ -284,8 +284,8 @@ def test_one_process_can_draw_and_then_train():
     """Mesa's LLVM used to crash the import of Triton's, which torch's optimisers bring along."""
     program = """
 from bench.cases.bodies import random_body
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 make_turnaround(random_body(0), SynthOptions(views=1, cell_px=32), 0)
 import torch
 torch.optim.Adam([torch.zeros(1, requires_grad=True)])

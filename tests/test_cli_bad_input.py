@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.mesh.load import load_mesh
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # numpy's are no clear line
 

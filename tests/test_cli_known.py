@@ -13,9 +13,9 @@ import pytest
 
 import toonset.calib.problem as library
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
-from toonset.dataset.landmark_formats import SCHEMA
-from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.transforms import read_cameras, transforms_dict
+from toonset.dataset.bundle.transforms import read_cameras, transforms_dict
+from toonset.dataset.mannequin.landmark_formats import SCHEMA
+from toonset.dataset.mesh.load import load_mesh
 
 VIEWS = 5
 LABELS = "0,72,144,216,288"

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
-from toonset.calib.coherence import coherence
 from toonset.calib.common_elevation import common_elevation
 from toonset.calib.rim import silhouette_mask
 from toonset.camera import Camera
+from toonset.dataset.silhouettes.coherence import coherence
 from toonset.errors import CameraError
 from toonset.view import View
 

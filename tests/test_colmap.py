@@ -15,14 +15,14 @@ import pytest
 from bench.cases.bodies import random_body
 from tests.exported_views import camera_at
 from toonset.camera import Camera
-from toonset.dataset.colmap import write_colmap
-from toonset.dataset.colmap_points import depth_map, sample_surface, track_points
-from toonset.dataset.colmap_read import read_colmap
-from toonset.dataset.export_views import ExportView, read_views
-from toonset.dataset.mesh_file import load_mesh, save_obj
-from toonset.dataset.picture import encode_png, load_rgba
-from toonset.dataset.scene import Frame
-from toonset.dataset.transforms import transforms_dict
+from toonset.dataset.bundle.scene import Frame
+from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.exporters.colmap import write_colmap
+from toonset.dataset.exporters.common import ExportView, read_views
+from toonset.dataset.exporters.points import depth_map, sample_surface, track_points
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.importers.colmap import read_colmap
+from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.write import write_json

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import Turnaround, make_turnaround
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.palette.pixels import ink_lines as contour_module
 from toonset.palette.pixels.ink_lines import find_contour
 

@@ -8,15 +8,15 @@ import trimesh
 
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
-from toonset.calib.contour import drawn_contour
 from toonset.calib.cut_off import at_cuts, ending_at, flat_sides
 from toonset.calib.match import Drawing
 from toonset.camera import Camera
-from toonset.dataset.mesh_file import save_obj
-from toonset.dataset.picture import encode_png, load_rgba
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.mesh.load import save_obj
+from toonset.dataset.silhouettes.contour import drawn_contour
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
 from toonset.view import View
 from toonset.write import write_bytes

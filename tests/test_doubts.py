@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.messy.sheet import make_messy_sheet
-from toonset.dataset.sheet import split_sheet
+from toonset.dataset.split.sheet import split_sheet
 
 
 def figure(height: int, shirt: tuple[int, int, int]) -> np.ndarray:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from toonset.calib.contour import Contour
 from toonset.calib.drawing_error import Noise, error_modes, marginalise, next_noise
 from toonset.calib.match import Drawing
+from toonset.dataset.silhouettes.contour import Contour
 
 
 def circle(count: int = 120) -> Drawing:

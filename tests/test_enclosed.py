@@ -11,11 +11,11 @@ from bench.cases.bodies import random_body
 from toonset.calib.enclosed import without_false_holes
 from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
-from toonset.dataset.mesh_file import save_obj
-from toonset.dataset.picture import encode_png, load_rgba
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.mesh.load import save_obj
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.view import View
 from toonset.write import write_bytes
 

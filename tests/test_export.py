@@ -22,16 +22,15 @@ from tests.exported_views import (
     off_px,
     views_all_round,
 )
-from toonset.dataset.colmap_points import TrackedPoints
-from toonset.dataset.export_blender_synthetic import write_blender_synthetic
-from toonset.dataset.export_lens import centred, common_lens, square_pixels
-from toonset.dataset.export_opencv import write_opencv
-from toonset.dataset.export_points import encode_ply
-from toonset.dataset.export_transforms import write_transforms
-from toonset.dataset.export_views import ExportView, read_views
-from toonset.dataset.mesh_file import save_obj
-from toonset.dataset.picture import encode_png, load_rgba
-from toonset.dataset.transforms import transforms_dict
+from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
+from toonset.dataset.exporters.common import ExportView, read_views
+from toonset.dataset.exporters.nerfstudio import write_transforms
+from toonset.dataset.exporters.opencv import write_opencv
+from toonset.dataset.exporters.pinhole import centred, common_lens, square_pixels
+from toonset.dataset.exporters.points import TrackedPoints, encode_ply
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.mesh.load import save_obj
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.write import write_bytes, write_json

@@ -13,9 +13,9 @@ import pytest
 import trimesh
 
 from tests.exported_views import MODELS, TARGET, around, egg, off_px, views_all_round
-from toonset.dataset.export_blender_script import write_blender_script
-from toonset.dataset.export_gltf import write_gltf
-from toonset.dataset.mesh_gltf_file import open_gltf
+from toonset.dataset.exporters.blender import write_blender_script
+from toonset.dataset.exporters.gltf import write_gltf
+from toonset.dataset.mesh.gltf_file import open_gltf
 
 
 def world_matrix(node: dict) -> np.ndarray:

@@ -11,8 +11,8 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
-from toonset.nerf.bounds import Box
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.field_box import (
     BINS,

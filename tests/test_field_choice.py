@@ -11,7 +11,7 @@ import torch
 from bench.cases.cases import train_cases
 from tests.test_train_summary import metrics
 from toonset.cli.train_summary import summary
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.nerf import field_trials
 from toonset.nerf.field_choice import Candidate, FieldChoice, chosen, shares_for
 from toonset.nerf.field_trials import left_out

@@ -9,8 +9,8 @@ import pytest
 import torch
 from torch import Tensor
 
+from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.batches import Batch
-from toonset.nerf.bounds import Box
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.field_gradients import gradients_of

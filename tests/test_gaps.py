@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.gaps import FEW_OUTLINES, guesses, outline_gap, wide_gaps
 from toonset.nerf.symmetry import with_all_mirrored
 

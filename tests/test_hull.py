@@ -8,8 +8,8 @@ import torch
 import torch.nn.functional as F
 
 from toonset.camera import Camera
+from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.errors import BundleError
-from toonset.nerf.bounds import box_of_masks
 from toonset.nerf.evidence import choose_missing
 from toonset.nerf.hull import EDGE, LEVEL, Hull, carve, grown
 from toonset.nerf.hull_views import agreement, project

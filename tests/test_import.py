@@ -14,15 +14,15 @@ import pytest
 from tests.exported_views import MODELS, TARGET, around
 from tests.imported_views import OWN_CAMERAS, WRITERS, change, tetrahedron, views_all_round
 from toonset.camera import Camera
-from toonset.dataset.colmap import write_colmap
-from toonset.dataset.export_blender_synthetic import write_blender_synthetic
-from toonset.dataset.export_opencv import write_opencv
-from toonset.dataset.export_transforms import write_transforms
-from toonset.dataset.import_bundle import write_imported
-from toonset.dataset.import_views import read_import, turned
-from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.picture import encode_png, load_rgba
-from toonset.dataset.transforms import read_scene
+from toonset.dataset.bundle.transforms import read_scene
+from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
+from toonset.dataset.exporters.colmap import write_colmap
+from toonset.dataset.exporters.nerfstudio import write_transforms
+from toonset.dataset.exporters.opencv import write_opencv
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.importers.detect import read_import, turned
+from toonset.dataset.importers.to_bundle import write_imported
+from toonset.dataset.mesh.load import load_mesh
 from toonset.write import write_bytes, write_json
 
 EVERY = pytest.mark.parametrize("kind", WRITERS)

@@ -12,13 +12,13 @@ import pycolmap
 import pytest
 
 from tests.imported_views import OWN_CAMERAS, WRITERS, change, tetrahedron, views_all_round
-from toonset.dataset.colmap import write_colmap
-from toonset.dataset.export_gltf import write_gltf
-from toonset.dataset.export_opencv import write_opencv
-from toonset.dataset.export_transforms import write_transforms
-from toonset.dataset.import_bundle import write_imported
-from toonset.dataset.import_views import read_import
-from toonset.dataset.picture import encode_png
+from toonset.dataset.exporters.colmap import write_colmap
+from toonset.dataset.exporters.gltf import write_gltf
+from toonset.dataset.exporters.nerfstudio import write_transforms
+from toonset.dataset.exporters.opencv import write_opencv
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.importers.detect import read_import
+from toonset.dataset.importers.to_bundle import write_imported
 from toonset.errors import BundleError, ToonsetError
 from toonset.write import write_bytes
 

@@ -14,10 +14,10 @@ import pytest
 from PIL import Image
 
 from bench.cases.bodies import random_body
-from toonset.dataset.palette_files import write_palette
-from toonset.dataset.picture import encode_indexed_png, load_indexed_png
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.bundle.palette_files import write_palette
+from toonset.dataset.images.picture import encode_indexed_png, load_indexed_png
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import PictureError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.palette import Palette, PaletteColor

@@ -8,7 +8,7 @@ import pytest
 
 from toonset.calib.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.rim import prepare_surface
-from toonset.dataset.landmark_file import read_known_points, read_landmarks
+from toonset.dataset.mannequin.landmark_file import read_known_points, read_landmarks
 from toonset.errors import LandmarkError
 from toonset.mesh import Mesh
 from toonset.view import View

@@ -13,7 +13,7 @@ from toonset.calib.landmarks import solve_landmarks
 from toonset.calib.pose import Pose, project
 from toonset.calib.rim import Surface, prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
-from toonset.dataset.landmark_file import Landmarks
+from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.errors import LandmarkError
 from toonset.mesh import Mesh
 

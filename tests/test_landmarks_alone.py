@@ -10,7 +10,7 @@ from toonset.calib.landmarks_alone import calibrate_by_landmarks
 from toonset.calib.result import Calibration
 from toonset.calib.rim import silhouette_mask
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
-from toonset.dataset.landmark_file import Landmarks
+from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.errors import LandmarkError
 from toonset.mesh import Mesh
 from toonset.view import View

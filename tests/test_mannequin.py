@@ -13,11 +13,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from toonset.dataset.landmark_file import read_known_points
-from toonset.dataset.mannequin import HEIGHT, Mannequin, default_mannequin, make_mannequin
-from toonset.dataset.mannequin_options import POSES, MannequinOptions
-from toonset.dataset.mannequin_solids import blended, ellipsoid, joined, limb
-from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.mannequin.landmark_file import read_known_points
+from toonset.dataset.mannequin.make import HEIGHT, Mannequin, default_mannequin, make_mannequin
+from toonset.dataset.mannequin.options import POSES, MannequinOptions
+from toonset.dataset.mannequin.solids import blended, ellipsoid, joined, limb
+from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
 

@@ -9,12 +9,12 @@ import trimesh
 from scipy.spatial import KDTree
 
 from toonset.calib.align import align, align_all, measure
-from toonset.calib.contour import drawn_contour
 from toonset.calib.match import Drawing, Table, match, nearest
 from toonset.calib.pose import Pose, project
 from toonset.calib.rim import find_rim, rim_at, silhouette_mask
 from toonset.calib.surface import Surface, prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
+from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -12,7 +12,7 @@ import trimesh
 from PIL import Image
 
 from tests.mesh_files import CUBE, FACES, ONE_NODE, POINTS, TRIANGLE, exported, gltf, load
-from toonset.dataset.mesh_file import save_obj
+from toonset.dataset.mesh.load import save_obj
 from toonset.mesh import Mesh
 
 

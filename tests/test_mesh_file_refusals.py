@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from tests.mesh_files import CUBE, FACES, ONE_NODE, POINTS, TRIANGLE, exported, gltf, load
-from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import MeshError, ToonsetError
 
 

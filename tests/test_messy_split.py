@@ -9,11 +9,11 @@ import pytest
 from bench.cases.bodies import random_body
 from bench.messy.options import DIFFICULTIES
 from bench.messy.sheet import make_messy_sheet
-from toonset.dataset import survey
-from toonset.dataset.background import find_background
-from toonset.dataset.sheet import Sheet, SheetOptions, split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.split import segment as survey
+from toonset.dataset.split.background import find_background
+from toonset.dataset.split.sheet import Sheet, SheetOptions, split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import SheetError
 
 WHITE, RED, BLUE, SKIN = (255, 255, 255), (200, 30, 40), (20, 60, 180), (236, 188, 155)

@@ -10,9 +10,9 @@ import pytest
 
 from bench.cases.bodies import random_body
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import Turnaround, make_turnaround
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.nerf.ink import InkStyle, without_ink
 from toonset.nerf.ink_nearest import depth_inside
 from toonset.nerf.ink_record import InkRecord

@@ -12,8 +12,8 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf import decoder, losses
-from toonset.nerf.bounds import Box
 from toonset.nerf.field import PLANES, TriplaneField
 from toonset.nerf.interpolation import Operator
 from toonset.nerf.metrics import BEST_PSNR, compare, ssim

@@ -15,7 +15,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError, PaletteError
 from toonset.nerf import field_gradients, field_loss
 from toonset.nerf import training as training_module

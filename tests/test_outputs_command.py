@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.mesh.load import load_mesh
 
 
 def test_mesh_and_planes_of_a_run(toonset: Callable[..., Any], run: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 import torch
 from PIL import Image
 
-from toonset.dataset.mesh_file import load_mesh
+from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError, OutputError, PaletteError
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.fields import Constants, Field, FieldSpec, Places

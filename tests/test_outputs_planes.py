@@ -11,8 +11,8 @@ import pytest
 import torch
 from PIL import Image
 
+from toonset.dataset.silhouettes.bounds import Box
 from toonset.errors import BundleError
-from toonset.nerf.bounds import Box
 from toonset.nerf.classifier import PaletteClassifier
 from toonset.nerf.field import TriplaneField
 from toonset.nerf.field_voxel import VoxelField

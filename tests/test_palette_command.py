@@ -11,8 +11,8 @@ from toonset.camera import Camera
 from toonset.cli.palette import Method, palette
 from toonset.cli.palette_report import palette_lines
 from toonset.cli.split import split
-from toonset.dataset.picture import encode_png, load_indexed_png
-from toonset.dataset.transforms import read_scene, transforms_dict
+from toonset.dataset.bundle.transforms import read_scene, transforms_dict
+from toonset.dataset.images.picture import encode_png, load_indexed_png
 from toonset.errors import ToonsetError
 from toonset.palette.palette import Evidence, Palette, PaletteColor
 from toonset.write import write_bytes, write_json

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from toonset.dataset.picture import (
+from toonset.dataset.images.picture import (
     encode_indexed_png,
     encode_png,
     load_indexed_png,

@@ -15,7 +15,7 @@ from bench.calib.measure import bench_colmap
 from bench.calib.sfm import SfmOptions, aligned_errors, pictures, reconstruct
 from bench.cases.cases import CalibCase
 from toonset.camera import Camera, rotation_from_angles
-from toonset.dataset.colmap_points import depth_map
+from toonset.dataset.exporters.points import depth_map
 from toonset.mesh import Mesh
 from toonset.view import View
 

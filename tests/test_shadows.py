@@ -6,7 +6,7 @@ from bench.messy.sheet import make_messy_sheet
 from bench.split.cases import Drawn, SplitCase
 from bench.split.methods import by_toonset
 from bench.split.score import score
-from toonset.dataset.sheet import split_sheet
+from toonset.dataset.split.sheet import split_sheet
 
 
 def fault(seed: int, *what: str) -> str:

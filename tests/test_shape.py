@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.shape import LEVELS, hull_of
 

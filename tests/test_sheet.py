@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.sheet import Sheet, SheetOptions, split_sheet
+from toonset.dataset.split.sheet import Sheet, SheetOptions, split_sheet
 from toonset.errors import SheetError
 
 WHITE = (255, 255, 255)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.nerf.silhouette import thin, widened
+from toonset.dataset.silhouettes.mask import thin, widened
 
 
 def coverage(corners: np.ndarray, side: int = 40, fine: int = 16) -> np.ndarray:

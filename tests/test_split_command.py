@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 
 from tests.split_sheets import COLORS, COUNT, HIGH, PITCH, TOP, WIDE, drawn_sheet
-from toonset.dataset.sheet import SheetOptions, split_sheet
-from toonset.dataset.split_files import NAME, VERSION
-from toonset.dataset.split_read import read_split
+from toonset.dataset.split.sheet import SheetOptions, split_sheet
+from toonset.dataset.split_folder.read import read_split
+from toonset.dataset.split_folder.write import NAME, VERSION
 
 
 @pytest.fixture
@@ -137,7 +137,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[SheetOptions]:
         seen.append(options)
         return split_sheet(rgba, SheetOptions())
 
-    monkeypatch.setattr("toonset.dataset.sheet.split_sheet", spy)
+    monkeypatch.setattr("toonset.dataset.split.sheet.split_sheet", spy)
     return seen
 
 

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
-from toonset.dataset.boxes_file import read_boxes
-from toonset.dataset.line_width import contour_width_px
-from toonset.dataset.picture import encode_png
-from toonset.dataset.picture_folder import natural_key, picture_files
-from toonset.dataset.sheet import LeftOut, Sheet
-from toonset.dataset.split import Split, joined, split_of_sheet, without
-from toonset.dataset.split_doubts import odd_files
-from toonset.dataset.split_files import read_records, write_split
-from toonset.dataset.split_read import read_split
+from toonset.dataset.images.folder import natural_key, picture_files
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.silhouettes.line_width import contour_width_px
+from toonset.dataset.split.sheet import LeftOut, Sheet
+from toonset.dataset.split_folder.boxes import read_boxes
+from toonset.dataset.split_folder.checks import odd_files
+from toonset.dataset.split_folder.read import read_split
+from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
+from toonset.dataset.split_folder.write import read_records, write_split
 from toonset.errors import PictureError, SheetError
 from toonset.view import View
 

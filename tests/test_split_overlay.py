@@ -5,10 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toonset.dataset.sheet import LeftOut
-from toonset.dataset.split_overlay import draw_split
-from toonset.dataset.split_panel import FIGURES, HEAD, LEFT_OUT, MARGIN, WIDEST, Panel, draw_panel
-from toonset.dataset.split_tags import FIGURE, Costs, Line, draw_tag, layout_size
+from toonset.dataset.split.sheet import LeftOut
+from toonset.dataset.split_folder.overlay import draw_split
+from toonset.dataset.split_folder.panel import (
+    FIGURES,
+    HEAD,
+    LEFT_OUT,
+    MARGIN,
+    WIDEST,
+    Panel,
+    draw_panel,
+)
+from toonset.dataset.split_folder.tags import FIGURE, Costs, Line, draw_tag, layout_size
 from toonset.view import View
 
 INK = (250, 250, 10)  # of the figures: no colour of the overlay's own

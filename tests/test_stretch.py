@@ -11,15 +11,15 @@ import pytest
 from bench.cases.bodies import random_body
 from bench.stability.damage import stretched
 from toonset.calib.calibrate import calibrate
-from toonset.calib.contour import drawn_contour
 from toonset.calib.cut_off import CutOff, FlatSide
 from toonset.calib.ladder import BIC_MARGIN, STRETCHED, TALLER
 from toonset.calib.match import Drawing
 from toonset.calib.result import Calibration
 from toonset.calib.stretch import Stretches, as_drawn, stretched_mannequin, unstretched
 from toonset.camera import rotation_distance
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import Turnaround, make_turnaround
+from toonset.dataset.silhouettes.contour import drawn_contour
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.view import View
 
 OPTIONS = SynthOptions(views=5, cell_px=200, outline_px=0, elevation_deg=6)

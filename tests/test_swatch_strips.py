@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from bench.messy.sheet import make_messy_sheet
-from toonset.dataset.figures import find_blobs
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.swatch_strips import strip_seams
+from toonset.dataset.split.figures.blobs import find_blobs
+from toonset.dataset.split.figures.swatch_strips import strip_seams
+from toonset.dataset.split.sheet import split_sheet
 
 COLORS = [(200, 30, 40), (20, 60, 180), (236, 188, 155), (30, 120, 60)]
 

@@ -9,9 +9,9 @@ import pytest
 
 from bench.cases.bodies import random_body
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.symmetry import ALIKE, completed, likeness, mirrored
 from toonset.nerf.training import train

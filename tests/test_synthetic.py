@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.dataset import gl_render
-from toonset.dataset.drawing_error import displace, displacement_field
-from toonset.dataset.gl_render import render_labels
-from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.native_camera import NativeCamera
-from toonset.dataset.picture import load_indexed_png, load_rgba
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
-from toonset.dataset.synthetic_files import write_turnaround
-from toonset.dataset.transforms import read_cameras
+from toonset.dataset.bundle.camera_record import NativeCamera
+from toonset.dataset.bundle.transforms import read_cameras
+from toonset.dataset.images.picture import load_indexed_png, load_rgba
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.synthetic import gl_render
+from toonset.dataset.synthetic.files import write_turnaround
+from toonset.dataset.synthetic.gl_render import render_labels
+from toonset.dataset.synthetic.hand_error import displace, displacement_field
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import CameraError, MeshError, SetupError, SheetError
 from toonset.mesh import Mesh
 from toonset.palette.pixels.labels import UNLABELLED
@@ -250,7 +250,7 @@ def test_files_hold_the_truth(tmp_path: Path) -> None:
 
 
 def test_command_writes_and_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from toonset.dataset.mesh_file import save_obj
+    from toonset.dataset.mesh.load import save_obj
 
     (tmp_path / "m.obj").write_bytes(save_obj(figure()))
     monkeypatch.chdir(tmp_path)

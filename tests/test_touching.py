@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.dataset.figures import find_blobs
-from toonset.dataset.touching import Cut, part_touching
-from toonset.dataset.touching_choice import best_option, find_options
-from toonset.dataset.touching_flanks import CAP, flanks, right_flank, unlikeness
-from toonset.dataset.touching_paths import DETOUR, distinct_ways, least_costs
-from toonset.dataset.touching_sight import look_at
+from toonset.dataset.split.figures.blobs import find_blobs
+from toonset.dataset.split.touching.costs import look_at
+from toonset.dataset.split.touching.cut import Cut, part_touching
+from toonset.dataset.split.touching.profiles import CAP, flanks, right_flank, unlikeness
+from toonset.dataset.split.touching.seams import DETOUR, distinct_ways, least_costs
+from toonset.dataset.split.touching.selection import best_option, find_options
 
 RED, BLUE, SKIN, WHITE = (200, 30, 40), (20, 60, 180), (236, 188, 155), (255, 255, 255)
 

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.dataset.figures import find_blobs, find_mains
-from toonset.dataset.parts import group_blobs
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.touching_parts import part_shared
+from toonset.dataset.split.figures.blobs import find_blobs, find_mains
+from toonset.dataset.split.figures.grouping import group_blobs
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.touching.parts import part_shared
 
 RED, SKIN = (200, 30, 40), (236, 188, 155)
 

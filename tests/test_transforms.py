@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.dataset.picture import encode_png
-from toonset.dataset.transforms import read_cameras, read_scene, transforms_dict
+from toonset.dataset.bundle.transforms import read_cameras, read_scene, transforms_dict
+from toonset.dataset.images.picture import encode_png
 from toonset.errors import BundleError
 from toonset.write import write_bytes, write_json
 

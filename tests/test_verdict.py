@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.evidence import HullEvidence
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import Prepared

@@ -16,7 +16,7 @@ class Mesh:
 
     Attributes:
         vertices: (n, 3) world coordinates, finite; welded (outlines need the faces at an edge)
-            and all used, as `toonset.dataset.mesh_file.load_mesh` returns them.
+            and all used, as `toonset.dataset.mesh.load.load_mesh` returns them.
         faces: (m, 3) vertex indices.
         face_colors: (m, 3) sRGB of every face, or None where the file has no colours.
         face_parts: (m,) part number of every face (0 where the file has no parts).

@@ -14,9 +14,9 @@ from bench.cases.bodies import HAIR, SKIN, random_body
 from bench.stability.bodies import recolored, with_eyes
 from bench.stability.page import Page
 from bench.stability.sheet import Step
-from toonset.dataset.picture import encode_png
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import ToonsetError
 from toonset.mesh import Mesh
 from toonset.nerf.metrics import over_white

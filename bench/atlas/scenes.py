@@ -20,9 +20,9 @@ from bench.stability.bodies import EARS, with_contrast, with_ears, with_eyes
 from bench.stability.damage import Drawn, stretched, with_gaps_closed
 from bench.stability.sheet import Step, stream
 from toonset.camera import rotation_from_angles
-from toonset.dataset.scene import Frame, Scene
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import BEND_REACH, MARGIN, Turnaround, make_turnaround
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import BEND_REACH, MARGIN, Turnaround, make_turnaround
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -19,8 +19,8 @@ from jaxtyping import Bool, UInt8
 from bench.atlas.scenes import DrawnScene, draw_scene
 from bench.stability.page import Page
 from bench.stability.sheet import Step
-from toonset.dataset.picture import encode_png
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.images.picture import encode_png
 from toonset.errors import ToonsetError
 from toonset.nerf.consistency import consistency_of
 from toonset.nerf.evaluation_picture import tile_of

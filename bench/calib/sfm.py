@@ -24,8 +24,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from toonset.camera import rotation_distance
-from toonset.dataset.background import flattened
-from toonset.dataset.picture import encode_png
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.split.background import flattened
 from toonset.view import View
 from toonset.write import write_bytes, write_json
 

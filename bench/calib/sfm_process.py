@@ -13,7 +13,7 @@ from typing import Any
 
 import pycolmap
 
-from toonset.dataset.picture import picture_size
+from toonset.dataset.images.picture import picture_size
 from toonset.write import write_json
 
 ONLY_FATAL = 3  # pycolmap's log level

@@ -17,13 +17,13 @@ from jaxtyping import Float
 
 from bench.cases.bodies import random_body
 from toonset import frames
-from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.picture import load_rgba
-from toonset.dataset.scene import Frame, Scene
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import Turnaround, make_turnaround
-from toonset.dataset.transforms import read_scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.bundle.transforms import read_scene
+from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import BundleError
 from toonset.json_file import read_json
 from toonset.mesh import Mesh

@@ -25,10 +25,10 @@ from toonset.calib.bank import load_bank
 from toonset.calib.calibrate import calibrate
 from toonset.calib.known import Known
 from toonset.calib.rim import prepare_surface
-from toonset.dataset.line_width import contour_width_px
-from toonset.dataset.mannequin import default_mannequin
-from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.picture import load_rgba
+from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.mannequin.make import default_mannequin
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.silhouettes.line_width import contour_width_px
 from toonset.errors import BundleError
 from toonset.json_file import read_json
 from toonset.mesh import Mesh

@@ -72,7 +72,7 @@ def _calibration(chosen: Chosen, printer: Printer) -> tuple[list[Record], str]:
 def _splitting(chosen: Chosen, printer: Printer) -> Measured:
     from bench.split.measure import bench_split
     from bench.split.picture import contact_sheet
-    from toonset.dataset.picture import encode_png
+    from toonset.dataset.images.picture import encode_png
 
     found = bench_split(_split_cases(chosen), chosen.seed, printer.progress)
     if not found.records:

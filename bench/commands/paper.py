@@ -104,7 +104,7 @@ def _strips_into(folder: Path, seed: int) -> Look:
 
     def look(job: Job, case: TrainCase, trained: TrainedField, _: Sequence[ScoredView]) -> None:
         from bench.paper.picture import strip_of
-        from toonset.dataset.picture import encode_png
+        from toonset.dataset.images.picture import encode_png
         from toonset.write import write_bytes
 
         if trained.palette is not None and job.seed == seed:
@@ -122,7 +122,7 @@ def _draw(folder: Path, case: TrainCase, jobs: list[Job]) -> None:
     from bench.charts.chart import DEFAULT
     from bench.paper.picture import drawn_strip, figure_of
     from bench.train.plan import side_px
-    from toonset.dataset.picture import encode_png, load_rgba
+    from toonset.dataset.images.picture import encode_png, load_rgba
     from toonset.write import write_bytes
 
     ordered = sorted(jobs, key=lambda job: job.method == DEFAULT)

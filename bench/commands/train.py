@@ -129,7 +129,7 @@ def _views_into(folder: Path) -> Look:
 
     def look(job: Job, _: TrainCase, trained: TrainedField, views: Sequence[ScoredView]) -> None:
         from bench.charts.chart import DEFAULT
-        from toonset.dataset.picture import encode_png
+        from toonset.dataset.images.picture import encode_png
         from toonset.nerf.evaluation_picture import contact_sheet
         from toonset.write import write_bytes
 

@@ -12,7 +12,7 @@ from jaxtyping import Float, UInt8
 from PIL import Image
 
 from bench.messy.figure import Rgb
-from toonset.dataset.picture import decode_rgba
+from toonset.dataset.images.picture import decode_rgba
 
 WHITE: Rgb = (255, 255, 255)
 CONTRAST = 45  # in some channel: what a painter leaves between a figure and its ground

@@ -15,8 +15,8 @@ import numpy as np
 from bench.cases.bodies import random_body
 from bench.messy.dress import EXTRAS, FLOAT_GAPS, Part, extra, hands, hat, staff
 from bench.messy.figure import Cast, Figure, Rgb, cut_figure
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
 
 HEAD_PARTS = ("neck", "head", "hair", "nose", "hat", "ear")

@@ -18,11 +18,11 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from bench.cases.bodies import random_body
-from toonset.dataset.flat_colors import flat_palette
-from toonset.dataset.gl_render import render_labels
-from toonset.dataset.mesh_file import load_mesh
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import Turnaround, make_turnaround
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.synthetic.flat_colors import flat_palette
+from toonset.dataset.synthetic.gl_render import render_labels
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.palette.colors import oklab_from_rgb

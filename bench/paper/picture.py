@@ -9,7 +9,7 @@ from jaxtyping import UInt8
 from PIL import Image, ImageDraw
 
 from bench.cases.cases import TrainCase
-from toonset.dataset.scene import Frame
+from toonset.dataset.bundle.scene import Frame
 from toonset.nerf.evaluation_picture import BLACK, GAP_PX, GREY, TEXT_PX, TILE_PX, font_of, tile_of
 from toonset.nerf.layers import color_picture, palette_picture
 from toonset.nerf.metrics import over_white

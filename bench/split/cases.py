@@ -15,7 +15,7 @@ from bench.cases.sprites import SHADOW_BELOW
 from bench.messy.figure import tight_window
 from bench.messy.options import DIFFICULTIES
 from bench.messy.sheet import make_messy_sheet
-from toonset.dataset.picture import load_rgba
+from toonset.dataset.images.picture import load_rgba
 from toonset.errors import BundleError
 from toonset.json_file import read_json
 from toonset.view import Box

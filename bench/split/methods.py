@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from bench.split.cases import Drawn, drawn_at
-from toonset.dataset.sheet import split_sheet
+from toonset.dataset.split.sheet import split_sheet
 from toonset.errors import ToonsetError
 from toonset.view import Box
 

@@ -33,10 +33,10 @@ from bench.stability.damage import (
     without_pieces,
 )
 from bench.stability.sheet import BASE, DrawnSheet, Step, draw_sheet, stream
-from toonset.dataset.picture import decode_rgba
-from toonset.dataset.sheet import split_sheet
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import Turnaround, make_turnaround
+from toonset.dataset.images.picture import decode_rgba
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import SheetError
 from toonset.mesh import Mesh
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from bench.cases.bodies import random_body
 from bench.stability.damage import Drawn
-from toonset.dataset.synth_options import SynthOptions
-from toonset.dataset.synthetic import make_turnaround
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
 
 BASE = SynthOptions(views=5, cell_px=200, yaw_jitter_deg=8, elevation_deg=10, outline_px=2)

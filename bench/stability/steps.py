@@ -23,12 +23,12 @@ from bench.stability.sheet import DrawnSheet, Step, draw_sheet
 from bench.stability.sweeps import Sweep
 from toonset.calib.align import align
 from toonset.calib.calibrate import calibrate
-from toonset.calib.contour import drawn_contour
 from toonset.calib.match import Drawing
 from toonset.calib.pose import Pose
 from toonset.calib.result import Calibration
 from toonset.calib.rim import Surface, prepare_surface
-from toonset.dataset.picture import encode_png
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import ToonsetError
 
 NO_VERDICT = ""  # an alignment alone judges nothing

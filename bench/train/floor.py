@@ -22,7 +22,7 @@ from torch import Tensor
 
 from bench.cases.cases import train_cases
 from bench.train.growth import growths, print_growth
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.adam import Adam, Group
 from toonset.nerf.allocator import keep_freed_memory
 from toonset.nerf.batches import Batch, make_batches

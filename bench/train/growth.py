@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.memory import needed_bytes
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.threads import SIDES, use_threads

@@ -13,13 +13,13 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.align import EFFECTIVE_POINTS, NOISE_OF_HEIGHT, robust_weights
-from toonset.calib.contour import drawn_contour
 from toonset.calib.known import Known
 from toonset.calib.match import Drawing, match
 from toonset.calib.pose import Pose, pixel_slopes, project
 from toonset.calib.proportions import Body, as_it_is
 from toonset.calib.surface import prepare_surface
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -22,8 +22,8 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial import KDTree
 
 from toonset.camera import Camera
-from toonset.dataset.gl_render import render_labels
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.nerf.field_hull import GRAZING, SHARPNESS

@@ -17,7 +17,7 @@ from bench.train.mannequin_fit import fitted_mannequin
 from bench.train.mannequin_views import mannequin_view, paint_mannequin
 from bench.train.plan import METHODS, Job, PaletteChoice, Preparation, subset
 from toonset.camera import rotation_distance
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError, ToonsetError
 from toonset.nerf.checkpoint_state import FitState
 from toonset.nerf.evaluation import LAYERS, ScoredView, score_views

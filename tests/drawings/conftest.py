@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.dataset.drawing_error import displacement_field
-from toonset.dataset.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
+from toonset.dataset.silhouettes.outlines import Square
+from toonset.dataset.synthetic.hand_error import displacement_field
 from toonset.nerf.warp import Warp
-from toonset.nerf.warp_moves import CONTROLS, Bends
-from toonset.nerf.warp_outline import Square
 
 SIDE = 96
 BALLS = (  # middle, half axes: body, head, two arms, a pack

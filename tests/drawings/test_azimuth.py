@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from toonset.camera import rotation_from_angles
-from toonset.dataset.scene import Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.azimuth import Turning, turned
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.preparation import prepared

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from toonset.dataset.silhouettes.displacement import CONTROLS, Bends, ShiftAndScale
+from toonset.dataset.silhouettes.outlines import FIGURE_PX, Square, outlines_of, signed_distance
+from toonset.dataset.silhouettes.register import fit_moves
+from toonset.dataset.silhouettes.tangency import Placed, touch
 from toonset.nerf.warp import MOST, Warp, unbent, warped
-from toonset.nerf.warp_coherence import Placed, touch
-from toonset.nerf.warp_fit import fit_moves
-from toonset.nerf.warp_moves import CONTROLS, Bends, ShiftAndScale
-from toonset.nerf.warp_outline import FIGURE_PX, Square, outlines_of, signed_distance
 
 
 def outlines(scene):
@@ -69,7 +69,7 @@ def test_a_thin_part_is_there_where_it_is_seen_from_its_edge(balls) -> None:
 
 def test_gradient_of_the_disagreement(balls) -> None:
     """The fit's first step goes downhill as steeply as finite differences say."""
-    from toonset.nerf.warp_fit import _normal, _touches
+    from toonset.dataset.silhouettes.register import _normal, _touches
 
     found, moves = outlines(balls.bent_sheet()[0]), ShiftAndScale.expected()
     generator = np.random.default_rng(3)

@@ -1,0 +1,1 @@
+"""A bundle on disk: cameras, pictures, calibration, palette, labels."""

@@ -1,0 +1,87 @@
+"""The bundle on disk: what calibration hands to palette, training and other programs.
+
+    transforms.json    cameras (see `toonset.dataset.bundle.transforms`) images/000.png     RGBA
+    crops, straight alpha calibration.json   native cameras, uncertainty, verdicts
+    (`toonset.dataset.bundle.calibration_schema`) overlay.png        every drawing with the
+    mannequin's outline over it mannequin.obj      the mannequin as it was fitted, in the cameras'
+    world palette.json       the colours, once `toonset palette` has found them; .gpl .ase .hex .png
+    are
+                       copies for other programs
+    labels/000.png     indexed PNG per picture: which colour a pixel is, 255 = none
+    contours/000.png   8-bit grey per picture: how much of a pixel is drawn line
+    run/               a trained field
+
+The folder appears whole or not at all. It holds no time, no path and no name of a machine: the same
+input, options, seed and versions give the same bytes, wherever it is made or moved to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.camera import Camera
+from toonset.dataset.bundle.calibration_file import calibration_content
+from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.load import load_mesh, save_obj
+from toonset.errors import BundleError
+from toonset.mesh import Mesh
+from toonset.view import View
+from toonset.write import new_folder, write_bytes, write_json
+
+MANNEQUIN, OVERLAY, CALIBRATION = "mannequin.obj", "overlay.png", "calibration.json"
+LABELS, CONTOURS, IMAGES = "labels", "contours", "images"
+
+
+def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:
+    """Return the mesh of a file that was given, else the folder's own, else None.
+
+    Raises:
+        MeshError: the file is no mesh.
+    """
+    own = folder / MANNEQUIN
+    file = given or (own if own.is_file() else None)
+    return None if file is None else load_mesh(file)
+
+
+def write_bundle(
+    folder: Path,
+    views: Sequence[View],
+    cameras: Sequence[Camera],
+    mesh: Mesh,
+    calibration: dict[str, Any],
+    overlay: UInt8[np.ndarray, "height width channels"],
+    *,
+    force: bool = False,
+) -> None:
+    """Write a bundle.
+
+    Args:
+        folder: where; replaced as a whole with `force`.
+        views: the drawings in sheet order.
+        cameras: one per view, in pixels of its crop.
+        mesh: the mannequin as it was fitted; its height and radius set the far pinholes and their
+            error bound.
+        calibration: the report of `toonset.calib.report`, with what the caller adds.
+        overlay: the picture for people.
+        force: replace an existing bundle.
+
+    Raises:
+        OutputError: the folder exists, or cannot be written.
+    """
+    if len(views) != len(cameras):
+        raise BundleError(f"{len(views)} views but {len(cameras)} cameras; one each is needed")
+    content = calibration_content(calibration, views)
+    named = [(f"{IMAGES}/{v.name}", camera) for v, camera in zip(views, cameras, strict=True)]
+    with new_folder(folder, force=force) as temporary:
+        for view in views:
+            write_bytes(temporary / IMAGES / view.name, encode_png(view.rgba))
+        write_json(temporary / "transforms.json", transforms_dict(named, mesh.height, mesh.radius))
+        write_json(temporary / CALIBRATION, content)
+        write_bytes(temporary / OVERLAY, encode_png(overlay))
+        write_bytes(temporary / MANNEQUIN, save_obj(mesh))

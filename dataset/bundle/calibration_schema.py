@@ -1,0 +1,199 @@
+"""calibration.json as a schema: what calibration found, how sure it is, and where it comes from.
+
+Angles are degrees, lengths world units or pixels of the view, as each name says. Unknown keys are
+ignored on reading (within a major version keys may be added), except in a camera. Version 1 had
+several shapes while it grew; `toonset.dataset.bundle.calibration_file` brings all of them to
+this one.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from toonset.camera import Camera
+from toonset.dataset.bundle.camera_record import Pair, Rotation, Row, check_numbers, check_range
+from toonset.dataset.bundle.transforms_schema import MAX_FRAMES
+from toonset.errors import BundleError
+
+SCHEMA, VERSION = "toonset-calibration", 2
+SAME_ANGLE_DEG = 1e-3
+ROUNDING = 1e-6  # of a covariance, relative to its largest number
+
+Verdict = Literal["ok", "weak", "ambiguous", "failed"]
+Probability = Annotated[float, Field(ge=0, le=1 + 1e-6)]  # sums of probabilities round
+Spread = Annotated[float, Field(ge=0)]
+Text = Annotated[str, Field(max_length=10_000)]
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+
+class CalibratedCamera(_Record):
+    """A camera; its angles are those of its rotation, for people."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    model: Literal["orthographic", "pinhole"]
+    yaw_deg: float
+    elevation_deg: float
+    roll_deg: float
+    camera_from_world_rotation: Rotation
+    target: Row
+    scale_px_per_unit: float
+    pixel_aspect: float = 1.0
+    center_px: Pair
+    k: float
+    size_wh: tuple[int, int]
+
+    def camera(self) -> Camera:
+        """Return the camera.
+
+        Raises:
+            CameraError, BundleError: it is none, none that can be computed with, or not as it is
+                described.
+        """
+        rotation, target = np.array(self.camera_from_world_rotation), np.array(self.target)
+        lens = [self.scale_px_per_unit, self.k, self.pixel_aspect]
+        check_numbers([*rotation.flat, *self.target, *self.center_px, *lens])
+        scale, k, aspect = lens
+        center = np.array(self.center_px)
+        camera = Camera(rotation, target, scale, center, self.size_wh, k, aspect)
+        check_range(camera)
+        if camera.is_orthographic != (self.model == "orthographic"):
+            raise BundleError(f"camera: is called {self.model} but k is {self.k:g}")
+        said = np.array([self.yaw_deg, self.elevation_deg, self.roll_deg])
+        off = (np.degrees(camera.angles) - said + 180) % 360 - 180
+        if np.abs(off).max() > SAME_ANGLE_DEG:
+            raise BundleError("camera: yaw, elevation and roll are not those of its rotation")
+        return camera
+
+
+class Sigmas(_Record):
+    """One standard deviation of each number of a camera."""
+
+    yaw_deg: Spread
+    elevation_deg: Spread
+    roll_deg: Spread
+    scale_relative: Spread
+    shift_px: Spread
+
+
+class Alternative(_Record):
+    """Another camera that explains the drawing."""
+
+    probability: Probability
+    camera: CalibratedCamera
+
+
+class ViewRecord(_Record):
+    """One drawing's camera; `line_width_px` is None in bundles of version 1."""
+
+    name: Annotated[str, Field(min_length=1, max_length=255)]
+    verdict: Verdict
+    reason: Text
+    camera: CalibratedCamera
+    sigma: Sigmas
+    covariance: Annotated[list[Six], Field(min_length=6, max_length=6)]
+    covariance_of: Text
+    p_flip: Probability
+    twin: CalibratedCamera
+    alternatives: Annotated[list[Alternative], Field(max_length=1000)]
+    outline_error_of_height: Spread
+    outline_coverage: Probability
+    line_width_px: Spread | None = None
+
+    def check(self) -> None:
+        """Refuse what no calibration writes.
+
+        Raises:
+            CameraError, BundleError: a camera is none, or the covariance is none.
+        """
+        for camera in (self.camera, self.twin, *(other.camera for other in self.alternatives)):
+            camera.camera()
+        covariance = np.array(self.covariance)
+        covariance = covariance / max(float(np.abs(covariance).max()), 1e-300)
+        if np.abs(covariance - covariance.T).max() > ROUNDING:
+            raise BundleError("covariance is not symmetric")
+        if np.linalg.eigvalsh(covariance).min() < -ROUNDING:
+            raise BundleError("covariance has a negative variance")
+
+
+class TriedModel(_Record):
+    """A richer camera model; proven where its gain exceeds the margin."""
+
+    model: Text
+    bic_gain: float
+    margin: float
+    unknowns: Spread
+
+
+class CameraModel(_Record):
+    """The camera model of the sheet, with its evidence; a distance of None is orthographic."""
+
+    chosen: Text
+    distance_heights: Annotated[list[Spread | None], Field(max_length=MAX_FRAMES)]
+    tried: Annotated[list[TriedModel], Field(max_length=100)]
+    effective_samples: Spread
+
+
+class DrawingError(_Record):
+    """How far drawn outlines are off: a smooth field, and noise from point to point."""
+
+    smooth: Spread
+    white: Spread
+
+
+class InputFile(_Record):
+    """A file that the cameras depend on."""
+
+    name: Annotated[str, Field(min_length=1, max_length=255)]
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    role: Text
+
+
+class LandmarkFit(_Record):
+    """How well a view's landmarks fit one camera."""
+
+    view: Annotated[str, Field(min_length=1, max_length=255)]
+    rms_px: Spread
+    misplaced: Annotated[list[Text], Field(max_length=10_000)]
+    perspective_bic_gain: float
+
+
+class FilledHole(_Record):
+    """A hole in a drawing that another drawing, from the other side, shows to be paint."""
+
+    view: Annotated[str, Field(min_length=1, max_length=255)]
+    box: tuple[int, int, int, int]
+    by: Annotated[str, Field(min_length=1, max_length=255)]
+
+
+class CutOff(_Record):
+    """A part of a figure that its picture lacks: a frame, not in the picture, cut it off."""
+
+    view: Annotated[str, Field(min_length=1, max_length=255)]
+    side: Literal["left", "top", "right", "bottom"]
+    lost_px: Spread
+
+
+class CalibrationFile(_Record):
+    """The whole file, except `schema`."""
+
+    verdict: Verdict
+    reason: Text
+    camera_model: CameraModel
+    outline_offset_of_height: float
+    drawing_error_of_height: DrawingError
+    drawings_contradiction_of_height: Spread | None = None
+    views: Annotated[list[ViewRecord], Field(min_length=1, max_length=MAX_FRAMES)]
+    landmarks: Annotated[list[LandmarkFit], Field(max_length=MAX_FRAMES)] = []
+    filled_holes: Annotated[list[FilledHole], Field(max_length=100_000)] = []
+    cut_off: Annotated[list[CutOff], Field(max_length=4 * MAX_FRAMES)] = []
+    options: dict[str, Any] = {}
+    seed: Annotated[int, Field(ge=0)] | None = None
+    versions: dict[str, Text] = {}
+    inputs: Annotated[list[InputFile], Field(max_length=100_000)] = []

@@ -1,0 +1,192 @@
+"""A scene from disk: pictures, their cameras, and labels where a palette stands beside them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.camera import Camera
+from toonset.dataset.bundle.calibration_file import read_calibration
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.bundle.transforms_read import (
+    PosedPicture,
+    is_inside,
+    read_frames,
+    transforms_file,
+)
+from toonset.dataset.images.picture import load_indexed_png, load_rgba
+from toonset.errors import BundleError
+from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.pixels.labels import UNLABELLED
+
+Labels = UInt8[np.ndarray, "height width"]
+
+
+def read_scene(path: Path) -> Scene:
+    """Return the posed pictures of a bundle, a transforms.json, or a folder that holds one.
+
+    Labels and palette are read where the folder has `palette.json` and `labels/`, sigmas where it
+    has the `calibration.json` of these cameras.
+
+    Raises:
+        BundleError: a file is missing, broken, of another size than its camera says, or outside
+            of the folder.
+        PaletteError: palette.json is broken.
+        PictureError: a picture cannot be read.
+    """
+    file = transforms_file(path)
+    root = file.parent
+    palette = read_palette_of(root)
+    posed = read_frames(file, need_pictures=True)
+    sigmas = read_yaw_sigmas(root, posed)
+    if palette is not None:
+        check_label_names(file, posed)
+    frames = []
+    for frame, sigma in zip(posed, sigmas, strict=True):
+        rgba = read_picture(frame, file)
+        labels = None if palette is None else read_labels(root, frame, len(palette))
+        frames.append(Frame(Path(frame.file_path).name, frame.camera, rgba, labels, sigma))
+    return Scene(tuple(frames), palette, str(path))
+
+
+def read_palette_of(root: Path) -> UInt8[np.ndarray, "colors 3"] | None:
+    """Return the colours of a folder's palette.json, None where there is none.
+
+    Raises:
+        BundleError, PaletteError: it lies elsewhere, or is broken.
+    """
+    file = member(root, "palette.json")
+    return None if file is None else read_palette_json(file).rgb
+
+
+def read_yaw_sigmas(root: Path, posed: Sequence[PosedPicture]) -> list[float | None]:
+    """Return each camera's sigma of yaw in radians, None where calibration.json has none for it.
+
+    A camera that was changed since is not the one that was calibrated.
+
+    Raises:
+        BundleError: calibration.json lies elsewhere, or is broken.
+    """
+    file = member(root, "calibration.json")
+    if file is None:
+        return [None] * len(posed)
+    found = {view.name: view for view in read_calibration(file).views}
+    sigmas: list[float | None] = []
+    for frame in posed:
+        view = found.get(Path(frame.file_path).name)
+        same = view is not None and _same(view.camera.camera(), frame.camera)
+        sigmas.append(math.radians(view.sigma.yaw_deg) if view is not None and same else None)
+    return sigmas
+
+
+def _same(camera: Camera, other: Camera) -> bool:
+    """Return whether cameras are equal but for rounding."""
+    ends = np.concatenate([np.eye(3), -np.eye(3)]) / max(camera.scale, 1e-9)
+    pixels, again = (c.project(camera.target + ends)[0] for c in (camera, other))
+    return camera.size_wh == other.size_wh and bool(np.allclose(pixels, again, atol=1e-3))
+
+
+def read_picture(frame: PosedPicture, file: Path) -> UInt8[np.ndarray, "height width 4"]:
+    """Return a frame's picture.
+
+    Raises:
+        PictureError: it cannot be read.
+        BundleError: it has another size than its camera.
+    """
+    assert frame.picture is not None  # read_frames has seen to it
+    rgba = load_rgba(frame.picture)
+    check_size(frame.picture, rgba, frame.camera, file.name)
+    return rgba
+
+
+def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
+    """Return a frame's label map, None where there is none.
+
+    Raises:
+        PictureError: it is no indexed PNG.
+        BundleError: it has another size than its camera, or a label without a colour.
+    """
+    file = member(root, f"labels/{label_name(frame)}")
+    if file is None:
+        return None
+    labels = load_indexed_png(file)
+    check_size(file, labels, frame.camera, "transforms.json")
+    used = labels[labels != UNLABELLED]
+    if used.size and used.max() >= colors:
+        raise BundleError(
+            f"{file}: label {used.max()} but the palette has {colors} colours; write the labels "
+            "again with `toonset palette`"
+        )
+    return labels
+
+
+def read_contour(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:
+    """Return how much of each pixel of a frame is drawn line (255 = all), None where not known.
+
+    Raises:
+        PictureError: it cannot be read.
+        BundleError: it has another size than its camera, or is not grey.
+    """
+    file = member(root, f"contours/{label_name(frame)}")
+    if file is None:
+        return None
+    rgba = load_rgba(file)
+    check_size(file, rgba, frame.camera, "transforms.json")
+    grey = rgba[..., 0]
+    if (rgba[..., 1:3] != grey[..., None]).any() or (rgba[..., 3] < 255).any():
+        raise BundleError(
+            f"{file}: is coloured or see-through, a grey picture is needed; save it as 8-bit grey"
+        )
+    return grey
+
+
+def label_name(frame: PosedPicture) -> str:
+    """Return the file name of a frame's label map (and contour)."""
+    return f"{Path(frame.file_path).stem}.png"
+
+
+def check_label_names(file: Path, posed: list[PosedPicture]) -> None:
+    """Refuse frames that would share one label map.
+
+    Raises:
+        BundleError: two pictures have one name.
+    """
+    name, count = Counter(label_name(frame) for frame in posed).most_common(1)[0]
+    if count > 1:
+        raise BundleError(f"{file}: {count} pictures share labels/{name}; rename all but one")
+
+
+def check_size(path: Path, pixels: np.ndarray, camera: Camera, said_by: str) -> None:
+    """Refuse a picture that is not its camera's.
+
+    Raises:
+        BundleError: it has another size.
+    """
+    height, width = pixels.shape[:2]
+    if (width, height) != camera.size_wh:
+        raise BundleError(
+            f"{path}: is {width} x {height} px, {said_by} says {camera.size_wh[0]} x "
+            f"{camera.size_wh[1]}; make them equal"
+        )
+
+
+def member(root: Path, name: str) -> Path | None:
+    """Return a file of a folder by its name, None where it is not there.
+
+    Raises:
+        BundleError: it is a link that leads out of the folder, or nowhere.
+    """
+    path = root / name
+    try:
+        if not path.exists() and not path.is_symlink():
+            return None
+        if is_inside(root, path) and path.exists():
+            return path
+    except (OSError, RuntimeError) as error:  # a loop of links
+        raise BundleError(f"{path}: is a link to itself; put the file there") from error
+    raise BundleError(f"{path}: is a link out of the folder or to nothing; put the file there")

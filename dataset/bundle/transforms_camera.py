@@ -1,0 +1,124 @@
+"""The camera of a transforms.json's frame: honoured exactly, or refused by name."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from toonset import frames as conventions
+from toonset.camera import Camera
+from toonset.dataset.bundle.camera_record import check_numbers, check_range
+from toonset.dataset.bundle.transforms_schema import FrameRecord, Intrinsics
+from toonset.dataset.images.picture import picture_size
+from toonset.errors import BundleError
+
+PINHOLE_MODELS = (None, "OPENCV", "PINHOLE", "SIMPLE_PINHOLE")
+SAME_VIEW_PX = 0.5  # a pinhole may differ this much from the exact camera beside it
+DISTORTION_KEYS = ("k1", "k2", "k3", "k4", "p1", "p2")
+
+
+def camera_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) -> Camera:
+    """Return a frame's camera: the exact one where it has one, else its pinhole.
+
+    Args:
+        defaults: what the file says for all frames.
+        frame: what the frame says.
+        picture: its file, for the size where neither says one.
+
+    Raises:
+        CameraError, BundleError: no camera, or none that can be honoured.
+    """
+    camera = _pinhole_of(defaults, frame, picture)
+    if frame.toonset is None:
+        check_range(camera)
+        return camera
+    native = frame.toonset.camera()
+    if native.size_wh != camera.size_wh:
+        raise BundleError(
+            f"w and h are {camera.size_wh}, the `toonset` camera's are {native.size_wh}; make "
+            "them equal"
+        )
+    if not shows_same_view(native, camera, frame.toonset.pinhole_error_px):
+        raise BundleError(
+            "transform_matrix and its `toonset` camera disagree; remove the `toonset` key of a "
+            "frame whose matrix you changed"
+        )
+    return native
+
+
+def shows_same_view(native: Camera, pinhole: Camera, error_px: float) -> bool:
+    """Return whether a far pinhole shows what the native camera does, around the target.
+
+    Args:
+        native: the exact camera.
+        pinhole: what stands for it.
+        error_px: by how much it may miss the exact one, beside rounding.
+    """
+    reach = 0.1 * max(native.size_wh) / native.scale
+    points = native.target + reach * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    off = np.abs(native.project(points)[0] - pinhole.project(points)[0])
+    return bool(np.nan_to_num(off, nan=np.inf).max() <= error_px + SAME_VIEW_PX)
+
+
+def _pinhole_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) -> Camera:
+    _refuse_distortion(defaults, frame)
+    values = {
+        name: getattr(frame, name) if getattr(frame, name) is not None else getattr(defaults, name)
+        for name in Intrinsics.model_fields
+    }
+    if values["camera_model"] not in PINHOLE_MODELS:
+        raise BundleError(
+            f"camera_model {values['camera_model'][:40]!r} is not supported; undistort to PINHOLE"
+        )
+    matrix = _matrix(frame)
+    size = _size_wh(values, picture)
+    fx = _focal_px(values, size[0])
+    fy = fx if values["fl_y"] is None else float(values["fl_y"])
+    if fx <= 0 or fy <= 0:
+        raise BundleError(f"fl_x {fx:g} and fl_y {fy:g} must be positive")
+    cx = size[0] / 2 if values["cx"] is None else values["cx"]
+    cy = size[1] / 2 if values["cy"] is None else values["cy"]
+    check_numbers([fx, fy, 1 / fx, 1 / fy, cx, cy])
+    K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+    return Camera.from_pinhole(conventions.opencv_pose_from_opengl(matrix), K, size)
+
+
+def _refuse_distortion(*records: Intrinsics) -> None:
+    for record in records:
+        bent = [k for k in DISTORTION_KEYS if (record.model_extra or {}).get(k)]
+        if bent:
+            raise BundleError(f"lens distortion {', '.join(bent)} is not supported; undistort")
+
+
+def _matrix(frame: FrameRecord) -> np.ndarray:
+    rows = frame.transform_matrix
+    if [len(row) for row in rows] != [4] * 4 or not np.allclose(rows[3], [0, 0, 0, 1], 0, 1e-6):
+        raise BundleError("transform_matrix must be 4 x 4 with last row 0 0 0 1")
+    matrix = np.array(rows, dtype=np.float64)
+    check_numbers(list(matrix.flat))
+    return matrix
+
+
+def _size_wh(values: dict[str, Any], picture: Path | None) -> tuple[int, int]:
+    width, height = values["w"], values["h"]
+    if width is not None and height is not None:
+        if width != int(width) or height != int(height):
+            raise BundleError(f"w {width:g} and h {height:g} must be whole numbers of pixels")
+        return int(width), int(height)
+    if picture is None:
+        raise BundleError("has neither w and h nor a picture to read them from")
+    return picture_size(picture)
+
+
+def _focal_px(values: dict[str, Any], width: int) -> float:
+    if values["fl_x"] is not None:
+        if values["fl_x"] <= 0:
+            raise BundleError(f"fl_x is {values['fl_x']:g}, a positive number is needed")
+        return float(values["fl_x"])
+    angle = values["camera_angle_x"]
+    if angle is None or not 0 < angle < math.pi:
+        raise BundleError("has neither fl_x nor a camera_angle_x between 0 and pi")
+    return width / (2 * math.tan(angle / 2))

@@ -1,0 +1,59 @@
+"""What a transforms.json may hold: nerfstudio's, instant-ngp's, Blender's, and toonset's own.
+
+Unknown keys are other programs' business and are ignored, except lens distortion, which would bend
+what is seen (`toonset.dataset.bundle.transforms_camera` refuses it).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from toonset.dataset.bundle.camera_record import NativeCamera
+from toonset.errors import BundleError
+from toonset.json_file import read_json, validated
+from toonset.read import schema_version
+
+SCHEMA, VERSION = "toonset-transforms", 1
+MAX_FRAMES = 10_000
+
+
+class Intrinsics(BaseModel):
+    """What a frame may say of its lens, or the file for all frames; pixels."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    w: float | None = None
+    h: float | None = None
+    fl_x: float | None = None
+    fl_y: float | None = None
+    cx: float | None = None
+    cy: float | None = None
+    camera_angle_x: float | None = None
+    camera_model: str | None = None
+
+
+class FrameRecord(Intrinsics):
+    """One picture and its camera."""
+
+    file_path: str
+    transform_matrix: list[list[float]]
+    toonset: NativeCamera | None = None
+
+
+class TransformsFile(Intrinsics):
+    """The whole file."""
+
+    frames: list[FrameRecord] = Field(min_length=1, max_length=MAX_FRAMES)
+
+
+def read_records(file: Path) -> TransformsFile:
+    """Return the content of a transforms.json as its schema has it; cameras are not made yet.
+
+    Raises:
+        BundleError: the file cannot be read, is of a newer toonset, or does not fit its schema.
+    """
+    content = read_json(file)
+    if isinstance(content, dict) and str(content.get("schema", "")).startswith("toonset-"):
+        schema_version(content, SCHEMA, VERSION, str(file), BundleError)
+    return validated(TransformsFile, content, file)

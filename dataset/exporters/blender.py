@@ -1,0 +1,83 @@
+"""Writing a Python script that rebuilds cameras, mannequin and drawings inside Blender.
+
+    import_cameras.py    run it in Blender: blender --python import_cameras.py, or Scripting > Open
+    images/000.png       the drawings, RGBA
+    mannequin.obj        the mannequin
+    toonset.json         the exact cameras
+
+Blender has orthographic cameras and lens shift: every view is exact. A scene has one render size:
+all cameras get the same window (in their own pixels) with the drawing in its middle. Every view is
+bound to its own frame of the timeline. Blender's world has +Z up: the script turns ours.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from toonset import __version__
+from toonset import frames as conventions
+from toonset.dataset.exporters.blender_script import SCRIPT
+from toonset.dataset.exporters.common import ExportView, write_views
+from toonset.dataset.exporters.view_planes import (
+    clip_range,
+    plane_corners,
+    scene_views,
+    stand,
+    window_wh,
+)
+from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes
+
+SCRIPT_NAME = "import_cameras.py"
+
+
+def write_blender_script(
+    folder: Path,
+    views: Sequence[ExportView],
+    mesh: Mesh | None = None,
+    *,
+    force: bool = False,
+) -> tuple[ExportView, ...]:
+    """Write import_cameras.py and what it reads; the folder appears whole or not at all.
+
+    Returns:
+        The views as they were written: with square pixels.
+
+    Raises:
+        OutputError: the folder exists, or cannot be written.
+    """
+    written = scene_views(views)
+    pictures = [f"images/{view.name}" for view in written]
+    records = [_record(v, p, written, mesh) for v, p in zip(written, pictures, strict=True)]
+    text = SCRIPT.replace("@VERSION@", __version__)
+    text = text.replace("@WINDOW@", repr(window_wh(written)))
+    text = text.replace("@VIEWS@", json.dumps(records, indent=1, allow_nan=False))
+    with new_folder(folder, force=force) as temporary:
+        write_bytes(temporary / SCRIPT_NAME, text.encode())
+        write_views(temporary, "blender", written, pictures, mesh)
+    return written
+
+
+def _record(
+    view: ExportView, picture: str, views: Sequence[ExportView], mesh: Mesh | None
+) -> dict[str, Any]:
+    camera, window = view.camera, window_wh(views)
+    width, height = camera.size_wh
+    near, far = clip_range(view, views, mesh)
+    # Blender measures lens shift in widths of the window, to the right and up
+    right = (width / 2 - float(camera.center[0])) / window[0]
+    up = (float(camera.center[1]) - height / 2) / window[0]
+    return {
+        "name": view.name,
+        "picture": picture,
+        "orthographic": camera.is_orthographic,
+        "world_from_camera": conventions.opengl_pose_from_opencv(stand(view, mesh)).tolist(),
+        "width_world": window[0] / camera.scale,
+        "focal_widths": 0.0 if camera.is_orthographic else float(camera.K[0, 0]) / window[0],
+        "shift": [right, up],
+        "clip": [near, far],
+        "plane": plane_corners(view, views, mesh).tolist(),
+    }

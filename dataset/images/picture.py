@@ -1,0 +1,192 @@
+"""Pictures in and out: one safe way to decode, one to encode.
+
+Pillow decodes behind an allow-list of formats; the size is capped from the header before anything
+is decoded. The format is recognised by content, so a PNG named `.jpg` reads fine and a text file
+named `.png` does not. What could be misread is converted properly
+(`toonset.dataset.images.pixel_modes`) or refused by name. A PNG's gAMA chunk is ignored, as paint
+programs do.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8, UInt16
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+from toonset.dataset.images.pixel_modes import rgba_of
+from toonset.errors import PictureError
+from toonset.palette.pixels.labels import UNLABELLED
+from toonset.read import describe, read_whole
+
+FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF")
+MAX_PIXELS = 80_000_000  # 16,384 x 4,096 and a margin; beyond 89 million Pillow suspects a bomb
+ORIENTATION_TAG = 0x0112  # EXIF; values 5 to 8 swap width and height
+COMPRESSION = 4  # of 0 to 9: as small as 6 on noisy pictures and a quarter faster
+PNG_END = b"IEND\xaeB`\x82"
+
+
+def load_rgba(path: Path, max_pixels: int = MAX_PIXELS) -> UInt8[np.ndarray, "height width 4"]:
+    """Return a picture as sRGB with straight alpha, upright, 8 bit per channel.
+
+    Args:
+        path: a PNG, JPEG, WebP, TIFF, BMP or GIF file with one frame.
+        max_pixels: a header that announces more is refused before decoding.
+
+    Raises:
+        PictureError: the file is missing, unreadable, damaged, cut off, too large, animated, or
+            of a kind whose colours cannot be told (CMYK without a profile, 32 bit, Lab).
+    """
+    return decode_rgba(read_whole(path, "picture", PictureError), path, max_pixels)
+
+
+def decode_rgba(
+    data: bytes, path: Path, max_pixels: int = MAX_PIXELS
+) -> UInt8[np.ndarray, "height width 4"]:
+    """Return `load_rgba` of bytes that came from `path` (a mesh's texture, for one).
+
+    Raises:
+        PictureError: as `load_rgba`.
+    """
+    with _opened(data, path, max_pixels) as image:
+        image.load()
+        ImageOps.exif_transpose(image, in_place=True)
+        return rgba_of(image, path)
+
+
+def picture_size(path: Path, max_pixels: int = MAX_PIXELS) -> tuple[int, int]:
+    """Return upright width and height of a picture without decoding it.
+
+    Raises:
+        PictureError: as `load_rgba`, as far as the header tells.
+    """
+    data = read_whole(path, "picture", PictureError)
+    with _opened(data, path, max_pixels) as image:
+        width, height = image.size
+        turned = image.getexif().get(ORIENTATION_TAG) in (5, 6, 7, 8)
+        return (height, width) if turned else (width, height)
+
+
+def load_indexed_png(path: Path, max_pixels: int = MAX_PIXELS) -> UInt8[np.ndarray, "height width"]:
+    """Return the palette indices of an indexed PNG, as `encode_indexed_png` writes it.
+
+    Raises:
+        PictureError: as `load_rgba`, or the picture has no palette.
+    """
+    data = read_whole(path, "picture", PictureError)
+    with _opened(data, path, max_pixels) as image:
+        if image.format != "PNG" or image.mode != "P":
+            raise PictureError(
+                f"{path}: is a {image.format} of mode {image.mode}, an indexed PNG is needed; "
+                "write the labels again with `toonset palette`"
+            )
+        image.load()
+        return np.asarray(image).astype(np.uint8)
+
+
+def encode_png(rgba: UInt8[np.ndarray, "height width channels"]) -> bytes:
+    """Return an RGBA (or RGB) picture as PNG bytes."""
+    buffer = io.BytesIO()
+    image = Image.fromarray(np.ascontiguousarray(rgba))
+    image.save(buffer, "PNG", compress_level=COMPRESSION)
+    return buffer.getvalue()
+
+
+def encode_grey_png(
+    values: UInt8[np.ndarray, "height width"] | UInt16[np.ndarray, "height width"],
+) -> bytes:
+    """Return a grey PNG of as many bits: a contour map, depth."""
+    buffer = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(values)).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def encode_indexed_png(
+    labels: UInt8[np.ndarray, "height width"], palette: UInt8[np.ndarray, "colors 3"]
+) -> bytes:
+    """Return labels as an indexed PNG whose palette is `palette`; index 255 is transparent.
+
+    Raises:
+        PictureError: more than 255 colours, or a label that has no colour and is not 255.
+    """
+    used = labels[labels != UNLABELLED]
+    if len(palette) > UNLABELLED or (used.size and int(used.max()) >= len(palette)):
+        raise PictureError(
+            f"labels up to {int(used.max(initial=0))} and {len(palette)} colours; at most 255 "
+            "colours fit an indexed PNG, and every label but 255 needs one"
+        )
+    table = np.zeros((256, 3), dtype=np.uint8)
+    table[: len(palette)] = palette
+    image = Image.fromarray(np.ascontiguousarray(labels, dtype=np.uint8))
+    image.putpalette(table.tobytes())  # turns the grey picture into an indexed one
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG", transparency=UNLABELLED)
+    return buffer.getvalue()
+
+
+@contextlib.contextmanager
+def _opened(data: bytes, path: Path, max_pixels: int) -> Iterator[Image.Image]:
+    """Yield the lazily opened picture; whatever Pillow raises inside becomes a PictureError."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # odd metadata is no reason to refuse or to print
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+                _check(image, data, path, max_pixels)
+                yield image
+    except PictureError:
+        raise
+    except UnidentifiedImageError as error:
+        raise PictureError(_not_a_picture(data, path)) from error
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        raise PictureError(
+            f"{path}: its header announces far more than {max_pixels / 1e6:g} megapixels, the "
+            "most that is read; scale the picture down"
+        ) from error
+    except Exception as error:  # decoders raise almost anything on damaged bytes
+        raise PictureError(
+            f"{path}: the {_format_of(data)} file is damaged or cut off "
+            f"({_first_words(error)}); export or download it again"
+        ) from error
+
+
+def _check(image: Image.Image, data: bytes, path: Path, max_pixels: int) -> None:
+    width, height = image.size
+    if width * height > max_pixels:
+        raise PictureError(
+            f"{path}: {width} x {height} pixels, at most {max_pixels / 1e6:g} megapixels are "
+            "read; scale the picture down"
+        )
+    # a phone's MPO is a JPEG with a preview behind it: the first picture is the picture
+    if image.format != "MPO" and getattr(image, "is_animated", False):
+        raise PictureError(
+            f"{path}: is an animated or multi-page {image.format}; save the frame that is meant "
+            "as a PNG"
+        )
+    if image.format == "PNG" and PNG_END not in data:
+        raise PictureError(
+            f"{path}: the PNG file is damaged or cut off (its end is missing); export or "
+            "download it again"
+        )
+
+
+def _not_a_picture(data: bytes, path: Path) -> str:
+    kind = describe(data)
+    if kind.endswith(" picture"):
+        return f"{path}: starts like {kind} but is damaged or cut off; export or download it again"
+    return f"{path}: is {kind}, no picture that can be read; save it as PNG"
+
+
+def _format_of(data: bytes) -> str:
+    kind = describe(data)
+    return kind.split()[1] if kind.endswith(" picture") and kind.startswith("a ") else "picture"
+
+
+def _first_words(error: Exception) -> str:
+    words = " ".join(str(error).split()) or type(error).__name__
+    return words[:80]

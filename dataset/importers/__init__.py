@@ -1,0 +1,1 @@
+"""Other programs' cameras and pictures as bundles."""

@@ -1,0 +1,103 @@
+"""Writing imported views as a bundle: RGBA pictures, cameras, and the mannequin if there is one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.dataset.bundle.bundle import MANNEQUIN
+from toonset.dataset.bundle.transforms import FAR_HEIGHTS, transforms_dict
+from toonset.dataset.bundle.transforms_read import check_total
+from toonset.dataset.exporters.common import NATIVE
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.importers.detect import Z_UP, Imported, turned
+from toonset.dataset.importers.paths import ImportView
+from toonset.dataset.mesh.load import save_obj
+from toonset.errors import BundleError
+from toonset.mesh import Mesh
+from toonset.write import new_folder, write_bytes, write_json
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """What was written.
+
+    Attributes:
+        views: names of the pictures.
+        opaque: those that show no background: the whole picture counts as figure.
+        masked: number of pictures whose alpha came from a mask.
+    """
+
+    views: tuple[str, ...]
+    opaque: tuple[str, ...]
+    masked: int
+
+
+def write_imported(
+    folder: Path, imported: Imported, mesh: Mesh | None, *, z_up: bool = False, force: bool = False
+) -> ImportReport:
+    """Write a bundle of imported views; the folder appears whole or not at all.
+
+    Args:
+        folder: where.
+        imported: what was read.
+        mesh: the mannequin in the world that was read.
+        z_up: turn the world from +Z up, front -Y (Blender) to ours: +Y up, front +Z.
+        force: replace an existing folder.
+
+    Raises:
+        BundleError: a picture or mask has another size than its camera, or `z_up` is asked for
+            an export of toonset's own.
+        PictureError: a picture or mask cannot be read.
+        OutputError: the folder exists, or cannot be written.
+    """
+    cameras = [view.camera for view in imported.views]
+    if z_up:
+        if imported.native is not None:
+            raise BundleError(f"{NATIVE} says that +Y is up, as in every export; leave out --up z")
+        cameras = [turned(camera) for camera in cameras]
+        mesh = None if mesh is None else replace(mesh, vertices=mesh.vertices @ Z_UP.T)
+    check_total(folder, cameras)
+    opaque = []
+    with new_folder(folder, force=force) as temporary:
+        for view in imported.views:
+            rgba = _picture(view)
+            if (rgba[..., 3] == 255).all():
+                opaque.append(view.name)
+            write_bytes(temporary / "images" / view.name, encode_png(rgba))
+        named = [(f"images/{v.name}", c) for v, c in zip(imported.views, cameras, strict=True)]
+        height, radius = _body(imported, mesh)
+        write_json(temporary / "transforms.json", transforms_dict(named, height, radius))
+        if mesh is not None:
+            write_bytes(temporary / MANNEQUIN, save_obj(mesh))
+    names = tuple(view.name for view in imported.views)
+    masked = sum(view.mask is not None for view in imported.views)
+    return ImportReport(names, tuple(opaque), masked)
+
+
+def _body(imported: Imported, mesh: Mesh | None) -> tuple[float, float]:
+    """Return height and radius for the far pinholes of orthographic views."""
+    if imported.native is not None:
+        return imported.native.far_distance / FAR_HEIGHTS, imported.native.radius
+    return (1.0, 1.0) if mesh is None else (mesh.height, mesh.radius)
+
+
+def _picture(view: ImportView) -> UInt8[np.ndarray, "height width 4"]:
+    rgba = _sized(view, view.picture)
+    if view.mask is not None:
+        rgba = rgba.copy()
+        rgba[..., 3] = np.minimum(rgba[..., 3], _sized(view, view.mask)[..., 0])
+    return rgba
+
+
+def _sized(view: ImportView, file: Path) -> UInt8[np.ndarray, "height width 4"]:
+    pixels = load_rgba(file)
+    if pixels.shape[1::-1] != view.camera.size_wh:
+        raise BundleError(
+            f"{file}: is {pixels.shape[1]} x {pixels.shape[0]} px, its camera says "
+            f"{view.camera.size_wh[0]} x {view.camera.size_wh[1]}; give the pictures of that size"
+        )
+    return pixels

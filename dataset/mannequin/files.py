@@ -1,0 +1,66 @@
+"""A mannequin on disk: NAME.obj with its parts, and NAME.landmarks.json beside it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from toonset.dataset.mannequin.landmark_formats import SCHEMA
+from toonset.dataset.mannequin.make import Mannequin
+from toonset.dataset.mesh.load import save_obj
+from toonset.errors import OutputError
+from toonset.write import write_bytes, write_json
+
+
+def landmarks_path(mesh_path: Path) -> Path:
+    """Return where the landmarks of a mannequin's file lie."""
+    return mesh_path.with_suffix(".landmarks.json")
+
+
+def check_files(mesh_path: Path, *, force: bool) -> None:
+    """Refuse, before any work, files that must not be written or replaced.
+
+    Args:
+        mesh_path: the OBJ file to write.
+        force: replace existing files.
+
+    Raises:
+        OutputError: the name is not an OBJ file's, or a file is there and `force` is off, or a
+            folder is.
+    """
+    if mesh_path.suffix.lower() != ".obj":
+        raise OutputError(f"{mesh_path}: a mannequin is written as .obj; choose another -o")
+    if mesh_path.parent.is_file():
+        raise OutputError(f"{mesh_path}: {mesh_path.parent} is a file; choose another -o")
+    for path in (mesh_path, landmarks_path(mesh_path)):
+        if path.is_dir():
+            raise OutputError(f"{path}: is a folder, a file is needed; choose another -o")
+        if path.exists() and not force:
+            raise OutputError(
+                f"{path}: exists already; pass --force to replace it, or choose another -o"
+            )
+
+
+def write_mannequin(mannequin: Mannequin, mesh_path: Path) -> None:
+    """Write both files; where one cannot be written, both stay as they were.
+
+    Raises:
+        OutputError: the place cannot be written.
+    """
+    points = {name: point.tolist() for name, point in mannequin.landmarks.items()}
+    landmarks = {"schema": SCHEMA, "units": "world", "points": points}
+    targets = (mesh_path, landmarks_path(mesh_path))
+    try:
+        mesh_path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".mannequin.", dir=mesh_path.parent) as folder:
+            mesh_file, landmarks_file = (Path(folder) / target.name for target in targets)
+            write_bytes(mesh_file, save_obj(mannequin.mesh))
+            write_json(landmarks_file, landmarks)
+            os.replace(mesh_file, targets[0])
+            os.replace(landmarks_file, targets[1])
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(
+            f"{mesh_path}: cannot be written ({reason}); free space or choose another -o"
+        ) from error

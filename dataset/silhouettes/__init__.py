@@ -1,0 +1,1 @@
+"""Outlines and masks: distances, coherence under cameras, displacement."""

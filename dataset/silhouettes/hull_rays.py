@@ -1,0 +1,140 @@
+"""Rays through outline points, cut by the other silhouettes: the visual hull where it matters.
+
+A point of a ray lies in the visual hull if it is inside every silhouette. Instead of cutting rays
+with polygons, the signed distance to each silhouette's rim is sampled along them: its minimum over
+the silhouettes says how deep in the hull, or how far outside of it, a sample lies.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+
+from toonset.camera import Camera
+from toonset.dataset.silhouettes.contour import drawn_contour
+from toonset.view import Ends, View
+
+SAMPLES = 96  # along a ray through the whole figure: about 1 % of the height apart
+FINE = 17  # samples between the neighbours of the best one
+POINTS = 160  # of a view's outline
+PAD_OF_HEIGHT = 0.25  # around a crop: how far outside a point can be told from the rim
+
+
+class Silhouette:
+    """A drawing's silhouette with its camera, outline and signed distance (built once)."""
+
+    def __init__(self, view: View, camera: Camera) -> None:
+        """Measure the view; `camera` is in the view's pixels."""
+        contour = drawn_contour(view)
+        self.camera = camera
+        self.height = contour.height_px
+        self.points = contour.points[:: max(1, len(contour.points) // POINTS)]
+        self.pad = int(np.ceil(PAD_OF_HEIGHT * self.height))
+        self.distance = _signed_distance(_continued(view.mask, self.pad, contour.ends))
+
+    def seen_by(self, camera: Camera) -> Silhouette:
+        """Return the same drawing under another camera."""
+        other = copy.copy(self)
+        other.camera = camera
+        return other
+
+    def reach(self, anchor: Float[np.ndarray, " 3"]) -> float:
+        """Return how far, in world units, the outline goes from the picture of `anchor`."""
+        (pixel,), (depth,), _ = self.camera.project(anchor[None])
+        far = float(np.linalg.norm(self.points - pixel, axis=1).max())
+        return far * (1 + self.camera.k * float(depth)) / self.camera.scale
+
+    def depth_inside(
+        self,
+        origins: Float[np.ndarray, "points 3"],
+        directions: Float[np.ndarray, "points 3"],
+        along: Float[np.ndarray, "points t"],
+    ) -> Float[np.ndarray, "points t"]:
+        """Return the signed distance from the rim over the height, positive inside, along rays."""
+        camera = self.camera
+        start = ((origins - camera.target) @ camera.rotation.T).astype(np.float32)
+        slope = (directions @ camera.rotation.T).astype(np.float32)
+        x, y, z = (start[:, a, None] + along * slope[:, a, None] for a in range(3))
+        scale = np.float32(camera.scale) / np.maximum(1 + np.float32(camera.k) * z, 1e-6)
+        left, top = camera.center.astype(np.float32) - 0.5 + self.pad
+        u = np.clip(left + scale * x, 0, self.distance.shape[1] - 1)
+        v = np.clip(
+            top + np.float32(camera.pixel_aspect) * scale * y, 0, self.distance.shape[0] - 1
+        )
+        return cv2.remap(self.distance, u, v, cv2.INTER_LINEAR) / np.float32(self.height)
+
+
+def cut_rays(
+    silhouettes: Sequence[Silhouette], i: int
+) -> tuple[Float[np.ndarray, "views points t"], Float[np.ndarray, " points"]]:
+    """Return distances inside the silhouettes along the rays of outline i, and the deepest ones.
+
+    Args:
+        silhouettes: all of the sheet.
+        i: whose outline; it excludes nothing on its own rays, so its row is infinite.
+
+    Returns:
+        Per silhouette and sample the signed distance over the silhouette's height, positive
+        inside; and per outline point the largest minimum over the silhouettes, refined.
+    """
+    anchor = middle_of(silhouettes)
+    radius = max(silhouette.reach(anchor) for silhouette in silhouettes)
+    camera, points = silhouettes[i].camera, silhouettes[i].points
+    _, (middle,), _ = camera.project(anchor[None])
+    origins, directions = camera.rays(points)
+    coarse = (float(middle) + np.linspace(-radius, radius, SAMPLES)).astype(np.float32)
+    step = coarse[1] - coarse[0]
+    fine = step * np.linspace(-1, 1, FINE, dtype=np.float32)
+
+    def depths(along: Float[np.ndarray, "points t"]) -> Float[np.ndarray, "views points t"]:
+        own = np.full(along.shape, np.inf, np.float32)
+        return np.stack(
+            [
+                own if j == i else f.depth_inside(origins, directions, along)
+                for j, f in enumerate(silhouettes)
+            ]
+        )
+
+    sampled = depths(np.broadcast_to(coarse, (len(points), SAMPLES)))
+    best = coarse[sampled.min(axis=0).argmax(axis=1)]
+    refined = depths(best[:, None] + fine).min(axis=0).max(axis=1)
+    return sampled, refined.astype(np.float64)
+
+
+def middle_of(silhouettes: Sequence[Silhouette]) -> Float[np.ndarray, " 3"]:
+    """Return the world point that the cameras look at, in the mean."""
+    return np.mean([silhouette.camera.target for silhouette in silhouettes], axis=0)
+
+
+def contradiction(residuals: Float[np.ndarray, " points"]) -> float:
+    """Return the mean square of the negative residuals: what the other silhouettes exclude."""
+    return float((np.minimum(residuals, 0) ** 2).mean())
+
+
+def _continued(
+    mask: Bool[np.ndarray, "height width"], pad: int, ends: Ends
+) -> Bool[np.ndarray, "height+2*pad width+2*pad"]:
+    """Return the padded mask; where the figure is cut off it goes on as it is at the cut."""
+    padded = np.pad(mask, pad)
+    left, top, right, bottom = (round(end) + pad if np.isfinite(end) else None for end in ends)
+    if top is not None:
+        padded[:top] = padded[top]
+    if bottom is not None:
+        padded[bottom:] = padded[bottom - 1]
+    if left is not None:
+        padded[:, :left] = padded[:, left, None]
+    if right is not None:
+        padded[:, right:] = padded[:, right - 1, None]
+    return padded
+
+
+def _signed_distance(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    inside = mask.astype(np.uint8)
+    within = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_5)
+    beyond = cv2.distanceTransform(1 - inside, cv2.DIST_L2, cv2.DIST_MASK_5)
+    # the rim lies half a pixel before the first centre of the other kind
+    return np.where(mask, within - 0.5, 0.5 - beyond).astype(np.float32)

@@ -1,0 +1,1 @@
+"""Segment one sheet: background, figures, what is none of them, cut-outs with alpha."""

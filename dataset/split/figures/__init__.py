@@ -1,0 +1,1 @@
+"""Figures from marks: connected blobs, groups of them, letters and swatches among them."""

@@ -1,0 +1,188 @@
+"""Which patches of a sheet are the bodies of the drawn views, and in which order one reads them.
+
+The views of a turnaround show one character, so they are about equally high: of all heights the one
+counts that explains most of what is drawn, tall things first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from toonset.dataset.split.figures.text_and_swatches import find_letters
+from toonset.view import Box
+
+LOWEST = 0.75  # of the views' median height: lower drawings are studies or props
+HIGHEST = 1.45  # of the same: higher ones, too
+LEAST_AREA = 0.25  # of the views' median area: a side view is rarely below a third of a front view
+SMALLER = 0.85  # of the views' median height or area
+STRANGE = 0.6  # of what the views commonly share of their colours: less is another thing
+RECTANGLE = 0.96  # of its box that a patch fills: a block of colour, no character
+LEVEL = 0.12  # of the views' height: perspective moves feet and heads by that
+PLAIN = 0.9  # of a patch in one of 64 colours: a swatch
+LEAST_SPECK = 4  # cells: smaller things are noise
+
+
+@dataclass(frozen=True, eq=False)
+class Blobs:
+    """Connected patches of foreground, numbered from 0.
+
+    Attributes:
+        labels: (height, width) number of the patch + 1; 0 = background.
+        boxes: (blobs, 4) x, y, width, height.
+        areas: (blobs,) pixels.
+        centers: (blobs, 2) x, y of the centre of mass.
+    """
+
+    labels: Int[np.ndarray, "height width"]
+    boxes: Int[np.ndarray, "blobs 4"]
+    areas: Int[np.ndarray, " blobs"]
+    centers: Float[np.ndarray, "blobs 2"]
+
+    def window(self, number: int) -> tuple[slice, slice]:
+        """Return rows and columns of a patch's box."""
+        x, y, width, height = self.boxes[number]
+        return slice(y, y + height), slice(x, x + width)
+
+    def mask(self, number: int) -> Bool[np.ndarray, "height width"]:
+        """Return the pixels of a patch within its box."""
+        return self.labels[self.window(number)] == number + 1
+
+
+def find_blobs(foreground: Bool[np.ndarray, "height width"]) -> Blobs:
+    """Return the connected patches (diagonal neighbours touch)."""
+    _, labels, stats, centers = cv2.connectedComponentsWithStats(
+        foreground.view(np.uint8), connectivity=8
+    )
+    return Blobs(labels, stats[1:, :4], stats[1:, 4], centers[1:])
+
+
+def as_box(numbers: Int[np.ndarray, " 4"]) -> Box:
+    """Return x, y, width, height as plain numbers."""
+    x, y, width, height = (int(value) for value in numbers)
+    return x, y, width, height
+
+
+def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
+    """Return the numbers of the patches that are the bodies of the views, in no order."""
+    large = np.flatnonzero(blobs.areas >= LEAST_SPECK)
+    letters = np.zeros(len(blobs.areas), dtype=bool)
+    letters[large] = find_letters(blobs.boxes[large], int(blobs.boxes[:, 3].max(initial=0)))
+    fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
+    drawn = large[~letters[large]]
+    figurative = drawn[fill[drawn] < RECTANGLE]
+    for candidates in (figurative, drawn, large):  # a sheet of boxes still has views
+        if len(candidates):
+            return candidates[_of_one_height(blobs.boxes[candidates, 3], blobs.areas[candidates])]
+    return large
+
+
+def with_blocks(
+    blobs: Blobs,
+    mains: Int[np.ndarray, " mains"],
+    painted: Bool[np.ndarray, "height width"],
+    rgb: UInt8[np.ndarray, "height width 3"],
+) -> Int[np.ndarray, " mains"]:
+    """Return the bodies and the rectangles that are views, too: a blocky character's profile.
+
+    It stands level with another view and has its colours, several of them; a swatch has one.
+    """
+    if len(mains) < 2:
+        return mains
+    fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
+    blocks = np.setdiff1d(np.flatnonzero(fill >= RECTANGLE), mains)
+    height, area = np.median(blobs.boxes[mains, 3]), np.median(blobs.areas[mains])
+    blocks = blocks[(blobs.areas[blocks] >= LEAST_AREA * area)]
+    if not len(blocks):
+        return mains
+    ends = np.stack([blobs.boxes[:, 1], blobs.boxes[:, 1] + blobs.boxes[:, 3]], axis=1)
+    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in mains])
+    typical = np.median([np.minimum(look, looks.mean(axis=0)).sum() for look in looks])
+    views = []
+    for block in blocks.tolist():
+        level = np.abs(ends[mains] - ends[block]).max(axis=1) <= LEVEL * height
+        look = _look_of(blobs, block, painted, rgb)
+        alike = np.minimum(look, looks.mean(axis=0)).sum() >= STRANGE * typical
+        if level.any() and alike and look.max() <= PLAIN:
+            views.append(block)
+    return np.concatenate([mains, np.array(views, dtype=mains.dtype)])
+
+
+def without_strangers(
+    blobs: Blobs,
+    mains: Int[np.ndarray, " mains"],
+    painted: Bool[np.ndarray, "height width"],
+    rgb: UInt8[np.ndarray, "height width 3"],
+) -> Int[np.ndarray, " mains"]:
+    """Return the bodies without smaller ones in other colours: a sword as high as its bearer."""
+    if len(mains) < 3:
+        return mains
+    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in mains])
+    others = (looks.sum(axis=0) - looks) / (len(mains) - 1)
+    shared = np.minimum(looks, others).sum(axis=1)
+    heights, areas = blobs.boxes[mains, 3], blobs.areas[mains]
+    smaller = (heights <= SMALLER * np.median(heights)) | (areas <= SMALLER * np.median(areas))
+    return mains[~smaller | (shared >= STRANGE * np.median(shared))]
+
+
+def shared_colors(a: UInt8[np.ndarray, "_ 3"], b: UInt8[np.ndarray, "_ 3"]) -> float:
+    """Return how much of their colours two figures share: the histograms' intersection."""
+    return float(np.minimum(_look(a), _look(b)).sum())
+
+
+def _look_of(
+    blobs: Blobs,
+    number: int,
+    painted: Bool[np.ndarray, "height width"],
+    rgb: UInt8[np.ndarray, "height width 3"],
+) -> Float[np.ndarray, " 64"]:
+    window = blobs.window(number)
+    return _look(rgb[window][blobs.mask(number) & painted[window]])
+
+
+def _look(colors: UInt8[np.ndarray, "_ 3"]) -> Float[np.ndarray, " 64"]:
+    """Return the shares of 64 colours."""
+    codes = (colors // 64).astype(np.int64) @ np.array([16, 4, 1])
+    return np.bincount(codes, minlength=64) / max(len(codes), 1)
+
+
+def reading_order(
+    boxes: Int[np.ndarray, "n 4"], centers: Float[np.ndarray, "n 2"]
+) -> Int[np.ndarray, " n"]:
+    """Return the order of boxes: rows from the top, from left to right within each.
+
+    A box belongs to a row if it shares at least half of the smaller height with the row's first.
+    """
+    rows: list[list[int]] = []
+    for index in np.argsort(centers[:, 1], kind="stable"):
+        top, height = boxes[index, 1], boxes[index, 3]
+        for row in rows:
+            first_top, first_height = boxes[row[0], 1], boxes[row[0], 3]
+            shared = min(top + height, first_top + first_height) - max(top, first_top)
+            if shared >= 0.5 * min(height, first_height):
+                row.append(int(index))
+                break
+        else:
+            rows.append([int(index)])
+    return np.array(
+        [i for row in rows for i in sorted(row, key=lambda i: centers[i, 0])], dtype=int
+    )
+
+
+def _of_one_height(
+    heights: Int[np.ndarray, " n"], areas: Int[np.ndarray, " n"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which patches are of the height that explains most: area, number, and tallness."""
+    best, merit = np.zeros(len(heights), dtype=bool), -1.0
+    for height in np.unique(heights[areas >= 0.02 * areas.max()]):
+        alike = (heights >= LOWEST * height) & (heights <= height / LOWEST)
+        alike &= areas >= LEAST_AREA * np.median(areas[alike])
+        middle = float(np.median(heights[alike]))
+        alike &= (heights >= LOWEST * middle) & (heights <= HIGHEST * middle)
+        score = float(areas[alike].sum()) * int(alike.sum()) * middle**2
+        if score > merit:
+            best, merit = alike, score
+    return best

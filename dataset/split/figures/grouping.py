@@ -1,0 +1,240 @@
+"""Which patches of a sheet are parts of a view, and what the others are.
+
+A patch that is no body of a view is a part of one (a floating hat, a hand apart) if it lies within
+or close to it, or if most views have the like at the same level; else it is left out under a name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from toonset.dataset.split.figures.blobs import Blobs, reading_order
+from toonset.dataset.split.figures.text_and_swatches import find_letters, find_swatches
+
+WITHIN = 0.5  # of a patch that lies in a figure's box: its part
+NEAR = 0.02  # of the figure's height: a part this near to the figure is the figure's
+ABOVE = 0.08  # of the figure's height: so near something above may be its part
+BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
+FARTHEST = 0.3  # of the figure's height: a part that most views have is no farther
+FEET = 0.95  # of the figure's height from its top: no part's middle lies lower
+SAME_LEVEL = 0.08  # of the figure's height
+SAME_SIZE = 2.5  # times, of shares of the figure's area
+OFTEN = 0.45  # times the views: in some a hand lies before the body, in some there are two
+PART_AREA = 0.35  # of the figure's area: a larger thing apart is a drawing of its own
+LEAST_PART = 0.004  # of the figure's area: smaller things beside a figure are marks
+LEAST_SPECK = 4  # cells: smaller things are noise
+LISTED_SPECK = 0.0005  # of the figure's area: smaller ones are counted, not listed
+FAMILIAR = 0.8  # of a part's pixels in colours that its figure has
+DARK = 170  # level: ink is no lighter
+LETTER_HEIGHT = 0.1  # of the figure's height
+OFF_INK = 24  # levels from the mixtures of ink and paper: noise
+ONE_INK = 0.95  # of a patch's pixels in its ink
+STROKE = 0.12  # of its box's squared diagonal: a thing that covers no more is a stroke
+SWATCH = 0.9  # of its box that a swatch fills
+DISC = (0.74, 0.83)  # of its box that a disc fills
+
+
+@dataclass(frozen=True, eq=False)
+class Grouping:
+    """Which figure every patch belongs to.
+
+    Attributes:
+        figure_of_blob: (blobs,) number of the figure in reading order; -1 = none.
+        count: number of figures.
+        kinds: per patch what it is if it is no figure's: see `toonset.dataset.split.sheet.LeftOut`;
+            "" for noise that is too small to name.
+    """
+
+    figure_of_blob: Int[np.ndarray, " blobs"]
+    count: int
+    kinds: tuple[str, ...]
+
+
+def group_blobs(
+    blobs: Blobs,
+    mains: Int[np.ndarray, " mains"],
+    rgb: UInt8[np.ndarray, "height width 3"],
+    bodies_known: Mapping[int, int] | None = None,
+) -> Grouping:
+    """Return which figure every patch belongs to, and what the others are.
+
+    Args:
+        blobs: the patches.
+        mains: those that are the bodies of the views.
+        rgb: the sheet.
+        bodies_known: numbers of the bodies of parts that are known already.
+    """
+    known = bodies_known or {}
+    mains = mains[reading_order(blobs.boxes[mains], blobs.centers[mains])]
+    figure = np.full(len(blobs.areas), -1)
+    figure[mains] = np.arange(len(mains))
+    kinds = np.full(len(blobs.areas), "", dtype=object)
+    small = np.flatnonzero((figure < 0) & (blobs.areas >= LEAST_SPECK))
+    if len(small):
+        nearest, gap = _nearest_main(blobs, mains, small)
+        letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[mains, 3])))
+        swatches = find_swatches(blobs.boxes[small], blobs.areas[small])
+        typical = float(np.median(blobs.areas[mains]))
+        for i, part in enumerate(small.tolist()):
+            nearest[i] = figure[known[part]] if part in known else nearest[i]
+        bodies = mains[nearest]
+        for i, number in enumerate(small):
+            within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
+            in_row = bool(letters[i] | swatches[i]) and not within
+            if not in_row and _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
+                figure[number] = nearest[i]
+        again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(mains), rgb)
+        figure[small[again]] = nearest[again]
+        figure[list(known)] = figure[list(known.values())]
+        for i, number in enumerate(small):
+            if figure[number] >= 0:
+                continue
+            if swatches[i]:
+                kinds[number] = "swatch"
+            elif letters[i]:
+                kinds[number] = "text"
+            elif blobs.areas[number] >= LISTED_SPECK * typical:
+                kinds[number] = _kind(blobs, int(number), typical)
+    return Grouping(figure, len(mains), tuple(kinds))
+
+
+def _nearest_main(
+    blobs: Blobs, mains: np.ndarray, small: np.ndarray
+) -> tuple[Int[np.ndarray, " small"], Float[np.ndarray, " small"]]:
+    """Return for every small patch the position in `mains` of the nearest figure, and the gap."""
+    is_main = np.zeros(len(blobs.areas) + 1, dtype=bool)
+    is_main[mains + 1] = True
+    position = np.zeros(len(blobs.areas) + 1, dtype=np.int64)
+    position[mains + 1] = np.arange(len(mains))
+    zero_at_main = (~is_main[blobs.labels]).view(np.uint8)
+    away, found = cv2.distanceTransformWithLabels(
+        zero_at_main, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    zones = np.asarray(found, dtype=np.int32)
+    main_of_zone = np.zeros(int(zones.max()) + 1, dtype=np.int64)
+    at_main = zero_at_main == 0
+    main_of_zone[zones[at_main]] = position[blobs.labels[at_main]]
+    nearest, gaps = [], []
+    for number in small:
+        window = blobs.window(number)
+        gap = np.where(blobs.mask(number), away[window], np.inf)
+        place = gap.argmin()
+        nearest.append(main_of_zone[zones[window].flat[place]])
+        gaps.append(gap.flat[place])
+    return np.array(nearest), np.array(gaps)
+
+
+def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) -> bool:
+    """Return whether a patch is a part of the figure whose body is nearest to it."""
+    own, main = blobs.boxes[number], blobs.boxes[body]
+    area = blobs.areas[number] / blobs.areas[body]
+    if area > PART_AREA:
+        return False
+    if _share_within(own, main) >= WITHIN:
+        return True
+    if blobs.areas[number] >= SWATCH * own[2] * own[3]:
+        return False
+    lettering = _is_lettering(blobs, number, body, rgb)
+    below = own[1] >= main[1] + main[3]
+    if gap <= NEAR * main[3]:
+        return not (lettering and below)
+    if area < LEAST_PART or _is_stroke(blobs.mask(number)):
+        return False
+    if lettering:
+        return False
+    middle = own[0] + own[2] / 2
+    if main[0] <= middle <= main[0] + main[2]:
+        return bool(gap <= ABOVE * main[3] and own[1] < main[1])
+    return gap <= BESIDE * main[3] and _in_its_colors(blobs, number, body, rgb)
+
+
+def _come_again(
+    blobs: Blobs,
+    numbers: Int[np.ndarray, " n"],
+    bodies: Int[np.ndarray, " n"],
+    gaps: Float[np.ndarray, " n"],
+    views: int,
+    rgb: np.ndarray,
+) -> Bool[np.ndarray, " n"]:
+    """Return which patches are parts: most views have the like at the level, or one has a pair.
+
+    So hands without arms and hats in the air are found, farther away than a single thing may be.
+    """
+    result = np.zeros(len(numbers), dtype=bool)
+    own, main = blobs.boxes[numbers], blobs.boxes[bodies]
+    middle = own[:, :2] + own[:, 2:] / 2 - main[:, :2]
+    level = middle[:, 1] / main[:, 3]
+    size = blobs.areas[numbers] / blobs.areas[bodies]
+    above = (middle[:, 0] >= 0) & (middle[:, 0] <= main[:, 2])
+    able = (gaps <= FARTHEST * main[:, 3]) & (size >= LEAST_PART) & (size <= PART_AREA)
+    able &= level <= FEET  # captions stand below
+    for i in np.flatnonzero(able):
+        number, body = int(numbers[i]), int(bodies[i])
+        drawn = not _is_lettering(blobs, number, body, rgb) and not _is_stroke(blobs.mask(number))
+        able[i] = drawn and (above[i] or _in_its_colors(blobs, number, body, rgb))
+    for i in np.flatnonzero(able):
+        alike = able & (np.abs(level - level[i]) <= SAME_LEVEL) & (above == above[i])
+        alike &= (size <= SAME_SIZE * size[i]) & (size >= size[i] / SAME_SIZE)
+        often = len(np.unique(bodies[alike])) >= 2 and alike.sum() >= OFTEN * views
+        left = middle[:, 0] < main[:, 2] / 2
+        pair = alike & (bodies == bodies[i]) & (left != left[i]) & ~above
+        result[i] = often or pair.any()
+    return result
+
+
+def _share_within(own: np.ndarray, main: np.ndarray) -> float:
+    start = np.maximum(own[:2], main[:2])
+    stop = np.minimum(own[:2] + own[2:], main[:2] + main[2:])
+    width, height = np.maximum(stop - start, 0)
+    return float(width * height / (own[2] * own[3]))
+
+
+def _is_stroke(mask: Bool[np.ndarray, "height width"]) -> bool:
+    """Return whether a patch is thin for its length: an arrow, a flourish."""
+    height, width = mask.shape
+    return bool(mask.sum() <= STROKE * (height**2 + width**2))
+
+
+def _is_lettering(blobs: Blobs, number: int, body: int, rgb: np.ndarray) -> bool:
+    """Return whether a patch is of one ink, and low or thin: a word, a figure, an arrow."""
+    mask = blobs.mask(number)
+    low = mask.shape[0] <= LETTER_HEIGHT * blobs.boxes[body, 3]
+    round_ = mask.mean() >= DISC[0] and max(mask.shape) <= 1.5 * min(mask.shape)  # a hand is
+    thin = (low and not round_) or _is_stroke(mask)
+    return thin and _is_ink(rgb[blobs.window(number)][mask])
+
+
+def _is_ink(colors: UInt8[np.ndarray, "n 3"]) -> bool:
+    """Return whether pixels are one dark ink and its soft edges: lettering, an arrow."""
+    luma = colors.mean(axis=1)
+    ink = np.median(colors[luma <= np.percentile(luma, 25)], axis=0)
+    if ink.mean() > DARK:
+        return False
+    spread = colors - ink  # soft edges lie between the ink and one paper
+    paper = np.median(spread[luma >= np.percentile(luma, 95)], axis=0)
+    along = np.clip(spread @ paper / max(float(paper @ paper), 1.0), 0, 1)
+    off = np.abs(spread - along[:, None] * paper).max(axis=1)
+    return bool((off <= OFF_INK).mean() >= ONE_INK)
+
+
+def _in_its_colors(blobs: Blobs, number: int, body: int, rgb: np.ndarray) -> bool:
+    """Return whether a patch has hardly a colour that the figure does not have."""
+    known = np.zeros((8, 8, 8), dtype=np.uint8)
+    known[tuple((rgb[blobs.window(body)][blobs.mask(body)] // 32).T)] = 1
+    own = tuple((rgb[blobs.window(number)][blobs.mask(number)] // 32).T)
+    return float(known[own].mean()) >= FAMILIAR
+
+
+def _kind(blobs: Blobs, number: int, typical: float) -> str:
+    mask, (_, _, width, height) = blobs.mask(number), blobs.boxes[number]
+    fill = blobs.areas[number] / (width * height)
+    if fill >= SWATCH or (DISC[0] <= fill <= DISC[1] and 0.8 <= width / height <= 1.25):
+        return "swatch"
+    if _is_stroke(mask):
+        return "mark"
+    return "study" if blobs.areas[number] >= LEAST_PART * typical else "speck"

@@ -1,0 +1,188 @@
+"""Enclosed patches in the background's colour: holes, or white eyes, shirts and paper?
+
+A picture alone cannot always tell; these rules say what is assumed. A patch is a hole (the gap
+between arm and body) if all of this holds:
+
+- it is larger than a small share of the figure,
+- it does not lie in the figure's top: a white patch there is hair, a face or a hat,
+- nothing lies inside it (an eye has a pupil),
+- a limb divides it from the outside: neither only a line (white clothes reach up to the outline)
+  nor half of the body (a white bag, a button),
+- a line or another colour runs all round it: it does not fade into a shade of its own colour,
+- its border looks like the figure's outline: as inked as that, and without soft shades beside it
+  (a white shirt has folds and borders on skin without the contour line),
+- most of the figure is in other colours (else it is a line drawing, whose paper is its body).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from toonset.dataset.split.background import difference
+
+LEAST_HOLE_PX = 9
+LEAST_ISLAND_PX = 4
+LINE_ART = 0.5  # of the figure: more of it in the background's colour is a line drawing
+INK_LUMA = 64  # of 255: darker is ink
+HEAD = 0.25  # of the figure's height from its top: no holes there
+SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
+LEAST_WALL_PX = 4.0
+THIN_WALL = 0.025  # of the figure's height: no limb but a line
+MOST_THIN = 0.15  # of the border behind so thin a wall
+THICK_WALL = 0.2  # of the figure's height: no limb but the body
+CLEAR = 40  # levels from the background: a line or another colour
+MOST_FADING = 0.1  # of the border
+AS_INKED = 0.5  # of the outline's share of ink
+SLACK = 0.05  # of the border: the shares of a short border are rough
+SQUARE = np.ones((3, 3), np.uint8)
+
+
+@dataclass(frozen=True)
+class BorderLook:
+    """Counts of pixels along a border.
+
+    Attributes:
+        ink: dark pixels within 3 px.
+        near: pixels within 3 px.
+        shades: pixels 3 to 4 px away that are nearly background; nearer, the edge itself is soft.
+        far: pixels 3 to 4 px away.
+    """
+
+    ink: int
+    near: int
+    shades: int
+    far: int
+
+    def __add__(self, other: BorderLook) -> BorderLook:
+        """Return the look of both borders together."""
+        return BorderLook(
+            self.ink + other.ink,
+            self.near + other.near,
+            self.shades + other.shades,
+            self.far + other.far,
+        )
+
+    def could_belong_to(self, outline: BorderLook) -> bool:
+        """Return whether this border is as inked as the outline, and as free of soft shades."""
+        ink, shades = self.ink / max(self.near, 1), self.shades / max(self.far, 1)
+        least_ink = AS_INKED * outline.ink / max(outline.near, 1) - SLACK
+        return ink >= least_ink and shades <= outline.shades / max(outline.far, 1) + SLACK
+
+
+def outline_look(
+    rgb: UInt8[np.ndarray, "height width 3"],
+    mask: Bool[np.ndarray, "height width"],
+    enclosed: Bool[np.ndarray, "height width"],
+    background: UInt8[np.ndarray, "height width 3"],
+) -> BorderLook:
+    """Return what a figure's outline looks like; see `open_holes` for the arguments."""
+    return _look(
+        ~mask,
+        mask & ~enclosed,
+        difference(rgb, background),
+        cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY),
+    )
+
+
+def open_holes(
+    rgb: UInt8[np.ndarray, "height width 3"],
+    mask: Bool[np.ndarray, "height width"],
+    enclosed: Bool[np.ndarray, "height width"],
+    background: UInt8[np.ndarray, "height width 3"],
+    outline: BorderLook,
+    least_share: float,
+) -> tuple[Bool[np.ndarray, "height width"], int]:
+    """Return the figure without its holes, and how many there were.
+
+    Args:
+        rgb: the crop of the sheet.
+        mask: the figure with everything that it encloses.
+        enclosed: its patches in the background's colour.
+        background: that colour behind the crop.
+        outline: what the outlines of all figures of the sheet look like.
+        least_share: of the figure's area; a smaller patch is no hole.
+    """
+    area = int(mask.sum())
+    if not enclosed.any() or int(enclosed.sum()) > LINE_ART * area:
+        return mask, 0
+    contrast, luma = (
+        difference(rgb, background),
+        cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY),
+    )
+    depth = cv2.distanceTransform(
+        np.pad(mask, 1).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+    )[1:-1, 1:-1]
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(
+        enclosed.astype(np.uint8), connectivity=4
+    )
+    result, opened = mask.copy(), 0
+    rows = np.flatnonzero(mask.any(axis=1))
+    top, height = int(rows[0]), int(rows[-1] - rows[0]) + 1
+    for number in range(1, len(stats)):
+        if stats[number, cv2.CC_STAT_AREA] < max(least_share * area, LEAST_HOLE_PX):
+            continue
+        if stats[number, cv2.CC_STAT_TOP] < top + HEAD * height:
+            continue
+        window = _window(stats[number], labels.shape)
+        patch = labels[window] == number
+        look = _look(patch, (mask & ~enclosed)[window], contrast[window], luma[window])
+        if not _is_behind_a_limb(patch, depth[window], height):
+            continue
+        fades = _fading(patch, contrast[window]) > MOST_FADING
+        if look.could_belong_to(outline) and not fades and not _has_islands(patch):
+            result[window] &= ~patch
+            opened += 1
+    return result, opened
+
+
+def _is_behind_a_limb(
+    patch: Bool[np.ndarray, "height width"], depth: Float[np.ndarray, "height width"], tall: int
+) -> bool:
+    """Return whether a patch is as far from the outside as a limb is thick."""
+    rim = patch & (cv2.erode(np.pad(patch, 1).view(np.uint8), SQUARE)[1:-1, 1:-1] == 0)
+    walls = depth[rim]
+    thin = float((walls <= max(LEAST_WALL_PX, THIN_WALL * tall)).mean())
+    return thin <= MOST_THIN and float(walls.min()) <= THICK_WALL * tall
+
+
+def _fading(
+    patch: Bool[np.ndarray, "height width"], contrast: UInt8[np.ndarray, "height width"]
+) -> float:
+    """Return the share of a patch's border beside which nothing differs from the background."""
+    rim = (cv2.dilate(patch.view(np.uint8), SQUARE) > 0) & ~patch
+    around = cv2.dilate(contrast, np.ones((7, 7), np.uint8))
+    return float((around[rim] < CLEAR).mean()) if rim.any() else 0.0
+
+
+def _look(
+    empty: np.ndarray, solid: np.ndarray, contrast: np.ndarray, luma: np.ndarray
+) -> BorderLook:
+    patch = empty.astype(np.uint8)
+    reach = [cv2.dilate(patch, SQUARE, iterations=steps) > 0 for steps in (2, 3, 4)]
+    near, far = reach[1] & solid, reach[2] & ~reach[0] & solid
+    return BorderLook(
+        int((luma[near] < INK_LUMA).sum()),
+        int(near.sum()),
+        int((contrast[far] < SOFT_SHADE).sum()),
+        int(far.sum()),
+    )
+
+
+def _window(stat: np.ndarray, shape: tuple[int, int]) -> tuple[slice, slice]:
+    x, y, width, height = (int(value) for value in stat[:4])
+    return (
+        slice(max(y - 5, 0), min(y + height + 5, shape[0])),
+        slice(max(x - 5, 0), min(x + width + 5, shape[1])),
+    )
+
+
+def _has_islands(patch: Bool[np.ndarray, "height width"]) -> bool:
+    """Return whether something lies inside the patch."""
+    outside = np.pad(~patch, 1, constant_values=True).astype(np.uint8)
+    _, _, stats, _ = cv2.connectedComponentsWithStats(outside, connectivity=8)
+    sizes = np.sort(stats[1:, cv2.CC_STAT_AREA])[::-1]  # the largest is the surroundings
+    return bool((sizes[1:] >= LEAST_ISLAND_PX).any())

@@ -1,0 +1,153 @@
+"""A look at the whole sheet: what is paint, what is paper, which figures stand where.
+
+Very large sheets are surveyed on cells of a few pixels; cutting out (`toonset.dataset.split.sheet`)
+uses every pixel again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Int, UInt8
+
+from toonset.dataset.split.background import Background, difference, ring_of, with_final_tolerance
+from toonset.dataset.split.figures.blobs import (
+    Blobs,
+    find_blobs,
+    find_mains,
+    with_blocks,
+    without_strangers,
+)
+from toonset.dataset.split.figures.grouping import Grouping, group_blobs
+from toonset.dataset.split.figures.swatch_strips import strip_seams
+from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
+from toonset.dataset.split.shadows import find_shadows
+from toonset.dataset.split.touching.cut import Cut, part_touching
+from toonset.dataset.split.touching.parts import part_shared
+from toonset.view import Box
+
+LARGEST_SIDE = 4096  # pixels: a larger sheet is surveyed on cells
+BAND = 2**22  # pixels that are compared with the background at a time
+PAINTED = 0.12  # of a cell: less is noise
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What a look at the sheet found, in cells of `cell_px` pixels.
+
+    Attributes:
+        cell_px: width and height of a cell.
+        paper: (rows, columns) cells that the border reaches through background.
+        shadow: (rows, columns) cells of cast shadows.
+        ruled: (rows, columns) cells of ruled lines.
+        lines: the ruled lines.
+        blobs: patches of figures and other things.
+        grouping: which patch is whose.
+        cuts: where touching figures were cut apart.
+    """
+
+    cell_px: int
+    paper: Bool[np.ndarray, "rows columns"]
+    shadow: Bool[np.ndarray, "rows columns"]
+    ruled: Bool[np.ndarray, "rows columns"]
+    lines: tuple[Line, ...]
+    blobs: Blobs
+    grouping: Grouping
+    cuts: tuple[Cut, ...]
+
+
+def find_paint(
+    rgba: UInt8[np.ndarray, "height width 4"], ground: Background
+) -> tuple[Bool[np.ndarray, "height width"], Background]:
+    """Return which pixels are not background, and the background with its final tolerance."""
+    if ground.rgb is None:
+        return rgba[..., 3] > 0, ground
+    height, width = rgba.shape[:2]
+    away = np.empty((height, width), dtype=np.uint8)
+    rows = max(1, BAND // width)
+    for top in range(0, height, rows):
+        part = rgba[top : top + rows, :, :3]
+        away[top : top + rows] = difference(part, ground.colors((0, top, width, len(part))))
+    ground = with_final_tolerance(ground, away)
+    return away > ground.tolerance, ground
+
+
+def survey(
+    rgba: UInt8[np.ndarray, "height width 4"],
+    paint: Bool[np.ndarray, "height width"],
+    ground: Background,
+) -> Survey:
+    """Return what stands where on a sheet."""
+    cell = max(1, -(-max(paint.shape) // LARGEST_SIDE))
+    painted = in_cells(paint, cell)
+    lines = find_lines(painted)
+    ruled = line_pixels(painted, lines)
+    shadow = np.zeros_like(painted)
+    ring = ring_of(painted.shape[0], painted.shape[1], ground.inset)
+    paper = joined(~painted | ruled, ring)
+    blobs = find_blobs(~paper)
+    small = np.ascontiguousarray(rgba[::cell, ::cell])
+    seams = strip_seams(blobs, small[..., :3])
+    if seams.any():
+        ruled = ruled | seams
+        paper = joined(~painted | ruled, ring)
+        blobs = find_blobs(~paper)
+    if len(blobs.areas):
+        box = (0, 0, paint.shape[1], paint.shape[0])
+        colors = None if ground.rgb is None else ground.colors(box)[::cell, ::cell]
+        shadow = find_shadows(blobs, find_mains(blobs), small, colors, ground.tolerance)
+    if shadow.any():
+        paper = joined(~painted | ruled | shadow, ring)
+        blobs = find_blobs(~paper)
+    blobs, cuts = part_touching(blobs, painted & ~ruled & ~shadow, small[..., :3])
+    mains = with_blocks(blobs, find_mains(blobs), painted, small[..., :3])
+    mains = without_strangers(blobs, mains, painted, small[..., :3])
+    grouping = group_blobs(blobs, mains, small[..., :3])
+    blobs, bodies, shared = part_shared(blobs, mains, grouping)
+    if shared:
+        grouping = group_blobs(blobs, mains, small[..., :3], bodies)
+    cuts += shared
+    return Survey(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
+
+
+def joined(
+    free: Bool[np.ndarray, "height width"], seeds: Bool[np.ndarray, "height width"]
+) -> Bool[np.ndarray, "height width"]:
+    """Return the free pixels that are connected to a seed through free pixels."""
+    _, found = cv2.connectedComponents(free.view(np.uint8), connectivity=4)
+    labels = np.asarray(found, dtype=np.int32)
+    touched = np.zeros(int(labels.max()) + 1, dtype=bool)
+    touched[labels[seeds]] = True
+    touched[0] = False
+    return touched[labels]
+
+
+def in_cells(
+    mask: Bool[np.ndarray, "height width"], cell_px: int
+) -> Bool[np.ndarray, "rows columns"]:
+    """Return which cells the mask covers by more than noise."""
+    if cell_px == 1:
+        return mask
+    height, width = mask.shape
+    below, beside = -height % cell_px, -width % cell_px
+    padded = cv2.copyMakeBorder(
+        255 * mask.view(np.uint8), 0, below, 0, beside, cv2.BORDER_REPLICATE
+    )
+    size = padded.shape[1] // cell_px, padded.shape[0] // cell_px
+    return cv2.resize(padded, size, interpolation=cv2.INTER_AREA) > 255 * PAINTED
+
+
+def in_pixels(cells: np.ndarray, cell_px: int, box: Box) -> np.ndarray:
+    """Return the cells' values for every pixel of a window (x, y, width, height) of the sheet."""
+    x, y, width, height = box
+    rows = np.arange(y, y + height) // cell_px
+    columns = np.arange(x, x + width) // cell_px
+    return cells[rows[:, None], columns]
+
+
+def figure_cells(found: Survey) -> Int[np.ndarray, "rows columns"]:
+    """Return the number of the figure of every cell, plus 1; 0 = none."""
+    number = np.append(0, found.grouping.figure_of_blob + 1).astype(np.int16)
+    return number[found.blobs.labels]

@@ -1,0 +1,231 @@
+"""From a sheet to its views: find the background, the figures, their order; cut each one out.
+
+The cost grows with the number of pixels, plus a little per figure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from toonset.dataset.silhouettes.line_width import contour_width_px
+from toonset.dataset.split.background import Background, find_background, flattened, is_transparent
+from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
+from toonset.dataset.split.figures.blobs import as_box
+from toonset.dataset.split.figures.text_and_swatches import words
+from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
+from toonset.dataset.split.matting import cut_out, edge_softness_px
+from toonset.dataset.split.segment import Survey, find_paint, survey
+from toonset.dataset.split.warnings import border_doubts, figure_doubts
+from toonset.errors import SheetError
+from toonset.view import Box, View
+
+LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
+
+NAMES = {
+    "text": "text beside the figures was",
+    "swatch": "patches of plain colour were",
+    "mark": "strokes beside the figures were",
+    "study": "smaller drawings were",
+    "speck": "small patches that belong to no figure were",
+}
+
+
+@dataclass(frozen=True)
+class SheetOptions:
+    """How a sheet is split.
+
+    Attributes:
+        margin_px: empty pixels around every figure.
+        least_hole: share of the figure's area from which an enclosed patch in the background's
+            colour is a hole.
+        most_figures: more are refused; a sheet of letters or a pattern is no character sheet.
+        background_rgb: the background's colour, where a person knows it.
+        boxes: (x, y, width, height) of the figures where a person gives them; one view each, in
+            this order.
+        grid: columns and rows of equal cells, one view per cell that is not empty.
+    """
+
+    margin_px: int = 4
+    least_hole: float = 0.001
+    most_figures: int = 64
+    background_rgb: tuple[int, int, int] | None = None
+    boxes: tuple[Box, ...] = ()
+    grid: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something on the sheet that is no view.
+
+    Attributes:
+        box: (x, y, width, height) in the sheet.
+        kind: "text", "frame", "swatch", "study" (a head, a prop, a small extra drawing), "mark"
+            (an arrow, a rule) or "speck".
+    """
+
+    box: Box
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The drawings of a sheet.
+
+    Attributes:
+        views: in reading order, rows from the top, each from left to right.
+        background: the sheet's colour; None where it is transparent.
+        sure: share of the sheet's border that is background, 0 to 1.
+        warnings: what a person should look at, for a view may be wrong.
+        left_out: what was seen but is no view.
+        remarks: what was done besides, for people.
+    """
+
+    views: tuple[View, ...]
+    background: tuple[int, int, int] | None
+    sure: float
+    warnings: tuple[str, ...]
+    left_out: tuple[LeftOut, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def split_sheet(
+    rgba: UInt8[np.ndarray, "height width 4"], options: SheetOptions | None = None
+) -> Sheet:
+    """Return the views of a sheet.
+
+    Args:
+        rgba: the picture; a single figure is fine.
+        options: see `SheetOptions`.
+
+    Raises:
+        SheetError: blank, no plain background, nothing on it large enough, far too many figures.
+    """
+    options = options or SheetOptions()
+    if options.background_rgb is not None or not is_transparent(rgba):
+        rgba = flattened(rgba)
+    ground = find_background(rgba, options.background_rgb)
+    paint, ground = find_paint(rgba, ground)
+    found = survey(rgba, paint, ground)
+    _check(found, ground, options)
+    crops = _crops(found, paint, options)
+    views, holes = _views(rgba, ground, crops, options)
+    by_hand = bool(options.boxes) or options.grid is not None
+    return Sheet(
+        tuple(views),
+        ground.rgb,
+        ground.sure,
+        border_doubts(ground, found) + (() if by_hand else figure_doubts(found, views, rgba)),
+        () if by_hand else _left_out(found),
+        _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+    )
+
+
+def _check(found: Survey, ground: Background, options: SheetOptions) -> None:
+    color = "transparent" if ground.rgb is None else "#{:02x}{:02x}{:02x}".format(*ground.rgb)
+    blobs = found.blobs
+    if not len(blobs.areas):
+        raise SheetError(f"the sheet is blank (all {color}); a drawn figure is needed")
+    width, height = (int(v) * found.cell_px for v in blobs.boxes[blobs.areas.argmax(), 2:])
+    if min(width, height) < LEAST_FIGURE_PX:
+        raise SheetError(
+            f"no figure on the {color} background: the largest patch is {width} x {height} px, "
+            f"{LEAST_FIGURE_PX} x {LEAST_FIGURE_PX} is needed; use a larger picture"
+        )
+    by_hand = bool(options.boxes) or options.grid is not None
+    if found.grouping.count > options.most_figures and not by_hand:
+        raise SheetError(
+            f"found {found.grouping.count} figures, at most {options.most_figures} are read; crop "
+            "the sheet to one character"
+        )
+
+
+def _crops(
+    found: Survey, paint: Bool[np.ndarray, "height width"], options: SheetOptions
+) -> list[Crop]:
+    if options.boxes:
+        return boxed_crops(found, paint, options.boxes, options.margin_px)
+    if options.grid is not None:
+        return grid_crops(found, paint, options.grid, options.margin_px)
+    return found_crops(found, paint, options.margin_px)
+
+
+def _window(picture: np.ndarray, box: Box) -> np.ndarray:
+    x, y, width, height = box
+    return picture[y : y + height, x : x + width]
+
+
+def _views(
+    rgba: np.ndarray, ground: Background, crops: list[Crop], options: SheetOptions
+) -> tuple[list[View], int]:
+    """Return the views and the number of opened holes."""
+    holes = 0
+    if ground.rgb is None:
+        cuts = [np.where(c.solid[..., None], _window(rgba, c.box), np.uint8(0)) for c in crops]
+    else:
+        papers = [ground.colors(crop.box) for crop in crops]
+        softness = _softness(rgba, ground, crops)
+        look = BorderLook(0, 0, 0, 0)
+        for crop, paper in zip(crops, papers, strict=True):
+            rgb = _window(rgba, crop.box)[..., :3]
+            look += outline_look(rgb, crop.solid, crop.enclosed, paper)
+        cuts = []
+        for crop, paper in zip(crops, papers, strict=True):
+            rgb = _window(rgba, crop.box)[..., :3]
+            solid, opened = open_holes(
+                rgb, crop.solid, crop.enclosed, paper, look, options.least_hole
+            )
+            cuts.append(cut_out(rgb, solid, paper, ground.tolerance, softness))
+            holes += opened
+    return [
+        _view(cut, crop.box, f"{i:03d}.png")
+        for i, (cut, crop) in enumerate(zip(cuts, crops, strict=True))
+    ], holes
+
+
+def _softness(rgba: np.ndarray, ground: Background, crops: list[Crop]) -> int:
+    """Return the edge softness of the sheet: the median of its figures'."""
+    each = [
+        edge_softness_px(
+            _window(rgba, crop.box)[..., :3], crop.solid, ground.colors(crop.box), ground.tolerance
+        )
+        for crop in crops
+    ]
+    return int(np.median(each))
+
+
+def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View:
+    if not (cut[..., 3] >= 128).any():
+        raise SheetError(f"view {name}: its figure is nearly transparent; an opaque one is needed")
+    return View(cut, box, contour_width_px(cut), name)
+
+
+def _left_out(found: Survey) -> tuple[LeftOut, ...]:
+    """Return what was seen but is no view, words as one each."""
+    boxes = [(line.box, "frame") for line in found.lines]
+    kinds = np.array(found.grouping.kinds, dtype=object)
+    for kind in NAMES:
+        own = found.blobs.boxes[kinds == kind]
+        boxes += [(as_box(box), kind) for box in (words(own) if kind == "text" else own)]
+    cell = found.cell_px
+    return tuple(
+        LeftOut((x * cell, y * cell, width * cell, height * cell), kind)
+        for (x, y, width, height), kind in boxes
+    )
+
+
+def _remarks(ground: Background, found: Survey, holes: int, cuts: int) -> tuple[str, ...]:
+    said = [] if ground.kind in ("plain", "transparent") else [str(ground)]
+    kinds = found.grouping.kinds
+    said += [f"{NAMES[kind]} left out ({kinds.count(kind)})" for kind in NAMES if kind in kinds]
+    if found.lines:
+        said.append(f"ruled lines were taken for paper ({len(found.lines)})")
+    if found.shadow.any():
+        said.append("shadows on the ground were left out")
+    if cuts:
+        said.append(f"touching figures were cut apart ({cuts})")
+    if holes:
+        said.append(f"enclosed patches in the background's colour became holes ({holes})")
+    return tuple(said)

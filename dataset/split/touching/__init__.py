@@ -1,0 +1,1 @@
+"""Cut figures apart that touch each other."""

@@ -1,0 +1,130 @@
+"""What a person should look at after a sheet was split, for a view may be wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.dataset.split.background import Background
+from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
+from toonset.dataset.split.figures.grouping import LEAST_PART
+from toonset.dataset.split.segment import Survey
+from toonset.view import View
+
+SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
+NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
+PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the narrowest's: no view
+ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
+BROAD = 1.15  # times its own height: wider than arms reach
+NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
+WIDE = 1.8  # times the median width: two figures that touch
+
+
+def border_doubts(ground: Background, found: Survey) -> tuple[str, ...]:
+    """Return a line if the background is hardly one."""
+    if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:  # a frame explains it
+        return ()
+    return (f"only {100 * ground.sure:.0f} % of the sheet's border is background",)
+
+
+def figure_doubts(
+    found: Survey, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
+) -> tuple[str, ...]:
+    """Return a line for every cut in doubt, every wide view, all left out that may be views."""
+    return (
+        *_cuts(found),
+        *_wide_views(views),
+        *_near_parts(found, views),
+        *_like_views(found, views, rgba),
+    )
+
+
+def _cuts(found: Survey) -> list[str]:
+    said = []
+    for cut in (cut for cut in found.cuts if cut.in_doubt):
+        x, y, width, height = (value * found.cell_px for value in cut.box)
+        said.append(
+            f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "
+            f"through {100 * cut.crossed:.1f} % of their height: look whether the cut is right"
+        )
+    return said
+
+
+def _wide_views(views: list[View]) -> list[str]:
+    said = []
+    widths = [view.figure_box[2] for view in views]
+    for view, width in zip(views, widths, strict=True):
+        among_others = len(views) >= 3 and width > WIDE * float(np.median(widths))
+        if among_others or width > BROAD * view.figure_box[3]:
+            said.append(f"view {view.name} is unusually wide: do two figures touch?")
+    return said
+
+
+def _near_parts(found: Survey, views: list[View]) -> list[str]:
+    """Return a line for every part apart that stands as near to another view as parts do."""
+    parts, bodies = _parts_apart(found)
+    own = [_gap(found.blobs, n, bodies[k]) for n, k in parts]
+    reach = NEARER * max((gap for gap in own if np.isfinite(gap)), default=0.0)
+    said = []
+    for (number, figure), gap in zip(parts, own, strict=True):
+        for other, body in enumerate(bodies):
+            if other != figure and np.isfinite(gap) and _gap(found.blobs, number, body) <= reach:
+                x, y, _, _ = (int(value) * found.cell_px for value in found.blobs.boxes[number])
+                said.append(
+                    f"a part at {x}, {y} went to view {views[figure].name}: "
+                    f"is it a part of {views[other].name}, which is near, too?"
+                )
+    return said
+
+
+def _parts_apart(found: Survey) -> tuple[list[tuple[int, int]], list[int]]:
+    """Return patches that are parts, with the numbers of their views, and the views' bodies."""
+    parts, bodies = list[tuple[int, int]](), list[int]()
+    areas = found.blobs.areas
+    for figure in range(found.grouping.count):
+        own = np.flatnonzero(found.grouping.figure_of_blob == figure)
+        bodies.append(int(own[areas[own].argmax()]))
+        least = LEAST_PART * areas[bodies[-1]]
+        parts += [(int(n), figure) for n in own if n != bodies[-1] and areas[n] >= least]
+    return parts, bodies
+
+
+def _gap(blobs: Blobs, part: int, body: int) -> float:
+    """Return how far a part is beside a body, in the body's heights; infinite at no level of it."""
+    x, y, width, height = blobs.boxes[part]
+    left, top, _, tall = blobs.boxes[body]
+    beside = blobs.mask(body)[max(0, y - top) : max(0, y + height - top)]
+    columns = np.flatnonzero(beside.any(axis=0))
+    if not len(columns):
+        return np.inf
+    return float(max(left + columns[0] - x - width, x - left - columns[-1] - 1, 0) / tall)
+
+
+def _like_views(found: Survey, views: list[View], rgba: np.ndarray) -> list[str]:
+    """Return a line for every drawing left out that is as high as a view, or like a small one."""
+    usual = float(np.median([view.figure_box[3] for view in views]))
+    shapes = [view.figure_box[2] / view.figure_box[3] for view in views]
+    colors = [view.rgba[view.mask][:, :3] for view in views]
+    said, cell = [], found.cell_px
+    for number, kind in enumerate(found.grouping.kinds):
+        if kind != "study":
+            continue
+        x, y, width, height = (int(value) * cell for value in found.blobs.boxes[number])
+        if height < NEARLY_A_VIEW * usual:
+            continue
+        own = rgba[::cell, ::cell, :3][found.blobs.window(number)][found.blobs.mask(number)]
+        slender = width / height >= min(shapes) / PROPORTIONS
+        shaped = slender and width / height <= max(shapes) * PROPORTIONS
+        if height >= LOWEST * usual or (shaped and _shares(own, colors)):
+            said.append(
+                f"a drawing at {x}, {y} of {100 * height / usual:.0f} % of the views' height "
+                "was left out: if it is a view, give all views with --boxes"
+            )
+    return said
+
+
+def _shares(own: UInt8[np.ndarray, "n 3"], views: list[np.ndarray]) -> bool:
+    """Return whether a drawing has the views' colours about as much as they have each other's."""
+    among = [shared_colors(a, b) for i, a in enumerate(views) for b in views[i + 1 : i + 2]]
+    least = ALIKE * float(np.median(among)) if among else ALIKE
+    return float(np.median([shared_colors(own, view) for view in views])) >= least

@@ -1,0 +1,120 @@
+"""The views of one or more sheets together, and where each was cut from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+
+from toonset.dataset.split.sheet import LeftOut, Sheet
+from toonset.view import View
+
+UNKNOWN_LABEL = "?"
+DROPPED = "dropped"  # what was left out by hand
+
+
+@dataclass(frozen=True)
+class Source:
+    """A picture that views were cut from.
+
+    Attributes:
+        name: its file name.
+        sha256: of the file.
+        size_wh: pixels.
+        background: its colour; None where it is transparent.
+        warnings: what was doubtful in it, for people.
+        left_out: what was seen in it but is no view.
+        remarks: what was done besides, for people.
+    """
+
+    name: str
+    sha256: str
+    size_wh: tuple[int, int]
+    background: tuple[int, int, int] | None = None
+    warnings: tuple[str, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """The views of one or more sheets.
+
+    Attributes:
+        sources: the sheets.
+        views: in order, named 000.png, 001.png, ...
+        source_of: per view, the position of its sheet in `sources`.
+        labels: per view, what it shows ("front", "90"); "" where nobody has said.
+    """
+
+    sources: tuple[Source, ...]
+    views: tuple[View, ...]
+    source_of: tuple[int, ...]
+    labels: tuple[str, ...]
+
+    @property
+    def label_text(self) -> str:
+        """Return the labels as --views takes them; empty where there are none."""
+        if not any(self.labels):
+            return ""
+        return ",".join(label or UNKNOWN_LABEL for label in self.labels)
+
+
+def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Sheet) -> Split:
+    """Return one sheet's views as a split.
+
+    Args:
+        name: the sheet's file name.
+        data: the file.
+        size_wh: the picture's size.
+        sheet: what was found in it.
+    """
+    digest = sha256(data).hexdigest()
+    source = Source(
+        name,
+        digest,
+        size_wh,
+        sheet.background,
+        sheet.warnings,
+        sheet.left_out,
+        sheet.remarks,
+    )
+    count = len(sheet.views)
+    return Split((source,), sheet.views, (0,) * count, ("",) * count)
+
+
+def joined(parts: Sequence[Split]) -> Split:
+    """Return several splits as one, views numbered through."""
+    sources: list[Source] = []
+    views: list[View] = []
+    source_of: list[int] = []
+    for part in parts:
+        source_of += [index + len(sources) for index in part.source_of]
+        sources += part.sources
+        views += part.views
+    labels = tuple(label for part in parts for label in part.labels)
+    return Split(tuple(sources), numbered(views), tuple(source_of), labels)
+
+
+def without(split: Split, dropped: frozenset[int]) -> Split:
+    """Return the split without some views, the others numbered anew.
+
+    A dropped view stays on record as something that was left out of its sheet.
+    """
+    sources = list(split.sources)
+    for number in sorted(dropped):
+        index = split.source_of[number]
+        left = LeftOut(split.views[number].figure_box, DROPPED)
+        sources[index] = replace(sources[index], left_out=(*sources[index].left_out, left))
+    kept = [number for number in range(len(split.views)) if number not in dropped]
+    return Split(
+        tuple(sources),
+        numbered([split.views[number] for number in kept]),
+        tuple(split.source_of[number] for number in kept),
+        tuple(split.labels[number] for number in kept),
+    )
+
+
+def numbered(views: Sequence[View]) -> tuple[View, ...]:
+    """Return the views named 000.png, 001.png, ..."""
+    return tuple(replace(view, name=f"{number:03d}.png") for number, view in enumerate(views))

@@ -1,0 +1,190 @@
+"""A split sheet on disk: what `toonset split` found, for people to look at and to correct.
+
+    images/000.png     RGBA crops, straight alpha
+    split.json         which sheet each was cut from, where it stood, its line width and label
+    overlay.png        the sheets with numbered boxes (`toonset.dataset.split_folder.overlay`)
+
+The folder may be corrected by hand; `toonset.dataset.split_folder.read` reads it back.
+"""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from jaxtyping import UInt8
+from pydantic import BaseModel, Field, ValidationError
+
+from toonset import __version__
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.split.sheet import LeftOut
+from toonset.dataset.split_folder.places import IMAGES, OVERLAY, SPLIT_FILE
+from toonset.dataset.split_folder.views import Source, Split
+from toonset.errors import SheetError
+from toonset.json_file import SchemaProblems
+from toonset.palette.formats.hex import rgb_of_hex
+from toonset.palette.names import hex_of
+from toonset.read import parse_json, read_whole, schema_version
+from toonset.write import new_folder, write_bytes, write_json
+
+NAME, VERSION = "toonset-split", 1
+MAX_JSON_BYTES = 8 * 2**20
+
+_Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]
+_Place = Annotated[int, Field(strict=True, ge=0, le=10**6)]
+_Box = tuple[_Place, _Place, _Length, _Length]
+
+
+class SplitProblems(SchemaProblems, SheetError):
+    """A split.json that does not fit its schema; all that is wrong is in `problems`."""
+
+
+class _LeftOutRecord(BaseModel):
+    kind: Annotated[str, Field(max_length=40)]
+    box: _Box
+
+
+class _SourceRecord(BaseModel):
+    name: str
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    size_wh: tuple[_Length, _Length]
+    background: Annotated[str, Field(pattern="^#[0-9a-f]{6}$")] | None = None
+    warnings: list[str] = []
+    remarks: list[str] = []
+    left_out: list[_LeftOutRecord] = []
+
+
+class ViewRecord(BaseModel):
+    """One view as split.json has it.
+
+    Attributes:
+        name: of its picture.
+        sheet: number of its sheet.
+        box: (x, y, width, height) of the figure in its sheet.
+        crop: the same of its picture, which has a margin.
+        line_width_px: of the drawn contour; 0 where there is none.
+        label: what it shows, where a person has said.
+        sha256: of its picture file.
+    """
+
+    name: str
+    sheet: Annotated[int, Field(strict=True, ge=0)]
+    box: _Box
+    crop: _Box
+    line_width_px: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    label: Annotated[str, Field(max_length=40, pattern="^[^,]*$")] | None = None
+    sha256: str = ""
+
+
+class _SplitFile(BaseModel):
+    sheets: list[_SourceRecord]
+    views: list[ViewRecord]
+
+
+def split_dict(split: Split, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of split.json but for the hashes of the views' files."""
+    return {
+        "schema": f"{NAME}/{VERSION}",
+        "toonset": __version__,
+        "sheets": [_source_dict(source) for source in split.sources],
+        "views": [
+            {
+                "name": view.name,
+                "sheet": index,
+                "box": list(view.figure_box),
+                "crop": list(view.box),
+                "line_width_px": round(view.line_width_px, 3),
+                "label": label or None,
+            }
+            for view, index, label in zip(split.views, split.source_of, split.labels, strict=True)
+        ],
+        "options": options,
+    }
+
+
+def write_split(
+    folder: Path,
+    split: Split,
+    overlay: UInt8[np.ndarray, "height width 3"],
+    options: dict[str, Any],
+    *,
+    force: bool = False,
+) -> None:
+    """Write a split folder.
+
+    Args:
+        folder: where; replaced as a whole with `force`.
+        split: what was found.
+        overlay: the picture for people.
+        options: what a person has said: boxes, drops and the like.
+        force: replace an existing folder.
+
+    Raises:
+        OutputError: the folder exists, or cannot be written.
+    """
+    content = split_dict(split, options)
+    with new_folder(folder, force=force) as temporary:
+        for view, record in zip(split.views, content["views"], strict=True):
+            data = encode_png(view.rgba)
+            record["sha256"] = sha256(data).hexdigest()
+            write_bytes(temporary / IMAGES / view.name, data)
+        write_json(temporary / SPLIT_FILE, content)
+        write_bytes(temporary / OVERLAY, encode_png(overlay))
+
+
+def _source_dict(source: Source) -> dict[str, Any]:
+    background = source.background
+    return {
+        "name": source.name,
+        "sha256": source.sha256,
+        "size_wh": list(source.size_wh),
+        "background": None if background is None else hex_of(background),
+        "warnings": list(source.warnings),
+        "remarks": list(source.remarks),
+        "left_out": [{"kind": left.kind, "box": list(left.box)} for left in source.left_out],
+    }
+
+
+def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ...]]:
+    """Return what split.json says of the sheets and of the views.
+
+    Raises:
+        SheetError: the file is missing, of another version, broken, or speaks of a sheet that it
+            does not have.
+    """
+    file = folder / SPLIT_FILE
+    data = read_whole(file, "split", SheetError, MAX_JSON_BYTES)
+    content = parse_json(data, str(file), SheetError)
+    if schema_version(content, NAME, VERSION, str(file), SheetError) is None:
+        raise SheetError(
+            f"{file}: states no schema, '{NAME}/{VERSION}' is needed; split the sheet again"
+        )
+    try:
+        found = _SplitFile.model_validate(content)
+    except ValidationError as error:
+        raise SplitProblems(file, error) from error
+    for view in found.views:
+        if view.sheet >= len(found.sheets):
+            raise SheetError(
+                f"{file}: {view.name} is of sheet {view.sheet}, but there are "
+                f"{len(found.sheets)} (numbered from 0); correct it"
+            )
+    return tuple(_source(record) for record in found.sheets), tuple(found.views)
+
+
+def _source(record: _SourceRecord) -> Source:
+    background = None
+    if record.background is not None:
+        background = rgb_of_hex(record.background, "background")
+    left_out = tuple(LeftOut(left.box, left.kind) for left in record.left_out)
+    return Source(
+        record.name,
+        record.sha256,
+        record.size_wh,
+        background,
+        tuple(record.warnings),
+        left_out,
+        tuple(record.remarks),
+    )

@@ -1,0 +1,1 @@
+"""Draw synthetic turnarounds with their exact truth."""

@@ -1,0 +1,86 @@
+"""The error of a hand-drawn view: a smooth random displacement of the whole drawing.
+
+The field is a sum of cosines that fit 1 to 3 half waves into the cell, per axis,
+
+    d(x, y) = sum over i, j in 0..3, not both 0, of a_ij cos(pi i x) cos(pi j y),   x, y in [0, 1],
+
+a_ij normal with deviation 1 / (i + j): proportions drift over a body part, lines stay smooth. Its
+mean over the figure is removed (a shift is no error of a drawing) and its size set exactly.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Shaped, UInt8
+
+from toonset.dataset.synthetic.drawing import Lines
+from toonset.palette.pixels.labels import UNLABELLED
+
+HALF_WAVES = 3
+
+
+def bend(
+    labels: UInt8[np.ndarray, "height width"],
+    lines: Lines,
+    rms_px: float,
+    generator: np.random.Generator,
+) -> tuple[UInt8[np.ndarray, "height width"], Lines]:
+    """Return labels and lines of a drawing bent by a random field of `rms_px` over its figure."""
+    if rms_px == 0:
+        return labels, lines
+    field = displacement_field(generator, labels != UNLABELLED, rms_px)
+    far = float(max(labels.shape))
+    return displace(labels, field, UNLABELLED, smooth=False), Lines(
+        displace(lines.silhouette, field, far, smooth=True),
+        displace(lines.inner, field, far, smooth=True),
+    )
+
+
+def displacement_field(
+    generator: np.random.Generator, figure: Bool[np.ndarray, "height width"], rms_px: float
+) -> Float[np.ndarray, "height width 2"]:
+    """Return how far (x, y) in pixels every pixel's content comes from.
+
+    Args:
+        generator: asked for the same number of draws, whatever the size.
+        figure: where the drawing is; not empty.
+        rms_px: root mean square length of the displacement over the figure.
+    """
+    height, width = figure.shape
+    weights = generator.standard_normal((HALF_WAVES + 1, HALF_WAVES + 1, 2))
+    order = np.add.outer(np.arange(HALF_WAVES + 1), np.arange(HALF_WAVES + 1))
+    weights = weights / np.maximum(order, 1)[..., None]
+    rows, columns = _waves(height), _waves(width)
+    field = np.einsum("hi,wj,ijc->hwc", rows, columns, weights, optimize=True)
+    field -= field[figure].mean(axis=0)
+    return field * (rms_px / np.sqrt((field[figure] ** 2).sum(axis=1).mean()))
+
+
+def displace(
+    picture: Shaped[np.ndarray, "height width"],
+    field: Float[np.ndarray, "height width 2"],
+    outside: float,
+    *,
+    smooth: bool,
+) -> Shaped[np.ndarray, "height width"]:
+    """Return `picture` with every pixel taken from where `field` says.
+
+    Args:
+        picture: uint8 or float32.
+        field: pixels.
+        outside: value beyond the picture's edges.
+        smooth: interpolate linearly; else take the nearest pixel (labels).
+    """
+    height, width = picture.shape
+    x = (np.arange(width) + field[..., 0]).astype(np.float32)
+    y = (np.arange(height)[:, None] + field[..., 1]).astype(np.float32)
+    mode = cv2.INTER_LINEAR if smooth else cv2.INTER_NEAREST
+    return cv2.remap(
+        picture, x, y, mode, borderMode=cv2.BORDER_CONSTANT, borderValue=(outside,) * 4
+    )
+
+
+def _waves(size: int) -> Float[np.ndarray, "size waves"]:
+    place = (np.arange(size) + 0.5) / size
+    return np.cos(np.pi * np.outer(place, np.arange(HALF_WAVES + 1)))

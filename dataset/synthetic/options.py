@@ -1,0 +1,87 @@
+"""What a synthetic turnaround looks like. No heavy imports: the command line reads the defaults."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from toonset.errors import SheetError
+
+MAX_SAMPLES = 4096  # px a side of a supersampled cell: what off-screen buffers hold in < 1 GiB
+HEX_COLOR = re.compile(r"#?[0-9a-fA-F]{6}")
+
+
+@dataclass(frozen=True)
+class SynthOptions:
+    """Options of `toonset.dataset.synthetic.turnaround.make_turnaround`.
+
+    Attributes:
+        views: drawings, evenly round the character from the front on; 8 is the usual turnaround.
+        cell_px: width and height of one drawing's cell; 300 shows every colour of a character.
+        columns: drawings in a row of the sheet; 0 = all in one row, as artists mostly draw.
+        yaw_jitter_deg: each view is turned too far or too little by up to this.
+        elevation_deg: all cameras look down by this; 0 is the drawing board's view.
+        distance_heights: camera distance in body heights; 0 = orthographic, as sheets mostly are.
+        outline_px: width of the silhouette's black line, 0 = no lines; inner lines are 0.6 of it.
+            2.5 is about 1 % of a 300 px cell, a usual brush.
+        label_lines: draw inner lines between colours, too, not only at depth jumps.
+        warp_percent: root mean square of the smooth drawing error over the figure, in percent of
+            the cell; 0 is perfect, 0.5 to 1.5 are careful hands.
+        scale_error_percent: each view is drawn larger or smaller by up to this.
+        following_parts: mesh parts that keep facing the viewer (the ears of a famous mouse).
+        background: "white", "transparent" or a colour such as "#aabbcc"; artists export white.
+        supersample: samples per pixel and axis for anti-aliasing; 3 gives 10 levels or more.
+    """
+
+    views: int = 8
+    cell_px: int = 300
+    columns: int = 0
+    yaw_jitter_deg: float = 0.0
+    elevation_deg: float = 0.0
+    distance_heights: float = 0.0
+    outline_px: float = 2.5
+    label_lines: bool = True
+    warp_percent: float = 0.0
+    scale_error_percent: float = 0.0
+    following_parts: tuple[str, ...] = ()
+    background: str = "white"
+    supersample: int = 3
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be drawn.
+
+        Raises:
+            SheetError: a number is out of its range, or the background is no colour.
+        """
+        limits = {
+            "views": (1, 360),
+            "cell_px": (16, MAX_SAMPLES // max(self.supersample, 1)),
+            "columns": (0, self.views),
+            "yaw_jitter_deg": (0, 180),
+            "elevation_deg": (-89, 89),
+            "distance_heights": (0, 1e6),
+            "outline_px": (0, self.cell_px / 10),
+            "warp_percent": (0, 5),
+            "scale_error_percent": (0, 50),
+            "supersample": (1, 16),
+        }
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            if not low <= value <= high:  # NaN, too
+                raise SheetError(f"synth: {name} is {value}, {low:g} to {high:g} is needed")
+        if self.background not in ("white", "transparent") and not HEX_COLOR.fullmatch(
+            self.background
+        ):
+            raise SheetError(
+                f"synth: background {self.background!r} is none of white, transparent, #rrggbb"
+            )
+
+    @property
+    def background_rgb(self) -> tuple[int, int, int] | None:
+        """Return the background's sRGB; None = transparent."""
+        if self.background == "transparent":
+            return None
+        if self.background == "white":
+            return 255, 255, 255
+        red, green, blue = bytes.fromhex(self.background.removeprefix("#"))
+        return red, green, blue

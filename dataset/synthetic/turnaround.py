@@ -1,0 +1,163 @@
+"""Synthetic turnarounds: sheets of any mesh, drawn like a cartoon, with their exact truth.
+
+One generator feeds tests, benchmarks and examples. Every view is drawn from labels and depth of
+`toonset.dataset.synthetic.gl_render`: flat colours, black contours, then the errors of a hand:
+turned a little too far, a little too large, smoothly bent; or cheated, with parts that keep facing
+the viewer. The bend is in the picture alone; all else is in the camera (or the mesh) of the truth.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Int, UInt8
+
+from toonset.camera import Camera
+from toonset.dataset.synthetic.drawing import Drawing, draw, find_lines
+from toonset.dataset.synthetic.flat_colors import flat_palette
+from toonset.dataset.synthetic.follow_viewer import part_numbers, turn_parts
+from toonset.dataset.synthetic.gl_render import render_labels
+from toonset.dataset.synthetic.hand_error import bend
+from toonset.dataset.synthetic.layout import CellGrid, paste
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.mesh import Mesh
+from toonset.view import View
+
+JUMP = 0.02  # of the body's height: a larger step in depth is drawn as a line
+MARGIN = 0.04  # of the cell on every side, beside what outline and bend may need
+BEND_REACH = 3.0  # times the bend's root mean square: as far as a figure's rim is assumed to move
+
+
+@dataclass(frozen=True, eq=False)
+class Turnaround:
+    """A sheet and everything that is true of it.
+
+    Attributes:
+        sheet: (height, width, 4) sRGB with the options' background.
+        views: the cells on transparent ground, in sheet order; `box` is the cell in the sheet.
+        cameras: one per view, exact, in pixels of its cell; the bend is not in them.
+        labels: per view (cell, cell) index into `palette`; 255 = background, ink, mixed pixel.
+        ink: per view (cell, cell) coverage of lines, 0 to 255.
+        palette: (colors, 3) sRGB.
+        figure_boxes: per view (x, y, width, height) of the figure in the sheet.
+        yaws: per view in radians, with jitter, in [0, 2 pi).
+        mesh: what was drawn (parts that follow the viewer stand as in the mesh).
+        options: as given.
+        seed: as given.
+    """
+
+    sheet: UInt8[np.ndarray, "height width 4"]
+    views: tuple[View, ...]
+    cameras: tuple[Camera, ...]
+    labels: tuple[UInt8[np.ndarray, "cell cell"], ...]
+    ink: tuple[UInt8[np.ndarray, "cell cell"], ...]
+    palette: UInt8[np.ndarray, "colors 3"]
+    figure_boxes: tuple[tuple[int, int, int, int], ...]
+    yaws: tuple[float, ...]
+    mesh: Mesh
+    options: SynthOptions
+    seed: int
+
+
+def make_turnaround(mesh: Mesh, options: SynthOptions, seed: int) -> Turnaround:
+    """Return a turnaround of `mesh`; the same arguments give the same bytes.
+
+    Args:
+        mesh: posed, +Y up, front +Z; face colours are used as they are, none means grey.
+        options: what to draw.
+        seed: of jitter, scale errors and bends; each of them draws from its own stream, so that
+            changing one option leaves the others' randomness as it was.
+
+    Raises:
+        MeshError: a part that should follow the viewer does not exist.
+        CameraError: the perspective's camera stands within the mesh.
+        SetupError: EGL or Mesa is missing.
+    """
+    jitter, sizes, bends = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)
+    )
+    following = part_numbers(mesh, options.following_parts)
+    turns = np.arange(options.views) * (2 * math.pi / options.views)
+    spread = math.radians(options.yaw_jitter_deg)
+    yaws = (turns + spread * jitter.uniform(-1, 1, options.views)) % (2 * math.pi)
+    errors = 1 + options.scale_error_percent / 100 * sizes.uniform(-1, 1, options.views)
+    meshes = [turn_parts(mesh, following, yaw) for yaw in yaws]
+    cameras = _cameras(meshes, yaws, errors, options)
+    palette, face_labels = flat_palette(mesh)
+    seeds = bends.integers(2**63, size=options.views)
+    cells = [
+        _draw_cell(posed, face_labels, palette, camera, JUMP * mesh.height, options, int(bend_seed))
+        for posed, camera, bend_seed in zip(meshes, cameras, seeds, strict=True)
+    ]
+    grid = CellGrid(options.views, options.columns or options.views, options.cell_px)
+    pictures = [cell.rgba for cell in cells]
+    return Turnaround(
+        sheet=paste(pictures, grid, options.background_rgb),
+        views=tuple(
+            View(rgba, grid.box(i), options.outline_px, f"{i:03d}.png")
+            for i, rgba in enumerate(pictures)
+        ),
+        cameras=tuple(cameras),
+        labels=tuple(cell.labels for cell in cells),
+        ink=tuple(cell.ink for cell in cells),
+        palette=palette,
+        figure_boxes=tuple(grid.figure_box(i, rgba) for i, rgba in enumerate(pictures)),
+        yaws=tuple(float(yaw) for yaw in yaws),
+        mesh=mesh,
+        options=options,
+        seed=seed,
+    )
+
+
+def _cameras(
+    meshes: list[Mesh], yaws: np.ndarray, errors: np.ndarray, options: SynthOptions
+) -> list[Camera]:
+    """Return cameras of one common scale (times each view's error) that keep figures in cells."""
+    body, size = meshes[0], (options.cell_px, options.cell_px)
+    k = 1 / (options.distance_heights * body.height) if options.distance_heights else 0.0
+    elevation = math.radians(options.elevation_deg)
+    zero = np.zeros(2)
+    unit = [
+        Camera.looking_at(body.middle, yaw, elevation, error, size, center=zero, k=k)
+        for yaw, error in zip(yaws, errors, strict=True)
+    ]
+    spans = [_span(mesh, camera) for mesh, camera in zip(meshes, unit, strict=True)]
+    low = np.min([span[0] for span in spans], axis=0)
+    high = np.max([span[1] for span in spans], axis=0)
+    half_extent = max(abs(low[0]), abs(high[0]), (high[1] - low[1]) / 2)
+    scale = _room_px(options) / half_extent
+    center = np.array([size[0] / 2, size[1] / 2 - scale * (low[1] + high[1]) / 2])
+    return [replace(camera, scale=camera.scale * scale, center=center) for camera in unit]
+
+
+def _span(mesh: Mesh, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    pixels, _, _ = camera.project(mesh.vertices)
+    return np.nanmin(pixels, axis=0), np.nanmax(pixels, axis=0)
+
+
+def _room_px(options: SynthOptions) -> float:
+    """Return how far from the cell's middle the undrawn figure may reach."""
+    bend = BEND_REACH * options.warp_percent / 100 * options.cell_px
+    return options.cell_px * (0.5 - MARGIN) - options.outline_px / 2 - bend
+
+
+def _draw_cell(
+    mesh: Mesh,
+    face_labels: Int[np.ndarray, " faces"],
+    palette: UInt8[np.ndarray, "colors 3"],
+    camera: Camera,
+    jump: float,
+    options: SynthOptions,
+    seed: int,
+) -> Drawing:
+    seen = render_labels(mesh, face_labels, camera.resized(options.supersample))
+    lines = find_lines(seen, jump, label_lines=options.label_lines)
+    bent = bend(
+        seen.labels,
+        lines,
+        rms_px=options.warp_percent / 100 * options.cell_px * options.supersample,
+        generator=np.random.default_rng(seed),
+    )
+    return draw(*bent, palette, options.outline_px, options.supersample)
