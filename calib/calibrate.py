@@ -5,7 +5,7 @@
 2. contour alignment of every start at low resolution
 3. selections of one candidate per view, compared by a joint fit of the sheet
 4. the camera model, from orthography up; drawings that are stretched are begun anew without it
-   (`toonset.calib.stretch`); the mannequin's proportions where outlines
+   (`toonset.calib.corrections.stretched`); the mannequin's proportions where outlines
    do not meet or a glance proves them
 5. rivals of the chosen cameras at full resolution: probabilities, uncertainties, verdicts
 """
@@ -17,9 +17,22 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from toonset.calib.cut_off import CutOff
-from toonset.calib.hypotheses import Candidates
-from toonset.calib.judge import (
+from toonset.calib.corrections.stretched import (
+    as_drawn,
+    nothing_stretched,
+    stretched_mannequin,
+    unstretched,
+)
+from toonset.calib.evidence.coherence_state import state_of
+from toonset.calib.fit.model_selection import Rung
+from toonset.calib.fit.sheet_prior import Turn
+from toonset.calib.hints import Known
+from toonset.calib.options import CalibrationOptions, Progress
+from toonset.calib.pipeline import Problem, SheetFit
+from toonset.calib.result import Calibration, CutOff
+from toonset.calib.search.hypotheses import Candidates
+from toonset.calib.search.templates import turns_visibly
+from toonset.calib.verdict.judge import (
     judge_sheet,
     judge_view,
     with_elevations_in_mind,
@@ -27,14 +40,6 @@ from toonset.calib.judge import (
     with_locks_in_mind,
     with_sheet_in_mind,
 )
-from toonset.calib.known import Known
-from toonset.calib.ladder import Rung
-from toonset.calib.problem import CalibrationOptions, Problem, Progress, SheetFit
-from toonset.calib.result import Calibration
-from toonset.calib.sheet_state import state_of
-from toonset.calib.stretch import as_drawn, nothing_stretched, stretched_mannequin, unstretched
-from toonset.calib.templates import turns_visibly
-from toonset.calib.ties import Turn
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -8,11 +8,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.cut_off import CutOff
-from toonset.calib.drawing_error import Noise
-from toonset.calib.ladder import ModelChoice
+from toonset.calib.fit.drawing_error import Noise
+from toonset.calib.fit.model_selection import ModelChoice
 from toonset.camera import Camera
+from toonset.view import View
 
+Side = Literal["left", "top", "right", "bottom"]
+SIDES: tuple[Side, ...] = ("left", "top", "right", "bottom")  # as in a view's ends
 Verdict = Literal["ok", "weak", "ambiguous", "failed"]
 SEVERITY: tuple[Verdict, ...] = ("ok", "weak", "ambiguous", "failed")
 
@@ -65,6 +67,53 @@ class ViewCalibration:
     coverage: float
     verdict: Verdict
     reason: str
+
+
+@dataclass(frozen=True)
+class FlatSide:
+    """A side on which a figure ends in a ruled line.
+
+    Attributes:
+        side: of the figure.
+        at: between which pixels: the row or column from 0 that begins there.
+        spans: (first, last + 1) columns or rows where the figure ends there.
+        at_edge: the line is the picture's edge.
+    """
+
+    side: Side
+    at: int
+    spans: tuple[tuple[int, int], ...]
+    at_edge: bool
+
+    @property
+    def axis(self) -> int:
+        """Return which pixel coordinate `at` is one of: u (0) or v (1)."""
+        return SIDES.index(self.side) % 2
+
+    def is_end_of(self, view: View) -> bool:
+        """Return whether the view is known to end there."""
+        return bool(view.ends[SIDES.index(self.side)] == self.at)
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """A part of a figure that its picture lacks.
+
+    Attributes:
+        view: the drawing.
+        flat: where it ends.
+        lost_px: how far the mannequin goes on beyond.
+    """
+
+    view: str
+    flat: FlatSide
+    lost_px: float
+
+    def __str__(self) -> str:
+        """Return what was found, for people."""
+        lost = f"about {self.lost_px:.0f} px are missing"
+        ends = "" if self.flat.at_edge else "; the picture ends there now"
+        return f"{self.view}: the figure is cut off at the {self.flat.side}, {lost}{ends}"
 
 
 @dataclass(frozen=True, eq=False)

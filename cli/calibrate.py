@@ -31,9 +31,9 @@ from toonset.cli.sheet_options import (
 )
 
 if TYPE_CHECKING:
-    from toonset.calib.enclosed import FilledHole
-    from toonset.calib.known import Known
-    from toonset.calib.landmarks import LandmarkFit
+    from toonset.calib.corrections.false_holes import FilledHole
+    from toonset.calib.hints import Known
+    from toonset.calib.landmarks.landmarks import LandmarkFit
     from toonset.calib.result import Calibration
     from toonset.mesh import Mesh
     from toonset.view import View
@@ -141,8 +141,8 @@ def calibrate(
     hints.check_usage()
     printer = Printer(as_json, quiet)
     check_output(out, [*sheets, mesh, landmarks, init, boxes], WRITTEN, force=force)
-    from toonset.calib.cut_off import at_cuts
-    from toonset.calib.enclosed import without_false_holes
+    from toonset.calib.corrections.cropped import at_cuts
+    from toonset.calib.corrections.false_holes import without_false_holes
 
     body = load_body(mesh)
     given = load_sheets(sheets, hints, printer)
@@ -171,8 +171,8 @@ def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
     """Return what the landmarks say of the views that have any."""
     if not known.landmarks:
         return []
-    from toonset.calib.landmarks import landmark_starts
-    from toonset.calib.rim import prepare_surface
+    from toonset.calib.landmarks.landmarks import landmark_starts
+    from toonset.calib.outline.occluding_contour import prepare_surface
 
     return [fit for fit in landmark_starts(known.landmarks, prepare_surface(mesh)) if fit]
 
@@ -192,11 +192,11 @@ def _fit(
     views: Sequence[View], mesh: Mesh, known: Known, printer: Printer, *, landmarks_only: bool
 ) -> Calibration:
     if landmarks_only:
-        from toonset.calib.landmarks_alone import calibrate_by_landmarks
+        from toonset.calib.from_landmarks import calibrate_by_landmarks
 
         return calibrate_by_landmarks(views, mesh, known.landmarks)
     from toonset.calib.calibrate import calibrate as fit
-    from toonset.calib.problem import CalibrationOptions
+    from toonset.calib.options import CalibrationOptions
 
     def progress(step: str, done: float) -> None:
         printer.progress(f"{step} {done:.0%}" if done else step)
@@ -207,7 +207,7 @@ def _fit(
 def _report(
     found: Calibration, marks: Sequence[LandmarkFit], filled: Sequence[FilledHole]
 ) -> dict[str, Any]:
-    from toonset.calib.report import calibration_dict
+    from toonset.calib.verdict.report import calibration_dict
 
     report = calibration_dict(found)
     report["filled_holes"] = [asdict(hole) for hole in filled]
@@ -233,7 +233,7 @@ def _write(
     *,
     force: bool,
 ) -> None:
-    from toonset.calib.overlay import draw_overlay
+    from toonset.calib.verdict.overlay import draw_overlay
     from toonset.dataset.bundle.bundle import write_bundle
 
     fitted = replace(mesh, vertices=found.mannequin)
@@ -243,7 +243,7 @@ def _write(
 
 
 def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
-    from toonset.calib.report import model_line, view_line
+    from toonset.calib.verdict.report import model_line, view_line
 
     printer.say(model_line(found))
     for view in found.views:

@@ -14,7 +14,7 @@ from toonset.cli.sheet_inputs import check_label_count, load_drawings
 from toonset.cli.sheet_options import Cutting
 
 if TYPE_CHECKING:
-    from toonset.calib.known import Known
+    from toonset.calib.hints import Known
     from toonset.camera import Camera
     from toonset.dataset.mannequin.landmark_file import Landmarks
     from toonset.dataset.mannequin.options import MannequinOptions
@@ -160,9 +160,9 @@ def load_known(hints: Hints, views: Sequence[View], body: Body) -> Known:
     Raises:
         ToonsetError: a label, a landmark file or cameras that do not belong to the views.
     """
-    from toonset.calib.known import Known
-    from toonset.calib.labels import parse_labels
-    from toonset.calib.landmarks_alone import landmarks_of_every_view
+    from toonset.calib.from_landmarks import landmarks_of_every_view
+    from toonset.calib.hints import Known
+    from toonset.calib.view_labels import parse_labels
     from toonset.dataset.mannequin.landmark_file import read_known_points, read_landmarks
 
     labels = parse_labels(hints.labels, len(views)) if hints.labels else ()

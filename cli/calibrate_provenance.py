@@ -24,7 +24,7 @@ def provenance(
     from hashlib import sha256
     from importlib.metadata import version
 
-    from toonset.calib.problem import CalibrationOptions
+    from toonset.calib.options import CalibrationOptions
 
     packages = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless")
     return {

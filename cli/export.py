@@ -104,7 +104,7 @@ def export(
 def _points(
     body: Mesh, views: Sequence[ExportView], seed: int, *, is_given: bool
 ) -> TrackedPoints | None:
-    from toonset.cli.export_points import mannequin_points
+    from toonset.calib.mannequin_points import mannequin_points
     from toonset.errors import MeshError
 
     points = mannequin_points(body, views, seed)

@@ -87,7 +87,7 @@ def _labelled(drawings: Drawings, text: str) -> Split:
     """
     from dataclasses import replace
 
-    from toonset.calib.labels import parse_labels
+    from toonset.calib.view_labels import parse_labels
 
     if not text:
         return drawings.split

@@ -237,7 +237,7 @@ def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def calibration_report(names: list[str], cameras: list[Any]) -> dict[str, Any]:
-    """Return what `toonset.calib.report` would say of these cameras."""
+    """Return what `toonset.calib.verdict.report` would say of these cameras."""
     import math
 
     from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION

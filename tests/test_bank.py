@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from toonset.calib import bank, templates
-from toonset.calib.bank import bank_path, load_bank
-from toonset.calib.pose import Pose, project
-from toonset.calib.rim import mask_at, silhouette_mask
-from toonset.calib.surface import Surface, prepare_surface
-from toonset.calib.templates import Templates, build_templates
+from toonset.calib.outline.mesh_edges import Surface, prepare_surface
+from toonset.calib.outline.occluding_contour import mask_at, silhouette_mask
+from toonset.calib.outline.pose import Pose, project
+from toonset.calib.search import template_cache, templates
+from toonset.calib.search.template_cache import bank_path, load_bank
+from toonset.calib.search.templates import Templates, build_templates
 from toonset.mesh import Mesh
 
 
@@ -42,7 +42,7 @@ def test_cached_equals_fresh_bit_for_bit(surface):
 
 def test_the_second_time_nothing_is_built(surface, monkeypatch):
     load_bank(surface)
-    monkeypatch.setattr(bank, "build_templates", None)
+    monkeypatch.setattr(template_cache, "build_templates", None)
     load_bank(surface)
 
 
@@ -58,7 +58,7 @@ def test_a_damaged_file_is_built_again(surface, damage):
         middle = len(data) // 2
         flipped = data[:middle] + bytes([data[middle] ^ 255]) + data[middle + 1 :]
         wrong = {"empty": b"", "cut": data[:middle], "flipped": flipped, "text": b"hello"}
-        path.write_bytes(wrong.get(damage, data + bytes(bank.MOST_BYTES)))
+        path.write_bytes(wrong.get(damage, data + bytes(template_cache.MOST_BYTES)))
     assert_bitwise_equal(load_bank(surface), fresh)
     assert path.read_bytes() == data  # and whole again
 
@@ -95,7 +95,7 @@ def test_the_cache_follows_the_system(surface, monkeypatch, tmp_path):
 
 
 def test_only_the_newest_files_stay(surface, monkeypatch):
-    monkeypatch.setattr(bank, "MOST_FILES", 3)
+    monkeypatch.setattr(template_cache, "MOST_FILES", 3)
     paths = []
     for i in range(5):
         other = replace(surface, vertices=surface.vertices * (1 + i))

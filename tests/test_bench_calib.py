@@ -27,8 +27,8 @@ from bench.cases import cases
 from bench.cases.bodies import random_body
 from bench.cases.cases import CONDITIONS, CalibCase, calib_cases
 from bench.records.record import Record
-from toonset.calib import templates
 from toonset.calib.result import SEVERITY
+from toonset.calib.search import templates
 from toonset.camera import Camera, rotation_from_angles
 from toonset.view import View
 

@@ -11,10 +11,10 @@ import pytest
 
 from bench.cases.bodies import random_body
 from bench.stability.bodies import with_arms_raised, with_head_grown
-from toonset.calib import problem
+from toonset.calib import pipeline
 from toonset.calib.calibrate import calibrate
-from toonset.calib.ladder import BIC_MARGIN, GLANCE_MARGIN, PROPORTIONS, Rung
-from toonset.calib.problem import SAME_BODY_COVERAGE
+from toonset.calib.fit.model_selection import BIC_MARGIN, GLANCE_MARGIN, PROPORTIONS, Rung
+from toonset.calib.pipeline import SAME_BODY_COVERAGE
 from toonset.calib.result import Calibration
 from toonset.camera import rotation_distance
 from toonset.dataset.images.picture import load_rgba
@@ -44,7 +44,7 @@ def test_arms_that_hardly_show_in_the_outlines_are_raised(monkeypatch: pytest.Mo
     assert bending(found).is_proven
     assert found.model.bends_mannequin
     assert errors(found, made).max() < 5.5
-    monkeypatch.setattr(problem, "GLANCE_MARGIN", np.inf)
+    monkeypatch.setattr(pipeline, "GLANCE_MARGIN", np.inf)
     rigid = calibrate(made.views, body)
     assert not rigid.model.bends_mannequin
     assert np.median([view.coverage for view in rigid.views]) > SAME_BODY_COVERAGE

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
-from toonset.calib.align import Fit
 from toonset.calib.calibrate import calibrate
-from toonset.calib.hypotheses import (
+from toonset.calib.fit.align import Fit
+from toonset.calib.outline.occluding_contour import prepare_surface
+from toonset.calib.outline.pose import Pose
+from toonset.calib.search.hypotheses import (
     Candidates,
     half_turned,
     level_twins,
     looks_alike_from_behind,
 )
-from toonset.calib.pose import Pose
-from toonset.calib.rim import prepare_surface
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.split.sheet import split_sheet
 from toonset.dataset.synthetic.options import SynthOptions

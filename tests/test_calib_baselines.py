@@ -36,7 +36,7 @@ from bench.calib.soft_silhouette import (
 from bench.cases.bodies import random_body
 from bench.cases.cases import CalibCase
 from bench.charts.points import CLICKED, PLOTS
-from toonset.calib.rim import silhouette_mask
+from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
 from toonset.mesh import Mesh
 from toonset.view import View

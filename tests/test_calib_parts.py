@@ -8,14 +8,14 @@ import pytest
 import torch
 import trimesh
 
-from toonset.calib.align import ElevationPrior, Fit, align, tilt, upright_prior
-from toonset.calib.face import FaceEvidence
-from toonset.calib.hypotheses import Candidates
-from toonset.calib.match import Drawing
-from toonset.calib.pose import Pose, project, project_with_jacobian
-from toonset.calib.rim import find_rim, prepare_surface, silhouette_mask
-from toonset.calib.shared import Sheet, possible_turns
-from toonset.calib.templates import build_templates, find_hypotheses
+from toonset.calib.evidence.face import FaceEvidence
+from toonset.calib.fit.align import ElevationPrior, Fit, align, tilt, upright_prior
+from toonset.calib.outline.correspondences import Drawing
+from toonset.calib.outline.occluding_contour import find_rim, prepare_surface, silhouette_mask
+from toonset.calib.outline.pose import Pose, project, project_with_jacobian
+from toonset.calib.search.hypotheses import Candidates
+from toonset.calib.search.sheet_posterior import Sheet, possible_turns
+from toonset.calib.search.templates import build_templates, find_hypotheses
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import SheetError

@@ -12,13 +12,13 @@ import trimesh
 from bench.calib.measure import view_error
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
-from toonset.calib.known import Known
-from toonset.calib.labels import parse_labels
-from toonset.calib.match import Drawing, match
-from toonset.calib.overlay import draw_overlay
-from toonset.calib.pose import Pose
-from toonset.calib.report import calibration_dict
-from toonset.calib.rim import prepare_surface
+from toonset.calib.hints import Known
+from toonset.calib.outline.correspondences import Drawing, match
+from toonset.calib.outline.occluding_contour import prepare_surface
+from toonset.calib.outline.pose import Pose
+from toonset.calib.verdict.overlay import draw_overlay
+from toonset.calib.verdict.report import calibration_dict
+from toonset.calib.view_labels import parse_labels
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.dataset.split.sheet import split_sheet

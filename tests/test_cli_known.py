@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import toonset.calib.problem as library
+import toonset.calib.pipeline as library
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
 from toonset.dataset.bundle.transforms import read_cameras, transforms_dict
 from toonset.dataset.mannequin.landmark_formats import SCHEMA

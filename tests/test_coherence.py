@@ -7,8 +7,8 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
-from toonset.calib.common_elevation import common_elevation
-from toonset.calib.rim import silhouette_mask
+from toonset.calib.evidence.common_elevation import common_elevation
+from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.coherence import coherence
 from toonset.errors import CameraError

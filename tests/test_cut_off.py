@@ -8,8 +8,8 @@ import trimesh
 
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
-from toonset.calib.cut_off import at_cuts, ending_at, flat_sides
-from toonset.calib.match import Drawing
+from toonset.calib.corrections.cropped import at_cuts, ending_at, flat_sides
+from toonset.calib.outline.correspondences import Drawing
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.mesh.load import save_obj

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from toonset.calib.drawing_error import Noise, error_modes, marginalise, next_noise
-from toonset.calib.match import Drawing
+from toonset.calib.fit.drawing_error import Noise, error_modes, marginalise, next_noise
+from toonset.calib.outline.correspondences import Drawing
 from toonset.dataset.silhouettes.contour import Contour
 
 

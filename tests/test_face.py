@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.calib.face import (
+from toonset.calib.evidence.cylinder import read_sections
+from toonset.calib.evidence.face import (
     NO_NECK,
     FaceEvidence,
     face_cues,
@@ -16,8 +17,7 @@ from toonset.calib.face import (
     neck_height,
     read_faces,
 )
-from toonset.calib.paint import BROKEN
-from toonset.calib.sections import read_sections
+from toonset.calib.evidence.texture import BROKEN
 from toonset.view import View
 
 TURN = np.arange(8) * np.pi / 4

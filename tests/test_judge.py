@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toonset.calib.judge import (
+from toonset.calib.evidence.coherence_state import CONFIRMING, TELLING_VIEWS, SheetState
+from toonset.calib.result import Sigmas, ViewCalibration
+from toonset.calib.verdict.judge import (
     judge_sheet,
     with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
     with_sheet_in_mind,
 )
-from toonset.calib.result import Sigmas, ViewCalibration
-from toonset.calib.sheet_state import CONFIRMING, TELLING_VIEWS, SheetState
 from toonset.camera import Camera
 
 

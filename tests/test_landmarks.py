@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from toonset.calib.landmark_models import explain
-from toonset.calib.landmark_pose import depth_reversed, refined, solve_pinhole, squared_error
-from toonset.calib.landmarks import solve_landmarks
-from toonset.calib.pose import Pose, project
-from toonset.calib.rim import Surface, prepare_surface
+from toonset.calib.landmarks.landmarks import solve_landmarks
+from toonset.calib.landmarks.models import explain
+from toonset.calib.landmarks.pose import depth_reversed, refined, solve_pinhole, squared_error
+from toonset.calib.outline.occluding_contour import Surface, prepare_surface
+from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.errors import LandmarkError

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
-from toonset.calib.landmarks_alone import calibrate_by_landmarks
+from toonset.calib.from_landmarks import calibrate_by_landmarks
+from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.calib.result import Calibration
-from toonset.calib.rim import silhouette_mask
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
 from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.errors import LandmarkError

@@ -8,11 +8,11 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
-from toonset.calib.align import align, align_all, measure
-from toonset.calib.match import Drawing, Table, match, nearest
-from toonset.calib.pose import Pose, project
-from toonset.calib.rim import find_rim, rim_at, silhouette_mask
-from toonset.calib.surface import Surface, prepare_surface
+from toonset.calib.fit.align import align, align_all, measure
+from toonset.calib.outline.correspondences import Drawing, Table, match, nearest
+from toonset.calib.outline.mesh_edges import Surface, prepare_surface
+from toonset.calib.outline.occluding_contour import find_rim, rim_at, silhouette_mask
+from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh
@@ -40,8 +40,8 @@ def pose_at(seed: int, k: float = 0.0) -> Pose:
 
 
 def covered_by_folds(surface: Surface, pixels: np.ndarray) -> np.ndarray:
-    from toonset.calib.coverage import covered
-    from toonset.calib.rim import _folds
+    from toonset.calib.outline.coverage import covered
+    from toonset.calib.outline.occluding_contour import _folds
 
     a, b, c = (pixels[surface.faces[:, i]] for i in range(3))
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] > 0

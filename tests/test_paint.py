@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from toonset.calib import paint
-from toonset.calib.paint import Paint, paint_evidence, paint_log_likelihood, read_paint
-from toonset.calib.sections import figure_height, read_sections
+from toonset.calib.evidence import texture
+from toonset.calib.evidence.cylinder import figure_height, read_sections
+from toonset.calib.evidence.texture import Paint, paint_evidence, paint_log_likelihood, read_paint
 from toonset.view import View
 
 EIGHT = np.arange(8) * np.pi / 4
@@ -52,7 +52,7 @@ def test_truth_beats_the_mirror_twin(yaws: np.ndarray) -> None:
 def test_no_yaws_are_excluded() -> None:
     likelihood = paint_log_likelihood(_read(EIGHT), np.stack([EIGHT, np.pi - EIGHT]))
     assert likelihood[0] == pytest.approx(0)
-    assert likelihood[1] >= np.log(paint.BROKEN)
+    assert likelihood[1] >= np.log(texture.BROKEN)
 
 
 def test_evidence_is_the_same_in_any_company() -> None:
@@ -107,10 +107,10 @@ def test_a_picture_too_thin_for_cells_says_nothing() -> None:
 
 def test_evidence_is_that_of_a_gaussian_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """At the profiled noise, the closed form equals the dense marginal likelihood."""
-    monkeypatch.setattr(paint, "FAINTEST", 0.0)
+    monkeypatch.setattr(texture, "FAINTEST", 0.0)
     read, yaws = _read(UNEVEN), UNEVEN + 0.3
-    across = np.arcsin((np.arange(paint.CELLS) + 0.5) * 2 / paint.CELLS - 1)
-    waves, variance = paint._series((yaws[:, None] + across).ravel())
+    across = np.arcsin((np.arange(texture.CELLS) + 0.5) * 2 / texture.CELLS - 1)
+    waves, variance = texture._series((yaws[:, None] + across).ravel())
     slow = []
     for lab, seen in zip(read.lab, read.seen > 0, strict=True):
         covariance = (waves[seen] * variance) @ waves[seen].T + np.eye(int(seen.sum()))
@@ -118,17 +118,17 @@ def test_evidence_is_that_of_a_gaussian_process(monkeypatch: pytest.MonkeyPatch)
         normal = multivariate_normal(cov=profiled * covariance)
         slow.append(normal.logpdf(lab[seen].T).sum() / (3 * seen.sum()))
     constant = -0.5 * (1 + np.log(2 * np.pi))
-    assert paint._evidence(read, yaws) == pytest.approx(np.mean(slow) - constant, abs=1e-9)
+    assert texture._evidence(read, yaws) == pytest.approx(np.mean(slow) - constant, abs=1e-9)
 
 
 def test_series_is_a_von_mises_kernel_without_asymmetry(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(paint, "ASYMMETRY", 1.0)
-    monkeypatch.setattr(paint, "ORDER", 12)
+    monkeypatch.setattr(texture, "ASYMMETRY", 1.0)
+    monkeypatch.setattr(texture, "ORDER", 12)
     longitude = np.linspace(0, 6, 25)
-    waves, variance = paint._series(longitude)
-    kernel = (waves[:, 1:] * variance[1:]) @ waves[:, 1:].T * paint.NOISE
+    waves, variance = texture._series(longitude)
+    kernel = (waves[:, 1:] * variance[1:]) @ waves[:, 1:].T * texture.NOISE
     apart = longitude[:, None] - longitude
-    expected = np.exp(paint.SMOOTHNESS * (np.cos(apart) - 1))
+    expected = np.exp(texture.SMOOTHNESS * (np.cos(apart) - 1))
     np.testing.assert_allclose(kernel - kernel[0, 0], expected - expected[0, 0], atol=1e-12)
 
 

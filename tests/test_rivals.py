@@ -7,14 +7,14 @@ import pytest
 
 from bench.stability.draws import warped
 from bench.stability.sheet import DrawnSheet
-from toonset.calib import problem
+from toonset.calib import pipeline
 from toonset.calib.calibrate import Calibration, calibrate
-from toonset.calib.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates
-from toonset.calib.joint import JointFit
-from toonset.calib.ladder import PROPORTIONS, UNSTEADY, UNSTEADY_MARGIN
-from toonset.calib.match import Drawing
-from toonset.calib.pose import Pose
-from toonset.calib.rivals import WORTH, steadied
+from toonset.calib.fit.model_selection import PROPORTIONS, UNSTEADY, UNSTEADY_MARGIN
+from toonset.calib.fit.sheet_adjustment import JointFit
+from toonset.calib.outline.correspondences import Drawing
+from toonset.calib.outline.pose import Pose
+from toonset.calib.search.alternatives import WORTH, steadied
+from toonset.calib.search.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates
 from toonset.camera import rotation_distance
 
 
@@ -52,7 +52,7 @@ def test_the_chosen_camera_and_its_twin_stay_among_the_candidates(
         seen.append((found, steady, joint.poses[index]))
         return steady
 
-    monkeypatch.setattr(problem, "steadied", watched)
+    monkeypatch.setattr(pipeline, "steadied", watched)
     calibrated(warped(percent, 1012))
     assert len(seen) == 5
     for found, steady, pose in seen:

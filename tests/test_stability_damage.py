@@ -21,7 +21,7 @@ from bench.stability.damage import (
 )
 from bench.stability.draws import LOSSLESS, blurred, compressed
 from bench.stability.sheet import BASE, DrawnSheet, draw_sheet
-from toonset.calib.rim import silhouette_mask
+from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.view import View

@@ -11,11 +11,15 @@ import pytest
 from bench.cases.bodies import random_body
 from bench.stability.damage import stretched
 from toonset.calib.calibrate import calibrate
-from toonset.calib.cut_off import CutOff, FlatSide
-from toonset.calib.ladder import BIC_MARGIN, STRETCHED, TALLER
-from toonset.calib.match import Drawing
-from toonset.calib.result import Calibration
-from toonset.calib.stretch import Stretches, as_drawn, stretched_mannequin, unstretched
+from toonset.calib.corrections.stretched import (
+    Stretches,
+    as_drawn,
+    stretched_mannequin,
+    unstretched,
+)
+from toonset.calib.fit.model_selection import BIC_MARGIN, STRETCHED, TALLER
+from toonset.calib.outline.correspondences import Drawing
+from toonset.calib.result import Calibration, CutOff, FlatSide
 from toonset.camera import rotation_distance
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.dataset.synthetic.options import SynthOptions

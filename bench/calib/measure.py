@@ -42,13 +42,14 @@ from bench.calib.sfm import METHODS as SFM_METHODS
 from bench.calib.sfm import SfmResult, aligned_errors, reconstruct
 from bench.cases.cases import CalibCase
 from bench.records.record import Record
-from toonset.calib import ladder, templates
-from toonset.calib.bank import load_bank
 from toonset.calib.calibrate import calibrate
-from toonset.calib.known import Known
-from toonset.calib.labels import Label
-from toonset.calib.problem import CalibrationOptions
-from toonset.calib.rim import prepare_surface
+from toonset.calib.fit import model_selection
+from toonset.calib.hints import Known
+from toonset.calib.options import CalibrationOptions
+from toonset.calib.outline.occluding_contour import prepare_surface
+from toonset.calib.search import templates
+from toonset.calib.search.template_cache import load_bank
+from toonset.calib.view_labels import Label
 from toonset.camera import Camera, angles_from_rotation
 
 __all__ = ["ViewError", "bench_calibration", "bench_colmap", "view_error"]
@@ -89,7 +90,7 @@ METHODS: dict[str, Method] = {
     "templates every 5 deg": Method(constants=((templates, "YAW_STEP", math.radians(5)),)),
     "templates every 20 deg": Method(constants=((templates, "YAW_STEP", math.radians(20)),)),
     "each drawing alone": Method(alone=True),
-    "orthographic, one scale": Method(constants=((ladder, "BIC_MARGIN", math.inf),)),
+    "orthographic, one scale": Method(constants=((model_selection, "BIC_MARGIN", math.inf),)),
 }
 QUICK = ("default", "labels", "no cached templates")
 QUICK_SFM = ("COLMAP", "COLMAP 1000 px")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.pose import Pose, project, project_with_jacobian
+from toonset.calib.outline.pose import Pose, project, project_with_jacobian
 from toonset.camera import rotation_from_angles
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def main() -> None:
             f"{row.name:32s} fold ends {row.fold_ends_ms:7.2f} ms   with derivatives "
             f"{row.derivatives_ms:7.2f} ms   off by {row.off_px:.1e} px"
         )
-    for module in ("toonset.calib.pose", "toonset.projection"):
+    for module in ("toonset.calib.outline.pose", "toonset.projection"):
         print(f"import {module:25s} {import_seconds(module):5.2f} s")
 
 

@@ -21,10 +21,10 @@ from jaxtyping import UInt8
 from bench.calib.figures import Recorder, angle_between, seconds_record
 from bench.calib.measure import named_directions, own_cache
 from bench.records.record import Record
-from toonset.calib.bank import load_bank
 from toonset.calib.calibrate import calibrate
-from toonset.calib.known import Known
-from toonset.calib.rim import prepare_surface
+from toonset.calib.hints import Known
+from toonset.calib.outline.occluding_contour import prepare_surface
+from toonset.calib.search.template_cache import load_bank
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.mannequin.make import default_mannequin
 from toonset.dataset.mesh.load import load_mesh

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.calib.rim import silhouette_mask
+from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.view import View

@@ -21,12 +21,12 @@ from bench.stability.damage import Drawn
 from bench.stability.picture import outlines_picture
 from bench.stability.sheet import DrawnSheet, Step, draw_sheet
 from bench.stability.sweeps import Sweep
-from toonset.calib.align import align
 from toonset.calib.calibrate import calibrate
-from toonset.calib.match import Drawing
-from toonset.calib.pose import Pose
+from toonset.calib.fit.align import align
+from toonset.calib.outline.correspondences import Drawing
+from toonset.calib.outline.occluding_contour import Surface, prepare_surface
+from toonset.calib.outline.pose import Pose
 from toonset.calib.result import Calibration
-from toonset.calib.rim import Surface, prepare_surface
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import ToonsetError

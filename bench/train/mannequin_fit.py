@@ -1,8 +1,8 @@
 """A mannequin in the character's proportions: bent until its outlines lie on the drawings'.
 
 Users have no model of their character, but calibration bends the body they have, band by band of
-its height (`toonset.calib.proportions`), and so does this: Gauss-Newton over these numbers alone,
-with the cameras as given and the two-sided outline distances of `toonset.calib.align`.
+its height (`toonset.calib.fit.proportions`), and so does this: Gauss-Newton over these numbers
+alone, with the cameras as given and the two-sided outline distances of `toonset.calib.fit.align`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.align import EFFECTIVE_POINTS, NOISE_OF_HEIGHT, robust_weights
-from toonset.calib.known import Known
-from toonset.calib.match import Drawing, match
-from toonset.calib.pose import Pose, pixel_slopes, project
-from toonset.calib.proportions import Body, as_it_is
-from toonset.calib.surface import prepare_surface
+from toonset.calib.fit.align import EFFECTIVE_POINTS, NOISE_OF_HEIGHT, robust_weights
+from toonset.calib.fit.proportions import Body, as_it_is
+from toonset.calib.hints import Known
+from toonset.calib.outline.correspondences import Drawing, match
+from toonset.calib.outline.mesh_edges import prepare_surface
+from toonset.calib.outline.pose import Pose, pixel_slopes, project
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh

@@ -67,7 +67,7 @@ def write_bundle(
         cameras: one per view, in pixels of its crop.
         mesh: the mannequin as it was fitted; its height and radius set the far pinholes and their
             error bound.
-        calibration: the report of `toonset.calib.report`, with what the caller adds.
+        calibration: the report of `toonset.calib.verdict.report`, with what the caller adds.
         overlay: the picture for people.
         force: replace an existing bundle.
 

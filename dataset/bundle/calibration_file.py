@@ -25,7 +25,8 @@ def calibration_content(report: dict[str, Any], views: Sequence[View]) -> dict[s
     """Return the content of calibration.json: the report, and what its views look like.
 
     Args:
-        report: of `toonset.calib.report`, with what the caller adds (options, versions, inputs).
+        report: of `toonset.calib.verdict.report`, with what the caller adds (options, versions,
+            inputs).
         views: the drawings, in the report's order.
     """
     content = {key: value for key, value in report.items() if key not in RUN_ONLY}

@@ -1,0 +1,1 @@
+"""Drawings that are cropped, stretched, or have holes that are paint."""

@@ -1,0 +1,1 @@
+"""What else tells cameras apart: face, paint, coherence of the drawings."""

@@ -1,0 +1,1 @@
+"""Fit cameras: one view, the sheet, the camera model, the mannequin's proportions."""

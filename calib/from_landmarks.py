@@ -1,0 +1,155 @@
+"""Cameras from landmarks alone: for drawings whose outline is not the mannequin's.
+
+Every view is solved by itself (`toonset.calib.landmarks.landmarks`). How far its outline is from
+the mannequin's is reported, and judges nothing: who clicks points of a body under a cloak knows.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from toonset.calib.evidence.coherence_state import state_of
+from toonset.calib.fit.align import measure
+from toonset.calib.fit.drawing_error import Noise
+from toonset.calib.fit.model_selection import ORTHOGRAPHIC, PER_VIEW, ModelChoice, Rung
+from toonset.calib.landmarks.landmarks import LandmarkFit, solve_landmarks
+from toonset.calib.landmarks.models import MARGIN
+from toonset.calib.outline.correspondences import Drawing
+from toonset.calib.outline.occluding_contour import Surface, prepare_surface
+from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
+from toonset.calib.search.hypotheses import is_twin
+from toonset.calib.verdict.judge import (
+    FAILED_COVERAGE,
+    SURE,
+    WEAK_ANGLE,
+    angle_sigmas,
+    judge_sheet,
+)
+from toonset.camera import angles_from_rotation
+from toonset.dataset.mannequin.landmark_file import Landmarks
+from toonset.dataset.silhouettes.contour import drawn_contour
+from toonset.errors import LandmarkError
+from toonset.mesh import Mesh
+from toonset.view import View
+
+OUTLINE_HEIGHT_PX, OUTLINE_POINTS = 250.0, 200  # scale at which outlines are compared
+TYPICAL = "perspective in the typical view"
+MOST_RMS = 0.05  # of the figure's height; farther off, the pairs are not this mannequin's
+
+
+def calibrate_by_landmarks(
+    views: Sequence[View],
+    mesh: Mesh,
+    landmarks: Sequence[Landmarks | None],
+) -> Calibration:
+    """Return one camera per view from its landmarks; no outline is fitted.
+
+    Args:
+        views: the drawings, at least one.
+        mesh: the mannequin that the landmarks' world points belong to.
+        landmarks: the pairs of every view.
+
+    Raises:
+        LandmarkError: a view without landmarks, or pairs that determine no camera.
+    """
+    start = time.perf_counter()
+    surface = prepare_surface(mesh)
+    pairs = landmarks_of_every_view(views, landmarks)
+    fits = [solve_landmarks(own, surface) for own in pairs]
+    solved = time.perf_counter()
+    drawings = [Drawing(drawn_contour(v), OUTLINE_HEIGHT_PX, OUTLINE_POINTS) for v in views]
+    judged = tuple(_judged(*each, surface) for each in zip(views, drawings, fits, strict=True))
+    state = state_of(views, [view.camera for view in judged])
+    # one drawing's landmarks confirm its scale and elevation; its outline would not
+    only = judged[0]
+    single = len(views) == 1
+    verdict, reason = (only.verdict, only.reason) if single else judge_sheet(judged, state)
+    heights = [drawing.height / drawing.factor for drawing in drawings]
+    off = [fit.sigma_px / height for fit, height in zip(fits, heights, strict=True)]
+    return Calibration(
+        judged,
+        _model(fits, pairs, surface),
+        0.0,
+        Noise(0.0, float(np.median(off))),
+        state.contradiction,
+        mesh.vertices,
+        verdict,
+        reason,
+        {"landmarks": solved - start, "judge": time.perf_counter() - solved},
+    )
+
+
+def landmarks_of_every_view(
+    views: Sequence[View], landmarks: Sequence[Landmarks | None]
+) -> list[Landmarks]:
+    """Return the landmarks of all views.
+
+    Raises:
+        LandmarkError: a view without any.
+    """
+    without = [v.name for v, own in zip(views, landmarks, strict=True) if own is None]
+    if without:
+        raise LandmarkError(
+            f"--landmarks-only: no landmarks for {', '.join(without)}; give three or more in "
+            "every view, or leave --landmarks-only out"
+        )
+    return [own for own in landmarks if own is not None]
+
+
+def _judged(view: View, drawing: Drawing, fit: LandmarkFit, surface: Surface) -> ViewCalibration:
+    size_wh = (view.rgba.shape[1], view.rgba.shape[0])
+    pose, *others = fit.poses
+    cameras = [other.camera(surface.middle, size_wh) for other in others]
+    mirrored = [is_twin(pose, other) for other in others]
+    twin = others[mirrored.index(True)] if any(mirrored) else pose.twin()
+    p_flip = float(np.dot(mirrored, fit.probabilities[1:]))
+    outline = measure(drawing, surface, drawing.pose_in(pose))
+    sigmas = angle_sigmas(pose, fit.covariance)
+    verdict, reason = _verdict(fit, sigmas, drawing.height / drawing.factor)
+    if verdict == "ok" and outline.coverage < FAILED_COVERAGE:
+        apart = f"{100 * (1 - outline.coverage):.0f} % of the outlines are more than 5 % apart"
+        verdict, reason = "weak", f"{apart}: are these the points of this mannequin?"
+    return ViewCalibration(
+        view.name,
+        pose.camera(surface.middle, size_wh),
+        sigmas,
+        fit.covariance,
+        p_flip,
+        twin.camera(surface.middle, size_wh),
+        tuple(map(Alternative, cameras, fit.probabilities[1:])),
+        outline.error,
+        outline.coverage,
+        verdict,
+        reason,
+    )
+
+
+def _verdict(fit: LandmarkFit, sigmas: Sigmas, height_px: float) -> tuple[Verdict, str]:
+    if fit.rms_px > MOST_RMS * height_px:
+        off = f"{100 * fit.rms_px / height_px:.0f} % of the height"
+        return "failed", f"the landmarks are {off} off: other points, or another body's"
+    if sum(fit.probabilities[1:]) > 1 - SURE:
+        yaw = np.degrees(angles_from_rotation(fit.poses[1].rotation)[0]) % 360
+        p = fit.probabilities[1]
+        return "ambiguous", f"yaw {yaw:.0f} fits as well (p = {p:.2f}): add a point off their plane"
+    if fit.misplaced:
+        return "weak", f"landmarks that do not fit the others: {', '.join(fit.misplaced)}"
+    if max(sigmas.yaw, sigmas.elevation) > WEAK_ANGLE:
+        worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
+        return "weak", f"the landmarks hardly tell {worst}: add points farther from the others"
+    return "ok", ""
+
+
+def _model(
+    fits: Sequence[LandmarkFit], pairs: Sequence[Landmarks], surface: Surface
+) -> ModelChoice:
+    nearness = [fit.poses[0].k * surface.height for fit in fits]
+    return ModelChoice(
+        PER_VIEW if any(nearness) else ORTHOGRAPHIC,
+        tuple(1 / near if near > 0 else float("inf") for near in nearness),
+        (Rung(TYPICAL, float(np.median([fit.bic_gain for fit in fits])), 1, MARGIN),),
+        float(2 * sum(len(own.names) for own in pairs)),
+    )

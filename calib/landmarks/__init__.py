@@ -1,0 +1,1 @@
+"""Cameras from pairs of points and pixels."""

@@ -1,0 +1,1 @@
+"""The mannequin's occluding contour, and its correspondences with a drawn outline."""

@@ -1,0 +1,1 @@
+"""Find where to start: templates, turns of the whole sheet, selections, alternatives."""

@@ -1,0 +1,1 @@
+"""How sure the cameras are: sigmas, verdicts, report, overlay."""
