@@ -67,8 +67,8 @@ def _problems(path: Path) -> list[Problem]:
 def _check_run(log: ProblemLog, run: Path) -> None:
     """Read a run as rendering would."""
     from toonset.json_file import read_json
-    from toonset.nerf.manifest import check_manifest
-    from toonset.nerf.run_folder import read_field
+    from toonset.nerf.run.folder import read_field
+    from toonset.nerf.run.manifest import check_manifest
 
     name = "" if run == log.root else f"{run.name}/"
     log.attempt(name, read_field, run)

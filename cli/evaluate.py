@@ -18,7 +18,7 @@ from toonset.cli.output import (
 
 if TYPE_CHECKING:
     from toonset.dataset.bundle.scene import Scene
-    from toonset.nerf.evaluation import ScoredView
+    from toonset.nerf.score.evaluate import ScoredView
 
 WRITTEN = ("evaluation.json", "evaluation.png")
 COLUMNS = {  # of the table: heading, number format
@@ -69,9 +69,9 @@ def evaluate(
     says why.
     """
     from toonset.dataset.bundle.transforms import read_scene
-    from toonset.nerf.evaluation import report, score_views
-    from toonset.nerf.metrics_view import load_judges
-    from toonset.nerf.run_folder import read_field
+    from toonset.nerf.run.folder import read_field
+    from toonset.nerf.score.evaluate import report, score_views
+    from toonset.nerf.score.metrics_view import load_judges
 
     printer = Printer(as_json, quiet)
     if out is not None:
@@ -99,7 +99,7 @@ def _write(
     force: bool,
 ) -> None:
     from toonset.dataset.images.picture import encode_png
-    from toonset.nerf.evaluation_picture import contact_sheet
+    from toonset.nerf.score.evaluation_picture import contact_sheet
     from toonset.write import new_folder, write_bytes, write_json
 
     errors_are = "mean difference" if "flip" in result["absent"] else "FLIP"
@@ -113,7 +113,7 @@ def _training_scene(run: Path, bundle: Path | None) -> tuple[Scene | None, str |
     from toonset.dataset.bundle.transforms import read_scene
     from toonset.errors import BundleError, ToonsetError
     from toonset.json_file import read_json
-    from toonset.nerf.evaluation import chosen_frames
+    from toonset.nerf.score.evaluate import chosen_frames
 
     place = bundle or run.resolve().parent
     if bundle is None and not (place / "transforms.json").is_file():

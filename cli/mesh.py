@@ -43,11 +43,11 @@ def mesh(
     and the palette as a picture, NAME.mtl and NAME.png.
     """
     printer = Printer(as_json, quiet)
-    from toonset.nerf.mesh_export import check_mesh_files, mesh_files, write_mesh_files
-    from toonset.nerf.recolor import recolored
-    from toonset.nerf.run_folder import read_field
-    from toonset.nerf.surface import surface_of
-    from toonset.nerf.threads import use_threads
+    from toonset.nerf.kernels.threads import use_threads
+    from toonset.nerf.render.recolor import recolored
+    from toonset.nerf.run.folder import read_field
+    from toonset.nerf.surface.export import check_mesh_files, mesh_files, write_mesh_files
+    from toonset.nerf.surface.surface import surface_of
 
     check_mesh_files(out, force=force)
     use_threads(threads)

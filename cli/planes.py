@@ -26,8 +26,8 @@ def planes(
 
     Planes and hull are PNGs with a byte per feature; planes.json holds the weights and every size.
     """
-    from toonset.nerf.planes_export import planes_files
-    from toonset.nerf.run_folder import read_field
+    from toonset.nerf.run.folder import read_field
+    from toonset.nerf.run.planes import planes_files
     from toonset.write import new_folder, write_bytes
 
     check_output(out, [run], WRITTEN, force=force)

@@ -14,7 +14,7 @@ from toonset.cli.render_layers import LAYER_NAMES, encoded
 
 if TYPE_CHECKING:
     from toonset.camera import Camera
-    from toonset.nerf.trained import TrainedField
+    from toonset.nerf.fields.trained_field import TrainedField
 
     Named = list[tuple[str, Camera]]
 
@@ -96,9 +96,9 @@ def render(
     if cameras is not None and (elevation is not None or size is not None):
         raise typer.BadParameter("--elevation and --size belong to --turntable")
 
-    from toonset.nerf.recolor import recolored, repainted
-    from toonset.nerf.run_folder import read_field
-    from toonset.nerf.threads import use_threads
+    from toonset.nerf.kernels.threads import use_threads
+    from toonset.nerf.render.recolor import recolored, repainted
+    from toonset.nerf.run.folder import read_field
 
     together = _formats(formats, gif, turning=views is not None)
     use_threads(threads)
@@ -131,10 +131,10 @@ def _write(
     force: bool,
 ) -> tuple[list[str], dict[str, int]]:
     """Write all pictures and files of the first layer; return names, and the latter's kB."""
-    from toonset.nerf.depth_levels import DepthLevels
-    from toonset.nerf.turntable_files import turntable_files
-    from toonset.nerf.views import render as render_view
-    from toonset.nerf.views_bake import Baked
+    from toonset.nerf.render.baked import Baked
+    from toonset.nerf.render.depth_levels import DepthLevels
+    from toonset.nerf.render.turntable_files import turntable_files
+    from toonset.nerf.render.views import render as render_view
     from toonset.write import new_folder, write_bytes, write_json
 
     baked, files, turning = Baked.of(trained), [], []
@@ -162,7 +162,7 @@ def _write(
 
 def _formats(given: str | None, gif: bool | None, *, turning: bool) -> tuple[str, ...]:
     """Return the names of the files that hold all views."""
-    from toonset.nerf.turntable_files import FORMATS
+    from toonset.nerf.render.turntable_files import FORMATS
 
     names = tuple(dict.fromkeys(word.strip() for word in given.split(","))) if given else ()
     for name in names:
@@ -217,7 +217,7 @@ def _cameras(
 ) -> Named:
     from toonset.dataset.bundle.transforms import read_cameras
     from toonset.errors import BundleError
-    from toonset.nerf.turntable import turntable
+    from toonset.nerf.render.turntable import turntable
 
     if cameras is None:
         turn = turntable(trained, views or 1, elevation, size)

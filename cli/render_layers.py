@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from jaxtyping import UInt8
 
     from toonset.camera import Camera
-    from toonset.nerf.depth_levels import DepthLevels
-    from toonset.nerf.trained import TrainedField
-    from toonset.nerf.views import Rendering
+    from toonset.nerf.fields.trained_field import TrainedField
+    from toonset.nerf.render.depth_levels import DepthLevels
+    from toonset.nerf.render.views import Rendering
 
     Picture = UInt8[np.ndarray, "height width 4"]
     Layer = UInt8[np.ndarray, "height width *channels"]
@@ -41,9 +41,9 @@ def encoded(
 
 def _layer(trained: TrainedField, view: Rendering, camera: Camera, layer: str) -> Layer:
     """Return one layer of a view as RGBA, or as a label map."""
-    from toonset.nerf import layers
-    from toonset.nerf.normals import normal_picture
-    from toonset.nerf.warp_back import give_back
+    from toonset.nerf.prepare.warp_back import give_back
+    from toonset.nerf.render import layers
+    from toonset.nerf.render.normals import normal_picture
 
     made: dict[str, Callable[[], Layer]] = {
         "rgb": lambda: layers.color_picture(view.rgb, view.alpha),

@@ -139,9 +139,8 @@ def train(
     are written then too. Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says
     how to go on.
     """
-    from toonset.nerf.options import FIELDS
-    from toonset.nerf.preset import PRESETS
-    from toonset.nerf.preset import preset as preset_options
+    from toonset.nerf.options import FIELDS, PRESETS
+    from toonset.nerf.options import preset as preset_options
 
     _check_choice(device, DEVICES, "--device")
     _check_choice(preset, PRESETS, "--preset")

@@ -16,7 +16,7 @@ from toonset.cli.output import check_output
 from toonset.errors import BundleError, OutputError
 
 if TYPE_CHECKING:
-    from toonset.nerf.checkpoint import Checkpoint
+    from toonset.nerf.run.checkpoint import Checkpoint
 
 WRITTEN = (
     *("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png"),
@@ -74,6 +74,6 @@ class Place:
         Raises:
             BundleError: it is damaged, or of another toonset.
         """
-        from toonset.nerf.checkpoint import read_checkpoint
+        from toonset.nerf.run.checkpoint import read_checkpoint
 
         return read_checkpoint(self.unfinished)

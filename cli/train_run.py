@@ -18,10 +18,10 @@ from toonset.errors import BundleError
 
 if TYPE_CHECKING:
     from toonset.dataset.bundle.scene import Scene
-    from toonset.nerf.checkpoint import Checkpoint
     from toonset.nerf.options import TrainOptions
-    from toonset.nerf.progress_watch import Onlooker
-    from toonset.nerf.trained import Training
+    from toonset.nerf.run.checkpoint import Checkpoint
+    from toonset.nerf.run.monitor import Onlooker
+    from toonset.nerf.train.result import Training
 
 DOUBTFUL = 3  # exit code: written, but weak, or training went wrong and was cut short
 FINE = ("steps", "budget")  # why a training may end
@@ -72,8 +72,8 @@ def run(request: Request, printer: Printer) -> int:
     """Train, write the run and print the result; return the exit code."""
     from toonset.dataset.bundle.transforms import read_scene
     from toonset.dataset.silhouettes.mask import check_cut_out, has_figure
-    from toonset.nerf.gaps import guesses
-    from toonset.nerf.symmetry import with_all_mirrored
+    from toonset.nerf.prepare.symmetry import with_all_mirrored
+    from toonset.nerf.prepare.view_coverage import guesses
 
     place = request.place
     place.check([request.bundle, request.test], resume=request.resume)
@@ -138,9 +138,9 @@ def _prepared(
     printer: Printer,
 ) -> Scene:
     """Set torch up and return the scene with what is trained."""
-    from toonset.nerf.memory import check_memory
-    from toonset.nerf.threads import SIDES, use_threads
-    from toonset.nerf.training import device_of
+    from toonset.nerf.kernels.threads import SIDES, use_threads
+    from toonset.nerf.train.memory import check_memory
+    from toonset.nerf.train.train import device_of
 
     device = device_of(options.device)  # refused before anything is computed or said
     asked = request.threads if checkpoint is None else str(checkpoint.record.threads)
@@ -152,7 +152,7 @@ def _prepared(
 
 
 def _with_palette(scene: Scene, palette: bool, printer: Printer) -> Scene:
-    from toonset.nerf.labelling import labelled, without_palette
+    from toonset.nerf.train.labelling import labelled, without_palette
     from toonset.palette.names import hex_of
 
     if not palette:
@@ -175,7 +175,7 @@ def _onlooker(
     voice: Voice,
     stop: Callable[[], bool],
 ) -> Onlooker:
-    from toonset.nerf.progress_watch import Looking, Onlooker
+    from toonset.nerf.run.monitor import Looking, Onlooker
 
     folder, every = request.place.unfinished, request.preview_every
     return Onlooker(Looking(voice.tell, stop, held_out, folder, every), scene, options)
@@ -187,7 +187,7 @@ def _go_on(onlooker: Onlooker, checkpoint: Checkpoint, place: Place, printer: Pr
     Raises:
         BundleError: the checkpoint is of another scene.
     """
-    from toonset.nerf.checkpoint import check_scene, versions
+    from toonset.nerf.run.checkpoint import check_scene, versions
 
     check_scene(checkpoint, onlooker.scene, place.unfinished)
     onlooker.start = checkpoint.state
@@ -201,8 +201,8 @@ def _fitted(
     scene: Scene, options: TrainOptions, onlooker: Onlooker, stopper: Stopper, printer: Printer
 ) -> Training:
     """Return the training, as far as it went."""
-    from toonset.nerf.memory import memory_errors
-    from toonset.nerf.training import train
+    from toonset.nerf.train.memory import memory_errors
+    from toonset.nerf.train.train import train
 
     with stopper.listening(), memory_errors():
         return train(scene, options, printer.progress, onlooker)
@@ -210,7 +210,7 @@ def _fitted(
 
 def _leave(request: Request, training: Training, onlooker: Onlooker, printer: Printer) -> None:
     """Keep what there is of an interrupted training and say how to go on."""
-    from toonset.nerf.report import write_unfinished
+    from toonset.nerf.run.report import write_unfinished
 
     folder = request.place.unfinished
     write_unfinished(folder, training, onlooker.scene, onlooker.held_out)
@@ -223,8 +223,8 @@ def _leave(request: Request, training: Training, onlooker: Onlooker, printer: Pr
 
 def _write(place: Place, training: Training, onlooker: Onlooker) -> dict[str, Any]:
     """Write the finished run; return the content of metrics.json."""
-    from toonset.nerf.memory import memory_errors
-    from toonset.nerf.report import write_run
+    from toonset.nerf.run.report import write_run
+    from toonset.nerf.train.memory import memory_errors
     from toonset.write import new_folder
 
     with new_folder(place.run, force=place.force) as folder, memory_errors():

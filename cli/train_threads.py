@@ -49,7 +49,7 @@ def measured(most: int) -> int:
 
     From one per side on, numbers are doubled as long as that pays.
     """
-    from toonset.nerf.threads import SIDES, use_threads
+    from toonset.nerf.kernels.threads import SIDES, use_threads
 
     best = min(SIDES, most)
     while 2 * best <= most and _gain(best) > WORTH:
@@ -73,8 +73,8 @@ def _rate(threads: int) -> float:
     import torch.nn.functional as F
     from torch import nn
 
-    from toonset.nerf.decoder import two_layers
-    from toonset.nerf.threads import SIDES, side_by_side, use_threads
+    from toonset.nerf.kernels.decoder import two_layers
+    from toonset.nerf.kernels.threads import SIDES, side_by_side, use_threads
 
     use_threads(threads, SIDES)
     generator = torch.Generator().manual_seed(0)

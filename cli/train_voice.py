@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from toonset.cli.output import Printer
 
 if TYPE_CHECKING:
-    from toonset.nerf.progress import Status
+    from toonset.nerf.train.progress import Status
 
 LIVE_S = 0.1  # between changes of the live line
 LOG_S = 10.0  # between lines of a log at most
@@ -52,7 +52,7 @@ class Voice:
 
     def tell(self, status: Status) -> None:
         """Say where a training stands, if that is due."""
-        from toonset.nerf.progress import line_of
+        from toonset.nerf.train.progress import line_of
 
         if not self._pace.due(status.steps / status.of):
             return

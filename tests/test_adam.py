@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from toonset.nerf.adam import Adam, Group
+from toonset.nerf.kernels.adam import Adam, Group
 
 
 def _gradient(values: torch.Tensor, step: int) -> torch.Tensor:

@@ -49,8 +49,8 @@ from bench.stability.bodies import (
 )
 from bench.stability.draws import squashed as squashed_sheet
 from bench.stability.sweeps import SWEEPS
-from toonset.nerf import verdict
-from toonset.nerf.verdict import MOST_OFF, WEAK
+from toonset.nerf.score import verdict
+from toonset.nerf.score.verdict import MOST_OFF, WEAK
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
 

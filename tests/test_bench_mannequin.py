@@ -21,7 +21,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
-from toonset.nerf.metrics import compare, silhouette_iou
+from toonset.nerf.score.metrics import compare, silhouette_iou
 
 SIDE = 64
 RED, GREEN, BLUE, YELLOW, GREY, BROWN = COLORS = (

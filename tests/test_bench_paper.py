@@ -21,9 +21,9 @@ from bench.train.plan import METHODS, PAPER, Job, Method
 from bench.train.run import RunResult, Seen, run_job
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.evaluation_picture import TILE_PX
-from toonset.nerf.metrics_view import Judges
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.score.evaluation_picture import TILE_PX
+from toonset.nerf.score.metrics_view import Judges
 
 LAST = "paper, automatic palette, 2000 steps"
 QUICK = [name for name in PAPER if name.endswith(" 200 steps")]

@@ -32,11 +32,11 @@ from bench.train.run import Look, RunResult, Seen, Snapshots, curve_frames, reac
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
-from toonset.nerf import field_box
-from toonset.nerf.labelling import without_palette
-from toonset.nerf.metrics_view import Judges
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.training import train
+from toonset.nerf.score.metrics_view import Judges
+from toonset.nerf.train import box_rays
+from toonset.nerf.train.labelling import without_palette
+from toonset.nerf.train.train import train
 
 # a grid in the whole box, of few rays a step: small scenes train in seconds
 QUICK = TrainOptions(device="cpu", carve=False, field="voxel", register=False, unbend=False)
@@ -67,7 +67,7 @@ def case(name: str = "ball-exact", views: int = 8, side: int = 32) -> TrainCase:
 @pytest.fixture
 def short_methods(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Method]]:
     """Replace the methods by quick ones; their order, which is that of tables, comes back too."""
-    monkeypatch.setattr(field_box, "RAYS_PER_STEP", 256)
+    monkeypatch.setattr(box_rays, "RAYS_PER_STEP", 256)
     short = {
         "default": Method(replace(QUICK, steps=60), curve=True),
         NEAREST: Method(None, first_seed_only=True),

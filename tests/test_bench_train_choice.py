@@ -5,7 +5,7 @@ from __future__ import annotations
 from bench.train.choice import choices_of, choices_text
 from bench.train.plan import METHODS, PLANES
 from bench.train.run import RunResult
-from toonset.nerf.field_choice import COARSE, FINE, USUAL
+from toonset.nerf.train.resolution_choice import COARSE, FINE, USUAL
 
 
 def run(method: str, psnr: float, parameters: int, case: str = "a", seed: int = 0) -> RunResult:

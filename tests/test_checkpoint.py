@@ -15,22 +15,22 @@ import torch
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
-from toonset.nerf import fitting
-from toonset.nerf.checkpoint import check_scene, read_checkpoint, scene_digest, write_checkpoint
-from toonset.nerf.checkpoint_state import FitState
-from toonset.nerf.field_rays import PRUNE_AFTER
-from toonset.nerf.fitting import Moment
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.progress import Status
-from toonset.nerf.progress_watch import (
+from toonset.nerf.run.checkpoint import check_scene, read_checkpoint, scene_digest, write_checkpoint
+from toonset.nerf.run.monitor import (
     INTERRUPTED,
     Looking,
     Onlooker,
     held_out_psnr,
     sample_of,
 )
-from toonset.nerf.trained import Training
-from toonset.nerf.training import train
+from toonset.nerf.train import loop
+from toonset.nerf.train.carved_rays import PRUNE_AFTER
+from toonset.nerf.train.loop import Moment
+from toonset.nerf.train.progress import Status
+from toonset.nerf.train.result import Training
+from toonset.nerf.train.state import FitState
+from toonset.nerf.train.train import train
 
 SIDE = 24
 PALETTE = np.array([[220, 40, 30], [30, 60, 200]], dtype=np.uint8)
@@ -105,7 +105,7 @@ def test_looking_on_changes_no_bit(
     whole: Training, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("CHECKPOINT_S", "FIRST_LOOK_S"):
-        monkeypatch.setattr(f"toonset.nerf.progress_watch.{name}", 0.05)
+        monkeypatch.setattr(f"toonset.nerf.run.monitor.{name}", 0.05)
     watch = onlooker(tmp_path)
     watched = train(SCENE, OPTIONS, watch=watch)
     assert {p.name for p in tmp_path.iterdir()} >= {"preview.png", "checkpoint.json"}
@@ -168,7 +168,7 @@ def test_a_training_killed_while_it_writes_keeps_its_last_checkpoint(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("toonset.nerf.checkpoint.write_json", killed)
+        patch.setattr("toonset.nerf.run.checkpoint.write_json", killed)
         with pytest.raises(KeyboardInterrupt):
             write_checkpoint(tmp_path, state, OPTIONS, SCENE)
     assert read_checkpoint(tmp_path).state.steps == state.steps - 1
@@ -281,7 +281,7 @@ def test_a_state_with_what_is_no_number_is_never_kept(
 
 
 def test_a_training_that_runs_away_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fitting, "TABLES_RATE", 1e6)
+    monkeypatch.setattr(loop, "TABLES_RATE", 1e6)
     training = train(SCENE, OPTIONS)
     assert training.stopped.startswith(("diverged", "loss not finite", "parameters not finite"))
     assert "kept the state of step" in training.stopped

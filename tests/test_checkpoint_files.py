@@ -16,17 +16,17 @@ from bench.train.growth import growths
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
-from toonset.nerf import memory
-from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.field import TriplaneField
-from toonset.nerf.field_loss import Model
-from toonset.nerf.field_rays import PRUNE_AFTER
-from toonset.nerf.fitting import store_in_half
-from toonset.nerf.hull import Hull
-from toonset.nerf.manifest import check_manifest, write_manifest
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.fields.triplane import TriplaneField
+from toonset.nerf.hull.hull import Hull
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.run_folder_tensors import packed, parameters_of, rows_near, unpack
-from toonset.nerf.trained import TrainedField
+from toonset.nerf.run.manifest import check_manifest, write_manifest
+from toonset.nerf.run.tensors import packed, parameters_of, rows_near, unpack
+from toonset.nerf.train import memory
+from toonset.nerf.train.carved_rays import PRUNE_AFTER
+from toonset.nerf.train.loop import store_in_half
+from toonset.nerf.train.loss import Model
 
 
 def figure(seed: int, voxel: float = 0.05, resolution: int = 24) -> TrainedField:

@@ -18,7 +18,7 @@ from toonset.cli.train_run import RESUMED_AS
 from toonset.cli.train_stop import Stopper
 from toonset.cli.train_threads import measured
 from toonset.cli.train_voice import LOG_S, Pace
-from toonset.nerf.threads import use_threads
+from toonset.nerf.kernels.threads import use_threads
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
 RUN_FILES = {
@@ -118,7 +118,7 @@ def test_held_out_views_are_looked_at_and_reported(bundle: Path, toonset, tmp_pa
 
 
 def test_a_training_that_went_wrong_is_written_with_its_reason(bundle: Path, toonset, monkeypatch):
-    monkeypatch.setattr("toonset.nerf.fitting.TABLES_RATE", float("inf"))
+    monkeypatch.setattr("toonset.nerf.train.loop.TABLES_RATE", float("inf"))
     done = toonset("train", bundle, *FAST, "--quiet")
     assert done.code == 3
     assert "training stopped early: " in done.err
@@ -133,7 +133,7 @@ def test_too_little_memory_is_said_before_anything_is_done(
 ):
     before = snapshot(bundle)
     with monkeypatch.context() as patch:
-        patch.setattr("toonset.nerf.memory.free_bytes", lambda: 10**6)
+        patch.setattr("toonset.nerf.train.memory.free_bytes", lambda: 10**6)
         reason = toonset("train", bundle, *FAST).reason.splitlines()[-1]
     assert "GB of memory, 0.0 GB are free; end other programs" in reason
     assert snapshot(bundle) == before
@@ -141,7 +141,7 @@ def test_too_little_memory_is_said_before_anything_is_done(
     def full(*_: object) -> None:
         raise RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 9")
 
-    monkeypatch.setattr("toonset.nerf.training.hull_of", full)
+    monkeypatch.setattr("toonset.nerf.train.train.hull_of", full)
     done = toonset("train", bundle, *FAST, "-q")
     assert done.reason.startswith("out of memory (training asked for more than this machine has)")
     assert snapshot(bundle) == before

@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import nn
 
-from toonset.nerf.checkpoint_good import DIVERGED, WINDOW, LastGood
+from toonset.nerf.train.divergence import DIVERGED, WINDOW, LastGood
 
 
 def judged(losses: list[float]) -> tuple[str, float, int]:

@@ -12,15 +12,15 @@ from PIL import Image
 
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.bundle.transforms import read_scene
-from toonset.nerf.evaluation import ScoredView, chosen_frames, report
-from toonset.nerf.evaluation_picture import (
+from toonset.nerf.score.evaluate import ScoredView, chosen_frames, report
+from toonset.nerf.score.evaluation_picture import (
     CAPTION_PX,
     HEADING_PX,
     TILE_PX,
     contact_sheet,
     worst_first,
 )
-from toonset.nerf.metrics_view import Judges, figures_of
+from toonset.nerf.score.metrics_view import Judges, figures_of
 
 JUDGES = Judges("no flip here", "no lpips here")
 RED, BLUE = (200, 30, 20, 255), (20, 60, 200, 255)

@@ -10,12 +10,12 @@ from scipy import ndimage
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.nerf.evidence import mask_iou
-from toonset.nerf.fairing import faired, sheets
-from toonset.nerf.fairing_distance import UNKNOWN, signed_distance, squared_distance
-from toonset.nerf.fairing_fit import Contacts, Pyramid
-from toonset.nerf.hull import Hull, carve
-from toonset.nerf.volume import add_bending, inner, laplacian, trilinear
+from toonset.nerf.hull.fairing import faired, sheets
+from toonset.nerf.hull.fairing_distance import UNKNOWN, signed_distance, squared_distance
+from toonset.nerf.hull.fairing_fit import Contacts, Pyramid
+from toonset.nerf.hull.hull import Hull, carve
+from toonset.nerf.hull.tolerance import mask_iou
+from toonset.nerf.kernels.volume import add_bending, inner, laplacian, trilinear
 
 
 @pytest.mark.parametrize("seed", [0, 1])

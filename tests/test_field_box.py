@@ -13,8 +13,18 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf.field import PLANES, TriplaneField
-from toonset.nerf.field_box import (
+from toonset.nerf.fields.base import FieldSpec, Kind, Places
+from toonset.nerf.fields.build import build_field
+from toonset.nerf.fields.painted_hull import paint
+from toonset.nerf.fields.triplane import PLANES, TriplaneField
+from toonset.nerf.fields.voxel import VoxelField
+from toonset.nerf.hull.hull import Hull, carve
+from toonset.nerf.hull.march import march, rays_of
+from toonset.nerf.kernels.compositing import composite_even, composite_packed
+from toonset.nerf.kernels.interpolation import apply_once
+from toonset.nerf.kernels.losses import photometric
+from toonset.nerf.options import PRESETS, TrainOptions, preset
+from toonset.nerf.train.box_rays import (
     BINS,
     BoxRays,
     any_backdrop,
@@ -23,18 +33,7 @@ from toonset.nerf.field_box import (
     open_box,
     without_empty_space,
 )
-from toonset.nerf.field_hull import paint
-from toonset.nerf.field_kinds import build_field
-from toonset.nerf.field_loss import render_batch
-from toonset.nerf.field_voxel import VoxelField
-from toonset.nerf.fields import FieldSpec, Kind, Places
-from toonset.nerf.hull import Hull, carve
-from toonset.nerf.interpolation import apply_once
-from toonset.nerf.losses import photometric
-from toonset.nerf.march import march, rays_of
-from toonset.nerf.options import TrainOptions
-from toonset.nerf.preset import PRESETS, preset
-from toonset.nerf.rendering import composite_even, composite_packed
+from toonset.nerf.train.loss import render_batch
 
 SIDE = 24
 PALETTE = np.array([[250, 0, 0], [0, 0, 250]], dtype=np.uint8)

@@ -12,14 +12,14 @@ from bench.cases.cases import train_cases
 from tests.test_train_summary import metrics
 from toonset.cli.train_summary import summary
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf import field_trials
-from toonset.nerf.field_choice import Candidate, FieldChoice, chosen, shares_for
-from toonset.nerf.field_trials import left_out
-from toonset.nerf.labelling import without_palette
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.report import write_run
-from toonset.nerf.run_folder import read_field
-from toonset.nerf.training import finest_cells, train
+from toonset.nerf.run.folder import read_field
+from toonset.nerf.run.report import write_run
+from toonset.nerf.train import resolution_search
+from toonset.nerf.train.labelling import without_palette
+from toonset.nerf.train.resolution_choice import Candidate, FieldChoice, chosen, shares_for
+from toonset.nerf.train.resolution_search import left_out
+from toonset.nerf.train.train import finest_cells, train
 
 FEW = 4  # steps of a trial
 SHORT = TrainOptions(steps=2 * FEW, device="cpu", missing_views=0)
@@ -40,7 +40,7 @@ def few(scene: Scene) -> Scene:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let trials take a few steps only."""
-    monkeypatch.setattr(field_trials, "STEPS", FEW)
+    monkeypatch.setattr(resolution_search, "STEPS", FEW)
 
 
 def candidates(*psnr: float) -> list[Candidate]:
@@ -98,13 +98,13 @@ def test_trials_see_the_other_drawings_only(
     few: Scene, quick: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[set[str]] = []
-    real = field_trials.make_batches
+    real = resolution_search.make_batches
 
     def noted(part: Scene, *rest: object) -> object:
         seen.append({frame.name for frame in part.frames})
         return real(part, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(field_trials, "make_batches", noted)
+    monkeypatch.setattr(resolution_search, "make_batches", noted)
     choice = train(few, SHORT).choice
     assert choice is not None
     every, left = {frame.name for frame in few.frames}, set(choice.left_out)

@@ -10,15 +10,20 @@ import torch
 from torch import Tensor
 
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf.batches import Batch
-from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.field import PLANES, TriplaneField
-from toonset.nerf.field_gradients import gradients_of
-from toonset.nerf.field_kinds import build_field
-from toonset.nerf.field_loss import Model, Weights, loss_terms, render_batch
-from toonset.nerf.field_rays import PRUNE_AFTER, FixedRays, seen_samples
-from toonset.nerf.fields import Field, FieldSpec, Places
-from toonset.nerf.rendering import composite, composite_packed, padded, transmittance_packed
+from toonset.nerf.fields.base import Field, FieldSpec, Places
+from toonset.nerf.fields.build import build_field
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.fields.triplane import PLANES, TriplaneField
+from toonset.nerf.kernels.compositing import (
+    composite,
+    composite_packed,
+    padded,
+    transmittance_packed,
+)
+from toonset.nerf.train.batches import Batch
+from toonset.nerf.train.carved_rays import PRUNE_AFTER, FixedRays, seen_samples
+from toonset.nerf.train.gradients import gradients_of
+from toonset.nerf.train.loss import Model, Weights, loss_terms, render_batch
 
 BOX = Box(np.array([-3.0, 10.0, 0.5]), np.array([1.0, 18.0, 2.5]))
 SPECS = (

@@ -10,8 +10,8 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.gaps import FEW_OUTLINES, guesses, outline_gap, wide_gaps
-from toonset.nerf.symmetry import with_all_mirrored
+from toonset.nerf.prepare.symmetry import with_all_mirrored
+from toonset.nerf.prepare.view_coverage import FEW_OUTLINES, guesses, outline_gap, wide_gaps
 
 NOTHING = np.zeros((8, 8, 4), dtype=np.uint8)
 

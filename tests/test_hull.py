@@ -10,10 +10,10 @@ import torch.nn.functional as F
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.errors import BundleError
-from toonset.nerf.evidence import choose_missing
-from toonset.nerf.hull import EDGE, LEVEL, Hull, carve, grown
-from toonset.nerf.hull_views import agreement, project
-from toonset.nerf.march import march, pixels_near, rays_of
+from toonset.nerf.hull.hull import EDGE, LEVEL, Hull, carve, grown
+from toonset.nerf.hull.march import march, pixels_near, rays_of
+from toonset.nerf.hull.support import agreement, project
+from toonset.nerf.hull.tolerance import choose_missing
 
 
 @pytest.mark.parametrize("k", [0.0, 0.15])

@@ -12,23 +12,23 @@ import pytest
 import torch
 from skimage.metrics import structural_similarity
 
-from toonset.nerf import lpips as lpips_metric
-from toonset.nerf.flip import load_flip
-from toonset.nerf.metrics import (
+from toonset.nerf.score import lpips as lpips_metric
+from toonset.nerf.score.flip import load_flip
+from toonset.nerf.score.labels import score_labels
+from toonset.nerf.score.lines import line_f1, line_pixels
+from toonset.nerf.score.metrics import (
     BEST_PSNR,
     compare,
     means,
-    over_white,
     psnr_of,
     shifted_psnr,
     silhouette_iou,
     ssim_inside,
     ssim_map,
 )
-from toonset.nerf.metrics_labels import score_labels
-from toonset.nerf.metrics_lines import line_f1, line_pixels
-from toonset.nerf.metrics_structure import gmsd, haarpsi
-from toonset.nerf.metrics_view import Judges, figures_of
+from toonset.nerf.score.metrics_view import Judges, figures_of
+from toonset.nerf.score.structure import gmsd, haarpsi
+from toonset.view import over_white
 
 NO_JUDGES = Judges("no flip here", "no lpips here")
 

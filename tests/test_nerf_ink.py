@@ -13,13 +13,13 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
-from toonset.nerf.ink import InkStyle, without_ink
-from toonset.nerf.ink_nearest import depth_inside
-from toonset.nerf.ink_record import InkRecord
-from toonset.nerf.ink_redraw import draw_ink, ink_scale, inked
+from toonset.nerf.lines.nearest import depth_inside
+from toonset.nerf.lines.remove import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.preparation import prepared
-from toonset.nerf.views import Rendering
+from toonset.nerf.prepare.prepare import prepared
+from toonset.nerf.render.line_drawing import draw_ink, ink_scale, inked
+from toonset.nerf.render.views import Rendering
+from toonset.nerf.run.records import InkRecord
 
 INK = 128
 STYLE = InkStyle((0, 0, 0), 2.0, 2.0, (2.0,), 50.0, 0.2, ((0, 1),))

@@ -13,11 +13,11 @@ import torch.nn.functional as F
 from torch import nn
 
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf import decoder, losses
-from toonset.nerf.field import PLANES, TriplaneField
-from toonset.nerf.interpolation import Operator
-from toonset.nerf.metrics import BEST_PSNR, compare, ssim
-from toonset.nerf.rendering import composite, compositing_weights, padded
+from toonset.nerf.fields.triplane import PLANES, TriplaneField
+from toonset.nerf.kernels import decoder, losses
+from toonset.nerf.kernels.compositing import composite, compositing_weights, padded
+from toonset.nerf.kernels.interpolation import Operator
+from toonset.nerf.score.metrics import BEST_PSNR, compare, ssim
 
 BOX = Box(np.array([-3.0, 10.0, 0.5]), np.array([1.0, 18.0, 2.5]))
 

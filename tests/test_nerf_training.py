@@ -17,23 +17,24 @@ from safetensors.torch import load_file, save_file
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError, PaletteError
-from toonset.nerf import field_gradients, field_loss
-from toonset.nerf import training as training_module
-from toonset.nerf.animation import encode_gif
-from toonset.nerf.batches import Batch
-from toonset.nerf.evaluation import evaluate
-from toonset.nerf.fitting import LEAST_STEPS
-from toonset.nerf.labelling import labelled
-from toonset.nerf.layers import alpha_picture, color_picture, depth_picture, palette_picture
-from toonset.nerf.metrics import compare
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.recolor import recolored
-from toonset.nerf.report import write_run
-from toonset.nerf.run_folder import read_field
-from toonset.nerf.trained import Training
-from toonset.nerf.training import train
-from toonset.nerf.turntable import turntable
-from toonset.nerf.views import render
+from toonset.nerf.render.animation import encode_gif
+from toonset.nerf.render.layers import alpha_picture, color_picture, depth_picture, palette_picture
+from toonset.nerf.render.recolor import recolored
+from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.views import render
+from toonset.nerf.run.folder import read_field
+from toonset.nerf.run.report import write_run
+from toonset.nerf.score.evaluate import evaluate
+from toonset.nerf.score.metrics import compare
+from toonset.nerf.train import gradients
+from toonset.nerf.train import loss as loss_module
+from toonset.nerf.train import train as train_module
+from toonset.nerf.train.batches import Batch
+from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.loop import LEAST_STEPS
+from toonset.nerf.train.result import Training
+from toonset.nerf.train.train import train
 from toonset.palette.names import name_of
 
 SIDE, FINE = 48, 3
@@ -131,16 +132,16 @@ def test_same_seed_same_bits_other_seed_other_bits() -> None:
 def test_a_loss_that_is_no_number_keeps_the_last_good_state(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    real = field_loss.loss_terms
+    real = loss_module.loss_terms
     calls = iter(range(1000))  # two a step: its rays are in two parts
 
     def poisoned(
-        model: field_loss.Model, batch: Batch, weights: field_loss.Weights
+        model: loss_module.Model, batch: Batch, weights: loss_module.Weights
     ) -> tuple[torch.Tensor, ...]:
         first, *rest = real(model, batch, weights)
         return (first * (float("nan") if next(calls) == 51 else 1.0), *rest)
 
-    monkeypatch.setattr(field_gradients, "loss_terms", poisoned)
+    monkeypatch.setattr(gradients, "loss_terms", poisoned)
     training = train(train_scene(), QUICK)
     assert training.stopped == "loss not finite at step 25, kept the state of step 20"
     assert len(training.history) == 25
@@ -155,13 +156,13 @@ def test_a_budget_ends_training() -> None:
 
 
 def test_a_budget_counts_what_comes_before_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = training_module.hull_of
+    real = train_module.hull_of
 
     def slow(*given: Any) -> Any:
         time.sleep(1.0)
         return real(*given)
 
-    monkeypatch.setattr(training_module, "hull_of", slow)
+    monkeypatch.setattr(train_module, "hull_of", slow)
     training = train(train_scene(), replace(QUICK, steps=100_000, budget_s=0.9))
     assert training.stopped == "budget"
     assert len(training.history) == LEAST_STEPS  # none of it was left

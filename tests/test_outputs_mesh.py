@@ -13,18 +13,23 @@ from PIL import Image
 
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError, OutputError, PaletteError
-from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.fields import Constants, Field, FieldSpec, Places
-from toonset.nerf.hull import Hull
-from toonset.nerf.layers import palette_picture
-from toonset.nerf.mesh_export import check_mesh_files, mesh_files, split_by_label, write_mesh_files
-from toonset.nerf.surface import Surface, surface_of
-from toonset.nerf.surface_cut import cut
-from toonset.nerf.surface_decimate import decimated
-from toonset.nerf.trained import TrainedField
-from toonset.nerf.turntable import turntable
-from toonset.nerf.turntable_files import turntable_files
-from toonset.nerf.views import render
+from toonset.nerf.fields.base import Constants, Field, FieldSpec, Places
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.hull.hull import Hull
+from toonset.nerf.render.layers import palette_picture
+from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.turntable_files import turntable_files
+from toonset.nerf.render.views import render
+from toonset.nerf.surface.cut import cut
+from toonset.nerf.surface.decimate import decimated
+from toonset.nerf.surface.export import (
+    check_mesh_files,
+    mesh_files,
+    split_by_label,
+    write_mesh_files,
+)
+from toonset.nerf.surface.surface import Surface, surface_of
 
 PALETTE = np.array([[200, 40, 40], [40, 80, 200], [250, 240, 10]], dtype=np.uint8)
 RADIUS, VOXEL, CELLS = 1.0, 0.085, 31

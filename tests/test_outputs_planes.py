@@ -13,13 +13,13 @@ from PIL import Image
 
 from toonset.dataset.silhouettes.bounds import Box
 from toonset.errors import BundleError
-from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.field import TriplaneField
-from toonset.nerf.field_voxel import VoxelField
-from toonset.nerf.fields import Field
-from toonset.nerf.hull import Hull
-from toonset.nerf.planes_export import planes_files
-from toonset.nerf.trained import TrainedField
+from toonset.nerf.fields.base import Field
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.fields.triplane import TriplaneField
+from toonset.nerf.fields.voxel import VoxelField
+from toonset.nerf.hull.hull import Hull
+from toonset.nerf.run.planes import planes_files
 
 BOX = Box(np.array([-1.0, -0.5, 0.2]), np.array([1.0, 1.5, 1.7]))
 PALETTE = np.array([[200, 40, 40], [40, 80, 200]], dtype=np.uint8)

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image, ImageSequence
 
 from toonset.errors import OutputError, SetupError
-from toonset.nerf.animation import duration_ms, encode_gif, encode_mp4, encode_webp
-from toonset.nerf.sprite_sheet import LARGEST_SIDE, sprite_json, sprite_sheet
+from toonset.nerf.render.animation import duration_ms, encode_gif, encode_mp4, encode_webp
+from toonset.nerf.render.sprite_sheet import LARGEST_SIDE, sprite_json, sprite_sheet
 
 COLORS = np.array([[200, 40, 40], [40, 80, 200], [20, 20, 20], [250, 240, 10]], dtype=np.uint8)
 

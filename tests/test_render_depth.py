@@ -13,11 +13,11 @@ import torch
 from PIL import Image
 
 from toonset.camera import Camera
-from toonset.nerf.depth_levels import LEVELS, DepthLevels
-from toonset.nerf.hull import Hull
-from toonset.nerf.run_folder import read_field
-from toonset.nerf.turntable import turntable
-from toonset.nerf.views import render
+from toonset.nerf.hull.hull import Hull
+from toonset.nerf.render.depth_levels import LEVELS, DepthLevels
+from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.views import render
+from toonset.nerf.run.folder import read_field
 
 HULL = Hull(np.array([-1.0, 0.0, -0.5]), 0.1, torch.ones(20, 30, 10))
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from toonset.nerf.views_labels import LEVELS, NONE, label_table, labels_of, palette_shares
+from toonset.nerf.render.labels import LEVELS, NONE, label_table, labels_of, palette_shares
 
 GREEN, BROWN, SKIN = PAINTS = torch.tensor(
     [[0.0, 0.55, 0.34], [0.6, 0.55, 0.4], [0.96, 0.72, 0.58]]

@@ -13,16 +13,16 @@ from torch import Tensor, nn
 from bench.train.views_speed import compare, plain
 from toonset.camera import Camera
 from toonset.errors import PaletteError
-from toonset.nerf.hull import EDGE, Hull, occupancy
-from toonset.nerf.march import clip, rays_of
-from toonset.nerf.normals import normal_picture, normals_of
-from toonset.nerf.recolor import repainted
-from toonset.nerf.supersample import borders, places_within
-from toonset.nerf.trained import TrainedField
-from toonset.nerf.views import render
-from toonset.nerf.views_bake import Baked
-from toonset.nerf.views_cast import OPAQUE_FROM, cast
-from toonset.nerf.views_rays import Sight
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.hull.hull import EDGE, Hull, occupancy
+from toonset.nerf.hull.march import clip, rays_of
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.cast import OPAQUE_FROM, cast
+from toonset.nerf.render.normals import normal_picture, normals_of
+from toonset.nerf.render.rays import Sight
+from toonset.nerf.render.recolor import repainted
+from toonset.nerf.render.supersample import borders, places_within
+from toonset.nerf.render.views import render
 
 SHAPE, VOXEL = (20, 28, 16), 0.1
 LOW = np.array([-1.0, -1.4, -0.8])

@@ -10,8 +10,8 @@ import torch
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.nerf.hull.scene_hull import LEVELS, hull_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.shape import LEVELS, hull_of
 
 RADIUS, SCALE, SIDE = 1.0, 12.0, 32
 

@@ -13,8 +13,8 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.symmetry import ALIKE, completed, likeness, mirrored
-from toonset.nerf.training import train
+from toonset.nerf.prepare.symmetry import ALIKE, completed, likeness, mirrored
+from toonset.nerf.train.train import train
 
 FLAT = SynthOptions(cell_px=80, outline_px=0, elevation_deg=8)
 FRONT_SIDE_BACK = (0, 2, 4)

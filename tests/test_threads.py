@@ -10,10 +10,10 @@ import pytest
 import torch
 
 from bench.cases.cases import train_cases
-from toonset.nerf.labelling import labelled
+from toonset.nerf.kernels.threads import SIDES, side_by_side, threads_in_use, use_threads
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.threads import SIDES, side_by_side, threads_in_use, use_threads
-from toonset.nerf.training import train
+from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.train import train
 
 
 @pytest.fixture(autouse=True)

@@ -12,14 +12,14 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.evidence import HullEvidence
+from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.preparation import Prepared
-from toonset.nerf.registration import Registration
-from toonset.nerf.symmetry import Symmetry
-from toonset.nerf.trained import Step, Training
-from toonset.nerf.verdict import MOST_OFF, OK, WEAK, blended, off_of, verdict_of
-from toonset.nerf.warp import Unbending
+from toonset.nerf.prepare.prepare import Prepared
+from toonset.nerf.prepare.registration import Registration
+from toonset.nerf.prepare.symmetry import Symmetry
+from toonset.nerf.prepare.unwarp import Unbending
+from toonset.nerf.score.verdict import MOST_OFF, OK, WEAK, blended, off_of, verdict_of
+from toonset.nerf.train.result import Step, Training
 
 SIDE, HEIGHT = 120, 80
 TURN = tuple(range(0, 360, 45))

@@ -85,3 +85,9 @@ def straight(values: Float[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "
     rgba = values.copy()
     rgba[..., :3] *= 255 / np.maximum(rgba[..., 3:], 1e-3)
     return np.rint(np.clip(rgba, 0, 255)).astype(np.uint8)
+
+
+def over_white(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "height width 3"]:
+    """Return a straight-alpha picture over white, in [0, 1]."""
+    values = rgba.astype(np.float64) / 255
+    return values[..., :3] * values[..., 3:] + 1 - values[..., 3:]

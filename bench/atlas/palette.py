@@ -19,12 +19,12 @@ from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import ToonsetError
 from toonset.mesh import Mesh
-from toonset.nerf.metrics import over_white
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
 from toonset.palette.paints.extract import extract_palette
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
+from toonset.view import over_white
 
 PICTURES = SynthOptions(views=8, cell_px=150, elevation_deg=8, outline_px=1.5)
 LINE = 128  # of 255: covered by half, a pixel is a line, as in `toonset palette`

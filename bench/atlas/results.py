@@ -26,7 +26,7 @@ from bench.atlas.training import WARNED as TRAIN_WARNED
 from bench.charts.chart import COLORS
 from bench.stability.steps import SheetResult, StepResult
 from bench.stability.table import SOLVED_DEG, WRONG_DEG
-from toonset.nerf.verdict import WEAK
+from toonset.nerf.score.verdict import WEAK
 
 BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, BLACK, GREY = COLORS
 LOST_FINE_DB, LOST_FAILED_DB = 1.0, 3.0

@@ -22,17 +22,18 @@ from bench.stability.sheet import Step
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.images.picture import encode_png
 from toonset.errors import ToonsetError
-from toonset.nerf.consistency import consistency_of
-from toonset.nerf.evaluation_picture import tile_of
-from toonset.nerf.labelling import labelled
-from toonset.nerf.metrics import over_white, psnr_of
+from toonset.nerf.kernels.threads import use_threads
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.report import figures_of, pictures_of
-from toonset.nerf.threads import use_threads
-from toonset.nerf.trained import Training
-from toonset.nerf.training import train
-from toonset.nerf.verdict import WEAK, Picture, Verdict, verdict_of
+from toonset.nerf.prepare.consistency import consistency_of
+from toonset.nerf.run.report import figures_of, pictures_of
+from toonset.nerf.score.evaluation_picture import tile_of
+from toonset.nerf.score.metrics import psnr_of
+from toonset.nerf.score.verdict import WEAK, Picture, Verdict, verdict_of
+from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.result import Training
+from toonset.nerf.train.train import train
 from toonset.palette.palette import Palette
+from toonset.view import over_white
 
 STEPS = TrainOptions().steps  # of the optimiser: the verdict is on what users get
 SILENT, REPAIRED, REFUSED, CRASHED = "silent", "repaired", "refused", "crashed"

@@ -25,7 +25,7 @@ from bench.calib.baselines import Placed, Rotation, nominal_cameras, timed
 from bench.cases.cases import CalibCase
 from toonset.camera import Camera
 from toonset.mesh import Mesh
-from toonset.nerf.surface_decimate import decimated
+from toonset.nerf.surface.decimate import decimated
 from toonset.projection import project, rotate
 from toonset.view import View
 

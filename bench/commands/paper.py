@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from bench.cases.cases import TrainCase
     from bench.train.plan import Job
     from bench.train.run import Look, RunResult
-    from toonset.nerf.evaluation import ScoredView
-    from toonset.nerf.trained import TrainedField
+    from toonset.nerf.fields.trained_field import TrainedField
+    from toonset.nerf.score.evaluate import ScoredView
 
 STRIPS, TABLE, FIGURE, DIFFERENCES = "strips", "table1", "figure4", "differences"
 WRITTEN_HERE = (*WRITTEN, STRIPS, f"{TABLE}.*", f"{FIGURE}-*.png", f"{DIFFERENCES}*.*")
@@ -38,7 +38,7 @@ def paper_into(
     """
     from bench.paper.difference import as_table, claim, differences_of
     from bench.paper.table import as_text, outdone_text
-    from toonset.nerf.metrics_view import load_judges
+    from toonset.nerf.score.metrics_view import load_judges
 
     jobs = _jobs_of(chosen)
 
@@ -57,7 +57,7 @@ def paper_into(
 def _found(runs: list[RunResult]) -> dict[str, Any]:
     from bench.paper.difference import as_rows, differences_of
     from bench.paper.table import outdone, paper_rows
-    from toonset.nerf.metrics_view import load_judges
+    from toonset.nerf.score.metrics_view import load_judges
 
     return {
         "rows": paper_rows(runs),

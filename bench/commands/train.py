@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from bench.cases.cases import TrainCase
     from bench.train.plan import Job
     from bench.train.run import Look, RunResult
-    from toonset.nerf.evaluation import ScoredView
-    from toonset.nerf.trained import TrainedField
+    from toonset.nerf.fields.trained_field import TrainedField
+    from toonset.nerf.score.evaluate import ScoredView
 
 RUNS, CURVES, VIEWS = "runs.json", "train", "views"
 WRITTEN = (RUNS, *RESULTS, f"{CURVES}.png", f"{CURVES}.svg", VIEWS)
@@ -130,7 +130,7 @@ def _views_into(folder: Path) -> Look:
     def look(job: Job, _: TrainCase, trained: TrainedField, views: Sequence[ScoredView]) -> None:
         from bench.charts.chart import DEFAULT
         from toonset.dataset.images.picture import encode_png
-        from toonset.nerf.evaluation_picture import contact_sheet
+        from toonset.nerf.score.evaluation_picture import contact_sheet
         from toonset.write import write_bytes
 
         if job.method == DEFAULT:

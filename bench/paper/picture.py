@@ -10,12 +10,20 @@ from PIL import Image, ImageDraw
 
 from bench.cases.cases import TrainCase
 from toonset.dataset.bundle.scene import Frame
-from toonset.nerf.evaluation_picture import BLACK, GAP_PX, GREY, TEXT_PX, TILE_PX, font_of, tile_of
-from toonset.nerf.layers import color_picture, palette_picture
-from toonset.nerf.metrics import over_white
-from toonset.nerf.trained import TrainedField
-from toonset.nerf.views import render
-from toonset.nerf.views_bake import Baked
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.layers import color_picture, palette_picture
+from toonset.nerf.render.views import render
+from toonset.nerf.score.evaluation_picture import (
+    BLACK,
+    GAP_PX,
+    GREY,
+    TEXT_PX,
+    TILE_PX,
+    font_of,
+    tile_of,
+)
+from toonset.view import over_white
 
 VIEWS = 2  # of each kind
 KINDS = ("training views", "new views")

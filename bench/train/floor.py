@@ -23,22 +23,22 @@ from torch import Tensor
 from bench.cases.cases import train_cases
 from bench.train.growth import growths, print_growth
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf.adam import Adam, Group
-from toonset.nerf.allocator import keep_freed_memory
-from toonset.nerf.batches import Batch, make_batches
-from toonset.nerf.classifier import HIDDEN as CLASSIFIER_WIDTH
-from toonset.nerf.classifier import PaletteClassifier
-from toonset.nerf.decoder import two_layers
-from toonset.nerf.field import TriplaneField
-from toonset.nerf.field_loss import Model, Weights, loss_terms
-from toonset.nerf.field_rays import PRUNE_AFTER, FixedRays
-from toonset.nerf.fitting import BETAS, TABLES_RATE
-from toonset.nerf.interpolation import Operator
-from toonset.nerf.labelling import labelled
+from toonset.nerf.fields.classifier import HIDDEN as CLASSIFIER_WIDTH
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.fields.triplane import TriplaneField
+from toonset.nerf.hull.scene_hull import hull_of, per_px
+from toonset.nerf.kernels.adam import Adam, Group
+from toonset.nerf.kernels.allocator import keep_freed_memory
+from toonset.nerf.kernels.compositing import composite_packed
+from toonset.nerf.kernels.decoder import two_layers
+from toonset.nerf.kernels.interpolation import Operator
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.rendering import composite_packed
-from toonset.nerf.shape import hull_of, per_px
-from toonset.nerf.training import (
+from toonset.nerf.train.batches import Batch, make_batches
+from toonset.nerf.train.carved_rays import PRUNE_AFTER, FixedRays
+from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.loop import BETAS, TABLES_RATE
+from toonset.nerf.train.loss import Model, Weights, loss_terms
+from toonset.nerf.train.train import (
     CELLS,
     CELLS_PER_PX,
     CHANNELS,

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf.memory import needed_bytes
+from toonset.nerf.kernels.threads import SIDES, use_threads
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.threads import SIDES, use_threads
-from toonset.nerf.training import train
+from toonset.nerf.train.memory import needed_bytes
+from toonset.nerf.train.train import train
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
     colour(x) = sum_v w_v colour_v(project_v(x)) / sum_v w_v,   w_v = cos^4 of the angle of sight
 
 over the drawings in which the mannequin hides x behind nothing: the rule of the coloured hull
-(`toonset.nerf.field_hull`), so that the two differ in shape alone. A point that no drawing shows,
-or only beside its figure, takes the colour of the nearest one that a drawing's pixel lies on.
+(`toonset.nerf.fields.painted_hull`), so that the two differ in shape alone. A point that no drawing
+shows, or only beside its figure, takes the colour of the nearest one that a drawing's pixel lies
+on.
 
 It is asked anew for every point that a view shows, so no texture limits how fine it is.
 
@@ -26,7 +27,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
-from toonset.nerf.field_hull import GRAZING, SHARPNESS
+from toonset.nerf.fields.painted_hull import GRAZING, SHARPNESS
 
 SAMPLES = 4  # per pixel and axis, of what is drawn; half as many cost 3 dB where the mesh is true
 MOST_SIDE_PX = 2048  # of those samples: half a GiB of points

@@ -12,7 +12,7 @@ from bench.charts.chart import DEFAULT
 from bench.records.record import CPU_SECONDS, Direction, Record, aligned, summarise
 from bench.train.plan import METHODS, Job
 from bench.train.run import Look, RunResult, Seen, reached, run_job
-from toonset.nerf.metrics_view import load_judges
+from toonset.nerf.score.metrics_view import load_judges
 
 NEAR_END_DB = 0.5
 

@@ -8,8 +8,7 @@ from typing import Any, Literal, get_args
 
 from bench.cases.cases import TrainCase
 from bench.charts.chart import DEFAULT
-from toonset.nerf.options import TrainOptions
-from toonset.nerf.preset import paper
+from toonset.nerf.options import TrainOptions, paper
 
 NEAREST = "nearest drawing"
 MANNEQUIN = "coloured mannequin"

@@ -19,21 +19,23 @@ from bench.train.plan import METHODS, Job, PaletteChoice, Preparation, subset
 from toonset.camera import rotation_distance
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError, ToonsetError
-from toonset.nerf.checkpoint_state import FitState
-from toonset.nerf.evaluation import LAYERS, ScoredView, score_views
-from toonset.nerf.field_box import without_empty_space
-from toonset.nerf.field_loss import Model
-from toonset.nerf.fitting import Moment
-from toonset.nerf.labelling import labelled, relabelled, without_palette
-from toonset.nerf.layers import color_picture
-from toonset.nerf.metrics import Figures, means, over_white, psnr_of
-from toonset.nerf.metrics_view import Judges, figures_of
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.kernels.threads import use_threads
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.run_folder import model_of
-from toonset.nerf.threads import use_threads
-from toonset.nerf.trained import TrainedField, Training
-from toonset.nerf.training import finest_cells, train
-from toonset.nerf.views import render
+from toonset.nerf.render.layers import color_picture
+from toonset.nerf.render.views import render
+from toonset.nerf.run.folder import model_of
+from toonset.nerf.score.evaluate import LAYERS, ScoredView, score_views
+from toonset.nerf.score.metrics import Figures, means, psnr_of
+from toonset.nerf.score.metrics_view import Judges, figures_of
+from toonset.nerf.train.box_rays import without_empty_space
+from toonset.nerf.train.labelling import labelled, relabelled, without_palette
+from toonset.nerf.train.loop import Moment
+from toonset.nerf.train.loss import Model
+from toonset.nerf.train.result import Training
+from toonset.nerf.train.state import FitState
+from toonset.nerf.train.train import finest_cells, train
+from toonset.view import over_white
 
 CURVE_VIEWS = 4  # held-out views that every point of the curves is the mean of
 Look = Callable[[Job, TrainCase, TrainedField, Sequence[ScoredView]], None]

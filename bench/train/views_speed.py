@@ -22,19 +22,19 @@ from jaxtyping import Float
 
 from bench.cases.cases import train_cases
 from toonset.camera import Camera
-from toonset.nerf.hull import EDGE, occupancy
-from toonset.nerf.labelling import labelled
-from toonset.nerf.march import clip, rays_of
-from toonset.nerf.metrics import psnr_of
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.hull.hull import EDGE, occupancy
+from toonset.nerf.hull.march import clip, rays_of
+from toonset.nerf.kernels.compositing import compositing_weights
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.rendering import compositing_weights
-from toonset.nerf.run_folder import read_field
-from toonset.nerf.supersample import places_within
-from toonset.nerf.trained import TrainedField
-from toonset.nerf.training import train
-from toonset.nerf.turntable import turntable
-from toonset.nerf.views import render
-from toonset.nerf.views_bake import Baked
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.supersample import places_within
+from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.views import render
+from toonset.nerf.run.folder import read_field
+from toonset.nerf.score.metrics import psnr_of
+from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.train import train
 
 SIZES = (150, 300, 600)
 VIEWS = 8  # all round

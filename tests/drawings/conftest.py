@@ -16,7 +16,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
 from toonset.dataset.silhouettes.outlines import Square
 from toonset.dataset.synthetic.hand_error import displacement_field
-from toonset.nerf.warp import Warp
+from toonset.nerf.prepare.unwarp import Warp
 
 SIDE = 96
 BALLS = (  # middle, half axes: body, head, two arms, a pack

@@ -11,9 +11,9 @@ import pytest
 
 from toonset.camera import rotation_from_angles
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf.azimuth import Turning, turned
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.preparation import prepared
+from toonset.nerf.prepare.prepare import prepared
+from toonset.nerf.prepare.refine_yaw import Turning, turned
 
 LEFT = 0.65  # of the error: round figures and opposite views tell little of yaws
 
@@ -125,7 +125,7 @@ def test_turns_that_leave_drawings_bent_are_not_believed(balls, monkeypatch) -> 
         assert found is not None
         return result, replace(found, gain_nats=1e6)
 
-    monkeypatch.setattr("toonset.nerf.preparation.turned", sure)
+    monkeypatch.setattr("toonset.nerf.prepare.prepare.turned", sure)
     ready = prepared(drawn, TrainOptions())
     assert ready.turning is not None
     assert not ready.turning.applied

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from toonset.nerf.field import TriplaneField
+from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.preparation import aligned
-from toonset.nerf.training import train
+from toonset.nerf.prepare.prepare import aligned
+from toonset.nerf.train.train import train
 
 
 def test_drawings_that_agree_stay(balls) -> None:

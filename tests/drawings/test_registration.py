@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from toonset.nerf.registration import registered
+from toonset.nerf.prepare.registration import registered
 
 
 @pytest.mark.parametrize("views", [3, 5, 8])

@@ -11,7 +11,7 @@ from toonset.dataset.silhouettes.displacement import CONTROLS, Bends, ShiftAndSc
 from toonset.dataset.silhouettes.outlines import FIGURE_PX, Square, outlines_of, signed_distance
 from toonset.dataset.silhouettes.register import fit_moves
 from toonset.dataset.silhouettes.tangency import Placed, touch
-from toonset.nerf.warp import MOST, Warp, unbent, warped
+from toonset.nerf.prepare.unwarp import MOST, Warp, unbent, warped
 
 
 def outlines(scene):

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.nerf.warp import Warp, warped
-from toonset.nerf.warp_back import KeyWarps, give_back, view_shares
-from toonset.nerf.warp_record import KeysRecord
+from toonset.nerf.prepare.unwarp import Warp, warped
+from toonset.nerf.prepare.warp_back import KeyWarps, give_back, view_shares
+from toonset.nerf.run.records import KeysRecord
 
 
 def test_back_undoes_a_warp(balls) -> None:

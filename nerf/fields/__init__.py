@@ -1,0 +1,1 @@
+"""Radiance fields: triplane, and what it is compared with."""

@@ -1,0 +1,47 @@
+"""A field that can be rendered, with all that its renderings need."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.nerf.fields.base import Field
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.hull.hull import Hull
+from toonset.nerf.lines.remove import InkStyle
+from toonset.nerf.prepare.warp_back import KeyWarps
+
+NO_PALETTE = (
+    "run: was trained without palette; train again without --no-palette and without --field hull"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedField:
+    """A field that can be rendered.
+
+    Attributes:
+        field: density and colour.
+        hull: where the field is evaluated.
+        step: distance of samples along rays, world units.
+        samples: most samples per ray.
+        classifier: colour to palette label; None without palette.
+        palette: (colors, 3) sRGB; None without palette.
+        k: 1 / distance of a typical training camera, 0 = orthographic; for turntables.
+        size_px: longest side of the training pictures, for turntables.
+        ink: contour lines that were taken off the drawings; None: there were none.
+        keys: bends that were taken out of the drawings; None: there were none.
+    """
+
+    field: Field
+    hull: Hull
+    step: float
+    samples: int
+    classifier: PaletteClassifier | None
+    palette: UInt8[np.ndarray, "colors 3"] | None
+    k: float
+    size_px: int
+    ink: InkStyle | None = None
+    keys: KeyWarps | None = None

@@ -1,0 +1,1 @@
+"""The visual hull: carve it, march through it, smooth it."""

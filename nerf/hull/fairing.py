@@ -1,0 +1,176 @@
+"""The fairest surface inside a visual hull that still touches every outline ray.
+
+Between the drawn views a visual hull is too large: eight views of a cylinder carve an octagon, 8 %
+wider at its corners. A body is rounder than that. Among all surfaces inside the hull that touch
+every ray through a drawn outline, the one that bends least is taken: on a coarse grid, the signed
+distance f (negative inside, in voxels) minimises
+
+    mean over outline rays of (min f along the ray)^2  +  stiffness * mean of (Laplacian f)^2
+    + the square of how far f dips below the hull's own signed distance, per ray
+
+by Adam over a pyramid of grids, stiff first, then softer. Where a ray touches is found anew in
+every step, so the contact may slide along the ray. Thin parts that the coarse grid loses come back
+from the hull: a ray through a drawing's mask keeps at least the voxels that f likes best, and capes
+and blades, which hide each other from most views, are taken over whole.
+
+Sources: thin-plate energy of an implicit surface, Turk and O'Brien, "Shape transformation using
+variational implicit functions", 1999; contact of an outline ray with its surface, Cipolla and
+Giblin, "Visual motion of curves and surfaces", 2000, chapter 2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from toonset.camera import Camera
+from toonset.nerf.hull.fairing_distance import signed_distance, squared_distance
+from toonset.nerf.hull.fairing_fit import Contacts, fit
+from toonset.nerf.hull.hull import LEVEL, Hull, grown
+from toonset.nerf.hull.march import Rays, march, rays_of
+from toonset.nerf.kernels.threads import side_by_side
+from toonset.nerf.kernels.volume import Volume, trilinear
+
+COARSE = 64  # voxels along the longest side of the grid on which the surface bends
+OUTLINE_RAYS = 8000  # of all views together
+SLOPE = 0.7  # of the support per voxel of distance, where the fair surface makes the border
+SHEET = 0.8  # coarse voxels: half the thickness of what the coarse grid has no room for
+NEAREST = 2.0  # times a lost ray's least distance: what is as near is kept, too
+SPOT = 0.01  # coarse voxels more, lest a ray hangs on a single voxel
+ALL = 1 << 20  # samples per ray: no limit
+
+
+def faired(
+    hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor], slack: float = 0.0
+) -> Hull:
+    """Return the hull without the corners that no drawing asks for.
+
+    Drawings that disagree have no common hull: the space on which all of them agree is too small.
+    With slack, the surface may leave the hull by so much to meet all outlines in the mean.
+
+    Args:
+        hull: as carved from the same views.
+        cameras: one per view.
+        alphas: (height, width) coverage in [0, 1] per view.
+        slack: how far outlines are off, in the hull's voxels.
+    """
+    reach = math.ceil(slack)
+    hull = _padded(hull, reach)
+    factor = max(1, round(max(hull.support.shape) / COARSE))
+    outside = signed_distance(hull, factor) - slack / factor
+    fair = fit(outside, _contacts(hull, factor, outside, cameras, alphas), len(cameras))
+    x, y, z = hull.support.shape
+    fine = F.interpolate(fair[None, None], scale_factor=factor, mode="trilinear")[0, 0, :x, :y, :z]
+    smooth = (LEVEL - SLOPE * factor * fine).clamp_(0, 1).minimum(grown(hull.support, reach))
+    sure = [
+        _shrunk(alpha, math.ceil(slack * hull.voxel * camera.scale))
+        for camera, alpha in zip(cameras, alphas, strict=True)
+    ]
+    kept = _lost(replace(hull, support=smooth), fine, hull, cameras, sure)
+    if slack < 1:  # the hull of drawings that disagree has shards which no drawing shows
+        kept |= sheets(hull, factor)
+    return replace(hull, support=torch.where(grown(kept, 1), smooth.maximum(hull.support), smooth))
+
+
+def _padded(hull: Hull, voxels: int) -> Hull:
+    low, support = hull.low - voxels * hull.voxel, F.pad(hull.support, [voxels] * 6)
+    return Hull(low, hull.voxel, support)
+
+
+def _shrunk(alpha: Float[Tensor, "height width"], radius: int) -> Float[Tensor, "height width"]:
+    return -F.max_pool2d(-alpha[None], 2 * radius + 1, stride=1, padding=radius)[0]
+
+
+def _contacts(
+    hull: Hull,
+    factor: int,
+    outside: Volume,
+    cameras: Sequence[Camera],
+    alphas: Sequence[Tensor],
+) -> Contacts:
+    most = max(1, OUTLINE_RAYS // len(cameras))
+    parts = []
+    for camera, alpha in zip(cameras, alphas, strict=True):
+        pixels = outline_points(alpha.numpy())
+        chosen = np.linspace(0, len(pixels) - 1, min(most, len(pixels))).astype(int)
+        parts.append(rays_of(camera, pixels[chosen], hull))
+    rays = Rays(*(torch.cat([getattr(p, n) for p in parts]) for n in Rays.__annotations__))
+    coarse = Hull(hull.low, hull.voxel * factor, (LEVEL - outside).clamp(0, 1))
+    samples = march(rays, coarse, coarse.voxel, ALL)
+    hit, ray = torch.unique_consecutive(samples.ray, return_inverse=True)
+    low = torch.as_tensor(hull.low, dtype=torch.float32)
+    rows, weights = trilinear((samples.points - low) / coarse.voxel - 0.5, outside.shape)
+    return Contacts(rows, weights, ray, len(hit))
+
+
+def outline_points(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "n 2"]:
+    """Return where the mask's outline crosses the lines between neighbouring pixels' centres.
+
+    (x, y) in pixels, the first pixel's centre at 0.5; beyond the picture nothing is drawn.
+    """
+    padded = np.pad(alpha, 1)
+    points = []
+    for first, second, axis in (
+        (padded[:-1], padded[1:], 1),
+        (padded[:, :-1], padded[:, 1:], 0),
+    ):
+        crossing = (first >= LEVEL) != (second >= LEVEL)
+        rows, columns = np.nonzero(crossing)
+        place = np.stack([columns, rows], axis=1) - 0.5
+        place[:, axis] += (first[crossing] - LEVEL) / (first[crossing] - second[crossing])
+        points.append(place)
+    return np.concatenate(points)
+
+
+def sheets(hull: Hull, factor: int) -> Bool[Tensor, "x y z"]:
+    """Return the thin parts of a hull, such as capes and blades.
+
+    Balls of radius SHEET are put wherever they lie wholly inside. Thin is what is farther than
+    2 SHEET from all their centres; what is nearer and in no ball is a corner of a thick part.
+
+    Args:
+        hull: as carved.
+        factor: its voxels per coarse voxel, along an axis.
+    """
+    radius = SHEET * factor
+    inside = hull.support >= LEVEL
+    core = squared_distance(~inside, math.ceil(radius)) > radius**2
+    return inside & (squared_distance(core, math.ceil(2 * radius)) > (2 * radius) ** 2)
+
+
+def _lost(
+    fair: Hull, distance: Volume, hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor]
+) -> Bool[Tensor, "x y z"]:
+    """Return, for rays through masks that no longer meet the inside, their nearest voxels.
+
+    A ray that just misses the surface keeps a spot; one that runs along a sheet which is lost as a
+    whole keeps the sheet.
+    """
+
+    def nearest(camera: Camera, alpha: Tensor) -> Int[Tensor, " n"]:
+        drawn = (alpha >= LEVEL).numpy()
+        seen = np.zeros_like(drawn)
+        pixels = np.argwhere(drawn)
+        rays = rays_of(camera, pixels[:, ::-1] + 0.5, fair)
+        hit = march(rays, fair, hull.voxel, 1, LEVEL).ray
+        seen[tuple(pixels[hit].T)] = True
+        missed = np.argwhere(drawn & ~seen)
+        samples = march(rays_of(camera, missed[:, ::-1] + 0.5, hull), hull, hull.voxel, ALL, LEVEL)
+        cells = hull.cell_index(samples.points, hull.support.shape, 1)
+        values = distance.reshape(-1)[cells]
+        best = torch.full((samples.rays,), torch.inf)
+        best = best.scatter_reduce(0, samples.ray, values, "amin").clamp_min(0)
+        return cells[values <= NEAREST * best[samples.ray] + SPOT]
+
+    views = zip(cameras, alphas, strict=True)
+    kept = torch.zeros(hull.support.numel(), dtype=torch.bool)
+    kept[torch.cat(side_by_side([partial(nearest, *view) for view in views]))] = True
+    return kept.view(hull.support.shape)

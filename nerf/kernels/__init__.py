@@ -1,0 +1,1 @@
+"""Fast numerics: interpolation, compositing, decoder, losses, threads."""

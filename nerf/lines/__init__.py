@@ -1,0 +1,1 @@
+"""Take contour lines off the drawings."""

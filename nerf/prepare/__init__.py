@@ -1,0 +1,1 @@
+"""Make drawings agree before training: cameras, bends, symmetry, what no drawing shows."""

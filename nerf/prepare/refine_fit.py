@@ -1,0 +1,240 @@
+"""Turning, placing and sizing a sheet's cameras until its outlines are those of one body.
+
+Minimised over each camera's shift, growth and yaw and the common perspective, by Gauss-Newton:
+
+    sum over rim points and other views of rho(r / sigma)^2 / CORRELATED
+      + |shift, growth|^2 / tau^2 + (yaw / its sigma)^2 + (log k / its sigma)^2
+
+with r of `toonset.dataset.silhouettes.tangency`, noise and tau as in
+`toonset.dataset.silhouettes.register`. What outlines cannot tell is left as it was: the mean yaw,
+and the body's place and size.
+
+Source: Hernandez, Schmitt, Cipolla, "Silhouette coherence for camera calibration under circular
+motion", PAMI 2007, with distances instead of overlaps and a prior on every number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from toonset.camera import Camera, rotation_from_angles
+from toonset.dataset.silhouettes.displacement import ShiftAndScale
+from toonset.dataset.silhouettes.outlines import Outline, Outlines, Square
+from toonset.dataset.silhouettes.register import (
+    AFRESH,
+    CORRELATED,
+    FOREIGN,
+    LEAST,
+    MOST,
+    NOISE,
+    NOISE_PX,
+    SETTLED,
+    Fit,
+    common,
+)
+from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
+from toonset.nerf.prepare.registration import moved
+
+PLACE, YAW, OWN = slice(0, 3), 3, 4  # a camera's numbers: shift x, shift y, growth; yaw
+STEP = 1e-3  # of central differences: of the square, radians, or log k
+
+_PLACES = ShiftAndScale.expected()
+
+
+@dataclass(frozen=True, eq=False)
+class TurnFit(Fit):
+    """Turned cameras and what speaks for turning them.
+
+    `numbers` are shift x and y and growth in units of the squares, and yaw in radians.
+
+    Attributes:
+        log_k: by how much every camera's k grows.
+    """
+
+    log_k: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Normal:
+    """Normal equations: H, gradient / 2, cost, disagreement, and where along the rays."""
+
+    matrix: Float[np.ndarray, "m m"]
+    slope: Float[np.ndarray, " m"]
+    cost: float
+    apart: float
+    along: list[Float[np.ndarray, " n"]]
+
+
+def fit_turns(
+    outlines: Outlines,
+    yaw_sigmas: Float[np.ndarray, " views"],
+    k_sigma: float,
+    tau: float,
+    rounds: int,
+) -> TurnFit:
+    """Return the smallest moves of the cameras that make outlines agree.
+
+    Args:
+        outlines: of three drawings or more.
+        yaw_sigmas: radians; 0: that camera does not turn.
+        k_sigma: of log k; 0: the perspective stays.
+        tau: first guess of the size of wrong places, of the square.
+        rounds: of Gauss-Newton.
+    """
+    views = len(outlines.views)
+    flat = np.zeros(OWN * views + 1)
+    first = normal = _linearised(outlines, flat, None)
+    deviation = _deviations(yaw_sigmas, k_sigma, tau)
+    idle = first.cost - _log_volume(first.matrix, deviation)
+    if idle <= 0:  # even a perfect fit would not be worth its numbers
+        apart = (first.apart, first.apart)
+        return TurnFit(flat[:-1].reshape(views, OWN), 0.0, idle / 2, apart, log_k=0.0)
+    body, shares = common(outlines, _PLACES)
+    for round_ in range(1, rounds + 1):
+        flat = _improved(normal, deviation, flat)
+        own = flat[:-1].reshape(views, OWN)  # a view of `flat`
+        own[:, PLACE] -= (body @ (shares @ own[:, PLACE].reshape(-1))).reshape(views, -1)
+        if yaw_sigmas.all():
+            own[:, YAW] -= np.average(own[:, YAW], weights=yaw_sigmas**-2)
+        normal = _linearised(outlines, flat, normal.along if round_ % AFRESH else None)
+        if round_ >= SETTLED:
+            tau = _learned(normal.matrix, deviation, flat, tau)
+            deviation = _deviations(yaw_sigmas, k_sigma, tau)
+    free = deviation > 0
+    spent = normal.cost + float(((flat[free] / deviation[free]) ** 2).sum())
+    gain = (first.cost - spent - _log_volume(normal.matrix, deviation)) / 2
+    apart = (first.apart, normal.apart)
+    return TurnFit(flat[:-1].reshape(views, OWN), tau, gain, apart, log_k=float(flat[-1]))
+
+
+def camera_moved(
+    camera: Camera, square: Square, own: Float[np.ndarray, " 4"], log_k: float
+) -> Camera:
+    """Return the camera of a drawing after its numbers; `square` in the camera's pixels."""
+    yaw, elevation, roll = camera.angles
+    rotation = rotation_from_angles(yaw + float(own[YAW]), elevation, roll)
+    turned = replace(camera, rotation=rotation, k=camera.k * float(np.exp(log_k)))
+    return moved(turned, square, own[PLACE])
+
+
+def _deviations(
+    yaw_sigmas: Float[np.ndarray, " views"], k_sigma: float, tau: float
+) -> Float[np.ndarray, " m"]:
+    """Return every number's standard deviation before the outlines are looked at."""
+    own = np.zeros((len(yaw_sigmas), OWN))
+    own[:, PLACE] = tau * np.sqrt(np.diag(_PLACES.covariance))
+    own[:, YAW] = yaw_sigmas
+    return np.append(own.reshape(-1), k_sigma)
+
+
+def _improved(normal: _Normal, deviation: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """Return the numbers after a step of Gauss-Newton, in units in which priors are standard."""
+    unit = np.divide(flat, deviation, out=np.zeros_like(flat), where=deviation > 0)
+    matrix = deviation[:, None] * normal.matrix * deviation + np.eye(len(flat))
+    return deviation * (unit - np.linalg.solve(matrix, deviation * normal.slope + unit))
+
+
+def _learned(matrix: np.ndarray, deviation: np.ndarray, flat: np.ndarray, tau: float) -> float:
+    """Return the size of wrong places that the numbers and their uncertainty speak for."""
+    spread = np.linalg.inv(deviation[:, None] * matrix * deviation + np.eye(len(flat)))
+    place = np.arange(len(flat) - 1).reshape(-1, OWN)[:, PLACE].reshape(-1)
+    unit = flat[place] / deviation[place]
+    energy = float(unit @ unit + np.diag(spread)[place].sum())
+    return float(np.clip(tau * np.sqrt(energy / len(place)), LEAST, MOST))
+
+
+def _log_volume(matrix: np.ndarray, deviation: np.ndarray) -> float:
+    """Return log det(1 + D H D): what the determined numbers cost."""
+    whole = np.eye(len(matrix)) + deviation[:, None] * matrix * deviation
+    return float(np.linalg.slogdet(whole)[1])
+
+
+def _linearised(
+    outlines: Outlines, flat: np.ndarray, along: Sequence[np.ndarray] | None
+) -> _Normal:
+    """Return the normal equations at `flat`, near earlier points of the rays or anywhere."""
+    own, log_k = flat[:-1].reshape(-1, OWN), float(flat[-1])
+    views = tuple(
+        replace(view, camera=camera_moved(view.camera, view.square, numbers, log_k))
+        for view, numbers in zip(outlines.views, own, strict=True)
+    )
+    aside = [
+        _aside(view, numbers, log_k) for view, numbers in zip(outlines.views, own, strict=True)
+    ]
+    placed = Placed.of(replace(outlines, views=views), _PLACES, np.zeros((len(views), 3)))
+    size = outlines.size_px
+    sigma = max(NOISE * size, NOISE_PX)
+    matrix, slope = np.zeros((len(flat), len(flat))), np.zeros(len(flat))
+    cost = squares = 0.0
+    points, touched = 0, []
+    for view, outline in enumerate(views):
+        found = touch(placed, view, outline.rim, None if along is None else along[view])
+        touched.append(found.along)
+        points += len(found.pixels)
+        for other in range(len(views)):
+            if other == view:
+                continue
+            residual, jacobian = _pair(views, aside, view, other, found)
+            tame = 1 + (residual / (FOREIGN * size)) ** 2
+            weight = 1 / (tame * sigma) ** 2 / CORRELATED
+            used = _columns(view, other, len(flat))
+            matrix[np.ix_(used, used)] += jacobian.T @ (weight[:, None] * jacobian)
+            slope[used] += jacobian.T @ (weight * residual)
+            cost += float((residual**2 / tame).sum()) / sigma**2 / CORRELATED
+            squares += float((residual**2).sum())
+    return _Normal(matrix, slope, cost, (squares / max(1, points)) ** 0.5, touched)
+
+
+Aside = list[tuple[Camera, Camera]]
+
+
+def _aside(outline: Outline, own: np.ndarray, log_k: float) -> Aside:
+    """Return a camera a STEP ahead and behind in each of its numbers, log k last."""
+    pairs = []
+    for number in range(OWN + 1):
+        ahead, behind = (
+            camera_moved(
+                outline.camera,
+                outline.square,
+                own + sign * STEP * (np.arange(OWN) == number),
+                log_k + sign * STEP * (number == OWN),
+            )
+            for sign in (1, -1)
+        )
+        pairs.append((ahead, behind))
+    return pairs
+
+
+def _columns(view: int, other: int, count: int) -> np.ndarray:
+    """Return where the numbers of a pair stand: `view`'s, `other`'s, log k."""
+    own = np.arange(OWN)
+    return np.concatenate([OWN * view + own, OWN * other + own, [count - 1]])
+
+
+def _pair(
+    views: Sequence[Outline], aside: Sequence[Aside], view: int, other: int, found: Touch
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the disagreements of `view`'s rays with `other`, and derivatives as `_columns`.
+
+    A ray's best point keeps its depth: there the cost is level along the ray.
+    """
+    mine, theirs = views[view].camera, views[other].camera
+    distance, *gradient = views[other].at(pixels_of(theirs, found.points))
+    off = distance < 0
+    across, points, pixels = np.stack(gradient, axis=-1)[off], found.points[off], found.pixels[off]
+    depth = mine.project(points)[1]
+
+    def slope(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
+        return ((ahead - behind) * across).sum(axis=-1) / (2 * STEP)
+
+    here = [
+        slope(*(pixels_of(theirs, camera.unproject(pixels, depth)) for camera in pair))
+        for pair in aside[view]
+    ]
+    there = [slope(*(pixels_of(camera, points) for camera in pair)) for pair in aside[other]]
+    columns = [*here[:OWN], *there[:OWN], here[OWN] + there[OWN]]
+    return distance[off], np.stack(columns, axis=-1)

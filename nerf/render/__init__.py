@@ -1,0 +1,1 @@
+"""Render a field: views, layers, turntables, animations."""

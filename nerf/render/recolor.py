@@ -1,0 +1,75 @@
+"""Replacing palette colours of a trained run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from toonset.errors import PaletteError
+from toonset.nerf.fields.trained_field import NO_PALETTE, TrainedField
+from toonset.palette.formats.registry import parse_colors
+from toonset.palette.formats.typed import is_color, rgb_of_typed
+from toonset.palette.named import RGB
+from toonset.palette.names import hex_of, name_of
+from toonset.palette.pixels.labels import nearest_colors
+
+
+def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
+    """Return the run with palette colours replaced; all changes happen at once.
+
+    Args:
+        trained: the run.
+        changes: "OLD=NEW", hex colours; OLD must be a colour of the run's palette, or the name
+            that `toonset palette` gives one of them and no other.
+
+    Raises:
+        PaletteError: no palette, no such colour, or text that is no such pair.
+    """
+    if not changes:
+        return trained
+    if trained.palette is None:
+        raise PaletteError(NO_PALETTE)
+    old: list[RGB] = [(r, g, b) for r, g, b in trained.palette.tolist()]
+    called = Counter(name_of(color) for color in old)
+    names = {name_of(color): color for color in old if called[name_of(color)] == 1}
+    palette = trained.palette.copy()
+    for change in changes:
+        words = change.split("=")
+        if len(words) != 2:
+            raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
+        source, where = words[0].strip().lower(), f"--recolor {change!r}"
+        known = names.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
+        if known not in old:
+            has = ", ".join(f"{hex_of(color)} ({name_of(color)})" for color in old)
+            raise PaletteError(f"{where}: the palette has {has}; choose one of them")
+        palette[old.index(known)] = rgb_of_typed(words[1].strip(), where)
+    return replace(trained, palette=palette)
+
+
+def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> TrainedField:
+    """Return the run in the colours of another palette, without training again.
+
+    Args:
+        trained: the run.
+        palette: a palette file, or typed colours.
+        nearest: give every colour of the run the nearest one (OKLab) of the palette; else the
+            first takes the place of the first and so on.
+
+    Raises:
+        PaletteError: no palette in the run, none in the file, or by order and other in number.
+    """
+    if trained.palette is None:
+        raise PaletteError(NO_PALETTE)
+    colors = np.asarray(parse_colors(palette))
+    if nearest:
+        place = nearest_colors(trained.palette, colors, space="oklab")
+        return replace(trained, palette=colors[place])
+    if len(colors) != len(trained.palette):
+        raise PaletteError(
+            f"--palette {palette}: {len(colors)} colours, the run has {len(trained.palette)}; "
+            "give as many in the same order, or pass --nearest"
+        )
+    return replace(trained, palette=colors)

@@ -1,0 +1,174 @@
+"""A trained run on disk, and back.
+
+    model.safetensors   parameters of field and classifier, and the hull
+    config.json         what is needed to build them, and the resolved options
+    metrics.json        how training went
+    history.csv         every step's losses
+    preview.png         four views of the result
+    manifest.json       the SHA-256 of them all
+
+Nothing is pickled, and no file names a place: a run folder may be moved. Loading checks every name,
+shape, type and value before use, then that the files are those that were written.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from toonset.errors import BundleError
+from toonset.json_file import read_json, validation_reason
+from toonset.nerf.fields.base import FieldSpec
+from toonset.nerf.fields.build import build_field
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.hull.hull import Hull
+from toonset.nerf.run.manifest import check_manifest
+from toonset.nerf.run.records import InkRecord, KeysRecord
+from toonset.nerf.run.tensors import packed, unpack
+from toonset.write import write_bytes
+
+CONFIG, MODEL = "config.json", "model.safetensors"
+FORMAT = 2
+MOST_CELLS = 512  # along one side, of planes and hull alike
+MAX_MODEL_BYTES = 512 * 2**20
+
+
+class FieldRecord(BaseModel):
+    """What builds a `TrainedField` around the tensors of model.safetensors."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    kind: Literal["triplane", "mlp", "voxel"]
+    resolution: int = Field(ge=1, le=MOST_CELLS)
+    channels: int = Field(ge=1, le=256)
+    hidden: int = Field(ge=0, le=1024)
+    hull_low: tuple[float, float, float]
+    hull_voxel: float = Field(gt=0, le=1e9)
+    hull_shape: tuple[int, int, int]
+    step: float = Field(gt=0, le=1e9)
+    samples: int = Field(ge=1, le=4096)
+    palette: list[tuple[int, int, int]] | None = Field(default=None, max_length=255)
+    k: float = Field(ge=0, le=1e9)
+    size_px: int = Field(ge=1, le=16384)
+    ink: InkRecord | None = None
+    keys: KeysRecord | None = None
+
+    @classmethod
+    def of(cls, trained: TrainedField) -> FieldRecord:
+        """Return the record of a field."""
+        spec = trained.field.spec
+        low = trained.hull.low.tolist()
+        shape = tuple(trained.hull.support.shape)
+        palette = None if trained.palette is None else [tuple(c) for c in trained.palette.tolist()]
+        return cls(
+            kind=spec.kind,
+            resolution=spec.resolution,
+            channels=spec.channels,
+            hidden=spec.hidden,
+            hull_low=(low[0], low[1], low[2]),
+            hull_voxel=trained.hull.voxel,
+            hull_shape=(shape[0], shape[1], shape[2]),
+            step=trained.step,
+            samples=trained.samples,
+            palette=palette,
+            k=trained.k,
+            size_px=trained.size_px,
+            ink=None if trained.ink is None else InkRecord.of(trained.ink),
+            keys=None if trained.keys is None else KeysRecord.of(trained.keys),
+        )
+
+
+class _Config(BaseModel):
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    format: int
+    field: FieldRecord
+
+
+def write_field(folder: Path, trained: TrainedField, about: dict[str, Any]) -> dict[str, Any]:
+    """Write model.safetensors; return the content of config.json.
+
+    Args:
+        folder: an existing folder.
+        trained: the field.
+        about: further entries of config.json (options, versions).
+    """
+    record = FieldRecord.of(trained)
+    write_bytes(folder / MODEL, model_of(trained))
+    return {"format": FORMAT, "field": record.model_dump(mode="json"), **about}
+
+
+def model_of(trained: TrainedField) -> bytes:
+    """Return the content of model.safetensors."""
+    return save(packed(trained))
+
+
+def read_field(folder: Path) -> TrainedField:
+    """Return the field of a run folder.
+
+    Raises:
+        BundleError: a file is missing or damaged, or holds what no training writes.
+    """
+    config_file, model_file = folder / CONFIG, folder / MODEL
+    for file in (config_file, model_file):
+        if not file.is_file():
+            raise BundleError(f"{file}: does not exist; `toonset train` writes run folders")
+    trained = _empty(_record(config_file))
+    unpack(_load(model_file), trained, str(model_file))
+    check_manifest(folder, (CONFIG, MODEL))
+    return trained
+
+
+def _record(file: Path) -> FieldRecord:
+    try:
+        config = _Config.model_validate(read_json(file))
+    except ValidationError as error:
+        raise BundleError(f"{file}: {validation_reason(error)}") from error
+    if config.format != FORMAT:
+        raise BundleError(
+            f"{file}: format {config.format}, this toonset reads {FORMAT}; train again"
+        )
+    record = config.field
+    if not all(1 <= n <= MOST_CELLS for n in record.hull_shape):
+        raise BundleError(f"{file}: hull_shape {record.hull_shape}, 1 to {MOST_CELLS} is needed")
+    if record.palette is not None and not all(0 <= v <= 255 for c in record.palette for v in c):
+        raise BundleError(f"{file}: a palette value is not in 0..255; train again")
+    return record
+
+
+def _empty(record: FieldRecord) -> TrainedField:
+    low = np.array(record.hull_low)
+    hull = Hull(low, record.hull_voxel, torch.zeros(record.hull_shape))
+    spec = FieldSpec(record.kind, record.resolution, record.channels, record.hidden)
+    field = build_field(spec, hull.box)
+    palette = None if record.palette is None else np.array(record.palette, dtype=np.uint8)
+    classifier = None if palette is None else PaletteClassifier(len(palette))
+    return TrainedField(
+        field,
+        hull,
+        record.step,
+        record.samples,
+        classifier,
+        palette,
+        record.k,
+        record.size_px,
+        None if record.ink is None else record.ink.style,
+        None if record.keys is None else record.keys.keys(),
+    )
+
+
+def _load(file: Path) -> dict[str, Tensor]:
+    try:
+        if file.stat().st_size > MAX_MODEL_BYTES:
+            raise BundleError(f"{file}: larger than {MAX_MODEL_BYTES >> 20} MiB; not a toonset run")
+        return load(file.read_bytes())
+    except OSError as error:
+        raise BundleError(f"{file}: cannot be read ({error.strerror})") from error
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise BundleError(f"{file}: is damaged ({error}); train again") from error

@@ -1,0 +1,190 @@
+"""What looks on while a field is fitted: held-out views, previews, checkpoints, a wish to stop.
+
+Each look is priced: held-out views and checkpoints may take a tenth of the time, so that a cheap
+look comes often and an expensive one seldom. None of it changes the training by a bit.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.images.picture import encode_png
+from toonset.errors import BundleError
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.render.layers import color_picture
+from toonset.nerf.render.views import render
+from toonset.nerf.run.checkpoint import write_checkpoint
+from toonset.nerf.run.report import preview
+from toonset.nerf.score.metrics import psnr_of
+from toonset.nerf.train.loop import Moment
+from toonset.nerf.train.loss import Model
+from toonset.nerf.train.progress import Status, status_of
+from toonset.nerf.train.result import HeldOut
+from toonset.nerf.train.state import FitState
+from toonset.view import over_white
+from toonset.write import write_bytes
+
+SHARE = 0.1  # of the training's seconds that looking at held-out views may take
+MOST_VIEWS, MOST_PX = 4, 200  # held-out views looked at in between, and their longest side
+FIRST_LOOK_S = 2.0  # of training: before, there is nothing to see
+CHECKPOINT_S = 30.0  # between checkpoints: what a killed training may lose
+INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True)
+class Looking:
+    """What to look at.
+
+    Attributes:
+        tell: called with the status after every step.
+        stop: whether somebody wants the training to end.
+        test: held-out views; None: none.
+        folder: where previews and checkpoints go; made with the first of them.
+        preview_every_s: seconds of training between previews; None: none.
+    """
+
+    tell: Callable[[Status], None]
+    stop: Callable[[], bool]
+    test: Scene | None = None
+    folder: Path | None = None
+    preview_every_s: float | None = None
+
+
+@dataclass
+class Onlooker:
+    """A `Watch` that does what a `Looking` asks for.
+
+    Attributes:
+        looking: what to look at.
+        scene: what is trained on.
+        options: how.
+        start: state to go on from; None: from the beginning.
+        held_out: what was seen of held-out views.
+    """
+
+    looking: Looking
+    scene: Scene
+    options: TrainOptions
+    start: FitState | None = None
+    held_out: list[HeldOut] = field(default_factory=list)
+
+    def begin(self, trained: TrainedField) -> FitState | None:
+        """Take the field that will be fitted.
+
+        Raises:
+            BundleError: the state to go on from is another field's.
+        """
+        if self.start is not None:
+            _check_fits(self.start, trained)
+        begun = 0.0 if self.start is None else self.start.seconds
+        self._trained = trained
+        self._views = [] if self.looking.test is None else sample_of(self.looking.test)
+        self._test_at, self._preview_at, self._saved_at = begun + FIRST_LOOK_S, begun, begun
+        return self.start
+
+    def look(self, moment: Moment) -> str:
+        """Look at a training after a step; return why it should end, or nothing."""
+        spent = moment.history[-1].seconds
+        unfinished = len(moment.history) < self.options.steps
+        if self.looking.stop() and unfinished and self._save(moment):
+            return INTERRUPTED
+        if self._views and spent >= self._test_at:
+            took = self._look_at_held_out(moment)
+            self._test_at = spent + took / SHARE
+        every = self.looking.preview_every_s
+        if every is not None and spent - self._preview_at >= every:
+            self._show(moment)
+        if spent - self._saved_at >= CHECKPOINT_S:
+            self._save(moment)
+        seen = self.held_out[-1] if self.held_out else None
+        self.looking.tell(status_of(moment, self.options.steps, seen))
+        return ""
+
+    def _save(self, moment: Moment) -> bool:
+        """Write a checkpoint, unless something is wrong: the next step will tell."""
+        self._saved_at = moment.history[-1].seconds
+        state = moment.state()
+        if not all(bool(torch.isfinite(values).all()) for values in state.parameters.values()):
+            return False
+        if self.looking.folder is not None:
+            write_checkpoint(self.looking.folder, state, self.options, self.scene)
+        return True
+
+    def _show(self, moment: Moment) -> None:
+        self._preview_at = moment.history[-1].seconds
+        if self.looking.folder is not None:
+            picture = encode_png(preview(self._shown()))
+            write_bytes(self.looking.folder / "preview.png", picture)
+
+    def _look_at_held_out(self, moment: Moment) -> float:
+        """Note how near held-out views are; return the seconds that it took."""
+        began = time.perf_counter()
+        psnr = held_out_psnr(self._shown(), self._views)
+        last = moment.history[-1]
+        self.held_out.append(HeldOut(last.step + 1, last.seconds, psnr))
+        return time.perf_counter() - began
+
+    def _shown(self) -> TrainedField:
+        """Return a copy on the CPU: what a renderer keeps of it must not outlive the step."""
+        there = copy.deepcopy(Model(self._trained.field, self._trained.classifier)).to("cpu")
+        return replace(self._trained, field=there.field, classifier=there.classifier)
+
+
+def sample_of(test: Scene) -> list[Frame]:
+    """Return a few of the held-out views, evenly chosen, none larger than `MOST_PX`."""
+    count = min(MOST_VIEWS, len(test.frames))
+    chosen = [test.frames[i * len(test.frames) // count] for i in range(count)]
+    return [_smaller(frame) for frame in chosen]
+
+
+def held_out_psnr(trained: TrainedField, views: list[Frame]) -> float:
+    """Return the mean PSNR of views over white, dB."""
+    found = []
+    for frame in views:
+        view = render(trained, frame.camera)
+        error = over_white(color_picture(view.rgb, view.alpha)) - over_white(frame.rgba)
+        found.append(psnr_of(float((error**2).mean())))
+    return float(np.mean(found))
+
+
+def _smaller(frame: Frame) -> Frame:
+    """Return a frame with whole blocks of pixels averaged until it is small enough."""
+    width, height = frame.camera.size_wh
+    block = -(-max(width, height) // MOST_PX)
+    if block == 1 or min(width, height) < block:
+        return frame
+    columns, rows = width // block, height // block
+    cut = frame.rgba[: rows * block, : columns * block].astype(np.float64)
+    color = cut[..., :3] * cut[..., 3:] / 255
+    parts = np.concatenate([color, cut[..., 3:]], axis=-1)
+    mean = parts.reshape(rows, block, columns, block, 4).mean(axis=(1, 3))
+    mean[..., :3] *= 255 / np.maximum(mean[..., 3:], 1e-9)
+    camera = frame.camera
+    camera = replace(
+        camera,
+        scale=camera.scale / block,
+        center=camera.center / block,
+        size_wh=(columns, rows),
+    )
+    return Frame(frame.name, camera, (mean + 0.5).clip(0, 255).astype(np.uint8))
+
+
+def _check_fits(state: FitState, trained: TrainedField) -> None:
+    model = Model(trained.field, trained.classifier)
+    wanted = {name: values.shape for name, values in model.named_parameters()}
+    for group in (state.parameters, state.means, state.squares):
+        shapes: dict[str, torch.Size] = {name: values.shape for name, values in group.items()}
+        if shapes != wanted:
+            raise BundleError(
+                "checkpoint: is of another field than this toonset trains; train again without "
+                "--resume"
+            )

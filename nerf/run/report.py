@@ -1,0 +1,142 @@
+"""The files of a run: the field, and beside it metrics.json, history.csv and preview.png."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import UInt8
+
+from toonset import __version__
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.images.picture import encode_png
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.kernels.threads import side_by_side, threads_in_use
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.layers import color_picture
+from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.views import render
+from toonset.nerf.run.folder import write_field
+from toonset.nerf.run.manifest import write_manifest
+from toonset.nerf.score.metrics import compare, means
+from toonset.nerf.score.verdict import verdict_of
+from toonset.nerf.train.result import HeldOut, Step, Training
+from toonset.view import over_white
+from toonset.write import write_bytes, write_json
+
+PREVIEW_VIEWS, PREVIEW_ELEVATION = 4, math.radians(10)
+
+
+def write_run(
+    folder: Path,
+    training: Training,
+    scene: Scene,
+    test: Scene | None = None,
+    held_out: Sequence[HeldOut] = (),
+) -> dict[str, Any]:
+    """Write all files of a run into an existing folder; return the content of metrics.json.
+
+    Its figures of training views are those of the drawings as they were fitted: set right, and
+    without the lines that were taken off.
+
+    Args:
+        folder: where to.
+        training: what to write.
+        scene: what was trained on.
+        test: held-out views, compared whole; None: none.
+        held_out: what was seen of them on the way.
+    """
+    drawn = training.prepared.scene
+    baked = Baked.of(training.result)
+    shown = pictures_of(replace(baked, trained=replace(training.result, ink=None)), drawn)
+    metrics = {
+        **_course(training, held_out),
+        "train": figures_of(shown, drawn),
+        "test": None if test is None else compared(baked, test),
+        "verdict": verdict_of(training, shown).to_json(),
+    }
+    write_bytes(folder / "preview.png", encode_png(preview(baked)))
+    _write_files(folder, training, scene, metrics)
+    return metrics
+
+
+def write_unfinished(
+    folder: Path, training: Training, scene: Scene, held_out: Sequence[HeldOut] = ()
+) -> None:
+    """Write a field as far as it has come, without rendering it: it can be looked at and moved."""
+    _write_files(folder, training, scene, {**_course(training, held_out), "train": None})
+
+
+def compared(source: TrainedField | Baked, scene: Scene) -> dict[str, float | None]:
+    """Return the mean figures of the field's renderings beside a scene's pictures."""
+    return figures_of(pictures_of(source, scene), scene)
+
+
+def pictures_of(
+    source: TrainedField | Baked, scene: Scene
+) -> list[UInt8[np.ndarray, "height width 4"]]:
+    """Return the field's pictures, straight alpha, seen by a scene's cameras."""
+    baked = source if isinstance(source, Baked) else Baked.of(source)
+    views = side_by_side([partial(render, baked, frame.camera) for frame in scene.frames])
+    return [color_picture(view.rgb, view.alpha) for view in views]
+
+
+def figures_of(
+    pictures: Sequence[UInt8[np.ndarray, "height width 4"]], scene: Scene
+) -> dict[str, float | None]:
+    """Return the mean figures of pictures beside a scene's."""
+    pairs = zip(pictures, scene.frames, strict=True)
+    return means([compare(picture, frame.rgba) for picture, frame in pairs])
+
+
+def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
+    """Return how training went: its end, hull evidence, seconds, counts."""
+    last = training.history[-1] if training.history else None
+    return {
+        "stopped": training.stopped,
+        "steps": len(training.history),
+        "loss": None if last is None else last.loss,
+        "held_out": [asdict(seen) for seen in held_out],
+        "drawings": training.prepared.to_json(),
+        "symmetry": None if training.symmetry is None else training.symmetry.to_json(),
+        "hull": asdict(training.evidence),
+        "planes": None if training.choice is None else training.choice.to_json(),
+        "counts": training.counts,
+        "seconds": {k: round(v, 3) for k, v in training.seconds.items()},
+    }
+
+
+def _write_files(folder: Path, training: Training, scene: Scene, metrics: dict[str, Any]) -> None:
+    about = {
+        "options": asdict(training.options),
+        "scene": {"views": [frame.name for frame in scene.frames]},
+        "versions": {"toonset": __version__, "torch": torch.__version__, "numpy": np.__version__},
+        "threads": threads_in_use(),
+    }
+    write_json(folder / "config.json", write_field(folder, training.result, about))
+    write_json(folder / "metrics.json", metrics)
+    write_bytes(folder / "history.csv", _csv(training.history).encode())
+    write_manifest(folder)
+
+
+def preview(source: TrainedField | Baked) -> np.ndarray:
+    """Return four views side by side over white, (height, 4 height, 3) bytes."""
+    baked = source if isinstance(source, Baked) else Baked.of(source)
+    cameras = turntable(baked.trained, PREVIEW_VIEWS, PREVIEW_ELEVATION)
+    views = side_by_side([partial(render, baked, camera) for camera in cameras])
+    pictures = [over_white(color_picture(view.rgb, view.alpha)) for view in views]
+    return (np.concatenate(pictures, axis=1) * 255 + 0.5).astype(np.uint8)
+
+
+def _csv(history: tuple[Step, ...]) -> str:
+    rows = [
+        f"{s.step},{s.loss:.8g},{s.photometric:.8g},{s.cross_entropy:.8g},{s.seconds:.3f}"
+        for s in history
+    ]
+    return "\n".join(["step,loss,photometric,cross_entropy,seconds", *rows]) + "\n"

@@ -1,0 +1,1 @@
+"""Score renderings beside pictures: metrics, tables, verdict."""

@@ -1,0 +1,1 @@
+"""A closed mesh of a field, in palette colours."""

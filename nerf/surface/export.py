@@ -1,0 +1,158 @@
+"""A coloured surface as GLB, OBJ or PLY.
+
+    GLB   one mesh, one unlit material whose texture holds the palette: flat colours as drawn, one
+          draw call; another palette is another texture of 8 x 8 px per colour
+    OBJ   the same, with NAME.mtl and NAME.png beside it; vertices shared, so it opens closed
+    PLY   vertex colours; a vertex between two colours comes once for each, at the same place
+
+World axes are glTF's own: +Y up, the character faces +Z.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
+from toonset.errors import OutputError
+from toonset.nerf.surface.surface import Surface
+from toonset.palette.names import hex_of
+from toonset.write import write_bytes
+
+KINDS = (".glb", ".obj", ".ply")
+CELL_PX = 8  # of the palette's texture: neighbours do not bleed into a colour's middle
+NAME = "figure"
+
+
+def mesh_files(surface: Surface, path: Path) -> dict[str, bytes]:
+    """Return the files of a mesh, by name: that of `path` first, then those that belong to it.
+
+    `path` ends in .glb, .obj or .ply, see `check_mesh_files`.
+    """
+    kind = path.suffix.lower()
+    if kind == ".glb":
+        return {path.name: encode_glb(surface)}
+    if kind == ".ply":
+        return {path.name: encode_ply(surface)}
+    material, texture = _companions(path)
+    return {
+        path.name: _obj(surface, material),
+        material: _mtl(texture),
+        texture: encode_png(palette_texture(surface.palette)),
+    }
+
+
+def check_mesh_files(path: Path, *, force: bool) -> None:
+    """Refuse, before any work, files that must not be written or replaced.
+
+    Raises:
+        OutputError: the name says no kind of mesh, or a file is there and `force` is off, or a
+            folder is.
+    """
+    kind = path.suffix.lower()
+    if kind not in KINDS:
+        raise OutputError(f"{path}: is no mesh file's name; end -o in {', '.join(KINDS)}")
+    if path.parent.is_file():
+        raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
+    beside = _companions(path) if kind == ".obj" else ()
+    for file in (path, *(path.with_name(name) for name in beside)):
+        if file.is_dir():
+            raise OutputError(f"{file}: is a folder, a file is needed; choose another -o")
+        if file.exists() and not force:
+            raise OutputError(
+                f"{file}: exists already; pass --force to replace it, or choose another -o"
+            )
+
+
+def write_mesh_files(files: dict[str, bytes], path: Path) -> None:
+    """Write what `mesh_files` returned beside each other, the mesh last: it names the others.
+
+    Raises:
+        OutputError: the place cannot be written.
+    """
+    for name in reversed(files):
+        write_bytes(path.with_name(name), files[name])
+
+
+def encode_glb(surface: Surface) -> bytes:
+    """Return the surface as a self-contained GLB."""
+    vertices, labels, faces = split_by_label(surface)
+    file = Gltf()
+    texture = file.add_texture(encode_png(palette_texture(surface.palette)), "palette")
+    material = file.add(
+        "materials",
+        name="palette",
+        pbrMetallicRoughness={
+            "baseColorTexture": {"index": texture},
+            "metallicFactor": 0,
+            "roughnessFactor": 1,
+        },
+        extensions={"KHR_materials_unlit": {}},
+    )
+    uv = _uv(labels, len(surface.palette)) * [1, -1] + [0, 1]  # glTF's v runs down
+    attributes = {"POSITION": file.add_array(vertices), "TEXCOORD_0": file.add_array(uv)}
+    indices = file.add_array(faces.ravel(), ELEMENT_ARRAY_BUFFER)
+    primitive = {"attributes": attributes, "indices": indices, "material": material}
+    mesh = file.add("meshes", name=NAME, primitives=[primitive])
+    file.roots.append(file.add("nodes", name=NAME, mesh=mesh))
+    return file.encode({"palette": [hex_of((r, g, b)) for r, g, b in surface.palette.tolist()]})
+
+
+def encode_ply(surface: Surface) -> bytes:
+    """Return the surface as binary PLY with vertex colours."""
+    vertices, labels, faces = split_by_label(surface)
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment toonset\n"
+        f"element vertex {len(vertices)}\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    points = np.zeros(len(vertices), dtype=[("place", "<f4", 3), ("color", "u1", 3)])
+    points["place"], points["color"] = vertices, surface.palette[labels]
+    rows = np.zeros(len(faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    rows["count"], rows["corners"] = 3, faces
+    return header.encode() + points.tobytes() + rows.tobytes()
+
+
+def palette_texture(palette: UInt8[np.ndarray, "colors 3"]) -> UInt8[np.ndarray, "height width 3"]:
+    """Return the palette as a row of squares."""
+    return np.tile(np.repeat(palette, CELL_PX, axis=0), (CELL_PX, 1, 1))
+
+
+def split_by_label(
+    surface: Surface,
+) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, " v"], Int[np.ndarray, "f 3"]]:
+    """Return vertices, their labels, and faces: a vertex of two labels comes twice."""
+    keys = surface.faces * np.int64(256) + surface.labels[:, None]
+    unique, index = np.unique(keys, return_inverse=True)
+    return surface.vertices[unique // 256], unique % 256, index.reshape(-1, 3)
+
+
+def _companions(path: Path) -> tuple[str, str]:
+    """Return the names of an OBJ's material and texture; OBJ ends a name at a space."""
+    word = "_".join(path.stem.split())
+    return f"{word}.mtl", f"{word}.png"
+
+
+def _obj(surface: Surface, material: str) -> bytes:
+    lines = ["# toonset", f"mtllib {material}", f"o {NAME}"]
+    lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in surface.vertices.tolist()]
+    count = len(surface.palette)
+    lines += [f"vt {u:.7g} {v:.7g}" for u, v in _uv(np.arange(count), count).tolist()]
+    lines.append("usemtl palette")
+    corners = np.column_stack([surface.faces, surface.labels]) + 1
+    lines += [f"f {a}/{t} {b}/{t} {c}/{t}" for a, b, c, t in corners.tolist()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _mtl(texture: str) -> bytes:
+    return f"# toonset\nnewmtl palette\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd {texture}\n".encode()
+
+
+def _uv(labels: Int[np.ndarray, " n"], colors: int) -> Float[np.ndarray, "n 2"]:
+    """Return the middle of each label's square; v runs up, as OBJ's does."""
+    return np.stack([(labels + 0.5) / colors, np.full(len(labels), 0.5)], axis=1)

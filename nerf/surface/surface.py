@@ -1,0 +1,84 @@
+"""The surface of a trained field as triangles in palette colours, with crisp borders.
+
+Marching cubes on what is solid; palette probabilities at the vertices; triangles cut where two
+colours are equally likely. Neighbours share the cuts, so the surface stays closed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from scipy import ndimage
+from skimage.measure import marching_cubes
+
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.surface.color import label_probabilities
+from toonset.nerf.surface.cut import cut
+from toonset.nerf.surface.decimate import decimated
+from toonset.nerf.surface.solid import SOLID_FROM, Solid, solid_of
+
+ROUNDS = 2  # of averaging colours over neighbours: specks go, borders come out smooth
+FINER = 4  # times as many faces as wanted are enough to choose from
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A closed, oriented triangle surface in the mesh frame (+Y up, the character faces +Z).
+
+    Attributes:
+        vertices: (n, 3) world coordinates.
+        faces: (m, 3) counter-clockwise as seen from outside; no two vertices at one place.
+        labels: (m,) palette colour of every face.
+        palette: (colors, 3) sRGB.
+    """
+
+    vertices: Float[np.ndarray, "vertices 3"]
+    faces: Int[np.ndarray, "faces 3"]
+    labels: Int[np.ndarray, " faces"]
+    palette: UInt8[np.ndarray, "colors 3"]
+
+
+def surface_of(trained: TrainedField, faces: int | None = None) -> Surface:
+    """Return the surface of a trained field.
+
+    Args:
+        trained: a field with palette.
+        faces: at most so many triangles; None: all, a few per voxel of the hull's surface.
+
+    Raises:
+        BundleError: the field shows nothing.
+        PaletteError: the run was trained without palette.
+    """
+    solid = solid_of(trained)
+    vertices, corners = _triangles(solid)
+    rounds = ROUNDS
+    if faces is not None and len(corners) > 4 * FINER * faces:
+        vertices, corners = _triangles(_halved(solid))
+        rounds = 0  # edges are twice as long: one round would already take small features
+    chances = label_probabilities(trained, vertices, corners, rounds)
+    vertices, corners, labels = cut(vertices, corners, chances)
+    if faces is not None and len(corners) > faces:
+        vertices, corners, labels = decimated(vertices, corners, labels, faces)
+    assert trained.palette is not None  # label_probabilities has refused a run without palette
+    return Surface(vertices, corners, labels, trained.palette)
+
+
+def _triangles(
+    solid: Solid,
+) -> tuple[Float[np.ndarray, "vertices 3"], Int[np.ndarray, "faces 3"]]:
+    """Return the level set; faces turn counter-clockwise as seen from where values are low."""
+    # a value at the level itself would put several vertices at one place
+    at_level = np.abs(solid.values - SOLID_FROM) < 1e-4
+    values = np.where(at_level, np.float32(SOLID_FROM + 1e-4), solid.values)
+    vertices, faces, _, _ = marching_cubes(values, SOLID_FROM, gradient_direction="ascent")
+    return solid.low + solid.voxel * vertices.astype(np.float64), faces.astype(np.int64)
+
+
+def _halved(solid: Solid) -> Solid:
+    """Return every other value along each axis, of the volume smoothed for that."""
+    smooth = np.pad(ndimage.uniform_filter(solid.values, 2, mode="constant"), 2)
+    # uniform_filter of 2 puts the mean of values i - 1 and i at i
+    low = solid.low - 2.5 * solid.voxel
+    return Solid(low, 2 * solid.voxel, smooth[::2, ::2, ::2])

@@ -1,0 +1,70 @@
+"""What one optimiser step minimises: a batch of rays, rendered and compared with the drawings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from toonset.nerf.fields.base import Field
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.kernels import losses
+from toonset.nerf.kernels.compositing import composite_even, composite_packed
+from toonset.nerf.train.batches import Batch
+
+
+class Model(nn.Module):
+    """The parameters of a training: field and, with a palette, classifier."""
+
+    def __init__(self, field: Field, classifier: PaletteClassifier | None) -> None:
+        """Hold both."""
+        super().__init__()
+        self.field = field
+        self.classifier = classifier
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the loss's terms.
+
+    Attributes:
+        palette: of the cross-entropy.
+        smoothness: of the tables' total variation.
+        backdrop: grey behind drawings and renderings.
+        opacity: of the error of opacity; 0: silhouettes count through the backdrop alone.
+    """
+
+    palette: float
+    smoothness: float
+    backdrop: float = losses.BACKDROP
+    opacity: float = losses.OPACITY_WEIGHT
+
+
+def loss_terms(
+    model: Model, batch: Batch, weights: Weights
+) -> tuple[Float[Tensor, ""], Float[Tensor, ""], Float[Tensor, ""]]:
+    """Return the weighted photometric, cross-entropy and smoothness terms of a batch."""
+    color, opacity = render_batch(model.field, batch)
+    photometric = losses.photometric(
+        color, opacity, batch.rgb, batch.alpha, weights.backdrop, weights.opacity
+    )
+    entropy = photometric.new_zeros(())
+    if model.classifier is not None:
+        logits = model.classifier(losses.straight(color, opacity))
+        entropy = weights.palette * losses.cross_entropy(logits, batch.labels)
+    smooth = photometric.new_zeros(())
+    if weights.smoothness:
+        smooth = weights.smoothness * model.field.roughness()
+    return photometric, entropy, smooth
+
+
+def render_batch(
+    field: Field, batch: Batch
+) -> tuple[Float[Tensor, "rays 3"], Float[Tensor, " rays"]]:
+    """Return premultiplied colour and opacity of a batch's rays."""
+    density, rgb = field.shade(batch.constants)
+    depth, rays = density * batch.length, len(batch.rgb)
+    if batch.even:
+        return composite_even(depth.view(rays, -1), rgb.T.reshape(3, rays, -1))
+    return composite_packed(depth, rgb, batch.ray, rays)

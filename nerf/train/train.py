@@ -1,0 +1,237 @@
+"""Fitting a triplane field and a palette classifier to posed drawings.
+
+    loss = photometric + palette_weight * cross-entropy + smoothness * total variation
+
+Everything that does not change is computed before the first step: the hull, the samples on every
+ray and their interpolation weights. A step is two sparse products, a small decoder and sums.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.mask import check_cut_out
+from toonset.errors import BundleError, SetupError
+from toonset.nerf.fields.base import Field, FieldSpec
+from toonset.nerf.fields.build import build_field
+from toonset.nerf.fields.classifier import PaletteClassifier
+from toonset.nerf.fields.painted_hull import paint
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.fields.voxel import VoxelField
+from toonset.nerf.hull.hull import Hull
+from toonset.nerf.hull.scene_hull import hull_of, per_px
+from toonset.nerf.hull.tolerance import HullEvidence
+from toonset.nerf.kernels import losses
+from toonset.nerf.kernels.allocator import keep_freed_memory
+from toonset.nerf.kernels.threads import SIDES
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.prepare.prepare import prepared
+from toonset.nerf.prepare.symmetry import completed
+from toonset.nerf.train.batches import make_batches
+from toonset.nerf.train.box_rays import (
+    BINS,
+    BoxRays,
+    any_backdrop,
+    clear,
+    open_box,
+    without_empty_space,
+)
+from toonset.nerf.train.carved_rays import FixedRays, TrainingRays
+from toonset.nerf.train.loop import Progress, Watch, fit
+from toonset.nerf.train.loss import Model, Weights
+from toonset.nerf.train.resolution_choice import FieldChoice
+from toonset.nerf.train.resolution_search import Ground, choose_cells
+from toonset.nerf.train.result import Training
+
+CHANNELS, HIDDEN = 16, 32
+CELLS_PER_PX, CELLS = 1.0, (48, 256)
+STEPS_ALONG = 200  # samples that the longest side of the hull would take
+MOST_SAMPLES = 30  # per ray, from its first inside the hull; twice as deep, surfaces turn to mist
+TRIAL_STRIDE = 2  # times the samples' distance: the order of fields is the same, in half the time
+MLP_LAYERS, MLP_WIDTH = 4, 64
+PARTS: tuple[str, ...] = ("drawings", "hull", "planes", "rays")  # before the steps, in order
+NO_EVIDENCE = HullEvidence(0, ())
+
+
+def train(
+    scene: Scene,
+    options: TrainOptions,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+) -> Training:
+    """Return the field that explains the drawings, and how it came about.
+
+    On a CPU the same scene, options and number of threads give the same bits, unless `budget_s`
+    ends the training.
+
+    Args:
+        scene: posed pictures; labels are used where the scene has them.
+        options: see there.
+        progress: called with a line that says what is prepared.
+        watch: looks on while the field is fitted.
+
+    Raises:
+        BundleError: fewer than two usable views, a picture that is opaque all over, or cameras that
+            do not belong to the pictures.
+        SetupError: a GPU was asked for and there is none.
+    """
+    tell = progress or (lambda _: None)
+    clock = [time.perf_counter()]
+    options, device = _resolved(options), device_of(options.device)
+    check_cut_out(scene)
+    keep_freed_memory()
+    torch.manual_seed(options.seed)
+    generator = torch.Generator().manual_seed(options.seed)
+    tell("comparing the drawings")
+    ready = prepared(scene, options)
+    scene, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
+    clock.append(time.perf_counter())
+    tell("carving the hull" if options.carve else "placing the box")
+    hull, evidence = open_box(scene), NO_EVIDENCE
+    if options.carve:
+        hull, evidence = hull_of(scene, options, ready.apart_px)
+    clock.append(time.perf_counter())
+    weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
+    if options.field == "auto" and options.resolution is None:
+        tell("choosing the planes")
+        choice = _choice(ready.scene, hull, weights, options, device, agree=ready.agree)
+        torch.manual_seed(options.seed)
+    cells = choice.cells if choice else None
+    clock.append(time.perf_counter())
+    tell("laying out the rays")
+    start = replace(_untrained(scene, hull, options, cells), ink=ready.ink, keys=ready.keys)
+    rays, counts = _rays(scene, start, options, generator, device)
+    clock.append(time.perf_counter())
+    model = Model(start.field, start.classifier).to(device)
+    begin = watch.begin(start) if watch else None
+    spent_s = clock[-1] - clock[0]
+    history, stopped = fit(model, rays, weights, options, generator, watch, begin, spent_s)
+    model.to("cpu")
+    seconds = dict(zip(PARTS, np.diff(clock).tolist(), strict=True))
+    seconds["steps"] = history[-1].seconds if history else 0.0  # without what the watch has taken
+    counts |= {"views": len(scene.frames), "parameters": sum(p.numel() for p in model.parameters())}
+    result = _finished(start, options)
+    return Training(
+        result, options, tuple(history), stopped, ready, evidence, seconds, counts, symmetry, choice
+    )
+
+
+def _resolved(options: TrainOptions) -> TrainOptions:
+    """Return the options without contradictions: a painted hull is carved, nothing is fitted."""
+    return replace(options, steps=0, carve=True) if options.field == "hull" else options
+
+
+def _choice(
+    scene: Scene,
+    hull: Hull,
+    weights: Weights,
+    options: TrainOptions,
+    device: torch.device,
+    *,
+    agree: bool,
+) -> FieldChoice:
+    """Return how fine the planes are that this scene needs."""
+    step = TRIAL_STRIDE * float(hull.box.size.max()) / STEPS_ALONG
+    ground = Ground(scene, hull, step, MOST_SAMPLES // TRIAL_STRIDE, weights, options, device)
+
+    def build(cells: int) -> Field:
+        return build_field(FieldSpec("triplane", cells, CHANNELS, HIDDEN), hull.box)
+
+    return choose_cells(ground, finest_cells(scene), build, agree=agree)
+
+
+def finest_cells(scene: Scene) -> int:
+    """Return the cells along the longest side of the finest planes that a scene is given."""
+    return per_px(scene, CELLS_PER_PX, CELLS)
+
+
+def _rays(
+    scene: Scene,
+    start: TrainedField,
+    options: TrainOptions,
+    generator: torch.Generator,
+    device: torch.device,
+) -> tuple[TrainingRays, dict[str, int]]:
+    """Return where the steps' batches come from, and how many rays and samples there are."""
+    parts = 1 if device.type == "cuda" else SIDES  # small kernels would leave a GPU idle
+    if not options.carve:
+        box_rays = BoxRays(scene, start.hull, options.seed, generator, parts)
+        return box_rays.to(device), {"rays": box_rays.rays, "samples": box_rays.rays * BINS}
+    sampling = (start.step, start.samples)
+    steps = make_batches(scene, start.hull, start.field, *sampling, generator, parts=parts)
+    batches = [batch for step in steps for batch in step]
+    if not batches:
+        raise BundleError(f"{scene.name}: no drawn pixel meets the hull; the cameras are wrong")
+    counts = {
+        "rays": sum(len(batch.rgb) for batch in batches),
+        "samples": sum(len(batch.ray) for batch in batches),
+    }
+    there = [tuple(batch.to(device) for batch in step) for step in steps]
+    return FixedRays(there), counts
+
+
+def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:
+    smoothness = losses.smoothness_weight(options.smoothness, views, agree=agree)
+    if options.carve:
+        return Weights(options.palette_weight, smoothness)
+    return any_backdrop(options.palette_weight, smoothness)
+
+
+def _untrained(scene: Scene, hull: Hull, options: TrainOptions, cells: int | None) -> TrainedField:
+    field = build_field(_spec(scene, options, cells), hull.box)
+    if not options.carve:
+        field = clear(field)
+    colors = scene.palette
+    if options.field == "hull":
+        assert isinstance(field, VoxelField)
+        paint(field, hull, scene)
+        colors = None  # no step would teach the classifier
+    classifier = None if colors is None else PaletteClassifier(len(colors))
+    along, most = (STEPS_ALONG, MOST_SAMPLES) if options.carve else (BINS, 2 * BINS)
+    step = float(hull.box.size.max()) / along
+    k, size_px = _typical_camera(scene, hull)
+    return TrainedField(field, hull, step, most, classifier, colors, k, size_px)
+
+
+def _finished(trained: TrainedField, options: TrainOptions) -> TrainedField:
+    """Return the field as it is rendered: without a hull, its own empty space is skipped."""
+    if options.carve:
+        return trained
+    return replace(trained, hull=without_empty_space(trained.hull, trained.field))
+
+
+def _spec(scene: Scene, options: TrainOptions, cells: int | None) -> FieldSpec:
+    cells = cells or options.resolution or finest_cells(scene)
+    if options.field == "mlp":
+        return FieldSpec("mlp", 1, MLP_LAYERS, MLP_WIDTH)
+    if options.field in ("auto", "triplane"):
+        return FieldSpec("triplane", cells, CHANNELS, HIDDEN)
+    if options.field == "voxel":  # whose cost grows with the cube of it
+        return FieldSpec("voxel", max(1, cells * 3 // 4), 4, 0)
+    return FieldSpec("voxel", cells, 4, 0)
+
+
+def _typical_camera(scene: Scene, hull: Hull) -> tuple[float, int]:
+    middle = (hull.box.low + hull.box.high) / 2
+    cameras = [frame.camera for frame in scene.frames]
+    # k at another depth of the same pinhole: 1 / (distance to that depth).
+    ks = [c.k / (1 + c.k * float(c.project(middle[None])[1][0])) for c in cameras]
+    return float(np.median(ks)), max(max(c.size_wh) for c in cameras)
+
+
+def device_of(name: str) -> torch.device:
+    """Return the device of "auto", "cpu" or "cuda".
+
+    Raises:
+        SetupError: a GPU is asked for and there is none.
+    """
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    if name == "cuda" and not torch.cuda.is_available():
+        raise SetupError("--device cuda: torch sees no GPU here; use --device cpu")
+    return torch.device(name)
