@@ -18,9 +18,8 @@ from bench.commands.charts import WRITTEN as RESULTS
 from bench.commands.check import check
 from bench.commands.chosen import Baseline, Chosen, Subject
 from bench.commands.measure import WRONG_SPLITS, measure
-from toonset.cli.help import Verb
-from toonset.cli.main import run
-from toonset.cli.output import (
+from toonset.cli.common.help import Verb
+from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
     JsonFlag,
@@ -29,6 +28,7 @@ from toonset.cli.output import (
     SeedOption,
     check_output,
 )
+from toonset.cli.main import run
 
 WRITTEN = (*RESULTS, WRONG_SPLITS)
 

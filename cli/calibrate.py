@@ -10,9 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.calibrate_inputs import Body, Hints, load_body, load_known, load_sheets
-from toonset.cli.calibrate_provenance import provenance
-from toonset.cli.output import (
+from toonset.cli.common.calibrate_inputs import Body, Hints, load_body, load_known, load_sheets
+from toonset.cli.common.cutting import (
+    LABELS_HELP,
+    BackgroundOption,
+    BoxesOption,
+    Cutting,
+    DropOption,
+    GridOption,
+)
+from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
     JsonFlag,
@@ -21,14 +28,7 @@ from toonset.cli.output import (
     SeedOption,
     check_output,
 )
-from toonset.cli.sheet_options import (
-    LABELS_HELP,
-    BackgroundOption,
-    BoxesOption,
-    Cutting,
-    DropOption,
-    GridOption,
-)
+from toonset.cli.common.provenance import provenance
 
 if TYPE_CHECKING:
     from toonset.calib.corrections.false_holes import FilledHole

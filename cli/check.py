@@ -1,19 +1,66 @@
-"""`toonset check`: everything that is wrong with a bundle, a run or a split folder."""
+"""`toonset info` and `check`: what a bundle, a run or a split folder holds, and what is wrong."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.folder_kind import RUN, SPLIT, kind_of
-from toonset.cli.output import JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import JsonFlag, Printer, QuietFlag
+from toonset.errors import BundleError
 
 if TYPE_CHECKING:
     from toonset.dataset.bundle.problem_log import Problem, ProblemLog
 
+RUN, SPLIT, CAMERAS = "run", "split", "cameras"
+MARKS = ((RUN, "config.json"), (RUN, "model.safetensors"), (SPLIT, "split.json"))
 BAD = 2  # exit code, as of any other bad input
+
+
+def info(
+    bundle: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FOLDER", help="A bundle, a run, a split folder, or any transforms.json."
+        ),
+    ] = Path("bundle"),
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Tell what is in a bundle: views and how sure they are, colours, runs, sizes, versions.
+
+    Also of a run folder, a folder of `toonset split`, and cameras of other programs. Pictures are
+    not looked into; `toonset check` does that.
+    """
+    from toonset.cli.common.info_folders import summarise_run, summarise_split
+    from toonset.cli.common.info_text import bundle_text, run_text, split_text
+
+    printer = Printer(as_json, quiet)
+    kind = kind_of(bundle)
+    if kind == RUN:
+        found = summarise_run(bundle)
+        printer.result(found, run_text(found))
+    elif kind == SPLIT:
+        found = summarise_split(bundle)
+        printer.result(found, split_text(found))
+    else:
+        found = _summarise_bundle(bundle)
+        printer.result(found, bundle_text(found))
+
+
+def _summarise_bundle(path: Path) -> dict[str, Any]:
+    from toonset.cli.common.info_folders import summarise_run
+    from toonset.dataset.bundle.summary import runs_of, summarise
+    from toonset.errors import ToonsetError
+
+    found = summarise(path) | {"runs": []}
+    for run in runs_of(path if path.is_dir() else path.parent):
+        try:
+            found["runs"].append(summarise_run(run))
+        except ToonsetError as error:
+            found["damaged"].append(str(error))
+    return found
 
 
 def check(
@@ -74,3 +121,31 @@ def _check_run(log: ProblemLog, run: Path) -> None:
     log.attempt(name, read_field, run)
     log.attempt(f"{name}manifest.json", check_manifest, run)
     log.attempt(f"{name}metrics.json", read_json, run / "metrics.json")
+
+
+def kind_of(path: Path) -> str:
+    """Return "cameras" (a bundle or any transforms.json), "run" or "split".
+
+    Raises:
+        BundleError: it is none of them.
+    """
+    from toonset.dataset.bundle.transforms_read import NAMES
+    from toonset.dataset.images.folder import ENDINGS
+
+    if not path.exists():
+        raise BundleError(f"{path}: does not exist; name a bundle, a run or a split folder")
+    if path.suffix.lower() in ENDINGS:
+        raise BundleError(
+            f"{path}: is a picture; name a folder that `toonset split` or `calibrate` has written"
+        )
+    if not path.is_dir():
+        return CAMERAS
+    if any((path / name).is_file() for name in NAMES):
+        return CAMERAS
+    kind = next((kind for kind, name in MARKS if (path / name).is_file()), None)
+    if kind is None:
+        raise BundleError(
+            f"{path}: holds no transforms.json, split.json or config.json; name a folder that "
+            "`toonset calibrate`, `split` or `train` has written (`toonset import` reads others)"
+        )
+    return kind

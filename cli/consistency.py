@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from toonset.cli.output import ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import ForceFlag, JsonFlag, Printer, QuietFlag
 
 WRITTEN = ("consistency.json", "consistency.png")
 STANDS_OUT = 3  # exit code: done, but look
@@ -30,7 +30,7 @@ def consistency(
     Writes consistency.json and consistency.png: what no shape that all drawings share explains,
     from yellow to red. Exit code 3 where a drawing stands out.
     """
-    from toonset.cli.output import check_output
+    from toonset.cli.common.output import check_output
     from toonset.dataset.bundle.transforms import read_scene
     from toonset.dataset.images.picture import encode_png
     from toonset.nerf.prepare.consistency import consistency_of

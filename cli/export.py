@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.export_formats import TARGETS, Format, Job
-from toonset.cli.output import (
+from toonset.cli.common.export_formats import TARGETS, Format, Job
+from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
     JsonFlag,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import (
+from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
     JsonFlag,

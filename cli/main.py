@@ -16,13 +16,15 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from toonset import __version__
-from toonset.cli.help import Verb, Verbs
+from toonset.cli.common.help import Verb, Verbs
 from toonset.errors import ToonsetError, one_line
 
 VERBS = (  # in the order in which they are used
     *("split", "calibrate", "palette", "train", "render", "evaluate", "mesh", "planes"),
     *("consistency", "info", "check", "export", "import", "mannequin", "synth"),
 )
+
+MODULES = {"info": "check"}  # where a verb shares another one's module
 
 INTERRUPTED, REFUSED = 130, 2
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name
@@ -60,8 +62,9 @@ def toonset(
 
 
 for _verb in VERBS:
-    _name = f"{_verb}_" if keyword.iskeyword(_verb) else _verb  # of module and function
-    app.command(_verb, cls=Verb)(getattr(importlib.import_module(f"toonset.cli.{_name}"), _name))
+    _name = f"{_verb}_" if keyword.iskeyword(_verb) else _verb  # of the function
+    _module = importlib.import_module(f"toonset.cli.{MODULES.get(_verb, _name)}")
+    app.command(_verb, cls=Verb)(getattr(_module, _name))
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
 from toonset.dataset.mannequin.options import HEADS_TALL, SCALES, MannequinOptions, Pose
 
 DEFAULT = MannequinOptions()

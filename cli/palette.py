@@ -8,13 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, check_output
+from toonset.cli.common.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    check_output,
+)
 
 if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import UInt8
 
-    from toonset.cli.palette_inputs import Drawn
+    from toonset.cli.common.palette_inputs import Drawn
     from toonset.palette.paints.select import PaletteOptions
     from toonset.palette.palette import Palette
 
@@ -117,7 +124,7 @@ def palette(
     Writes palette.json, .gpl, .ase, .hex, .png, labels/ and contours/ into the bundle, replacing
     those of an earlier run; for images and other folders, or with -o, into a folder of their own.
     """
-    from toonset.cli.palette_inputs import bundle_of, load_drawn
+    from toonset.cli.common.palette_inputs import bundle_of, load_drawn
     from toonset.write import new_folder
 
     printer = Printer(as_json, quiet)
@@ -204,7 +211,7 @@ def _write(
 
 
 def _report(found: Palette, target: Path, printer: Printer) -> None:
-    from toonset.cli.palette_report import palette_lines
+    from toonset.cli.common.palette_report import palette_lines
     from toonset.palette.formats.registry import to_json
 
     for warning in found.warnings:

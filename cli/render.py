@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, check_output
-from toonset.cli.render_layers import LAYER_NAMES, encoded
+from toonset.cli.common.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    check_output,
+)
+from toonset.cli.common.render_layers import LAYER_NAMES, encoded
 
 if TYPE_CHECKING:
     from toonset.camera import Camera

@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    check_output,
-)
-from toonset.cli.sheet_inputs import Drawings, check_label_count, load_drawings
-from toonset.cli.sheet_options import (
+from toonset.cli.common.cutting import (
     CORRECTIONS_PANEL,
     LABELS_HELP,
     BackgroundOption,
@@ -26,6 +17,15 @@ from toonset.cli.sheet_options import (
     DropOption,
     GridOption,
 )
+from toonset.cli.common.output import (
+    OUTPUT_PANEL,
+    ForceFlag,
+    JsonFlag,
+    Printer,
+    QuietFlag,
+    check_output,
+)
+from toonset.cli.common.sheet_inputs import Drawings, check_label_count, load_drawings
 
 if TYPE_CHECKING:
     from toonset.dataset.split_folder.panel import Panel

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.output import (
+from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
     JsonFlag,

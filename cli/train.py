@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.output import (
+from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
     JsonFlag,
@@ -16,9 +16,9 @@ from toonset.cli.output import (
     QuietFlag,
     SeedOption,
 )
-from toonset.cli.train_place import Place
-from toonset.cli.train_run import Request, run
-from toonset.cli.train_threads import AUTO, checked
+from toonset.cli.common.train_place import Place
+from toonset.cli.common.train_run import Request, run
+from toonset.cli.common.train_threads import AUTO, checked
 
 DEVICES = ("auto", "cpu", "cuda")
 INKS = ("paint", "redraw")

@@ -19,7 +19,7 @@ from bench.records.gate import (
     yardstick_s,
 )
 from bench.records.record import Record, summarise
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
 
 YARD_S = 0.02

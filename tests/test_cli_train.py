@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 import torch
 
-from toonset.cli import train_threads
-from toonset.cli.train_run import RESUMED_AS
-from toonset.cli.train_stop import Stopper
-from toonset.cli.train_threads import measured
-from toonset.cli.train_voice import LOG_S, Pace
+from toonset.cli.common import train_threads
+from toonset.cli.common.train_printer import LOG_S, Pace
+from toonset.cli.common.train_run import RESUMED_AS
+from toonset.cli.common.train_stop import Stopper
+from toonset.cli.common.train_threads import measured
 from toonset.nerf.kernels.threads import use_threads
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")

@@ -10,7 +10,7 @@ import torch
 
 from bench.cases.cases import train_cases
 from tests.test_train_summary import metrics
-from toonset.cli.train_summary import summary
+from toonset.cli.common.train_summary import summary
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.folder import read_field

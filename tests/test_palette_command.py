@@ -8,8 +8,8 @@ import pytest
 import typer
 
 from toonset.camera import Camera
+from toonset.cli.common.palette_report import palette_lines
 from toonset.cli.palette import Method, palette
-from toonset.cli.palette_report import palette_lines
 from toonset.cli.split import split
 from toonset.dataset.bundle.transforms import read_scene, transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png

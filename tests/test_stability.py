@@ -24,7 +24,7 @@ from bench.stability.sheet import BASE, draw_sheet
 from bench.stability.steps import SheetResult, StepResult, align_from, run_sheet
 from bench.stability.sweeps import SWEEPS, Sweep
 from bench.stability.table import as_csv, as_records, row
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 from toonset.errors import BundleError, SheetError
 
 PLAIN = replace(BASE, outline_px=0, cell_px=120, views=3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from toonset.cli.train_summary import summary
+from toonset.cli.common.train_summary import summary
 
 
 def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:

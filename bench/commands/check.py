@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from bench.commands.chosen import Chosen, Subject
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:

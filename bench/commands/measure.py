@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from bench.commands.chosen import DEFAULT_COUNT, Baseline, Chosen, Subject
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from bench.commands.charts import file_name
 from bench.commands.chosen import Chosen
 from bench.commands.train import WRITTEN, cases_of, run_into, some
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 
 if TYPE_CHECKING:
     from bench.cases.cases import TrainCase

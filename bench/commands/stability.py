@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from bench.commands.charts import REPORT, file_name
 from toonset import __version__
-from toonset.cli.output import check_output
+from toonset.cli.common.output import check_output
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:

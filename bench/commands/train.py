@@ -17,7 +17,7 @@ from bench.commands.charts import WRITTEN as RESULTS
 from bench.commands.charts import file_name, result_files
 from bench.commands.chosen import DEFAULT_COUNT, Chosen
 from toonset import __version__
-from toonset.cli.output import Printer, check_output
+from toonset.cli.common.output import Printer, check_output
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:

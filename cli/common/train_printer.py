@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 
 if TYPE_CHECKING:
     from toonset.nerf.train.progress import Status

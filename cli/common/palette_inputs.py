@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 from toonset.dataset.split_folder.places import is_split_folder, sheet_places
 
 if TYPE_CHECKING:

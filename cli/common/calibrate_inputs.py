@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from toonset.cli.output import Printer
-from toonset.cli.sheet_inputs import check_label_count, load_drawings
-from toonset.cli.sheet_options import Cutting
+from toonset.cli.common.cutting import Cutting
+from toonset.cli.common.output import Printer
+from toonset.cli.common.sheet_inputs import check_label_count, load_drawings
 
 if TYPE_CHECKING:
     from toonset.calib.hints import Known

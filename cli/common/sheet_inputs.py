@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toonset.cli.output import Printer
-from toonset.cli.sheet_options import Cutting
+from toonset.cli.common.cutting import Cutting
+from toonset.cli.common.output import Printer
 from toonset.dataset.split_folder.places import sheet_places
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import signal
 from collections.abc import Iterator
 from types import FrameType
 
-from toonset.cli.output import Printer
+from toonset.cli.common.output import Printer
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 EXIT_CODE = 128  # plus the signal's number, as shells have it

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toonset.cli.output import check_output
+from toonset.cli.common.output import check_output
 from toonset.errors import BundleError, OutputError
 
 if TYPE_CHECKING:

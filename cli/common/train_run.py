@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toonset.cli.output import Printer
-from toonset.cli.train_place import Place
-from toonset.cli.train_stop import Stopper
-from toonset.cli.train_summary import summary
-from toonset.cli.train_threads import threads_of
-from toonset.cli.train_voice import Voice
+from toonset.cli.common.output import Printer
+from toonset.cli.common.train_place import Place
+from toonset.cli.common.train_printer import Voice
+from toonset.cli.common.train_stop import Stopper
+from toonset.cli.common.train_summary import summary
+from toonset.cli.common.train_threads import threads_of
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:

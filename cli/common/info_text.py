@@ -1,4 +1,4 @@
-"""A bundle's facts as text: a table of views, then one line for everything else."""
+"""Facts of bundles, runs and split folders as text: a table of views, a line for all else."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any
 
-from toonset.cli.info_folders import run_line
 from toonset.errors import printable
 
 NAME_WIDTH = 10  # of the left column below the table
@@ -34,6 +33,53 @@ def bundle_text(found: dict[str, Any]) -> str:
         *[("damaged", f"{text} (`toonset check` looks at all)") for text in found["damaged"]],
     ]
     return "\n".join([*lines, "", *fact_lines(facts)])
+
+
+def run_line(found: dict[str, Any]) -> str:
+    """Return a run in one line."""
+    parts = [f"{found['path']}: {found['steps']} steps"]
+    parts += [f"{name} {value:.4g}" for name, value in found["fit"].items() if _is_number(value)]
+    views, colors = found["views"], found["palette"]
+    parts += [f"{len(views)} views"] if isinstance(views, list) else []
+    parts += [f"{len(colors)} colours"] if isinstance(colors, list) else ["no palette"]
+    parts += [found["verdict"]] if isinstance(found["verdict"], str) else []
+    return ", ".join(parts)
+
+
+def run_text(found: dict[str, Any]) -> str:
+    """Return a run for people."""
+    reasons = found["reasons"]
+    facts = [
+        *[("weak", str(reason)) for reason in (reasons if isinstance(reasons, list) else [])],
+        ("stopped", str(found["stopped"] or "")),
+        ("options", _pairs(found["options"])),
+        ("made by", _pairs(found["versions"])),
+        ("on disk", size_line(found["bytes"])),
+    ]
+    return "\n".join([run_line(found), "", *fact_lines(facts)])
+
+
+def split_text(found: dict[str, Any]) -> str:
+    """Return a split folder for people."""
+    rows = [("view", "size", "at", "line", "sheet", "shows")]
+    for view in found["views"]:
+        x, y, width, height = view["box"]
+        sheet = found["sheets"][view["sheet"]]["name"]
+        line = f"{view['line_width_px']:.1f} px" if view["line_width_px"] else "none"
+        shows = view["label"] or ""
+        rows.append((view["name"], f"{width} x {height}", f"{x}, {y}", line, sheet, shows))
+    facts = []
+    for sheet in found["sheets"]:
+        kinds = [one["kind"] for one in sheet["left_out"]]
+        facts.append(("sheet", f"{sheet['name']}, {sheet['size_wh'][0]} x {sheet['size_wh'][1]}"))
+        counts = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
+        facts.append(("left out", ", ".join(counts)))
+        facts += [("warning", text) for text in sheet["warnings"]]
+    facts.append(("gone", ", ".join(found["gone"])))
+    facts.append(("new", ", ".join(found["new"]) + " (or renamed)" * bool(found["new"])))
+    facts.append(("on disk", size_line(found["bytes"])))
+    title = f"{found['path']}: a split of {len(found['views'])} views"
+    return "\n".join([title, "", *table(rows), "", *fact_lines(facts)])
 
 
 _JUDGED = ("view", "size", "line", "yaw", "elevation", "p_flip", "verdict")
@@ -155,3 +201,12 @@ def _versions(found: dict[str, Any]) -> str:
     versions = found.get("versions", {})
     seed = "" if found.get("seed") is None else f", seed {found['seed']}"
     return ", ".join(f"{name} {number}" for name, number in versions.items()) + seed
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float)
+
+
+def _pairs(value: Any) -> str:
+    items = value.items() if isinstance(value, dict) else ()
+    return ", ".join(f"{name} {number}" for name, number in items)

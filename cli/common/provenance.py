@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from toonset.cli.calibrate_inputs import Body, Hints
+from toonset.cli.common.calibrate_inputs import Body, Hints
 
 
 def provenance(
