@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +16,7 @@ from toonset.cli.common.output import (
     QuietFlag,
     check_output,
 )
-from toonset.cli.common.render_layers import LAYER_NAMES, encoded
+from toonset.nerf.options import LAYERS
 
 if TYPE_CHECKING:
     from toonset.camera import Camera
@@ -50,7 +49,7 @@ def render(
     ] = None,
     layers: Annotated[
         list[str] | None,
-        typer.Option("--layer", help=f"{', '.join(LAYER_NAMES)}; repeatable (default: rgb)."),
+        typer.Option("--layer", help=f"{', '.join(LAYERS)}; repeatable (default: rgb)."),
     ] = None,
     recolor: Annotated[
         list[str] | None,
@@ -104,8 +103,10 @@ def render(
         raise typer.BadParameter("--elevation and --size belong to --turntable")
 
     from toonset.nerf.kernels.threads import use_threads
+    from toonset.nerf.render.files import rendered_files
     from toonset.nerf.render.recolor import recolored, repainted
     from toonset.nerf.run.folder import read_field
+    from toonset.write import new_folder, write_bytes
 
     together = _formats(formats, gif, turning=views is not None)
     use_threads(threads)
@@ -114,62 +115,30 @@ def render(
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
     trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
-    files, turns = _write(out, trained, named, wanted, printer, together, force=force)
-    extra = "".join(f", {name} ({size} kB)" for name, size in turns.items())
-    shown = f"{len(files)} {'picture' if len(files) == 1 else 'pictures'} ({', '.join(wanted)})"
-    values = {
-        "out": out,
-        "layer": wanted[0],
-        "layers": wanted,
-        "files": files,
-        "together": list(turns),
-    }
-    printer.result(values, f"{out}: {shown}{extra}")
-
-
-def _write(
-    out: Path,
-    trained: TrainedField,
-    named: Named,
-    layers: list[str],
-    printer: Printer,
-    formats: Sequence[str],
-    *,
-    force: bool,
-) -> tuple[list[str], dict[str, int]]:
-    """Write all pictures and files of the first layer; return names, and the latter's kB."""
-    from toonset.nerf.render.baked import Baked
-    from toonset.nerf.render.depth_levels import DepthLevels
-    from toonset.nerf.render.turntable_files import turntable_files
-    from toonset.nerf.render.views import render as render_view
-    from toonset.write import new_folder, write_bytes, write_json
-
-    baked, files, turning = Baked.of(trained), [], []
-    cameras = [camera for _, camera in named]
-    levels = DepthLevels.of(trained.hull, cameras)
+    files = rendered_files(trained, named, wanted, together, printer.progress, as_drawn=as_drawn)
+    sizes: dict[str, int] = {}
     with new_folder(out, force=force) as folder:
-        for number, (stem, camera) in enumerate(named):
-            printer.progress(f"rendering {number + 1} of {len(named)}")
-            view = render_view(baked, camera)
-            for layer in layers:
-                data, picture = encoded(trained, view, camera, layer, levels)
-                files.append(f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png")
-                write_bytes(folder / files[-1], data)
-                if layer == layers[0]:
-                    turning.append(picture)
-        if "depth" in layers:
-            write_json(
-                folder / DEPTH_FILE, levels.to_json(files[layers.index("depth") :: len(layers)])
-            )
-        made = turntable_files(formats, turning, trained, cameras)
-        for name, data in made.items():
+        for name, data in files:
             write_bytes(folder / name, data)
-    return files, {name: math.ceil(len(data) / 1000) for name, data in made.items()}
+            sizes[name] = len(data)
+    _report(out, wanted, sizes, len(named), printer)
+
+
+def _report(
+    out: Path, layers: list[str], sizes: dict[str, int], views: int, printer: Printer
+) -> None:
+    """Print what was written: a picture per view and layer, and files of all views."""
+    names = [name for name in sizes if name != DEPTH_FILE]
+    files, together = names[: views * len(layers)], names[views * len(layers) :]
+    extra = "".join(f", {name} ({math.ceil(sizes[name] / 1000)} kB)" for name in together)
+    shown = f"{len(files)} {'picture' if len(files) == 1 else 'pictures'} ({', '.join(layers)})"
+    values = {"out": out, "layer": layers[0], "layers": layers, "files": files}
+    printer.result({**values, "together": together}, f"{out}: {shown}{extra}")
 
 
 def _formats(given: str | None, gif: bool | None, *, turning: bool) -> tuple[str, ...]:
     """Return the names of the files that hold all views."""
-    from toonset.nerf.render.turntable_files import FORMATS
+    from toonset.nerf.render.files import FORMATS
 
     names = tuple(dict.fromkeys(word.strip() for word in given.split(","))) if given else ()
     for name in names:
@@ -196,8 +165,7 @@ def _style(
         raise BundleError("run: its drawings have no contour lines; leave --layer ink out")
     if as_drawn and trained.keys is None:
         raise BundleError("run: its drawings were not bent; leave --as-drawn out")
-    ink, keys = trained.ink if lines else None, trained.keys if as_drawn else None
-    return replace(trained, ink=ink, keys=keys)
+    return trained if lines else replace(trained, ink=None)
 
 
 def _check_arguments(
@@ -206,8 +174,8 @@ def _check_arguments(
     if (cameras is None) == (views is None):
         raise typer.BadParameter("give either --cameras transforms.json or --turntable N")
     for layer in layers:
-        if layer not in LAYER_NAMES:
-            names = ", ".join(LAYER_NAMES)
+        if layer not in LAYERS:
+            names = ", ".join(LAYERS)
             raise typer.BadParameter(f"{layer!r} is none of {names}", param_hint="--layer")
     if len(set(layers)) < len(layers):
         raise typer.BadParameter("names a layer twice", param_hint="--layer")

@@ -1,10 +1,12 @@
-"""What can be set about training. Imports nothing heavy."""
+"""What can be set about training and rendering. Imports nothing heavy."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
+# What can be seen of a rendering.
+LAYERS = ("rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
 FieldName = Literal["auto", "triplane", "mlp", "voxel", "hull"]
 FIELDS: tuple[FieldName, ...] = get_args(FieldName)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,46 @@ ROOT = Path(__file__).resolve().parents[1]
 # A stage imports only stages with a lower number: calib and nerf never see each other.
 LAYERS = {"palette": 1, "dataset": 2, "calib": 3, "nerf": 3, "cli": 4}
 OUTSIDE = ("bench", "tests", "examples")  # of the wheel: no stage imports them
+
+
+# Within a stage a room imports only rooms on a lower floor; "@" marks a file of the stage's own
+# folder. Rooms of one floor do not see each other, so there is no circle.
+FLOORS: dict[str, tuple[str, ...]] = {
+    "palette": (
+        "@colors @named @palette",
+        "@names pixels",
+        "@swatch_image formats paints",
+    ),
+    "dataset": (
+        "images split.figures",
+        "mesh split.touching",
+        "bundle mannequin",
+        "silhouettes synthetic",
+        "split",
+        "exporters split_folder",
+        "importers",
+    ),
+    "calib": (
+        "@options @view_labels evidence outline",
+        "@mannequin_points fit landmarks",
+        "@result search",
+        "@hints corrections verdict",
+        "@from_landmarks @pipeline",
+        "@calibrate",
+    ),
+    "nerf": (
+        "@options kernels",
+        "hull",
+        "lines",
+        "prepare",
+        "fields",
+        "render surface train",
+        "score",
+        "run",
+    ),
+    "cli": ("common", "@"),  # a verb imports no other verb
+}
+MOST_FILES, MOST_ROOMS = 16, 40  # in a folder; of the product
 
 
 def imported_names(path: Path) -> set[str]:
@@ -33,6 +74,35 @@ def imported_stages(path: Path) -> set[str]:
     return {part[1] for part in parts if part[0] == "toonset" and len(part) > 1} & set(LAYERS)
 
 
+def room_of(module: str) -> str:
+    """Return the room of `toonset.STAGE.ROOM.FILE`, "@FILE" for a file outside of all rooms."""
+    inside = module.split(".")[2:]
+    return ".".join(inside[:-1]) or f"@{inside[-1]}"
+
+
+def floor_of(stage: str, room: str) -> int:
+    """Return the number of the floor that a room is listed on."""
+    for number, floor in enumerate(FLOORS[stage]):
+        if room in floor.split() or (room[0] == "@" and "@" in floor.split()):
+            return number
+    raise AssertionError(f"{stage}: {room} is on no floor of this file's table")
+
+
+def imports_within(stage: str) -> Iterator[tuple[str, str]]:
+    """Yield every (importing, imported) pair of a stage's modules, as dotted names."""
+    files = [path for path in (ROOT / stage).rglob("*.py") if path.name != "__init__.py"]
+    places = {path: dotted(path) for path in files}
+    for path, module in places.items():
+        for name in imported_names(path) & set(places.values()):
+            yield module, name
+
+
+def dotted(path: Path) -> str:
+    """Return the name under which a source file is imported."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts if parts[0] == "toonset" else ("toonset", *parts))
+
+
 def pyproject() -> dict[str, Any]:
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
@@ -42,6 +112,56 @@ def test_stage_imports_only_lower_layers(stage: str) -> None:
     for path in (ROOT / stage).rglob("*.py"):
         for other in imported_stages(path) - {stage}:
             assert LAYERS[other] < LAYERS[stage], f"{path.relative_to(ROOT)} imports {other}"
+
+
+@pytest.mark.parametrize("stage", LAYERS)
+def test_room_imports_only_lower_floors(stage: str) -> None:
+    wrong = [
+        f"{one} imports {other}"
+        for one, other in imports_within(stage)
+        if (here := room_of(one)) != (there := room_of(other))
+        and floor_of(stage, there) >= floor_of(stage, here)
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize("stage", LAYERS)
+def test_table_of_floors_lists_what_is_there(stage: str) -> None:
+    listed = {room for floor in FLOORS[stage] for room in floor.split()} - {"@"}
+    files = [path for path in (ROOT / stage).rglob("*.py") if path.name != "__init__.py"]
+    there = {room_of(dotted(path)) for path in files}
+    assert listed <= there
+    assert all(floor_of(stage, room) >= 0 for room in there)
+
+
+def test_no_circle_within_a_room() -> None:
+    for folder in folders():
+        for module, imported in imports_among(folder).items():
+            seen, left = set(), set(imported)
+            while left:
+                name = left.pop()
+                assert name != module, f"{module} imports itself by way of others"
+                seen.add(name)
+                left |= imports_among(folder)[name] - seen
+
+
+def imports_among(folder: Path) -> dict[str, set[str]]:
+    """Return which modules of one folder import which of the others."""
+    modules = {dotted(path): path for path in folder.glob("*.py") if path.name != "__init__.py"}
+    return {name: imported_names(path) & set(modules) for name, path in modules.items()}
+
+
+def folders() -> list[Path]:
+    """Return every folder of the product that holds Python files."""
+    stages = [path.parent for stage in LAYERS for path in (ROOT / stage).rglob("__init__.py")]
+    return [ROOT / "toonset", *stages]
+
+
+def test_folders_are_rooms_not_halls() -> None:
+    others = {path.parent for top in ("bench", "tests") for path in (ROOT / top).rglob("*.py")}
+    for folder in {*folders(), *others}:
+        assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder.relative_to(ROOT)
+    assert len(folders()) <= MOST_ROOMS
 
 
 def test_bottom_layer_imports_no_stage() -> None:

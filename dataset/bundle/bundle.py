@@ -1,11 +1,11 @@
 """The bundle on disk: what calibration hands to palette, training and other programs.
 
-    transforms.json    cameras (see `toonset.dataset.bundle.transforms`) images/000.png     RGBA
-    crops, straight alpha calibration.json   native cameras, uncertainty, verdicts
-    (`toonset.dataset.bundle.calibration_schema`) overlay.png        every drawing with the
-    mannequin's outline over it mannequin.obj      the mannequin as it was fitted, in the cameras'
-    world palette.json       the colours, once `toonset palette` has found them; .gpl .ase .hex .png
-    are
+    transforms.json    cameras (see `toonset.dataset.bundle.transforms`)
+    images/000.png     RGBA crops, straight alpha
+    calibration.json   native cameras, uncertainty, verdicts (`calibration_schema`)
+    overlay.png        every drawing with the mannequin's outline over it
+    mannequin.obj      the mannequin as it was fitted, in the cameras' world
+    palette.json       the colours, once `toonset palette` has found them; .gpl .ase .hex .png are
                        copies for other programs
     labels/000.png     indexed PNG per picture: which colour a pixel is, 255 = none
     contours/000.png   8-bit grey per picture: how much of a pixel is drawn line

@@ -1,14 +1,122 @@
-"""Layers of a rendering as 8-bit pictures."""
+"""A rendered view, and its layers as 8-bit pictures."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from toonset.errors import PaletteError
-from toonset.nerf.fields.trained_field import NO_PALETTE
+from toonset.camera import Camera
+from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
+from toonset.errors import PaletteError, ToonsetError
+from toonset.nerf.fields.trained_field import NO_PALETTE, TrainedField
+from toonset.nerf.options import LAYERS
+from toonset.nerf.prepare.warp_back import give_back
+from toonset.nerf.render.depth_levels import DepthLevels
 from toonset.nerf.render.line_drawing import inked
-from toonset.nerf.render.views import Rendering
+from toonset.nerf.render.normals import normal_picture
+from toonset.palette.pixels.labels import UNLABELLED
+from toonset.write import write_bytes
+
+Picture = UInt8[np.ndarray, "height width 4"]
+Layer = UInt8[np.ndarray, "height width *channels"]
+
+BENT = ("rgb", "palette", "labels")  # layers that can be bent as the drawings were
+
+
+@dataclass(frozen=True, eq=False)
+class Rendering:
+    """One rendered view.
+
+    Attributes:
+        rgb: (height, width, 3) premultiplied colour in [0, 1].
+        alpha: (height, width) opacity in [0, 1].
+        depth: (height, width) mean distance past the plane through the camera's target, world
+            units; nan where nothing is seen.
+        labels: (height, width) most frequent palette label, 255 where nothing is seen; None
+            without palette.
+        shares: (height, width, colors) share of a pixel that each palette colour covers
+            (premultiplied by alpha); None without palette.
+        camera: it is seen from.
+        field: that was rendered.
+        ink: (height, width) share of a pixel that contour lines cover, already part of `rgb`; None
+            where the drawings have no lines.
+        ink_rgb: sRGB of the lines; None without.
+    """
+
+    rgb: Float[np.ndarray, "height width 3"]
+    alpha: Float[np.ndarray, "height width"]
+    depth: Float[np.ndarray, "height width"]
+    labels: UInt8[np.ndarray, "height width"] | None
+    shares: Float[np.ndarray, "height width colors"] | None
+    camera: Camera
+    field: TrainedField
+    ink: Float[np.ndarray, "height width"] | None = None
+    ink_rgb: tuple[int, int, int] | None = None
+
+    def picture(self, layer: str = "rgb", *, as_drawn: bool = False) -> Layer:
+        """Return one layer as RGBA with straight alpha, or as a label map.
+
+        Args:
+            layer: one of `LAYERS`; "depth" is grey, the nearest point white.
+            as_drawn: bend it as the drawings were, which training had bent back.
+
+        Raises:
+            ToonsetError: there is no such layer, or it needs a palette and there is none.
+        """
+        if layer not in LAYERS:
+            raise ToonsetError(f"layer {layer!r} is none of {', '.join(LAYERS)}; choose one")
+        made: dict[str, Callable[[], Layer]] = {
+            "rgb": lambda: color_picture(self.rgb, self.alpha),
+            "palette": lambda: palette_picture(self, self.field.palette),
+            "labels": lambda: label_picture(self),
+            "depth": lambda: depth_picture(self),
+            "alpha": lambda: alpha_picture(self),
+            "ink": lambda: ink_picture(self),
+            "normal": lambda: normal_picture(self.depth, self.alpha, self.camera),
+            "normal-camera": lambda: normal_picture(
+                self.depth, self.alpha, self.camera, in_camera=True
+            ),
+        }
+        picture = made[layer]()
+        if not as_drawn or self.field.keys is None or layer not in BENT:
+            return picture
+        return give_back({layer: picture}, self.camera, self.field.keys)[layer]
+
+    def png(
+        self, layer: str = "rgb", *, as_drawn: bool = False, levels: DepthLevels | None = None
+    ) -> tuple[bytes, Picture]:
+        """Return a layer as a PNG file, and as RGBA for a GIF.
+
+        Args:
+            layer: one of `LAYERS`. Labels are an indexed PNG, depth is grey of 16 bits.
+            as_drawn: see `picture`.
+            levels: scale of depth; None: that of this view alone.
+
+        Raises:
+            ToonsetError: see `picture`.
+        """
+        picture = self.picture(layer, as_drawn=as_drawn)
+        if layer == "depth":
+            levels = levels or DepthLevels.of(self.field.hull, [self.camera])
+            return encode_grey_png(levels.picture(self.depth)), picture
+        if layer != "labels":
+            return encode_png(picture), picture
+        assert self.field.palette is not None  # label_picture has refused a run without palette
+        return encode_indexed_png(picture, self.field.palette), _in_colors(
+            picture, self.field.palette
+        )
+
+    def save(self, path: str | Path, layer: str = "rgb", *, as_drawn: bool = False) -> None:
+        """Write a layer as a PNG file; the file appears whole or not at all.
+
+        Raises:
+            ToonsetError: see `picture`; or the file cannot be written.
+        """
+        write_bytes(Path(path), self.png(layer, as_drawn=as_drawn)[0])
 
 
 def color_picture(
@@ -72,3 +180,10 @@ def label_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width"]:
 
 def _bytes(values: Float[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
     return (values.clip(0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def _in_colors(
+    labels: UInt8[np.ndarray, "height width"], palette: UInt8[np.ndarray, "colors 3"]
+) -> Picture:
+    colors = np.concatenate([palette, np.zeros((256 - len(palette), 3), np.uint8)])[labels]
+    return np.dstack([colors, np.where(labels == UNLABELLED, 0, 255).astype(np.uint8)])

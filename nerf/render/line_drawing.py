@@ -8,7 +8,6 @@ a step's line lies on the nearer side, for it is that part's outline.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -19,9 +18,6 @@ from toonset.camera import Camera
 from toonset.nerf.lines.explain import step_edges
 from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest, parts
 from toonset.nerf.lines.remove import InkStyle
-
-if TYPE_CHECKING:
-    from toonset.nerf.render.views import Rendering
 
 SAMPLES_PER_LINE = 4.0  # across a line, at least
 FINEST = 4  # samples per pixel and axis, at most
@@ -35,29 +31,35 @@ def ink_scale(camera: Camera, style: InkStyle) -> float:
 
 
 def draw_ink(
-    rendering: Rendering, style: InkStyle, scale: float
+    alpha: Float[np.ndarray, "height width"],
+    depth: Float[np.ndarray, "height width"],
+    shares: Float[np.ndarray, "height width colors"] | None,
+    style: InkStyle,
+    scale: float,
 ) -> Float[np.ndarray, "height width"]:
     """Return the share of every pixel that contour lines cover, at most its alpha.
 
     Args:
-        rendering: of a field trained without contour lines.
+        alpha: of a rendering of a field trained without contour lines.
+        depth: of the rendering.
+        shares: of the rendering, None without palette.
         style: of the sheet's lines.
         scale: pixels of the rendering per pixel of the drawings, see `ink_scale`.
     """
     outline, inner = scale * style.outline_px, scale * style.inner_px
     factor = int(np.clip(math.ceil(SAMPLES_PER_LINE / max(outline, 1e-6)), 1, FINEST))
-    figure = _enlarged(rendering.alpha, factor) >= 0.5
+    figure = _enlarged(alpha, factor) >= 0.5
     ink = _line(depth_inside(figure) - factor * outline / 2, factor * outline)
     if style.jump is not None:
-        signed = _to_steps(rendering, style.jump, factor, SHORTEST * inner)
+        signed = _to_steps(depth, style.jump, factor, SHORTEST * inner)
         ink = np.maximum(ink, _line(signed - factor * inner / 2, factor * inner))
-    if rendering.shares is not None and style.borders:
-        border = _border(rendering.shares, style, figure, factor)
+    if shares is not None and style.borders:
+        border = _border(shares, style, figure, factor)
         ink = np.maximum(ink, _line(distance_to(border) + 0.5, factor * inner))
-    height, width = rendering.alpha.shape
+    height, width = alpha.shape
     covered = np.where(figure, ink, 0).astype(np.float32)
     mean = cv2.resize(covered, (width, height), interpolation=cv2.INTER_AREA)
-    return np.minimum(mean, rendering.alpha)
+    return np.minimum(mean, alpha)
 
 
 def inked(
@@ -90,17 +92,17 @@ def _enlarged(picture: np.ndarray, factor: int) -> np.ndarray:
 
 
 def _to_steps(
-    rendering: Rendering, jump: float, factor: int, shortest_px: float
+    depth: Float[np.ndarray, "height width"], jump: float, factor: int, shortest_px: float
 ) -> Float[np.ndarray, "fine_height fine_width"]:
     """Return the distance in samples to the nearest step, negative on its farther side."""
-    seen = np.isfinite(rendering.depth)
+    seen = np.isfinite(depth)
     if not seen.any():
         return np.full(tuple(factor * n for n in seen.shape), np.inf)
-    edges = _long(step_edges(rendering.depth, jump), shortest_px)
+    edges = _long(step_edges(depth, jump), shortest_px)
     rows, columns = nearest(seen)
-    depth = rendering.depth[rows, columns].astype(np.float32)
-    middle = (cv2.erode(depth, SQUARE) + cv2.dilate(depth, SQUARE)) / 2
-    nearer = _enlarged(depth, factor) < _enlarged(middle, factor)
+    filled = depth[rows, columns].astype(np.float32)
+    middle = (cv2.erode(filled, SQUARE) + cv2.dilate(filled, SQUARE)) / 2
+    nearer = _enlarged(filled, factor) < _enlarged(middle, factor)
     zone = _enlarged(edges, factor) >= 0.5
     near_side, far_side = _sides(nearer, zone)
     to_near, to_far = distance_to(near_side) + 0.5, distance_to(far_side) + 0.5

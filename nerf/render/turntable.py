@@ -14,7 +14,7 @@ FILL = 0.94  # of the picture's side that the figure may take
 
 
 def turntable(
-    trained: TrainedField, count: int, elevation: float, size_px: int | None = None
+    trained: TrainedField, count: int, elevation: float = 0.0, size: int | None = None
 ) -> tuple[Camera, ...]:
     """Return `count` cameras at equal turns, the first in front, all at one scale.
 
@@ -22,9 +22,9 @@ def turntable(
         trained: the figure; cameras see as far (or as parallel) as its training cameras.
         count: number of views, yaw rising.
         elevation: radians, > 0 looks down.
-        size_px: side of the square pictures; None: as the training pictures.
+        size: side of the square pictures, px; None: as the training pictures.
     """
-    side = size_px or trained.size_px
+    side = size or trained.size_px
     low, high = filled_box(trained.hull)
     target = (low + high) / 2
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])

@@ -6,53 +6,26 @@ folds, where one colour meets the next. Outlines are soft through the hull's occ
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import one_thread
-from toonset.nerf.lines.remove import InkStyle
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import cast
 from toonset.nerf.render.labels import NONE, labels_of, palette_shares
+from toonset.nerf.render.layers import Rendering
 from toonset.nerf.render.line_drawing import draw_ink, ink_scale, inked
 from toonset.nerf.render.rays import Sight
 from toonset.nerf.render.supersample import borders, places_within
 from toonset.palette.pixels.labels import UNLABELLED
 
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
-
-
-@dataclass(frozen=True, eq=False)
-class Rendering:
-    """One rendered view.
-
-    Attributes:
-        rgb: (height, width, 3) premultiplied colour in [0, 1].
-        alpha: (height, width) opacity in [0, 1].
-        depth: (height, width) mean distance past the plane through the camera's target, world
-            units; nan where nothing is seen.
-        labels: (height, width) most frequent palette label, 255 where nothing is seen; None
-            without palette.
-        shares: (height, width, colors) share of a pixel that each palette colour covers
-            (premultiplied by alpha); None without palette.
-        ink: (height, width) share of a pixel that contour lines cover, already part of `rgb`; None
-            where the drawings have no lines.
-        ink_rgb: sRGB of the lines; None without.
-    """
-
-    rgb: Float[np.ndarray, "height width 3"]
-    alpha: Float[np.ndarray, "height width"]
-    depth: Float[np.ndarray, "height width"]
-    labels: UInt8[np.ndarray, "height width"] | None
-    shares: Float[np.ndarray, "height width colors"] | None
-    ink: Float[np.ndarray, "height width"] | None = None
-    ink_rgb: tuple[int, int, int] | None = None
 
 
 @torch.no_grad()
@@ -82,8 +55,8 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     if baked.labels is not None:
         shares = palette_shares(baked.labels, baked.paints, seen[3], labels, chosen, more)
     seen[:, chosen] = more.mean(dim=2)
-    view = _rendering(seen.numpy(), None if shares is None else shares.numpy())
-    return _with_lines(view, trained.ink, camera)
+    means = seen.numpy(), None if shares is None else shares.numpy()
+    return _with_lines(_rendering(*means, camera, trained))
 
 
 def _grid(height: int, width: int) -> Float[Tensor, "2 pixels"]:
@@ -92,10 +65,11 @@ def _grid(height: int, width: int) -> Float[Tensor, "2 pixels"]:
     return torch.stack([u, v]).view(2, -1)
 
 
-def _with_lines(view: Rendering, style: InkStyle | None, camera: Camera) -> Rendering:
+def _with_lines(view: Rendering) -> Rendering:
+    style = view.field.ink
     if style is None:
         return view
-    ink = draw_ink(view, style, ink_scale(camera, style))
+    ink = draw_ink(view.alpha, view.depth, view.shares, style, ink_scale(view.camera, style))
     return replace(
         view, rgb=inked(view.rgb, view.alpha, ink, style.rgb), ink=ink, ink_rgb=style.rgb
     )
@@ -104,6 +78,8 @@ def _with_lines(view: Rendering, style: InkStyle | None, camera: Camera) -> Rend
 def _rendering(
     mean: Float[np.ndarray, "5 height width"],
     shares: Float[np.ndarray, "height width colors"] | None,
+    camera: Camera,
+    field: TrainedField,
 ) -> Rendering:
     alpha = mean[3].clip(0, 1)
     seen = alpha >= SEEN_FROM
@@ -111,6 +87,5 @@ def _rendering(
     labels = None
     if shares is not None:
         labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
-    return Rendering(
-        np.ascontiguousarray(np.moveaxis(mean[:3], 0, -1)), alpha, depth, labels, shares
-    )
+    rgb = np.ascontiguousarray(np.moveaxis(mean[:3], 0, -1))
+    return Rendering(rgb, alpha, depth, labels, shares, camera, field)

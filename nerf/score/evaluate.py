@@ -12,8 +12,8 @@ from jaxtyping import Float, UInt8
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.layers import color_picture, palette_picture
-from toonset.nerf.render.views import Rendering, render
+from toonset.nerf.render.layers import Rendering, color_picture, palette_picture
+from toonset.nerf.render.views import render
 from toonset.nerf.score.flip import PIXELS_PER_DEGREE
 from toonset.nerf.score.labels import score_labels
 from toonset.nerf.score.lines import TOLERANCE_PX

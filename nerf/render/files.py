@@ -1,0 +1,91 @@
+"""The files of a rendering: a picture per camera and layer, and all of a turn in one file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+from toonset.camera import Camera
+from toonset.dataset.images.picture import encode_png
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.render.animation import Pictures, encode_gif, encode_mp4, encode_webp
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.depth_levels import DepthLevels
+from toonset.nerf.render.sprite_sheet import feet, sprite_json, sprite_sheet
+from toonset.nerf.render.views import render
+
+FORMATS = ("gif", "webp", "mp4", "sprites")
+ANIMATIONS = {"gif": encode_gif, "webp": encode_webp, "mp4": encode_mp4}
+SPRITES = "sprites"
+DEPTH_FILE = "depth.json"  # the scale of depth pictures
+
+
+def rendered_files(
+    trained: TrainedField,
+    named: Sequence[tuple[str, Camera]],
+    layers: Sequence[str] = ("rgb",),
+    formats: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda line: None,
+    *,
+    as_drawn: bool = False,
+) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of every file that `toonset render` writes.
+
+    Args:
+        trained: what is rendered.
+        named: cameras with the names of their pictures, without ending.
+        layers: names out of LAYERS; several are written as NAME-LAYER.png.
+        formats: names out of FORMATS: files of all views of the first layer.
+        progress: told which view is rendered.
+        as_drawn: bend pictures as the drawings were.
+
+    Raises:
+        ToonsetError: see `Rendering.picture` and `turntable_files`.
+    """
+    baked, turning, depths = Baked.of(trained), [], []
+    cameras = [camera for _, camera in named]
+    levels = DepthLevels.of(trained.hull, cameras)
+    for number, (stem, camera) in enumerate(named):
+        progress(f"rendering {number + 1} of {len(named)}")
+        view = render(baked, camera)
+        for layer in layers:
+            data, picture = view.png(layer, as_drawn=as_drawn, levels=levels)
+            name = f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png"
+            yield name, data
+            depths += [name] if layer == "depth" else []
+            turning += [picture] if layer == layers[0] else []
+    if depths:
+        yield DEPTH_FILE, _json(levels.to_json(depths))
+    yield from turntable_files(formats, turning, trained, cameras).items()
+
+
+def turntable_files(
+    formats: Iterable[str], pictures: Pictures, trained: TrainedField, cameras: Sequence[Camera]
+) -> dict[str, bytes]:
+    """Return turntable.gif, .webp, .mp4 and sprites.png with sprites.json, by name.
+
+    Args:
+        formats: names out of FORMATS.
+        pictures: one per camera, in the order of the turn.
+        trained: what they show.
+        cameras: that saw them.
+
+    Raises:
+        OutputError: the pictures differ in size or do not fit into a texture.
+        SetupError: "mp4" without its extra.
+    """
+    files = {}
+    for name in formats:
+        if name == SPRITES:
+            sheet = sprite_sheet(pictures)
+            about = sprite_json(sheet, f"{SPRITES}.png", [feet(trained, c) for c in cameras])
+            files[f"{SPRITES}.png"] = encode_png(sheet.rgba)
+            files[f"{SPRITES}.json"] = _json(about)
+        else:
+            files[f"turntable.{name}"] = ANIMATIONS[name](pictures)
+    return files
+
+
+def _json(content: dict[str, Any]) -> bytes:
+    return json.dumps(content, indent=2, allow_nan=False).encode() + b"\n"

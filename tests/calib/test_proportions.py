@@ -1,0 +1,105 @@
+"""A mannequin that stands a little otherwise than the character, or is built a little otherwise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.cases.bodies import random_body
+from bench.stability.bodies import with_arms_raised, with_head_grown
+from toonset.calib import pipeline
+from toonset.calib.calibrate import calibrate
+from toonset.calib.fit.model_selection import BIC_MARGIN, GLANCE_MARGIN, PROPORTIONS, Rung
+from toonset.calib.pipeline import SAME_BODY_COVERAGE
+from toonset.calib.result import Calibration
+from toonset.camera import rotation_distance
+from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+OPTIONS = SynthOptions(views=5, cell_px=200, outline_px=0, elevation_deg=8, yaw_jitter_deg=8)
+
+
+def bending(found: Calibration) -> Rung:
+    (rung,) = (rung for rung in found.model.rungs if rung.name == PROPORTIONS)
+    return rung
+
+
+def errors(found: Calibration, made: Turnaround) -> np.ndarray:
+    pairs = zip(found.views, made.cameras, strict=True)
+    return np.degrees([rotation_distance(v.camera.rotation, c.rotation) for v, c in pairs])
+
+
+def test_arms_that_hardly_show_in_the_outlines_are_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = random_body(3005)
+    made = make_turnaround(with_arms_raised(body, math.radians(8)), OPTIONS, 3005)
+    found = calibrate(made.views, body)
+    assert bending(found).is_proven
+    assert found.model.bends_mannequin
+    assert errors(found, made).max() < 5.5
+    monkeypatch.setattr(pipeline, "GLANCE_MARGIN", np.inf)
+    rigid = calibrate(made.views, body)
+    assert not rigid.model.bends_mannequin
+    assert np.median([view.coverage for view in rigid.views]) > SAME_BODY_COVERAGE
+    assert errors(found, made).max() < 0.6 * errors(rigid, made).max()
+    assert found.views[0].sigmas.yaw > rigid.views[0].sigmas.yaw  # another body is less certain
+
+
+def test_what_another_shape_looks_like_is_no_perspective() -> None:
+    """Lower arms look like a distance per view, until the mannequin is known to be another."""
+    body = random_body(3007)
+    made = make_turnaround(
+        with_arms_raised(body, math.radians(-10)), replace(OPTIONS, views=8), 3007
+    )
+    found = calibrate(made.views, body)
+    assert bending(found).is_proven
+    assert not found.model.is_perspective
+    assert errors(found, made).max() < 5
+
+
+def test_a_larger_head_is_seen() -> None:
+    body = random_body(3004)
+    drawn = with_head_grown(body, 0.1)
+    made = make_turnaround(drawn, OPTIONS, 3004)
+    found = calibrate(made.views, body)
+    assert bending(found).is_proven
+
+    def head_over_height(vertices: np.ndarray) -> float:
+        up = vertices[:, 1] - vertices[:, 1].min()
+        return float(np.ptp(vertices[up > 0.88 * up.max(), 0]) / up.max())
+
+    own, wanted = head_over_height(body.vertices), head_over_height(drawn.vertices)
+    assert head_over_height(found.mannequin) == pytest.approx(wanted, rel=0.02)
+    assert own < 0.97 * wanted
+
+
+@pytest.mark.parametrize(("views", "seed"), [(5, 12), (3, 1000)])
+def test_drawing_error_bends_no_mannequin(views: int, seed: int) -> None:
+    drawn = replace(OPTIONS, views=views, outline_px=2, warp_percent=1.5)
+    made = make_turnaround(random_body(seed), drawn, seed)
+    found = calibrate(made.views, made.mesh)
+    assert bending(found).margin == GLANCE_MARGIN
+    assert not bending(found).is_proven
+    assert bending(found).bic_gain > BIC_MARGIN  # strong evidence by itself
+    assert np.ptp(found.mannequin, axis=0) == pytest.approx(np.ptp(made.mesh.vertices, axis=0))
+
+
+def test_two_drawings_whose_outlines_meet_prove_no_other_body() -> None:
+    body = random_body(3004)
+    made = make_turnaround(with_arms_raised(body, math.radians(8)), replace(OPTIONS, views=2), 3004)
+    found = calibrate(made.views, body)
+    assert PROPORTIONS not in {rung.name for rung in found.model.rungs}
+
+
+def test_the_example_is_ok_though_its_mannequin_lacks_hair_scarf_and_bag() -> None:
+    views = split_sheet(load_rgba(EXAMPLES / "sheet.png")).views
+    found = calibrate(views, load_mesh(EXAMPLES / "mannequin.obj"))
+    assert bending(found).is_proven
+    assert (found.verdict, {view.verdict for view in found.views}) == ("ok", {"ok"})

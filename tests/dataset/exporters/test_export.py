@@ -1,0 +1,294 @@
+"""Exports: what another program reads is what the bundle says, format by format."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+
+from tests.dataset.exporters.exported_views import (
+    HEIGHT,
+    MODELS,
+    RADIUS,
+    TARGET,
+    around,
+    egg,
+    off_px,
+    views_all_round,
+)
+from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
+from toonset.dataset.exporters.common import ExportView, read_views
+from toonset.dataset.exporters.nerfstudio import write_transforms
+from toonset.dataset.exporters.opencv import write_opencv
+from toonset.dataset.exporters.pinhole import centred, common_lens, square_pixels
+from toonset.dataset.exporters.points import TrackedPoints, encode_ply
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.mesh.load import save_obj
+from toonset.errors import BundleError
+from toonset.mesh import Mesh
+from toonset.write import write_bytes, write_json
+
+
+def where_is_spot(rgba: np.ndarray) -> np.ndarray:
+    height, width = rgba.shape[:2]
+    v, u = np.mgrid[:height, :width] + 0.5
+    weight = rgba[..., 3].astype(float)
+    return np.array([(u * weight).sum(), (v * weight).sum()]) / weight.sum()
+
+
+def through(
+    pose: np.ndarray, focal: tuple[float, float], center: np.ndarray, *, dtype: type = float
+) -> np.ndarray:
+    """Project the points as a NeRF program does: world_from_camera with OpenGL axes."""
+    points = around(TARGET).astype(dtype)
+    pose = pose.astype(dtype)
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    ray = np.stack([local[:, 0], -local[:, 1]], axis=1) / -local[:, 2:]
+    return ray * np.array(focal, dtype) + np.asarray(center, dtype)
+
+
+# ---- lenses
+
+
+@MODELS
+def test_centring_moves_picture_and_camera_together(k: float) -> None:
+    for view in views_all_round(k=k):
+        moved = centred(view)
+        np.testing.assert_allclose(moved.camera.center, np.array(moved.camera.size_wh) / 2)
+        assert moved.rgba.shape[1::-1] == moved.camera.size_wh
+        shown = moved.camera.project(np.array([[0.2, 1.0, 0.1]]))[0][0]
+        np.testing.assert_allclose(where_is_spot(moved.rgba), shown, atol=0.05)
+        shift = shown - view.camera.project(np.array([[0.2, 1.0, 0.1]]))[0][0]
+        points = around(view.camera.target)
+        pixels = moved.camera.project(points)[0] - shift
+        np.testing.assert_allclose(pixels, view.camera.project(points)[0], atol=1e-9)
+        if k == 0:
+            np.testing.assert_array_equal(moved.rgba, view.rgba)
+
+
+def test_a_moved_target_still_covers_the_body_in_its_bound() -> None:
+    for view in views_all_round():
+        moved = centred(view)
+        points = around(view.camera.target)
+        off = moved.pinhole.project(points)[0] - moved.camera.project(points)[0]
+        assert np.linalg.norm(off, axis=1).max() <= moved.error_px
+
+
+@MODELS
+@pytest.mark.parametrize("aspect", [1.0, 1.25])
+def test_a_common_lens_is_one_lens(k: float, aspect: float) -> None:
+    views = views_all_round(k=k, aspect=aspect)
+    result = common_lens(views)
+    focals = [view.pinhole.K[[0, 1], [0, 1]] for view in result]
+    np.testing.assert_allclose(focals, np.full((len(views), 2), focals[0][0]), rtol=1e-12)
+    assert len({view.camera.size_wh for view in result}) == 1
+    for old, new in zip(views, result, strict=True):
+        np.testing.assert_allclose(new.camera.center, np.array(new.camera.size_wh) / 2)
+        shown = new.camera.project(np.array([[0.2, 1.0, 0.1]]))[0][0]
+        np.testing.assert_allclose(where_is_spot(new.rgba), shown, atol=0.05)
+        assert new.distance >= old.distance * (1 - 1e-12) or k > 0
+        if k == 0 and aspect == 1:
+            kept = new.rgba[new.rgba[..., 3] > 0]
+            np.testing.assert_array_equal(kept, old.rgba[old.rgba[..., 3] > 0])
+
+
+def test_views_without_a_common_lens_are_refused() -> None:
+    mixed = (*views_all_round(2), *views_all_round(2, k=0.2))
+    with pytest.raises(BundleError, match="one for all is needed; export to a format with a lens"):
+        common_lens(mixed)
+    near, far = views_all_round(2, k=0.2)[0], views_all_round(2, k=0.02)[1]
+    with pytest.raises(BundleError, match="focal lengths from 235 to 2400 px"):
+        common_lens((near, far))
+
+
+def test_a_principal_point_far_outside_is_refused() -> None:
+    view = views_all_round(1, k=0.2)[0]
+    astray = replace(view, camera=replace(view.camera, center=np.array([60_000.0, 60.0])))
+    with pytest.raises(BundleError, match="at most 80 megapixels"):
+        centred(replace(astray, camera=replace(astray.camera, center=np.array([6e5, 6e5]))))
+
+
+def test_square_pixels_enlarge_the_shorter_direction() -> None:
+    for aspect in (0.8, 1.25):
+        view = views_all_round(1, aspect=aspect)[0]
+        square = square_pixels(view)
+        assert square.camera.pixel_aspect == pytest.approx(1)
+        assert square.camera.size_wh >= view.camera.size_wh
+        shown = square.camera.project(np.array([[0.2, 1.0, 0.1]]))[0][0]
+        np.testing.assert_allclose(where_is_spot(square.rgba), shown, atol=0.05)
+    view = views_all_round(1)[0]
+    assert square_pixels(view) is view
+
+
+# ---- transforms.json
+
+
+@MODELS
+@pytest.mark.parametrize("instant_ngp", [False, True])
+def test_transforms_hold_every_lens(tmp_path: Path, k: float, instant_ngp: bool) -> None:
+    views = views_all_round(k=k)
+    write_transforms(tmp_path / "out", views, instant_ngp=instant_ngp)
+    content = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    for frame, view in zip(content["frames"], views, strict=True):
+        focal = (frame["fl_x"], frame["fl_y"])
+        center = np.array([frame["cx"], frame["cy"]])
+        pixels = through(np.array(frame["transform_matrix"]), focal, center)
+        assert off_px(pixels, view.pinhole) < 1e-6
+        assert off_px(pixels, view.camera) <= view.error_px + 1e-6
+        picture = load_rgba(tmp_path / "out" / frame["file_path"])
+        np.testing.assert_array_equal(picture, view.rgba)
+        assert picture.shape == (frame["h"], frame["w"], 4)
+        assert "mask_path" not in frame  # it would hide the empty background from training
+
+
+@MODELS
+def test_instant_ngp_sees_the_same_in_its_unit_cube(tmp_path: Path, k: float) -> None:
+    """Its loader in float32: p' = p scale + offset, principal point as a part of the size."""
+    mesh = egg()
+    views = views_all_round(k=k)
+    write_transforms(tmp_path / "out", views, mesh=mesh, instant_ngp=True)
+    content = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    scale, offset = np.float32(content["scale"]), np.array(content["offset"], np.float32)
+    cube = mesh.vertices * content["scale"] + offset
+    assert cube.min() > 0
+    assert cube.max() < 1
+    assert np.ptp(cube, axis=0).max() > 0.8
+    assert (content["aabb_scale"], content["up"]) == (1, [0, 1, 0])
+    points = around(TARGET) * content["scale"] + content["offset"]
+    for frame, view in zip(content["frames"], views, strict=True):
+        pose = np.array(frame["transform_matrix"], np.float32)
+        pose[:3, 3] = pose[:3, 3] * scale + offset
+        local = (points.astype(np.float32) - pose[:3, 3]) @ pose[:3, :3]
+        principal = np.array([frame["cx"], frame["cy"]], np.float32)
+        size = np.array([frame["w"], frame["h"]], np.float32)
+        focal = np.array([frame["fl_x"], frame["fl_y"]], np.float32)
+        ray = np.stack([local[:, 0], -local[:, 1]], axis=1) / -local[:, 2:]
+        pixels = (ray * focal / size + principal / size) * size
+        assert off_px(pixels, view.pinhole) < 0.01
+
+
+# ---- NeRF's synthetic scenes
+
+
+@MODELS
+def test_synthetic_scene_follows_from_one_angle(tmp_path: Path, k: float) -> None:
+    views = write_blender_synthetic(tmp_path / "out", views_all_round(k=k))
+    for split in ("train", "val", "test"):
+        content = json.loads((tmp_path / "out" / f"transforms_{split}.json").read_text())
+        assert len(content["frames"]) == len(views)
+    for frame, view in zip(content["frames"], views, strict=True):
+        picture = load_rgba(tmp_path / "out" / (frame["file_path"] + ".png"))
+        height, width = picture.shape[:2]
+        focal = 0.5 * width / math.tan(0.5 * content["camera_angle_x"])
+        middle = np.array([width, height]) / 2
+        pixels = through(np.array(frame["transform_matrix"]), (focal, focal), middle)
+        assert off_px(pixels, view.pinhole) < 0.01
+        assert off_px(pixels, view.camera) <= view.error_px + 0.01
+
+
+# ---- OpenCV
+
+
+@MODELS
+@pytest.mark.parametrize("xml", [False, True], ids=["yml", "xml"])
+def test_opencv_projects_to_the_same_pixels(tmp_path: Path, k: float, xml: bool) -> None:
+    views = views_all_round(k=k)
+    write_opencv(tmp_path / "out", views, xml=xml)
+    file = tmp_path / "out" / f"cameras.{'xml' if xml else 'yml'}"
+    storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
+    listed = storage.getNode("views")
+    assert listed.size() == len(views)
+    points = around(TARGET)
+    for i, view in enumerate(views):
+        node = listed.at(i)
+        names = ("rvec", "tvec", "camera_matrix", "distortion_coefficients")
+        rvec, tvec, K, bent = (node.getNode(name).mat() for name in names)
+        np.testing.assert_allclose(cv2.Rodrigues(rvec)[0], node.getNode("R").mat(), atol=1e-12)
+        pixels, _ = cv2.projectPoints(points, rvec, tvec, K, bent)
+        assert off_px(pixels[:, 0] + 0.5, view.pinhole) < 1e-6
+        assert node.getNode("image_width").real() == view.camera.size_wh[0]
+        assert node.getNode("name").string() == view.name
+
+
+# ---- points
+
+
+def test_ply_is_read_back_by_trimesh() -> None:
+    rng = np.random.default_rng(3)
+    xyz, rgb = rng.normal(size=(50, 3)), rng.integers(0, 256, (50, 3)).astype(np.uint8)
+    points = TrackedPoints(xyz, rgb, np.ones((1, 50), bool), np.zeros((1, 50, 2)))
+    data = encode_ply(points)
+    cloud = trimesh.load(trimesh.util.wrap_as_stream(data), file_type="ply")
+    assert isinstance(cloud, trimesh.PointCloud)
+    np.testing.assert_allclose(cloud.vertices, xyz, atol=1e-6)
+    np.testing.assert_array_equal(np.asarray(cloud.colors)[:, :3], rgb)
+
+
+# ---- the verb
+
+
+FORMATS = [
+    *("colmap", "nerfstudio", "instant-ngp", "blender-synthetic"),
+    *("blender", "gltf", "opencv", "opencv-xml"),
+]
+
+
+def bundle_of(views: tuple[ExportView, ...], mesh: Mesh, folder: Path) -> Path:
+    named = [(f"images/{view.name}", view.camera) for view in views]
+    for view in views:
+        write_bytes(folder / "images" / view.name, encode_png(view.rgba))
+    write_json(folder / "transforms.json", transforms_dict(named, HEIGHT, RADIUS))
+    write_bytes(folder / "mannequin.obj", save_obj(mesh))
+    return folder
+
+
+def test_views_keep_distance_and_radius_of_their_bundle(tmp_path: Path) -> None:
+    views = views_all_round(3)
+    bundle = bundle_of(views, egg(), tmp_path / "bundle")
+    for read, view in zip(read_views(bundle), views, strict=True):
+        assert read.distance == pytest.approx(view.distance)
+        assert read.radius == pytest.approx(RADIUS)
+        assert read.error_px == pytest.approx(view.error_px)
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_every_format_is_written_whole_and_replaced_only_by_force(
+    toonset, tmp_path: Path, to: str
+) -> None:
+    bundle = bundle_of(views_all_round(3), egg(), tmp_path / "bundle")
+    out = tmp_path / "out"
+    first = toonset("export", bundle, "--to", to, "-o", out, "--json")
+    assert first.code == 0, first
+    assert first.json["views"] == 3
+    assert (first.json["pinhole_error_px"] == 0) == (to in ("blender", "gltf"))
+    before = {path.name for path in out.iterdir()}
+    assert {"toonset.json", "mannequin.obj"} < before
+    assert "exists already" in toonset("export", bundle, "--to", to, "-o", out).reason
+    again = toonset("export", bundle, "--to", to, "-o", out, "--force", "-q")
+    assert (again.code, again.err) == (0, "")
+    assert {path.name for path in out.iterdir()} == before
+    (out / "mine.txt").write_text("keep")
+    refused = toonset("export", bundle, "--to", to, "-o", out, "--force").reason
+    assert "holds 'mine.txt'" in refused
+
+
+def test_options_of_colmap_are_refused_elsewhere(toonset, tmp_path: Path) -> None:
+    for option in (["--text"], ["--centre"], ["--layout", "old"]):
+        done = toonset("export", tmp_path, "--to", "gltf", "-o", tmp_path / "out", *option)
+        assert done.code == 2
+        assert "belong to --to colmap" in " ".join(done.err.replace("│", " ").split())
+
+
+def test_centre_is_offered_where_it_matters(toonset, tmp_path: Path) -> None:
+    bundle = bundle_of(views_all_round(3), egg(), tmp_path / "bundle")
+    plain = toonset("export", bundle, "-o", tmp_path / "plain")
+    assert "principal points up to 3.7 px off" in plain.err
+    done = toonset("export", bundle, "-o", tmp_path / "centred", "--centre")
+    assert "principal points" not in done.err
