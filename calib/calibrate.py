@@ -1,170 +1,148 @@
-"""Views and a mannequin to cameras: coarse hypotheses, contour alignment, the sheet together.
-
-1. templates: silhouettes of the mesh over yaw and elevation; the best overlaps start each view, and
-   the turns (or labels) that explain the whole sheet start all views
-2. contour alignment of every start at low resolution
-3. selections of one candidate per view, compared by a joint fit of the sheet
-4. the camera model, from orthography up; drawings that are stretched are begun anew without it
-   (`toonset.calib.corrections.stretched`); the mannequin's proportions where outlines
-   do not meet or a glance proves them
-5. rivals of the chosen cameras at full resolution: probabilities, uncertainties, verdicts
-"""
+"""Drawings and a mannequin to cameras: what `toonset calibrate` does between files."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
-from toonset.calib.corrections.stretched import (
-    as_drawn,
-    nothing_stretched,
-    stretched_mannequin,
-    unstretched,
-)
-from toonset.calib.evidence.coherence_state import state_of
-from toonset.calib.fit.model_selection import Rung
-from toonset.calib.fit.sheet_prior import Turn
-from toonset.calib.hints import Known
+from toonset.calib.corrections.cropped import at_cuts
+from toonset.calib.corrections.false_holes import without_false_holes
+from toonset.calib.find_cameras import find_cameras
+from toonset.calib.from_landmarks import calibrate_by_landmarks
+from toonset.calib.hints import Hints, known_of
+from toonset.calib.known import Known
+from toonset.calib.landmarks.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress
-from toonset.calib.pipeline import Problem, SheetFit
-from toonset.calib.result import Calibration, CutOff
-from toonset.calib.search.hypotheses import Candidates
-from toonset.calib.search.templates import turns_visibly
-from toonset.calib.verdict.judge import (
-    judge_sheet,
-    judge_view,
-    with_elevations_in_mind,
-    with_labels_in_mind,
-    with_locks_in_mind,
-    with_sheet_in_mind,
-)
+from toonset.calib.outline.occluding_contour import prepare_surface
+from toonset.calib.result import Calibration
+from toonset.dataset.bundle.transforms import transforms_file
+from toonset.dataset.mannequin.files import landmarks_path
+from toonset.dataset.mannequin.landmark_file import read_known_points
+from toonset.dataset.mannequin.make import default_mannequin
+from toonset.dataset.mannequin.options import MannequinOptions
+from toonset.errors import MeshError
 from toonset.mesh import Mesh
+from toonset.origin import InputFile
 from toonset.view import View
 
-# Times that stretches are taken off: the first look at strong ones may miss a view
-MOST_UNSTRETCHED = 2
+LEAST_HEIGHT = 0.01  # of the width; flatter, nothing can be told from its outline
+PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless")
 
 
 def calibrate(
     views: Sequence[View],
-    mesh: Mesh,
-    options: CalibrationOptions = CalibrationOptions(),
+    mesh: Mesh | None = None,
+    hints: Hints = Hints(),
+    *,
+    seed: int = 0,
     progress: Progress = lambda step, share: None,
-    known: Known | None = None,
 ) -> Calibration:
-    """Return one camera per view with its uncertainty.
+    """Return one camera per drawing, with how sure it is.
 
     Args:
-        views: the drawings, at least one.
-        mesh: the posed mannequin; world frame and units are its own.
-        options: search effort.
-        progress: called with the step's name and the share done.
-        known: what a person knows beforehand.
+        views: the drawings, at least one, as `split_sheet` cuts them out.
+        mesh: the posed mannequin; its frame and units become the world's. None: a plain body.
+        hints: what is known of the views.
+        seed: recorded with the result; nothing is random.
+        progress: called with the step's name and the share of it that is done.
 
     Raises:
-        CameraError, LandmarkError: what is known does not belong to the views or the mannequin.
+        ToonsetError: a mannequin that lies, or hints that contradict each other or do not belong
+            to the views or the mannequin.
     """
-    known = known or Known()
-    known.check(views)
-    seconds: dict[str, float] = {}
-    stretches, taken = nothing_stretched(len(views)), list(views)
-    fitted = _fitted(taken, mesh, options, progress, known, seconds)
-    for _ in range(MOST_UNSTRETCHED):
-        with _timed(seconds, "joint"):
-            more = fitted.problem.stretches(fitted.rigid, fitted.cuts)
-        stretches = stretches.and_then(more)
-        if more.is_none:
-            break
-        taken = [unstretched(*pair) for pair in zip(views, stretches.views, strict=True)]
-        mannequin = stretched_mannequin(mesh, stretches)
-        fitted = _fitted(taken, mannequin, options, progress, known, seconds)
-    found = _judged(fitted, stretches.rungs, seconds)
-    return as_drawn(found, taken, views)
-
-
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    """A sheet whose cameras are found, before they are judged.
-
-    Attributes:
-        problem: with drawings that end at their cuts.
-        candidates: what else every view could be.
-        turn: where the views are meant to be seen from.
-        rigid: the fit with the mannequin as it is.
-        cuts: parts of figures that their pictures lack.
-    """
-
-    problem: Problem
-    candidates: Sequence[Candidates]
-    turn: Turn
-    rigid: SheetFit
-    cuts: tuple[CutOff, ...]
-
-
-def _fitted(
-    views: Sequence[View],
-    mesh: Mesh,
-    options: CalibrationOptions,
-    progress: Progress,
-    known: Known,
-    seconds: dict[str, float],
-) -> _Fitted:
-    with _timed(seconds, "prepare"):
-        problem = Problem.of(views, mesh, options, progress, known)
-    with _timed(seconds, "search"):
-        candidates, together = problem.search()
-    with _timed(seconds, "together"):
-        progress("together", 0.0)
-        sketch, turn, candidates = problem.together(candidates, together)
-    with _timed(seconds, "joint"):
-        progress("joint", 0.0)
-        whole = problem.rigid(sketch, turn)
-        problem, rigid, cuts = problem.cut_off(whole, turn)
-    return _Fitted(problem, candidates, turn, rigid, cuts)
-
-
-def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -> Calibration:
-    """Return the calibration; `rungs` are what has been said about stretches."""
-    problem = fitted.problem
-    with _timed(seconds, "joint"):
-        bent = problem.bent(fitted.rigid, fitted.turn)
-        joint, differs = bent.joint, bent.differs
-        model = replace(bent.model, rungs=(*rungs, *bent.model.rungs))
-    with _timed(seconds, "judge"):
-        problem.progress("judge", 0.0)
-        observable = turns_visibly(problem.templates)
-        state = state_of(problem.views, problem.cameras(joint), yaw_observable=observable)
-        bare = [drawing.inset(joint.offset) for drawing in problem.fine]
-        final = problem.rivals(bare, joint, model, fitted.candidates, differs=differs)
-        sure = problem.sheet.probabilities(final)
-        body = joint.body.surface
-        each = [
-            judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
-            for i, v in enumerate(problem.views)
-        ]
-        each = with_labels_in_mind(with_elevations_in_mind(each), problem.known.labels)
-        each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
-        contradict = problem.sheet.faces_contradict(final)
-        judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)
-    verdict, reason = judge_sheet(judged, state)
-    return Calibration(
-        judged,
-        model,
-        joint.offset,
-        joint.noise,
-        state.contradiction,
-        joint.body.surface.vertices + problem.surface.middle,
-        verdict,
-        reason,
-        seconds,
-        fitted.cuts,
+    hints.check()
+    body = _Body.of(mesh)
+    known = known_of(hints, views, body.points_for(hints))
+    marks = _landmark_fits(known, body.mesh)
+    if hints.landmarks_only:
+        found = calibrate_by_landmarks(views, body.mesh, known.landmarks)
+    else:
+        found = find_cameras(views, body.mesh, CalibrationOptions(), progress, known)
+    drawings, found = at_cuts(views, found)
+    drawings, filled = without_false_holes(drawings, found.views, found.mannequin)
+    return replace(
+        found,
+        filled_holes=filled,
+        landmarks=tuple(marks),
+        drawings=drawings,
+        mesh=body.mesh,
+        origin=_origin(views, body, hints, seed),
     )
 
 
-@contextmanager
-def _timed(seconds: dict[str, float], step: str) -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    seconds[step] = seconds.get(step, 0.0) + time.perf_counter() - start
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """The mannequin to fit.
+
+    Attributes:
+        mesh: its surface.
+        looks: proportions and pose of one made by code; None for a user's.
+        points: named points of one made by code.
+    """
+
+    mesh: Mesh
+    looks: MannequinOptions | None
+    points: Mapping[str, Sequence[float]]
+
+    @classmethod
+    def of(cls, mesh: Mesh | None) -> _Body:
+        if mesh is not None:
+            _check_upright(mesh)
+            return cls(mesh, None, {})
+        made = default_mannequin()
+        points = {name: tuple(point.tolist()) for name, point in made.landmarks.items()}
+        return cls(made.mesh, MannequinOptions(), points)
+
+    def points_for(self, hints: Hints) -> Mapping[str, Sequence[float]]:
+        """Return the named points that a landmark file may speak of."""
+        if hints.landmarks is None or self.mesh.path is None:
+            return self.points
+        return read_known_points(self.mesh.path)
+
+
+def _check_upright(mesh: Mesh) -> None:
+    widths = mesh.bounds[1] - mesh.bounds[0]
+    if widths[1] < LEAST_HEIGHT * max(widths):
+        raise MeshError(
+            f"{mesh.name}: {widths[1]:.3g} high (+Y is up) but {max(widths):.3g} wide; turn the "
+            "mannequin upright and export it again"
+        )
+
+
+def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
+    """Return what the landmarks say of the views that have any."""
+    if not known.landmarks:
+        return []
+    return [fit for fit in landmark_starts(known.landmarks, prepare_surface(mesh)) if fit]
+
+
+def _origin(views: Sequence[View], body: _Body, hints: Hints, seed: int) -> dict[str, Any]:
+    """Return what calibration.json says of where its cameras come from."""
+    origins = list(dict.fromkeys(view.origin for view in views if view.origin is not None))
+    files = [file for origin in origins for file in origin.files]
+    files += [InputFile.of(*each) for each in _hint_files(body.mesh, hints)]
+    cut = origins[0].options if origins else {}
+    made = {} if body.looks is None else {"mannequin": asdict(body.looks)}
+    return {
+        "options": asdict(CalibrationOptions()) | hints.as_options(views) | dict(cut) | made,
+        "seed": seed,
+        "versions": {name: version(name) for name in PACKAGES},
+        "inputs": [  # views may come from files of the same name in several folders
+            {"name": file.name, "sha256": file.sha256, "role": file.role} for file in files
+        ],
+    }
+
+
+def _hint_files(mesh: Mesh, hints: Hints) -> list[tuple[str, Path]]:
+    """Return role and path of every file besides the drawings that the cameras depend on."""
+    files = [] if mesh.path is None else [("mesh", mesh.path)]
+    if hints.landmarks is not None:
+        files.append(("landmarks", Path(hints.landmarks)))
+        if mesh.path is not None and landmarks_path(mesh.path).exists():
+            files.append(("points of the mesh", landmarks_path(mesh.path)))
+    if hints.init is not None:
+        files.append(("init", transforms_file(Path(hints.init))))
+    return files

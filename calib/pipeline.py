@@ -1,6 +1,7 @@
 """A sheet on its way from drawings to cameras: search, selection, camera model, body, rivals.
 
-What `toonset.calib.calibrate` does one after the other, each a step from plain data to plain data.
+What `toonset.calib.find_cameras` does one after the other, each a step from plain data to plain
+data.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from toonset.calib.fit.model_selection import (
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
 from toonset.calib.fit.sheet_prior import Turn
-from toonset.calib.hints import Known, weighed_by_landmarks
+from toonset.calib.known import Known, weighed_by_landmarks
 from toonset.calib.landmarks.landmarks import landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.correspondences import Drawing
@@ -50,7 +51,7 @@ from toonset.calib.search.hypotheses import (
     with_twins,
 )
 from toonset.calib.search.selection import SKETCHED, TogetherSearch, with_k
-from toonset.calib.search.sheet_posterior import Sheet, possible_turns
+from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.search.templates import Templates, find_hypotheses
 from toonset.calib.search.turntable_starts import TurnStart, likely_turns
@@ -111,7 +112,7 @@ class Problem:
     templates: Templates
     coarse: Sequence[Drawing]
     fine: Sequence[Drawing]
-    sheet: Sheet
+    sheet: SheetPosterior
     known: Known
     options: CalibrationOptions
     progress: Progress
@@ -136,7 +137,7 @@ class Problem:
             load_bank(surface),
             [Drawing(c, options.coarse_height_px, COARSE_POINTS) for c in contours],
             [Drawing(c, options.fine_height_px, FINE_POINTS) for c in contours],
-            Sheet(turns, read_faces(views), read_paint(views)),
+            SheetPosterior(turns, read_faces(views), read_paint(views)),
             known,
             options,
             progress,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.model_selection import ModelChoice
+from toonset.calib.landmarks.landmarks import LandmarkFit
 from toonset.camera import Camera
-from toonset.view import View
+from toonset.mesh import Mesh
+from toonset.view import Box, View
 
 Side = Literal["left", "top", "right", "bottom"]
 SIDES: tuple[Side, ...] = ("left", "top", "right", "bottom")  # as in a view's ends
@@ -116,6 +119,29 @@ class CutOff:
         return f"{self.view}: the figure is cut off at the {self.flat.side}, {lost}{ends}"
 
 
+@dataclass(frozen=True)
+class FilledHole:
+    """A hole that is none.
+
+    Attributes:
+        view: the drawing that has it.
+        box: (x, y, width, height) in that drawing, pixels.
+        by: the drawing that contradicts it.
+    """
+
+    view: str
+    box: Box
+    by: str
+
+    def __str__(self) -> str:
+        """Return what was done, for people."""
+        x, y, width, height = self.box
+        return (
+            f"{self.view}: the hole at {x}, {y} ({width} x {height} px) is paint: {self.by}, drawn "
+            "from the other side, shows none; filled"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """The cameras of a sheet.
@@ -131,6 +157,11 @@ class Calibration:
         reason: why, in words.
         seconds: per step.
         cuts: parts of figures that their pictures lack.
+        filled_holes: holes of the drawings that turned out to be paint.
+        landmarks: what the landmarks of each view say, where there are any.
+        drawings: the drawings that the cameras belong to: cropped at cuts, holes filled.
+        mesh: the mannequin as it was given; `mannequin` has its vertices as they were fitted.
+        origin: the options that were set, versions and input files, as calibration.json has them.
     """
 
     views: tuple[ViewCalibration, ...]
@@ -143,3 +174,13 @@ class Calibration:
     reason: str
     seconds: dict[str, float]
     cuts: tuple[CutOff, ...] = ()
+    filled_holes: tuple[FilledHole, ...] = ()
+    landmarks: tuple[LandmarkFit, ...] = ()
+    drawings: tuple[View, ...] = ()
+    mesh: Mesh | None = None
+    origin: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_certain(self) -> bool:
+        """Return whether every view and the sheet as a whole are ok."""
+        return all(verdict == "ok" for verdict in (self.verdict, *(v.verdict for v in self.views)))

@@ -13,7 +13,6 @@ from toonset.cli.common.cutting import (
     LABELS_HELP,
     BackgroundOption,
     BoxesOption,
-    Cutting,
     DropOption,
     GridOption,
 )
@@ -25,11 +24,10 @@ from toonset.cli.common.output import (
     QuietFlag,
     check_output,
 )
-from toonset.cli.common.sheet_inputs import Drawings, check_label_count, load_drawings
 
 if TYPE_CHECKING:
-    from toonset.dataset.split_folder.panel import Panel
-    from toonset.dataset.split_folder.views import Source, Split
+    from toonset.dataset.split_folder.load import Sheet
+    from toonset.dataset.split_folder.views import Source
 
 WRITTEN = ("images", "split.json", "overlay.png")
 DOUBTFUL = 3  # exit code: files are written, but a person should look
@@ -66,80 +64,27 @@ def split(
     with the options below or in images/ itself (delete, rename, repaint), and give the folder to
     `toonset calibrate`. Exit code 3 when something is doubtful; the files are written then too.
     """
-    cutting = Cutting(boxes, drop, background, grid)
-    cutting.check_usage()
+    from toonset.dataset.split_folder.load import split_sheet
+    from toonset.dataset.split_folder.overlay import draw_sheet
+    from toonset.dataset.split_folder.write import write_split
+
     printer = Printer(as_json, quiet)
     check_output(out, [*sheets, boxes], WRITTEN, force=force)
-    drawings = load_drawings(sheets, cutting, printer)
-    named = _labelled(drawings, labels)
-    doubts = drawings.doubts
-    _write(out, named, drawings, cutting, doubts, force=force)
-    _say(named, cutting, doubts, out, printer)
-    if doubts:
+    sheet = split_sheet(
+        sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
+    )
+    write_split(out, sheet.split, draw_sheet(sheet), sheet.options, force=force)
+    _say(sheet, out, printer)
+    if sheet.warnings:
         raise typer.Exit(DOUBTFUL)
 
 
-def _labelled(drawings: Drawings, text: str) -> Split:
-    """Return the views with the labels of --views, else with those that they have.
-
-    Raises:
-        SheetError: not one label per view, or a word that is no direction.
-    """
-    from dataclasses import replace
-
-    from toonset.calib.view_labels import parse_labels
-
-    if not text:
-        return drawings.split
-    check_label_count(text, drawings)
-    parse_labels(text, len(drawings.split.views))
-    words = [word.strip() for word in text.split(",")]
-    return replace(drawings.split, labels=tuple("" if word == "?" else word for word in words))
-
-
-def _write(
-    out: Path,
-    named: Split,
-    drawings: Drawings,
-    cutting: Cutting,
-    doubts: tuple[str, ...],
-    *,
-    force: bool,
-) -> None:
-    from toonset.dataset.split_folder.overlay import draw_split
-    from toonset.dataset.split_folder.write import write_split
-
-    overlay = draw_split(_panels(named, drawings), doubts)
-    write_split(out, named, overlay, cutting.as_options(), force=force)
-
-
-def _panels(named: Split, drawings: Drawings) -> list[Panel]:
-    """Return the sheets for the overlay; a view whose sheet is not at hand stands alone."""
-    from dataclasses import replace
-
-    from toonset.dataset.split_folder.panel import Panel
-
-    panels = []
-    for index, (source, picture) in enumerate(zip(named.sources, drawings.pictures, strict=True)):
-        mine = [i for i, of in enumerate(named.source_of) if of == index]
-        views, labels = [named.views[i] for i in mine], [named.labels[i] for i in mine]
-        if picture is not None:
-            ground = source.background
-            panels.append(
-                Panel(source.name, picture, ground, tuple(views), tuple(labels), source.left_out)
-            )
-            continue
-        for view, label in zip(views, labels, strict=True):
-            alone = replace(view, box=(0, 0, *view.box[2:]))
-            panels.append(Panel(source.name, view.rgba, None, (alone,), (label,)))
-    return panels
-
-
-def _say(
-    named: Split, cutting: Cutting, doubts: tuple[str, ...], out: Path, printer: Printer
-) -> None:
+def _say(sheet: Sheet, out: Path, printer: Printer) -> None:
     from toonset.dataset.split_folder.write import split_dict
 
+    for note in sheet.skipped:
+        printer.say(note)
+    named = sheet.split
     for index, source in enumerate(named.sources):
         printer.say(_source_line(source))
         for view, of, label in zip(named.views, named.source_of, named.labels, strict=True):
@@ -154,12 +99,12 @@ def _say(
             printer.say(f"  left out: {listed}")
         for remark in source.remarks:
             printer.say(f"  {remark}")
-    for doubt in doubts:
-        printer.doubt(f"look: {doubt}")
-    if cutting.drop:
+    for warning in sheet.warnings:
+        printer.doubt(f"look: {warning}")
+    if "drop" in sheet.options:
         printer.say("views are numbered anew; --drop counts as in the overlay without it")
     printer.say(f"look at {out / 'overlay.png'}")
-    printer.result({"folder": out, **split_dict(named, cutting.as_options())}, str(out))
+    printer.result({"folder": out, **split_dict(named, sheet.options)}, str(out))
 
 
 def _source_line(source: Source) -> str:

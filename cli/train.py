@@ -15,6 +15,7 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     SeedOption,
+    VerboseFlag,
 )
 from toonset.cli.common.train_place import Place
 from toonset.cli.common.train_run import Request, run
@@ -132,6 +133,7 @@ def train(
     seed: SeedOption = 0,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
+    verbose: VerboseFlag = False,
 ) -> None:
     """Train a triplane radiance field and a palette classifier on the drawings of a bundle.
 
@@ -162,7 +164,7 @@ def train(
         palette=not no_palette,
         resume=resume,
     )
-    code = run(request, Printer(as_json, quiet))
+    code = run(request, Printer(as_json, quiet, verbose))
     if code:
         raise typer.Exit(code)
 

@@ -201,7 +201,7 @@ def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from PIL import Image
 
     from toonset.camera import Camera
-    from toonset.dataset.bundle.bundle import write_bundle
+    from toonset.dataset.bundle.bundle import bundle_folder
     from toonset.dataset.images.picture import encode_indexed_png
     from toonset.dataset.mesh.load import load_mesh
     from toonset.palette.formats.registry import to_gpl, to_json
@@ -224,7 +224,8 @@ def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rgba[4:20, 5:15, 3] = 255
     views = [View(rgba, (20 * i, 0, 20, 24), 1.5, f"{i:03d}.png") for i in range(3)]
     report = calibration_report([view.name for view in views], cameras)
-    write_bundle(folder, views, cameras, load_mesh(obj), report, rgba[..., :3])
+    with bundle_folder(folder, views, cameras, load_mesh(obj), report, rgba[..., :3]):
+        pass
     named = [PaletteColor((200, 30, 20), 0.5, "red"), PaletteColor((20, 60, 200), 0.5, "blue")]
     palette = Palette(tuple(named), "by hand")
     write_json(folder / "palette.json", to_json(palette))

@@ -23,6 +23,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@colors @named @palette",
         "@names pixels",
         "@swatch_image formats paints",
+        "@extract",
     ),
     "dataset": (
         "images split.figures",
@@ -34,11 +35,12 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "importers",
     ),
     "calib": (
-        "@options @view_labels evidence outline",
+        "@options evidence outline",
         "@mannequin_points fit landmarks",
         "@result search",
-        "@hints corrections verdict",
-        "@from_landmarks @pipeline",
+        "@known corrections verdict",
+        "@from_landmarks @pipeline @write_bundle",
+        "@find_cameras @hints",
         "@calibrate",
     ),
     "nerf": (
@@ -50,6 +52,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "render surface train",
         "score",
         "run",
+        "@training",
     ),
     "cli": ("common", "@"),  # a verb imports no other verb
 }

@@ -9,6 +9,7 @@ ToonsetError            exit code 2: bad input or usage, one line says where, wh
 |- BundleError          a bundle or transforms.json folder that is broken
 |- PaletteError         palette colours that cannot be used
 |- OutputError          a place that cannot be written
+|- UsageError          arguments that contradict each other
 |- SetupError           a missing system library; the message holds the install line
 
 Numeric doubt is never an exception: it is returned as data (verdicts, probabilities, residuals).
@@ -52,6 +53,10 @@ class PaletteError(ToonsetError):
 
 class OutputError(ToonsetError):
     """A place that cannot be written."""
+
+
+class UsageError(ToonsetError):
+    """Arguments that contradict each other."""
 
 
 class SetupError(ToonsetError):

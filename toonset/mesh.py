@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -22,6 +23,7 @@ class Mesh:
         face_parts: (m,) part number of every face (0 where the file has no parts).
         part_names: name of each part number.
         name: where it came from, for messages.
+        path: its file, if it has one.
     """
 
     vertices: Float[np.ndarray, "vertices 3"]
@@ -30,6 +32,7 @@ class Mesh:
     face_parts: Int[np.ndarray, " faces"] | None = None
     part_names: tuple[str, ...] = ("body",)
     name: str = "mesh"
+    path: Path | None = None
 
     def __post_init__(self) -> None:
         """Refuse what is no surface.

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.errors import SheetError
+from toonset.origin import Origin
 
 VISIBLE = 16  # alpha: fainter is a file's noise
 
@@ -28,6 +29,10 @@ class View:
         name: file name of the view in a bundle, e.g. "000.png".
         ends: lines in pixels of the crop where a frame cuts the figure, infinite where none does:
             beyond them the drawing says nothing.
+        paper: sRGB of the sheet behind the drawing; None where it is transparent or unknown, or
+            where a person has had the chance to correct what was cut out.
+        label: what it shows, as a person has said ("front", "3q", "90"); empty where nobody has.
+        origin: what it was cut from; None where that is not recorded.
     """
 
     rgba: UInt8[np.ndarray, "height width 4"]
@@ -35,6 +40,9 @@ class View:
     line_width_px: float
     name: str
     ends: Ends = NO_ENDS
+    paper: tuple[int, int, int] | None = None
+    label: str = ""
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         """Refuse an empty drawing.

@@ -21,7 +21,7 @@ from toonset.errors import ToonsetError
 from toonset.mesh import Mesh
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
-from toonset.palette.paints.extract import extract_palette
+from toonset.palette.paints.extract import find_palette
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.view import over_white
@@ -74,7 +74,7 @@ def try_palette(page: PalettePage, step: Step, seed: int) -> tuple[Tried, bytes]
     made = make_turnaround(body, PICTURES, seed)
     pictures = [view.rgba for view in made.views]
     try:
-        palette = extract_palette(pictures, contours=[find_contour(p) >= LINE for p in pictures])
+        palette = find_palette(pictures, contours=[find_contour(p) >= LINE for p in pictures])
     except ToonsetError as error:
         return Tried(seed, 0.0, REFUSED, str(error)), b""
     missed = [color for color in wanted if not _has(palette.rgb, color, wanted)]

@@ -31,7 +31,7 @@ from toonset.nerf.score.metrics import psnr_of
 from toonset.nerf.score.verdict import WEAK, Picture, Verdict, verdict_of
 from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.result import Training
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 from toonset.palette.palette import Palette
 from toonset.view import over_white
 
@@ -96,7 +96,7 @@ def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
     try:
         scene = draw()
         ready, palette = labelled(scene.train)
-        training = train(ready, TrainOptions(steps=STEPS, seed=seed))
+        training = fit_field(ready, TrainOptions(steps=STEPS, seed=seed))
         views = pictures_of(training.result, scene.test)
         fitted = pictures_of(training.result, training.prepared.scene)
         verdict = verdict_of(training, fitted)

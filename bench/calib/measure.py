@@ -42,15 +42,15 @@ from bench.calib.sfm import METHODS as SFM_METHODS
 from bench.calib.sfm import SfmResult, aligned_errors, reconstruct
 from bench.cases.cases import CalibCase
 from bench.records.record import Record
-from toonset.calib.calibrate import calibrate
+from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit import model_selection
-from toonset.calib.hints import Known
+from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.search import templates
 from toonset.calib.search.template_cache import load_bank
-from toonset.calib.view_labels import Label
 from toonset.camera import Camera, angles_from_rotation
+from toonset.dataset.split_folder.view_labels import Label
 
 __all__ = ["ViewError", "bench_calibration", "bench_colmap", "view_error"]
 
@@ -211,7 +211,7 @@ def _calibrated(case: CalibCase, method: Method) -> MeasuredSheet:
     yaws = [angles_from_rotation(rotation)[0] for rotation in case.rotations]
     known = Known(labels=named_directions(yaws)) if method.labels else None
     wall, cpu = time.perf_counter(), time.process_time()
-    result = calibrate(case.views, case.mesh, method.options, known=known)
+    result = find_cameras(case.views, case.mesh, method.options, known=known)
     seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
     views = tuple(
         _measured(view.camera, truth, view.verdict, view.sigmas.yaw)

@@ -21,7 +21,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.bundle.transforms import read_scene
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.mesh.load import load_mesh
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import BundleError
@@ -123,7 +123,7 @@ def calib_cases(folder: Path | None, seed: int, count: int, only: str = "") -> I
         return
     for case in (place for place in _folders(folder, "gt.json") if only in place.name):
         truth = read_json(case / "gt.json")
-        views = split_sheet(load_rgba(case / "sheet.png")).views
+        views = split_picture(load_rgba(case / "sheet.png")).views
         poses = [frames.opencv_pose_from_opengl(np.array(m)) for m in truth["world_from_camera"]]
         if len(views) != len(poses):
             raise BundleError(f"{case}: split into {len(views)} views, {len(poses)} were drawn")
@@ -192,7 +192,7 @@ def _scene(turnaround: Turnaround) -> Scene:
 def _synthetic_calib(name: str, group: str, condition: Condition, seed: int) -> CalibCase:
     body = random_body(seed, symmetric=condition.symmetric)
     made = make_turnaround(body, condition.options, seed)
-    views = split_sheet(made.sheet).views
+    views = split_picture(made.sheet).views
     rotations = np.stack([camera.rotation for camera in made.cameras])
     if len(views) != len(rotations):
         raise BundleError(f"synthetic {name}: split into {len(views)} views")

@@ -21,8 +21,8 @@ from jaxtyping import UInt8
 from bench.calib.figures import Recorder, angle_between, seconds_record
 from bench.calib.measure import named_directions, own_cache
 from bench.records.record import Record
-from toonset.calib.calibrate import calibrate
-from toonset.calib.hints import Known
+from toonset.calib.find_cameras import find_cameras
+from toonset.calib.known import Known
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.search.template_cache import load_bank
 from toonset.dataset.images.picture import load_rgba
@@ -105,7 +105,7 @@ def bench_sprites(
 
 def _calibrated(case: SpriteCase, known: Known | None) -> MeasuredSprites:
     start = time.perf_counter()
-    result = calibrate(case.views, case.mesh, known=known)
+    result = find_cameras(case.views, case.mesh, known=known)
     seconds = time.perf_counter() - start
     errors = tuple(
         abs(angle_between(view.camera.angles[0], yaw))

@@ -19,12 +19,12 @@ from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
 from bench.records.record import Record, summarise, table
 from toonset.palette.pixels.antialias import opaque_pixels
 from toonset.palette.pixels.ink_lines import find_contour
-from toonset.palette.pixels.labels import UNLABELLED, label_image, nearest_labels
+from toonset.palette.pixels.labels import UNLABELLED, label_pixels, nearest_labels
 
 Labeller = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 LABELLERS: dict[str, Labeller] = {
-    "default": lambda rgba, palette: label_image(rgba, palette),
+    "default": lambda rgba, palette: label_pixels(rgba, palette),
     "nearest colour": lambda rgba, palette: nearest_labels(rgba, palette),
 }
 CONTOURS: dict[str, Callable[[LabelCase], np.ndarray]] = {

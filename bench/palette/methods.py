@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.palette.paints.extract import extract_palette
+from toonset.palette.paints.extract import find_palette
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.pixels.ink_lines import find_contour
 
@@ -27,14 +27,14 @@ Method = Callable[[Images, int], list[RGB]]  # pictures, true number of colours 
 
 
 def ours(images: Images, _: int) -> list[RGB]:
-    """Return what `extract_palette` finds."""
-    return [color.rgb for color in extract_palette(images).colors]
+    """Return what `find_palette` finds."""
+    return [color.rgb for color in find_palette(images).colors]
 
 
 def ours_with_lines(images: Images, _: int) -> list[RGB]:
     """Return what `toonset palette` finds: drawn lines are looked for first."""
     lines = [find_contour(image) >= LINE for image in images]
-    return [color.rgb for color in extract_palette(images, contours=lines).colors]
+    return [color.rgb for color in find_palette(images, contours=lines).colors]
 
 
 def extcolors(images: Images, _: int) -> list[RGB]:

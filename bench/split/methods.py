@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from bench.split.cases import Drawn, drawn_at
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.errors import ToonsetError
 from toonset.view import Box
 
@@ -41,10 +41,10 @@ Method = Callable[[UInt8[np.ndarray, "height width 4"]], Found]
 
 
 def by_toonset(rgba: UInt8[np.ndarray, "height width 4"]) -> Found:
-    """Return what `split_sheet` finds; a refusal is a warning and finds nothing."""
+    """Return what `split_picture` finds; a refusal is a warning and finds nothing."""
     start = time.process_time()
     try:
-        sheet = split_sheet(rgba)
+        sheet = split_picture(rgba)
     except ToonsetError:
         return Found((), True, (), time.process_time() - start)
     seconds = time.process_time() - start

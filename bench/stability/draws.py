@@ -34,7 +34,7 @@ from bench.stability.damage import (
 )
 from bench.stability.sheet import BASE, DrawnSheet, Step, draw_sheet, stream
 from toonset.dataset.images.picture import decode_rgba
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import SheetError
@@ -213,7 +213,7 @@ def cut_out(made: Turnaround, sheet: Rgba) -> DrawnSheet:
     Raises:
         SheetError: other than the drawn number of views was found.
     """
-    found = split_sheet(sheet).views
+    found = split_picture(sheet).views
     if len(found) != len(made.views):
         raise SheetError(f"split into {len(found)} views, {len(made.views)} were drawn")
     drawings = []

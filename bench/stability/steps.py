@@ -21,7 +21,7 @@ from bench.stability.damage import Drawn
 from bench.stability.picture import outlines_picture
 from bench.stability.sheet import DrawnSheet, Step, draw_sheet
 from bench.stability.sweeps import Sweep
-from toonset.calib.calibrate import calibrate
+from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.align import align
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
@@ -89,7 +89,7 @@ def _tried(sweep: Sweep, step: Step, seed: int) -> tuple[SheetResult, bytes]:
         if sweep.from_start:
             views = align_from(sheet, math.radians(float(step)), seed)
         else:
-            found = calibrate([view for view, _ in sheet.drawings], sheet.mesh)
+            found = find_cameras([view for view, _ in sheet.drawings], sheet.mesh)
             views = _errors(found, sheet)
     except ToonsetError as error:
         views, note = (REFUSED,) * len(sheet.drawings), str(error)

@@ -22,13 +22,13 @@ from torch import Tensor
 
 from bench.cases.cases import train_cases
 from bench.train.growth import growths, print_growth
+from toonset.cli.common.allocator import keep_freed_memory
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.fields.classifier import HIDDEN as CLASSIFIER_WIDTH
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.scene_hull import hull_of, per_px
 from toonset.nerf.kernels.adam import Adam, Group
-from toonset.nerf.kernels.allocator import keep_freed_memory
 from toonset.nerf.kernels.compositing import composite_packed
 from toonset.nerf.kernels.decoder import two_layers
 from toonset.nerf.kernels.interpolation import Operator

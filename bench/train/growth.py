@@ -12,7 +12,7 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.kernels.threads import SIDES, use_threads
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.train.memory import needed_bytes
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def growth(scene: Scene, px: int, options: TrainOptions) -> Growth:
     """Train in this process, which should have done nothing else, and return what it took."""
     estimate, before = needed_bytes(scene, options), _resident_bytes("VmRSS")
     began = time.process_time()
-    training = train(scene, options)
+    training = fit_field(scene, options)
     cpu = time.process_time() - began
     peak = _resident_bytes("VmHWM") - before
     opaque = sum(int((frame.rgba[..., 3] > 127).sum()) for frame in scene.frames)

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from toonset.calib.fit.align import EFFECTIVE_POINTS, NOISE_OF_HEIGHT, robust_weights
 from toonset.calib.fit.proportions import Body, as_it_is
-from toonset.calib.hints import Known
+from toonset.calib.known import Known
 from toonset.calib.outline.correspondences import Drawing, match
 from toonset.calib.outline.mesh_edges import prepare_surface
 from toonset.calib.outline.pose import Pose, pixel_slopes, project

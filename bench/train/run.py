@@ -34,7 +34,7 @@ from toonset.nerf.train.loop import Moment
 from toonset.nerf.train.loss import Model
 from toonset.nerf.train.result import Training
 from toonset.nerf.train.state import FitState
-from toonset.nerf.train.train import finest_cells, train
+from toonset.nerf.train.train import finest_cells, fit_field
 from toonset.view import over_white
 
 CURVE_VIEWS = 4  # held-out views that every point of the curves is the mean of
@@ -114,7 +114,7 @@ def _trained(
     share = METHODS[job.method].share
     if share is not None:
         options = replace(options, resolution=round(share * finest_cells(scene)))
-    training = train(scene, options, watch=watch)
+    training = fit_field(scene, options, watch=watch)
     seconds, cpu_seconds = watch.spent()
     sample = curve_frames(case.test)
     curve = [Seen(*spent, _psnr(trained, sample)) for spent, trained in watch.states()]

@@ -34,7 +34,7 @@ from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.score.metrics import psnr_of
 from toonset.nerf.train.labelling import labelled
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 
 SIZES = (150, 300, 600)
 VIEWS = 8  # all round
@@ -124,7 +124,7 @@ def main(arguments: list[str]) -> None:
 
 def _some_body() -> TrainedField:
     case = next(iter(train_cases(None, 0, 1)))
-    return train(labelled(case.train)[0], TrainOptions(steps=STEPS)).result
+    return fit_field(labelled(case.train)[0], TrainOptions(steps=STEPS)).result
 
 
 def _over_white(premultiplied: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 3"]:

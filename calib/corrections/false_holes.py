@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.calib.result import ViewCalibration
+from toonset.calib.result import FilledHole, ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.split.background import difference
 from toonset.dataset.split.holes import CLEAR, LEAST_HOLE_PX
@@ -34,48 +34,23 @@ MOST_PLACES = 400  # pixels of a hole that are looked along
 DEPTHS = 9  # places along each of their rays
 
 
-@dataclass(frozen=True)
-class FilledHole:
-    """A hole that is none.
-
-    Attributes:
-        view: the drawing that has it.
-        box: (x, y, width, height) in that drawing, pixels.
-        by: the drawing that contradicts it.
-    """
-
-    view: str
-    box: Box
-    by: str
-
-    def __str__(self) -> str:
-        """Return what was done, for people."""
-        x, y, width, height = self.box
-        return (
-            f"{self.view}: the hole at {x}, {y} ({width} x {height} px) is paint: {self.by}, drawn "
-            "from the other side, shows none; filled"
-        )
-
-
 def without_false_holes(
     views: Sequence[View],
     found: Sequence[ViewCalibration],
-    papers: Sequence[Rgb | None],
     vertices: Float[np.ndarray, "vertices 3"],
 ) -> tuple[tuple[View, ...], tuple[FilledHole, ...]]:
     """Return the drawings with the holes filled that another one contradicts, and which those are.
 
     Args:
-        views: the drawings, as cut out.
+        views: the drawings, as cut out; where the paper behind one is not known, nothing is filled
+            in it, and it cannot contradict.
         found: their cameras; drawings without a usable one have no say.
-        papers: per drawing the colour behind it; None where that is not known: nothing is filled,
-            and it cannot contradict.
         vertices: of the mannequin: how deep the body is.
     """
     known = [
-        (view, fit.camera, paper)
-        for view, fit, paper in zip(views, found, papers, strict=True)
-        if paper is not None and fit.verdict != "failed"
+        (view, fit.camera, view.paper)
+        for view, fit in zip(views, found, strict=True)
+        if view.paper is not None and fit.verdict != "failed"
     ]
     painted = {view.name: _painted(view, paper) for view, _, paper in known}
     result, filled = {view.name: view for view in views}, []

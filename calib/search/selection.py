@@ -21,7 +21,7 @@ from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
 from toonset.calib.search.hypotheses import SAME_POSE, Candidates, refine, with_twins
-from toonset.calib.search.sheet_posterior import Sheet
+from toonset.calib.search.sheet_posterior import SheetPosterior
 from toonset.calib.search.turntable_starts import TurnStart
 from toonset.camera import rotation_distance
 
@@ -39,7 +39,7 @@ class TogetherSearch:
 
     drawings: Sequence[Drawing]
     body: Body
-    sheet: Sheet
+    sheet: SheetPosterior
     informed: Callable[[Candidates, int], Candidates]
 
     def run(

@@ -26,8 +26,8 @@ from toonset.calib.fit.align import ElevationPrior, tilt
 from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.outline.pose import Pose
 from toonset.calib.search.hypotheses import Candidates
-from toonset.calib.view_labels import Label, label_rows
 from toonset.camera import angles_from_rotation
+from toonset.dataset.split_folder.view_labels import Label, label_rows
 
 ELEVATION_GRID = np.radians(np.arange(-30.0, 61.0, 2.5))
 ELEVATION_SIGMA = np.radians(4.0)  # of a view about its sheet's elevation
@@ -73,7 +73,7 @@ def possible_turns(views: int, labels: tuple[Label, ...] = ()) -> Turns:
     return Turns(places, log_prior)
 
 
-class Sheet:
+class SheetPosterior:
     """The grid of what the views might share, against which candidates are weighed."""
 
     def __init__(

@@ -16,8 +16,8 @@ from toonset.calib.outline.occluding_contour import Surface
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
 from toonset.calib.search.hypotheses import OTHER, Candidates, is_twin
-from toonset.calib.view_labels import Label
 from toonset.camera import angles_from_rotation, rotation_distance
+from toonset.dataset.split_folder.view_labels import Label
 from toonset.view import View
 
 SURE = 0.95  # probability of the chosen camera below which it is called ambiguous

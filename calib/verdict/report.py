@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 from toonset.calib.result import Calibration, ViewCalibration
@@ -15,9 +16,8 @@ STRETCHED_BY = 0.005  # of height over width: less is how pictures are rounded t
 def calibration_dict(calibration: Calibration) -> dict[str, Any]:
     """Return the JSON form; angles in degrees, lengths in world units or pixels of the view.
 
-    Callers add what only they know: options, seed, versions, input hashes. `seconds` is for the
-    screen: `toonset.dataset.bundle.calibration_file` writes the rest, so that a bundle's bytes
-    depend on its input alone.
+    `seconds` is for the screen: `toonset.dataset.bundle.calibration_file` writes the rest, so that
+    a bundle's bytes depend on its input alone.
     """
     model = calibration.model
     return {
@@ -52,20 +52,43 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
             for cut in calibration.cuts
         ],
         "seconds": {step: round(value, 4) for step, value in calibration.seconds.items()},
+        "filled_holes": [asdict(hole) for hole in calibration.filled_holes],
+        **_landmarks_dict(calibration),
+        **calibration.origin,
     }
 
 
+def _landmarks_dict(calibration: Calibration) -> dict[str, Any]:
+    """Return what landmarks say, under its key; nothing where there are none."""
+    fits = [
+        {
+            "view": fit.view,
+            "rms_px": fit.rms_px,
+            "misplaced": list(fit.misplaced),
+            "perspective_bic_gain": fit.bic_gain,
+        }
+        for fit in calibration.landmarks
+    ]
+    return {"landmarks": fits} if fits else {}
+
+
 def model_line(calibration: Calibration) -> str:
-    """Return what camera model was chosen and why, for people."""
+    """Return what camera model was chosen, for people."""
     model = calibration.model
-    tried = "; ".join(f"{r.name} {r.bic_gain:+.0f} of {r.margin:.0f}" for r in model.rungs)
     text = f"camera model: {model.model}"
     near, far = min(model.distances), max(model.distances)
     if math.isfinite(near):
         text += f" from {near:.1f}" + (f" to {far:.1f}" if far > near * 1.01 else "")
         text += " body heights"
+    return text
+
+
+def evidence_line(calibration: Calibration) -> str:
+    """Return the evidence for the camera model: what larger models gained of what they need."""
+    model = calibration.model
+    tried = "; ".join(f"{r.name} {r.bic_gain:+.0f} of {r.margin:.0f}" for r in model.rungs)
     evidence = f"BIC gain and what is needed: {tried}. " if tried else ""
-    return f"{text} ({evidence}{model.effective_samples:.0f} effective samples)"
+    return f"  {evidence}{model.effective_samples:.0f} effective samples"
 
 
 def view_line(view: ViewCalibration) -> str:

@@ -8,11 +8,20 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from toonset.errors import UsageError
+
 NOTHING_ASKED = 2  # exit code, as of any wrong use
 
 
 class Verb(TyperCommand):
-    """One verb's help: arguments, options, then the options' panels, each a paragraph."""
+    """A verb: its help is arguments, options, then the options' panels, each a paragraph."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb; arguments that contradict each other are named with the verb's help."""
+        try:
+            return super().invoke(ctx)
+        except UsageError as error:
+            raise typer.BadParameter(str(error), ctx=ctx) from error
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write every parameter under its panel; a panel comes where its first parameter does."""

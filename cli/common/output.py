@@ -26,6 +26,10 @@ QuietFlag = Annotated[
         "--quiet", "-q", help="Print results and reasons only.", rich_help_panel=OUTPUT_PANEL
     ),
 ]
+VerboseFlag = Annotated[
+    bool,
+    typer.Option("--verbose", "-v", help="Print the evidence, too.", rich_help_panel=OUTPUT_PANEL),
+]
 SeedOption = Annotated[
     int, typer.Option("--seed", help="Seed of everything random.", min=0, max=2**63 - 1)
 ]
@@ -77,16 +81,22 @@ def check_output(
 
 @dataclass
 class Printer:
-    """One command's voice: `say` for people, `doubt` why exit 3, `result` once at the end."""
+    """What one command prints: `say` for people, `doubt` why exit 3, `result` once at the end."""
 
     as_json: bool = False
     quiet: bool = False
+    verbose: bool = False
     _last: float = field(default=0.0)
 
     def say(self, text: str) -> None:
         """Print a line for people on stderr, unless quiet."""
         if not self.quiet:
             self.doubt(text)
+
+    def detail(self, text: str) -> None:
+        """Print evidence on stderr, if it is asked for."""
+        if self.verbose:
+            self.say(text)
 
     def doubt(self, text: str) -> None:
         """Print on stderr why the exit code will not be 0; quiet or not."""

@@ -6,30 +6,37 @@ from pathlib import Path
 from typing import Any
 
 
-def summary(run: Path, metrics: dict[str, Any]) -> str:
-    """Return the content of metrics.json for people."""
-    fit, counts, hull = metrics["train"], metrics["counts"], metrics["hull"]
-    seconds = sum(metrics["seconds"].values())
-    tried = ", ".join(f"{100 * iou:.1f} %" for iou in hull["left_out_iou"])
-    evidence = f" (left-out views' outlines met with 0, 1 against: {tried})" if tried else ""
+def summary(run: Path, metrics: dict[str, Any], verbose: bool = False) -> str:
+    """Return the content of metrics.json for people; the evidence only if `verbose`."""
+    fit, seconds = metrics["train"], sum(metrics["seconds"].values())
+    counts = metrics["counts"]
+    size = f", {counts['rays']} rays, {counts['parameters']} parameters" if verbose else ""
+    held_out = [f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []
     return "\n".join(
         [
-            f"{counts['views']} views, {counts['rays']} rays, {counts['parameters']} parameters; "
-            f"{metrics['steps']} steps in {seconds:.1f} s",
-            *_drawings(metrics["drawings"]),
-            *_symmetry(metrics["symmetry"]),
-            f"hull: filled where at most {hull['missing']} views say background{evidence}",
-            *_planes(metrics["planes"]),
+            f"{counts['views']} views{size}; {metrics['steps']} steps in {seconds:.1f} s",
+            *_drawings(metrics["drawings"], verbose=verbose),
+            *_symmetry(metrics["symmetry"], verbose=verbose),
+            *(_hull(metrics["hull"]) + _planes(metrics["planes"]) if verbose else []),
             f"fit to the drawings{_set_right(metrics['drawings'])}: {_figures(fit)}",
-            *([f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []),
-            _verdict(metrics["verdict"]),
-            f"{run}: preview.png shows it; next: toonset render {run} --turntable 36",
+            *held_out,
+            _verdict(metrics["verdict"], verbose=verbose),
+            f"{run}: look at preview.png; next: toonset render {run} --turntable 36",
         ]
     )
 
 
-def _verdict(found: dict[str, Any]) -> str:
+def _hull(hull: dict[str, Any]) -> list[str]:
+    """Return how many drawings may contradict the hull, and why so many."""
+    tried = ", ".join(f"{100 * iou:.1f} %" for iou in hull["left_out_iou"])
+    evidence = f" (left-out views' outlines met with 0, 1 against: {tried})" if tried else ""
+    return [f"hull: filled where at most {hull['missing']} views say background{evidence}"]
+
+
+def _verdict(found: dict[str, Any], *, verbose: bool) -> str:
     """Return what the run is worth, and by what."""
+    if not verbose:
+        return f"verdict: {found['verdict']}"
     off = found["off_height"]
     parts = f"outlines {_percent(off['outlines'])}, pictures {_percent(off['pictures'])}"
     bound = f"together up to {_percent(off['bound'])} is ok"
@@ -40,8 +47,8 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2f} %"
 
 
-def _drawings(found: dict[str, Any]) -> list[str]:
-    """Return what was done to the drawings, and on what evidence."""
+def _drawings(found: dict[str, Any], *, verbose: bool) -> list[str]:
+    """Return what was done to the drawings; if verbose, on what evidence, and what was not."""
     lines = []
     for name, what, done in (
         ("turning", "cameras", "turned"),
@@ -49,14 +56,14 @@ def _drawings(found: dict[str, Any]) -> list[str]:
         ("unbending", "drawings", "bent back"),
     ):
         step = found[name]
-        if step is None:
+        if step is None or not (verbose or step["applied"]):
             continue
         before, after = step["apart_px"]
         moved = f"{what} {done}: outlines {before:.2f} px apart, {after:.2f} px after"
         kept = f"{what} not {done}: outlines {before:.2f} px apart"
         more = "" if step["applied"] or step["gain_nats"] <= 0 else ", not the best explanation"
-        gain = f"{step['gain_nats']:+.0f} nats{more}"
-        lines.append(f"{moved if step['applied'] else kept} ({gain})")
+        gain = f" ({step['gain_nats']:+.0f} nats{more})" if verbose else ""
+        lines.append(f"{moved if step['applied'] else kept}{gain}")
     if found["ink"]:
         ink = found["ink"]
         widths = f"{ink['outline_px']:.1f} px outside, {ink['inner_px']:.1f} px inside"
@@ -84,13 +91,13 @@ def _set_right(found: dict[str, Any]) -> str:
     return " as set right" if any(step and step["applied"] for step in steps) else ""
 
 
-def _symmetry(found: dict[str, Any] | None) -> list[str]:
+def _symmetry(found: dict[str, Any] | None, *, verbose: bool) -> list[str]:
     """Return whether undrawn sides were taken from mirror images."""
     if found is None:
         return []
     alike = f"left and right are {100 * min(found['alike']):.0f} % alike"
     if not found["mirrored"]:
-        return [f"{alike}: no mirror images for the undrawn side"]
+        return [f"{alike}: no mirror images for the undrawn side"] if verbose else []
     return [f"{alike}: the undrawn side is that of {', '.join(found['mirrored'])}, mirrored"]
 
 

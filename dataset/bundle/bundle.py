@@ -17,7 +17,9 @@ input, options, seed and versions give the same bytes, wherever it is made or mo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +28,16 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.calibration_file import calibration_content
+from toonset.dataset.bundle.read_scene import member, read_scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
+from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.palette import Palette
 from toonset.view import View
 from toonset.write import new_folder, write_bytes, write_json
 
@@ -49,17 +56,48 @@ def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:
     return None if file is None else load_mesh(file)
 
 
-def write_bundle(
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """A bundle on disk.
+
+    Attributes:
+        folder: where it lies.
+        scene: its posed drawings, with labels where it has a palette: what `train` takes.
+        palette: its colours; None before they are found.
+        mannequin: as it was fitted; None in bundles without one.
+    """
+
+    folder: Path
+    scene: Scene
+    palette: Palette | None
+    mannequin: Mesh | None
+
+
+def read_bundle(folder: str | Path) -> Bundle:
+    """Return a bundle, or any folder with a transforms.json and RGBA pictures.
+
+    Raises:
+        ToonsetError: a file is missing or broken, or pictures do not belong to their cameras.
+    """
+    folder = Path(folder)
+    scene = read_scene(folder)
+    file = member(transforms_file(folder).parent, "palette.json")
+    palette = None if file is None else read_palette_json(file)
+    return Bundle(folder, scene, palette, mannequin_of(folder))
+
+
+@contextmanager
+def bundle_folder(
     folder: Path,
     views: Sequence[View],
     cameras: Sequence[Camera],
     mesh: Mesh,
-    calibration: dict[str, Any],
+    calibration: Mapping[str, Any],
     overlay: UInt8[np.ndarray, "height width channels"],
     *,
     force: bool = False,
-) -> None:
-    """Write a bundle.
+) -> Iterator[Path]:
+    """Write a bundle; yield its temporary folder, to add to it before it appears.
 
     Args:
         folder: where; replaced as a whole with `force`.
@@ -67,7 +105,7 @@ def write_bundle(
         cameras: one per view, in pixels of its crop.
         mesh: the mannequin as it was fitted; its height and radius set the far pinholes and their
             error bound.
-        calibration: the report of `toonset.calib.verdict.report`, with what the caller adds.
+        calibration: the report of `toonset.calib.verdict.report`.
         overlay: the picture for people.
         force: replace an existing bundle.
 
@@ -85,3 +123,4 @@ def write_bundle(
         write_json(temporary / CALIBRATION, content)
         write_bytes(temporary / OVERLAY, encode_png(overlay))
         write_bytes(temporary / MANNEQUIN, save_obj(mesh))
+        yield temporary

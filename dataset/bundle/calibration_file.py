@@ -8,7 +8,7 @@ error was one number, and `inputs` was a table of hashes, then a list without ro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from toonset.view import View
 RUN_ONLY = ("seconds",)  # of this run, not of the result: the same input gives the same bytes
 
 
-def calibration_content(report: dict[str, Any], views: Sequence[View]) -> dict[str, Any]:
+def calibration_content(report: Mapping[str, Any], views: Sequence[View]) -> dict[str, Any]:
     """Return the content of calibration.json: the report, and what its views look like.
 
     Args:

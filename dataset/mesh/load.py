@@ -25,7 +25,7 @@ MAX_FACES = 5_000_000
 KINDS = ("obj", "ply", "stl", "glb", "gltf", "off")
 
 
-def load_mesh(path: Path, max_bytes: int = MAX_BYTES, max_faces: int = MAX_FACES) -> Mesh:
+def load_mesh(path: str | Path, max_bytes: int = MAX_BYTES, max_faces: int = MAX_FACES) -> Mesh:
     """Return the mesh of a file, in the file's own units, scene transforms applied.
 
     Args:
@@ -41,6 +41,7 @@ def load_mesh(path: Path, max_bytes: int = MAX_BYTES, max_faces: int = MAX_FACES
         MeshError: the file is missing, damaged, cut off, an archive, too large, without faces,
             or has vertices that are not finite or face indices out of range.
     """
+    path = Path(path)
     data = read_whole(path, "mesh", MeshError, max_bytes)
     return mesh_of_soup(_read(data, path, max_faces), path)
 

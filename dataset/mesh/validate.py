@@ -79,6 +79,7 @@ def mesh_of_soup(soup: Soup, path: Path) -> Mesh:
         face_parts=None if soup.parts is None else soup.parts[keep],
         part_names=soup.part_names,
         name=path.name,
+        path=path,
     )
 
 

@@ -71,7 +71,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class Segmentation:
     """The drawings of a sheet.
 
     Attributes:
@@ -91,9 +91,9 @@ class Sheet:
     remarks: tuple[str, ...] = ()
 
 
-def split_sheet(
+def split_picture(
     rgba: UInt8[np.ndarray, "height width 4"], options: SheetOptions | None = None
-) -> Sheet:
+) -> Segmentation:
     """Return the views of a sheet.
 
     Args:
@@ -113,7 +113,7 @@ def split_sheet(
     crops = _crops(found, paint, options)
     views, holes = _views(rgba, ground, crops, options)
     by_hand = bool(options.boxes) or options.grid is not None
-    return Sheet(
+    return Segmentation(
         tuple(views),
         ground.rgb,
         ground.sure,

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
+from toonset.dataset.split_folder.load import Sheet
 from toonset.dataset.split_folder.panel import LEFT_OUT, MARGIN, WIDEST, Panel, draw_panel
 from toonset.dataset.split_folder.tags import Line, Rgb, text_width
 from toonset.palette.names import hex_of
 
 GREY: Rgb = (40, 40, 40)
+
+
+def draw_sheet(sheet: Sheet) -> UInt8[np.ndarray, "height width 3"]:
+    """Return the picture of a sheet that a person checks."""
+    return draw_split(_panels(sheet), sheet.warnings)
 
 
 def draw_split(
@@ -80,3 +87,21 @@ def _beside(row: Sequence[np.ndarray], width: int) -> np.ndarray:
         strip[: picture.shape[0], x : x + picture.shape[1]] = picture
         x += picture.shape[1]
     return strip
+
+
+def _panels(sheet: Sheet) -> list[Panel]:
+    """Return the sheets for the overlay; a view whose sheet is not at hand stands alone."""
+    panels, named = [], sheet.split
+    for index, (source, picture) in enumerate(zip(named.sources, sheet.pictures, strict=True)):
+        mine = [i for i, of in enumerate(named.source_of) if of == index]
+        views, labels = [named.views[i] for i in mine], [named.labels[i] for i in mine]
+        if picture is not None:
+            ground = source.background
+            panels.append(
+                Panel(source.name, picture, ground, tuple(views), tuple(labels), source.left_out)
+            )
+            continue
+        for view, label in zip(views, labels, strict=True):
+            alone = replace(view, box=(0, 0, *view.box[2:]))
+            panels.append(Panel(source.name, view.rgba, None, (alone,), (label,)))
+    return panels

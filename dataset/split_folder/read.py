@@ -24,7 +24,7 @@ from toonset.dataset.images.folder import picture_files
 from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.silhouettes.line_width import contour_width_px
 from toonset.dataset.split.background import is_transparent
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE
 from toonset.dataset.split_folder.views import Source, Split, numbered
 from toonset.dataset.split_folder.write import ViewRecord, read_records
@@ -149,7 +149,7 @@ def _figure(rgba: UInt8[np.ndarray, "height width 4"], path: Path) -> np.ndarray
     if is_transparent(rgba):
         return rgba
     try:
-        sheet = split_sheet(rgba)
+        sheet = split_picture(rgba)
     except SheetError as error:
         raise SheetError(f"{path}: {error}") from error
     if len(sheet.views) != 1:

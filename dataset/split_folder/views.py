@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 
-from toonset.dataset.split.sheet import LeftOut, Sheet
+from toonset.dataset.split.sheet import LeftOut, Segmentation
 from toonset.view import View
 
 UNKNOWN_LABEL = "?"
@@ -60,7 +60,7 @@ class Split:
         return ",".join(label or UNKNOWN_LABEL for label in self.labels)
 
 
-def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Sheet) -> Split:
+def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segmentation) -> Split:
     """Return one sheet's views as a split.
 
     Args:

@@ -9,6 +9,7 @@ The folder may be corrected by hand; `toonset.dataset.split_folder.read` reads i
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any
@@ -83,7 +84,7 @@ class _SplitFile(BaseModel):
     views: list[ViewRecord]
 
 
-def split_dict(split: Split, options: dict[str, Any]) -> dict[str, Any]:
+def split_dict(split: Split, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the content of split.json but for the hashes of the views' files."""
     return {
         "schema": f"{NAME}/{VERSION}",
@@ -108,7 +109,7 @@ def write_split(
     folder: Path,
     split: Split,
     overlay: UInt8[np.ndarray, "height width 3"],
-    options: dict[str, Any],
+    options: Mapping[str, Any],
     *,
     force: bool = False,
 ) -> None:

@@ -49,6 +49,29 @@ def use_threads(count: int | None, sides: int = 1) -> None:
         _TEAM.pool = ThreadPoolExecutor(sides - 1)
 
 
+@contextmanager
+def working_threads(count: int | None = None) -> Iterator[int]:
+    """Let so many threads work within the block, side by side where there are two; yield how many.
+
+    Afterwards torch has as many as before.
+
+    Args:
+        count: of threads; None: as many as torch is set to use.
+    """
+    before, pool = torch.get_num_threads(), _TEAM.pool
+    count = count or before
+    sides = min(SIDES, count)
+    torch.set_num_threads(count // sides)
+    _TEAM.pool = ThreadPoolExecutor(sides - 1) if sides > 1 else None
+    try:
+        yield count
+    finally:
+        if _TEAM.pool is not None:
+            _TEAM.pool.shutdown()
+        _TEAM.pool = pool
+        torch.set_num_threads(before)
+
+
 def threads_in_use() -> int:
     """Return how many threads work for the calling one."""
     return torch.get_num_threads() * (1 if _TEAM.pool is None else SIDES)

@@ -7,6 +7,7 @@ look comes often and an expensive one seldom. None of it changes the training by
 from __future__ import annotations
 
 import copy
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -48,12 +49,13 @@ class Looking:
         tell: called with the status after every step.
         stop: whether somebody wants the training to end.
         test: held-out views; None: none.
-        folder: where previews and checkpoints go; made with the first of them.
+        folder: where previews and checkpoints go; made with the first of them. What an earlier
+            training left there is removed when a new one begins.
         preview_every_s: seconds of training between previews; None: none.
     """
 
-    tell: Callable[[Status], None]
-    stop: Callable[[], bool]
+    tell: Callable[[Status], None] = lambda status: None
+    stop: Callable[[], bool] = lambda: False
     test: Scene | None = None
     folder: Path | None = None
     preview_every_s: float | None = None
@@ -85,6 +87,8 @@ class Onlooker:
         """
         if self.start is not None:
             _check_fits(self.start, trained)
+        elif self.looking.folder is not None:
+            shutil.rmtree(self.looking.folder, ignore_errors=True)
         begun = 0.0 if self.start is None else self.start.seconds
         self._trained = trained
         self._views = [] if self.looking.test is None else sample_of(self.looking.test)

@@ -19,7 +19,7 @@ from toonset.nerf.score.labels import score_labels
 from toonset.nerf.score.lines import TOLERANCE_PX
 from toonset.nerf.score.metrics import MOST_SHIFT_PX, Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
-from toonset.palette.pixels.labels import label_image
+from toonset.palette.pixels.labels import label_pixels
 
 LAYERS = ("rgb", "palette")  # the field's own colour; in palette colours
 Progress = Callable[[str], None]
@@ -128,7 +128,7 @@ def _label_figures(trained: TrainedField, scene: Scene, frame: Frame, view: Rend
     if trained.palette is not None and view.labels is not None:
         own = scene.palette is not None and np.array_equal(scene.palette, trained.palette)
         true = frame.labels if own else None
-        true = label_image(frame.rgba, trained.palette) if true is None else true
+        true = label_pixels(frame.rgba, trained.palette) if true is None else true
         score = score_labels(view.labels, true)
     return {
         "label_accuracy": None if score is None else score.accuracy,

@@ -8,21 +8,21 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.bundle.scene import Scene
-from toonset.palette.paints.extract import extract_palette
+from toonset.palette.paints.extract import find_palette
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.labels import label_image
+from toonset.palette.pixels.labels import label_pixels
 
 
 def labelled(scene: Scene) -> tuple[Scene, Palette]:
     """Return the scene with palette and labels extracted from its own pictures."""
-    palette = extract_palette([frame.rgba for frame in scene.frames])
+    palette = find_palette([frame.rgba for frame in scene.frames])
     return relabelled(scene, palette.rgb), palette
 
 
 def relabelled(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
     """Return the scene with a palette and every pixel's label by it."""
     frames = tuple(
-        replace(frame, labels=label_image(frame.rgba, palette)) for frame in scene.frames
+        replace(frame, labels=label_pixels(frame.rgba, palette)) for frame in scene.frames
     )
     return replace(scene, palette=palette, frames=frames)
 

@@ -27,7 +27,6 @@ from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.scene_hull import hull_of, per_px
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import losses
-from toonset.nerf.kernels.allocator import keep_freed_memory
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import prepared
@@ -58,7 +57,7 @@ PARTS: tuple[str, ...] = ("drawings", "hull", "planes", "rays")  # before the st
 NO_EVIDENCE = HullEvidence(0, ())
 
 
-def train(
+def fit_field(
     scene: Scene,
     options: TrainOptions,
     progress: Progress | None = None,
@@ -84,7 +83,6 @@ def train(
     clock = [time.perf_counter()]
     options, device = _resolved(options), device_of(options.device)
     check_cut_out(scene)
-    keep_freed_memory()
     torch.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")

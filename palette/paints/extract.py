@@ -42,7 +42,7 @@ Images = Sequence[UInt8[np.ndarray, "_ _ 4"]]
 Masks = Sequence[Bool[np.ndarray, "_ _"]]
 
 
-def extract_palette(
+def find_palette(
     images: Images, options: PaletteOptions | None = None, contours: Masks | None = None
 ) -> Palette:
     """Return the colours of a character, the most frequent first.

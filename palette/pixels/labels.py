@@ -23,7 +23,7 @@ BAND_PX = 1 << 21  # pixels looked up at once: bounds the memory
 BATCH = 1 << 18  # colours compared with the palette at once
 
 
-def label_image(
+def label_pixels(
     rgba: UInt8[np.ndarray, "height width 4"],
     palette: UInt8[np.ndarray, "colors 3"],
     *,

@@ -23,7 +23,7 @@ from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
 from bench.split.picture import COLUMNS, TILE_WH, contact_sheet, tile
 from bench.split.score import mask_iou, same_box, score
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.split.sheet import LeftOut, Sheet
+from toonset.dataset.split.sheet import LeftOut, Segmentation
 from toonset.errors import BundleError, SheetError
 from toonset.view import View
 
@@ -136,8 +136,8 @@ def test_our_views_keep_their_place_and_their_warnings(monkeypatch: pytest.Monke
     rgba = np.zeros((48, 68, 4), np.uint8)
     rgba[4:44, 4:64] = 255
     view = View(rgba, (6, 6, 68, 48), 0.0, "000.png")
-    sheet = Sheet((view,), None, 1.0, ("look at this",), (LeftOut((1, 2, 3, 4), "speck"),))
-    monkeypatch.setattr("bench.split.methods.split_sheet", lambda rgba: sheet)
+    sheet = Segmentation((view,), None, 1.0, ("look at this",), (LeftOut((1, 2, 3, 4), "speck"),))
+    monkeypatch.setattr("bench.split.methods.split_picture", lambda rgba: sheet)
     result = by_toonset(rgba)
     assert [figure.box for figure in result.figures] == [(10, 10, 60, 40)]
     assert result.warned
@@ -145,10 +145,10 @@ def test_our_views_keep_their_place_and_their_warnings(monkeypatch: pytest.Monke
 
 
 def test_a_refusal_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(rgba: np.ndarray) -> Sheet:
+    def refuse(rgba: np.ndarray) -> Segmentation:
         raise SheetError("blank")
 
-    monkeypatch.setattr("bench.split.methods.split_sheet", refuse)
+    monkeypatch.setattr("bench.split.methods.split_picture", refuse)
     result = by_toonset(np.zeros((5, 5, 4), np.uint8))
     assert result.warned
     assert result.figures == ()

@@ -11,17 +11,17 @@ import trimesh
 
 from bench.calib.measure import view_error
 from bench.cases.bodies import random_body
-from toonset.calib.calibrate import calibrate
-from toonset.calib.hints import Known
+from toonset.calib.find_cameras import find_cameras
+from toonset.calib.known import Known
 from toonset.calib.outline.correspondences import Drawing, match
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose
 from toonset.calib.verdict.overlay import draw_overlay
 from toonset.calib.verdict.report import calibration_dict
-from toonset.calib.view_labels import parse_labels
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
@@ -32,7 +32,7 @@ DRAWN = dataclasses.replace(CLEAN, outline_px=2, warp_percent=0.6, yaw_jitter_de
 
 def solved(options, seed, *, symmetric=False, mannequin=None):
     turnaround = make_turnaround(random_body(seed, symmetric=symmetric), options, seed)
-    found = calibrate(split_sheet(turnaround.sheet).views, mannequin or turnaround.mesh)
+    found = find_cameras(split_picture(turnaround.sheet).views, mannequin or turnaround.mesh)
     errors = [
         view_error(view.camera, camera.rotation, view.verdict)
         for view, camera in zip(found.views, turnaround.cameras, strict=True)
@@ -59,7 +59,7 @@ def test_clean_sheets_are_solved_to_a_fraction_of_a_degree(clean):
     assert found.verdict == "ok"
     assert found.model.model == "orthographic"
     for view, camera, cell in zip(
-        found.views, turnaround.cameras, split_sheet(turnaround.sheet).views, strict=True
+        found.views, turnaround.cameras, split_picture(turnaround.sheet).views, strict=True
     ):
         # same pixels, once the crop's place in the sheet and the cell's are taken into account
         points = turnaround.mesh.vertices[::50]
@@ -87,8 +87,8 @@ def test_perspective_is_found_only_where_it_is():
 def test_a_symmetric_body_without_paint_at_eye_level_is_called_ambiguous():
     level = dataclasses.replace(CLEAN, elevation_deg=0, warp_percent=0.6)
     turnaround = make_turnaround(random_body(41, symmetric=True), level, 41)
-    views = [plain(view) for view in split_sheet(turnaround.sheet).views]
-    found = calibrate(views, turnaround.mesh)
+    views = [plain(view) for view in split_picture(turnaround.sheet).views]
+    found = find_cameras(views, turnaround.mesh)
     assert {view.verdict for view in found.views} == {"ambiguous"}
     assert found.verdict == "ambiguous"
     assert max(view.p_flip for view in found.views) > 0.05
@@ -104,9 +104,9 @@ def test_paint_tells_a_symmetric_body_from_its_twin():
 def test_labels_say_which_twin_is_meant():
     level = dataclasses.replace(CLEAN, views=4, elevation_deg=0, warp_percent=0.6)
     turnaround = make_turnaround(random_body(41, symmetric=True), level, 41)
-    views = [plain(view) for view in split_sheet(turnaround.sheet).views]
+    views = [plain(view) for view in split_picture(turnaround.sheet).views]
     for text, flipped in (("front,left,back,right", False), ("back,left,front,right", True)):
-        found = calibrate(views, turnaround.mesh, known=Known(parse_labels(text, 4)))
+        found = find_cameras(views, turnaround.mesh, known=Known(parse_labels(text, 4)))
         for view, camera in zip(found.views, turnaround.cameras, strict=True):
             error = view_error(view.camera, camera.rotation, view.verdict)
             assert math.degrees(error.modulo_twin) < 10
@@ -128,7 +128,7 @@ def test_a_vase_has_no_yaw_and_is_not_called_ok():
     upright = np.array(vase.vertices)[:, [1, 2, 0]]
     mesh = Mesh(upright, np.array(vase.faces))
     turnaround = make_turnaround(mesh, CLEAN, 1)
-    found = calibrate(split_sheet(turnaround.sheet).views, mesh)
+    found = find_cameras(split_picture(turnaround.sheet).views, mesh)
     assert {view.verdict for view in found.views} == {"ambiguous"}
     assert all("yaw is not observable" in view.reason for view in found.views)
     assert min(view.sigmas.yaw for view in found.views) > math.radians(90)
@@ -146,8 +146,8 @@ def test_another_body_is_only_called_ok_where_many_drawings_agree(views):
 
 def test_one_drawing_alone_is_fitted_and_called_weak():
     turnaround = make_turnaround(random_body(61), CLEAN, 61)
-    view = split_sheet(turnaround.sheet).views[1]
-    found = calibrate([view], turnaround.mesh)
+    view = split_picture(turnaround.sheet).views[1]
+    found = find_cameras([view], turnaround.mesh)
     error = view_error(found.views[0].camera, turnaround.cameras[1].rotation, "ok")
     assert math.degrees(error.raw) < 2
     assert found.verdict == "weak"
@@ -158,7 +158,7 @@ def test_moving_and_enlarging_the_sheet_moves_only_shift_and_scale(clean):
     turnaround, found, _ = clean
     larger = np.kron(turnaround.sheet, np.ones((2, 2, 1), np.uint8))
     framed = np.pad(larger, ((13, 7), (31, 5), (0, 0)), constant_values=255)
-    again = calibrate(split_sheet(framed).views, turnaround.mesh)
+    again = find_cameras(split_picture(framed).views, turnaround.mesh)
     for a, b in zip(found.views, again.views, strict=True):
         change = view_error(b.camera, a.camera.rotation, "ok").raw
         assert math.degrees(change) < 1.2  # a staircase of twice the size is another drawing
@@ -167,14 +167,14 @@ def test_moving_and_enlarging_the_sheet_moves_only_shift_and_scale(clean):
 
 def test_the_same_input_gives_the_same_bits(clean):
     turnaround, found, _ = clean
-    again = calibrate(split_sheet(turnaround.sheet).views, turnaround.mesh)
+    again = find_cameras(split_picture(turnaround.sheet).views, turnaround.mesh)
     one, two = (calibration_dict(c) | {"seconds": None} for c in (found, again))
     assert json.dumps(one) == json.dumps(two)
 
 
 def test_the_overlay_follows_the_drawing(clean):
     turnaround, found, _ = clean
-    views = split_sheet(turnaround.sheet).views
+    views = split_picture(turnaround.sheet).views
     picture = draw_overlay(views, turnaround.mesh, found).astype(int)
     blue = (picture[..., 2] > picture[..., 0] + 60) & (picture[..., 2] > picture[..., 1] + 30)
     assert blue.sum() > 3000  # the outline of every "ok" view is drawn in blue
@@ -187,7 +187,7 @@ def test_perspective_from_opencvs_pnp_on_the_same_outlines_agrees():
     near = dataclasses.replace(CLEAN, distance_heights=2.5)
     turnaround, found, _ = solved(near, 31)
     surface = prepare_surface(turnaround.mesh)
-    for view, cell in zip(found.views, split_sheet(turnaround.sheet).views, strict=True):
+    for view, cell in zip(found.views, split_picture(turnaround.sheet).views, strict=True):
         camera = view.camera
         drawing = Drawing(drawn_contour(cell), 250.0, 400)
         pose = Pose(camera.rotation, camera.center, camera.scale, camera.k)
@@ -209,7 +209,7 @@ def test_a_locked_yaw_stays_even_where_the_drawings_say_another():
     turnaround = make_turnaround(random_body(13), dataclasses.replace(DRAWN, views=4), 13)
     labels = parse_labels("front,right,back,left", 4)  # the sides are the other way round
     known = Known(labels, locked=frozenset({"yaw"}))
-    found = calibrate(split_sheet(turnaround.sheet).views, turnaround.mesh, known=known)
+    found = find_cameras(split_picture(turnaround.sheet).views, turnaround.mesh, known=known)
     for view, label in zip(found.views, labels, strict=True):
         off = math.remainder(view.camera.angles[0] - label[0], 2 * math.pi)
         assert abs(math.degrees(off)) < 0.1
@@ -219,16 +219,16 @@ def test_a_locked_yaw_stays_even_where_the_drawings_say_another():
 def test_a_wrong_lock_that_hides_in_another_number_is_not_ok():
     options = SynthOptions(views=4, cell_px=260, elevation_deg=8, warp_percent=1, yaw_jitter_deg=3)
     turnaround = make_turnaround(random_body(3204), options, 3204)
-    views = split_sheet(turnaround.sheet).views
-    free = [view.camera for view in calibrate(views, turnaround.mesh).views]
+    views = split_picture(turnaround.sheet).views
+    free = [view.camera for view in find_cameras(views, turnaround.mesh).views]
     elevation = frozenset({"elevation"})
-    right = calibrate(views, turnaround.mesh, known=Known(cameras=tuple(free), locked=elevation))
+    right = find_cameras(views, turnaround.mesh, known=Known(cameras=tuple(free), locked=elevation))
     tilted = tuple(
         dataclasses.replace(camera, rotation=rotation_from_angles(yaw, up + 0.35, roll))
         for camera in free
         for yaw, up, roll in [camera.angles]
     )
-    wrong = calibrate(views, turnaround.mesh, known=Known(cameras=tilted, locked=elevation))
+    wrong = find_cameras(views, turnaround.mesh, known=Known(cameras=tilted, locked=elevation))
     assert not any("--lock" in view.reason for view in right.views)
     assert all(view.verdict != "ok" for view in wrong.views)
     assert any("--lock" in view.reason for view in wrong.views)
@@ -236,8 +236,8 @@ def test_a_wrong_lock_that_hides_in_another_number_is_not_ok():
 
 def test_a_label_that_the_drawing_contradicts_is_said():
     turnaround = make_turnaround(random_body(11), dataclasses.replace(CLEAN, views=4), 11)
-    views = split_sheet(turnaround.sheet).views
-    found = calibrate(
+    views = split_picture(turnaround.sheet).views
+    found = find_cameras(
         views, turnaround.mesh, known=Known(parse_labels("front,left,front,right", 4))
     )
     far = view_error(found.views[2].camera, turnaround.cameras[2].rotation, "ok")

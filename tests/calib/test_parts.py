@@ -14,7 +14,7 @@ from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import find_rim, prepare_surface, silhouette_mask
 from toonset.calib.outline.pose import Pose, project, project_with_jacobian
 from toonset.calib.search.hypotheses import Candidates
-from toonset.calib.search.sheet_posterior import Sheet, possible_turns
+from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.templates import build_templates, find_hypotheses
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
@@ -197,8 +197,8 @@ def candidates(*poses_and_energies) -> Candidates:
     return Candidates(fits, np.array([energy for _, energy in poses_and_energies]))
 
 
-def sheet(views: int) -> Sheet:
-    return Sheet(possible_turns(views))
+def sheet(views: int) -> SheetPosterior:
+    return SheetPosterior(possible_turns(views))
 
 
 def test_equal_twins_at_eye_level_are_a_coin_toss():
@@ -226,7 +226,7 @@ def test_a_drawing_too_faint_for_an_outline_is_refused_by_name():
 def test_outlines_that_put_the_faces_at_the_back_say_so():
     yaws = np.radians(np.arange(0.0, 360.0, 45.0))
     faces = FaceEvidence(4.0 * np.stack([np.cos(yaws), np.sin(yaws)], axis=1))
-    sheet_with_faces = Sheet(possible_turns(8), faces)
+    sheet_with_faces = SheetPosterior(possible_turns(8), faces)
     right = [candidates((pose_at(yaw, 0.1, 0.0), 0.0)) for yaw in yaws]
     twins = [candidates((pose_at(math.pi - yaw, -0.1, 0.0), 0.0)) for yaw in yaws]
     assert sheet_with_faces.faces_contradict(right) < 0.05

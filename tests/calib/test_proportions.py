@@ -12,14 +12,14 @@ import pytest
 from bench.cases.bodies import random_body
 from bench.stability.bodies import with_arms_raised, with_head_grown
 from toonset.calib import pipeline
-from toonset.calib.calibrate import calibrate
+from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import BIC_MARGIN, GLANCE_MARGIN, PROPORTIONS, Rung
 from toonset.calib.pipeline import SAME_BODY_COVERAGE
 from toonset.calib.result import Calibration
 from toonset.camera import rotation_distance
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.mesh.load import load_mesh
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 
@@ -40,12 +40,12 @@ def errors(found: Calibration, made: Turnaround) -> np.ndarray:
 def test_arms_that_hardly_show_in_the_outlines_are_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     body = random_body(3005)
     made = make_turnaround(with_arms_raised(body, math.radians(8)), OPTIONS, 3005)
-    found = calibrate(made.views, body)
+    found = find_cameras(made.views, body)
     assert bending(found).is_proven
     assert found.model.bends_mannequin
     assert errors(found, made).max() < 5.5
     monkeypatch.setattr(pipeline, "GLANCE_MARGIN", np.inf)
-    rigid = calibrate(made.views, body)
+    rigid = find_cameras(made.views, body)
     assert not rigid.model.bends_mannequin
     assert np.median([view.coverage for view in rigid.views]) > SAME_BODY_COVERAGE
     assert errors(found, made).max() < 0.6 * errors(rigid, made).max()
@@ -58,7 +58,7 @@ def test_what_another_shape_looks_like_is_no_perspective() -> None:
     made = make_turnaround(
         with_arms_raised(body, math.radians(-10)), replace(OPTIONS, views=8), 3007
     )
-    found = calibrate(made.views, body)
+    found = find_cameras(made.views, body)
     assert bending(found).is_proven
     assert not found.model.is_perspective
     assert errors(found, made).max() < 5
@@ -68,7 +68,7 @@ def test_a_larger_head_is_seen() -> None:
     body = random_body(3004)
     drawn = with_head_grown(body, 0.1)
     made = make_turnaround(drawn, OPTIONS, 3004)
-    found = calibrate(made.views, body)
+    found = find_cameras(made.views, body)
     assert bending(found).is_proven
 
     def head_over_height(vertices: np.ndarray) -> float:
@@ -84,7 +84,7 @@ def test_a_larger_head_is_seen() -> None:
 def test_drawing_error_bends_no_mannequin(views: int, seed: int) -> None:
     drawn = replace(OPTIONS, views=views, outline_px=2, warp_percent=1.5)
     made = make_turnaround(random_body(seed), drawn, seed)
-    found = calibrate(made.views, made.mesh)
+    found = find_cameras(made.views, made.mesh)
     assert bending(found).margin == GLANCE_MARGIN
     assert not bending(found).is_proven
     assert bending(found).bic_gain > BIC_MARGIN  # strong evidence by itself
@@ -94,12 +94,12 @@ def test_drawing_error_bends_no_mannequin(views: int, seed: int) -> None:
 def test_two_drawings_whose_outlines_meet_prove_no_other_body() -> None:
     body = random_body(3004)
     made = make_turnaround(with_arms_raised(body, math.radians(8)), replace(OPTIONS, views=2), 3004)
-    found = calibrate(made.views, body)
+    found = find_cameras(made.views, body)
     assert PROPORTIONS not in {rung.name for rung in found.model.rungs}
 
 
 def test_the_example_is_ok_though_its_mannequin_lacks_hair_scarf_and_bag() -> None:
-    views = split_sheet(load_rgba(EXAMPLES / "sheet.png")).views
-    found = calibrate(views, load_mesh(EXAMPLES / "mannequin.obj"))
+    views = split_picture(load_rgba(EXAMPLES / "sheet.png")).views
+    found = find_cameras(views, load_mesh(EXAMPLES / "mannequin.obj"))
     assert bending(found).is_proven
     assert (found.verdict, {view.verdict for view in found.views}) == ("ok", {"ok"})

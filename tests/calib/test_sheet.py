@@ -12,8 +12,8 @@ from toonset.calib.fit.sheet_prior import Turn, sheet_ties, yaw_slope
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose, pixel_slopes, project
 from toonset.calib.search.sheet_posterior import possible_turns
-from toonset.calib.view_labels import label_rows, parse_labels
 from toonset.camera import angles_from_rotation, rotation_from_angles
+from toonset.dataset.split_folder.view_labels import label_rows, parse_labels
 from toonset.errors import SheetError
 from toonset.mesh import Mesh
 

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 from toonset.camera import Camera
 from toonset.cli.common.palette_report import palette_lines
@@ -13,7 +12,7 @@ from toonset.cli.palette import Method, palette
 from toonset.cli.split import split
 from toonset.dataset.bundle.transforms import read_scene, transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png
-from toonset.errors import ToonsetError
+from toonset.errors import ToonsetError, UsageError
 from toonset.palette.palette import Evidence, Palette, PaletteColor
 from toonset.write import write_bytes, write_json
 
@@ -222,5 +221,5 @@ def test_the_papers_tool_can_be_asked(tmp_path: Path) -> None:
     content = json.loads((tmp_path / "out" / "palette.json").read_text())
     assert content["rule"].startswith("extcolors, tolerance 32")
     assert [color["hex"] for color in content["colors"]] == ["#c81e28", "#143cb4"]
-    with pytest.raises(typer.BadParameter, match="--keep belongs to --method toonset"):
+    with pytest.raises(UsageError, match="--keep belongs to --method toonset"):
         palette([tmp_path / "a.png"], method=Method.extcolors, keep="#fff", out=tmp_path / "o")

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.cli.split_sheets import COLORS, COUNT, HIGH, PITCH, TOP, WIDE, drawn_sheet
-from toonset.dataset.split.sheet import SheetOptions, split_sheet
+from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.write import NAME, VERSION
 
@@ -135,9 +135,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[SheetOptions]:
 
     def spy(rgba, options):
         seen.append(options)
-        return split_sheet(rgba, SheetOptions())
+        return split_picture(rgba, SheetOptions())
 
-    monkeypatch.setattr("toonset.dataset.split.sheet.split_sheet", spy)
+    monkeypatch.setattr("toonset.dataset.split_folder.load.split_picture", spy)
     return seen
 
 

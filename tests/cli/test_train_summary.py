@@ -39,6 +39,7 @@ def test_evidence_that_was_not_acted_on_is_called_so() -> None:
             registration=step(-5, applied=False),
             unbending=step(90, applied=True),
         ),
+        verbose=True,
     ).splitlines()
     assert (
         "cameras not turned: outlines 1.00 px apart (+70 nats, not the best explanation)" in found
@@ -49,7 +50,9 @@ def test_evidence_that_was_not_acted_on_is_called_so() -> None:
 
 
 def test_the_verdict_is_there_with_what_it_rests_on() -> None:
-    (line,) = (x for x in summary(Path("run"), metrics()).splitlines() if x.startswith("verdict"))
+    (line,) = (
+        x for x in summary(Path("run"), metrics(), True).splitlines() if x.startswith("verdict")
+    )
     assert line.startswith("verdict: weak; outlines 0.12 %, pictures 0.15 % of the height apart")
     assert "up to 0.12 % is ok" in line
 
@@ -58,3 +61,18 @@ def test_drawings_that_agree_are_fitted_as_they_are() -> None:
     assert "fit to the drawings: PSNR 30.00 dB" in summary(
         Path("run"), metrics(registration=step(-5, applied=False))
     )
+
+
+def test_evidence_is_for_those_who_ask() -> None:
+    drawn = metrics(
+        turning=step(70, applied=False),
+        registration=step(-5, applied=False),
+        unbending=step(90, applied=True),
+    )
+    assert summary(Path("run"), drawn).splitlines() == [
+        "8 views; 3 steps in 1.0 s",
+        "drawings bent back: outlines 1.00 px apart, 0.50 px after",
+        "fit to the drawings as set right: PSNR 30.00 dB",
+        "verdict: weak",
+        "run: look at preview.png; next: toonset render run --turntable 36",
+    ]

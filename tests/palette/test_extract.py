@@ -13,9 +13,9 @@ from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import NAMED, name_of
 from toonset.palette.paints.extcolors import extcolors_palette
-from toonset.palette.paints.extract import extract_palette
+from toonset.palette.paints.extract import find_palette
 from toonset.palette.paints.histogram import count_pixels
-from toonset.palette.pixels.labels import label_image, nearest_colors
+from toonset.palette.pixels.labels import label_pixels, nearest_colors
 
 FINE = 8
 COLORS = np.array(
@@ -50,7 +50,7 @@ RGBA, LABELS, AREAS = flat_drawing()
 
 
 def test_a_flat_drawing_gives_exactly_its_colours() -> None:
-    palette = extract_palette([RGBA])
+    palette = find_palette([RGBA])
     assert as_set(palette) == {tuple(color) for color in COLORS.tolist()}
     shares = {color.rgb: color.share for color in palette.colors}
     for color, share in zip(COLORS.tolist(), AREAS, strict=True):
@@ -60,7 +60,7 @@ def test_a_flat_drawing_gives_exactly_its_colours() -> None:
 
 
 def test_labels_equal_the_truth_on_flat_pixels() -> None:
-    found = label_image(RGBA, COLORS)
+    found = label_pixels(RGBA, COLORS)
     labelled = found != 255
     assert np.array_equal(found[labelled & (LABELS != 255)], LABELS[labelled & (LABELS != 255)])
     assert labelled[LABELS != 255].mean() > 0.98  # flat pixels that were taken for mixtures
@@ -72,23 +72,23 @@ def test_labels_equal_the_truth_on_flat_pixels() -> None:
 
 def test_palette_is_blind_to_order_orientation_and_repetition() -> None:
     other = np.ascontiguousarray(RGBA[10:, 5:80])
-    palette = extract_palette([RGBA, other])
+    palette = find_palette([RGBA, other])
     turned = [np.rot90(other), RGBA[::-1], RGBA[:, ::-1], np.rot90(other, 2)]
-    assert extract_palette(turned) == palette
+    assert find_palette(turned) == palette
     big = [image.repeat(2, axis=0).repeat(2, axis=1) for image in (RGBA, other)]
-    assert as_set(extract_palette(big)) == as_set(palette)
+    assert as_set(find_palette(big)) == as_set(palette)
 
 
 def test_labels_turn_with_the_picture() -> None:
-    assert np.array_equal(label_image(RGBA[:, ::-1], COLORS), label_image(RGBA, COLORS)[:, ::-1])
+    assert np.array_equal(label_pixels(RGBA[:, ::-1], COLORS), label_pixels(RGBA, COLORS)[:, ::-1])
 
 
 def test_a_gradient_is_one_colour_and_two_paints_stay_two() -> None:
     ramp = np.linspace(0.8, 1.0, 200)[None, :, None] * [210, 60, 50] * np.ones((40, 1, 1))
     ramp = np.dstack([np.rint(ramp), np.full((40, 200), 255)]).astype(np.uint8)
-    assert len(extract_palette([ramp]).colors) == 1
+    assert len(find_palette([ramp]).colors) == 1
     base, shadow = (214, 120, 80), (160, 80, 60)
-    assert as_set(extract_palette([block((base, 60), (shadow, 40))])) == {base, shadow}
+    assert as_set(find_palette([block((base, 60), (shadow, 40))])) == {base, shadow}
 
 
 @pytest.mark.parametrize("quality", [70, 85, 95])
@@ -98,7 +98,7 @@ def test_jpeg_noise_does_not_shatter_colours(quality: int) -> None:
     buffer = io.BytesIO()
     Image.fromarray(over_white.astype(np.uint8)).save(buffer, "JPEG", quality=quality)
     noisy = np.dstack([np.asarray(Image.open(buffer)), big[..., 3]])
-    palette = extract_palette([noisy])
+    palette = find_palette([noisy])
     assert len(palette.colors) == 5
     drawn = oklab_from_rgb(np.concatenate([COLORS[:4], [(0, 0, 0)]]).astype(np.uint8))
     for color in palette.colors:
@@ -153,17 +153,17 @@ def test_large_and_small_pictures_are_counted_alike(monkeypatch: pytest.MonkeyPa
 
 def test_blends_are_no_colours_and_count_half_to_either_side() -> None:
     colors = (200, 30, 40), (20, 60, 180), (30, 160, 60)
-    palette = extract_palette([soft_stripes(*colors, width=4)])
+    palette = find_palette([soft_stripes(*colors, width=4)])
     assert as_set(palette) == set(colors)
     assert sum(color.share for color in palette.colors) == pytest.approx(1)
 
 
 def test_near_shades_merge_and_near_paints_do_not() -> None:
     near, far = block(((150, 90, 60), 60), ((152, 91, 60), 40)), ((150, 90, 60), (160, 104, 72))
-    assert as_set(extract_palette([near])) == {(150, 90, 60)}
+    assert as_set(find_palette([near])) == {(150, 90, 60)}
     apart = oklab_from_rgb(np.array(far, dtype=np.uint8))
     assert 0.04 < np.linalg.norm(apart[0] - apart[1]) < 0.06
-    assert as_set(extract_palette([block((far[0], 60), (far[1], 40))])) == set(far)
+    assert as_set(find_palette([block((far[0], 60), (far[1], 40))])) == set(far)
 
 
 @pytest.mark.parametrize("low", [0.8, 0.4])
@@ -171,14 +171,14 @@ def test_long_gradients_are_one_colour(low: float) -> None:
     for color in ((210, 60, 50), (90, 200, 120), (240, 220, 90)):
         ramp = np.linspace(low, 1.0, 300)[None, :, None] * np.array(color) * np.ones((40, 1, 1))
         rgba = np.dstack([np.rint(ramp), np.full((40, 300), 255)]).astype(np.uint8)
-        assert len(extract_palette([rgba]).colors) == 1, color
+        assert len(find_palette([rgba]).colors) == 1, color
 
 
 def test_a_paint_of_very_different_shades_is_said() -> None:
     for low, count in ((0.7, 0), (0.0, 1)):
         ramp = np.linspace(low, 1.0, 300)[None, :, None] * [240, 225, 190] * np.ones((40, 1, 1))
         shaded = np.dstack([np.rint(ramp), np.full((40, 300), 255)]).astype(np.uint8)
-        palette = extract_palette([shaded])
+        palette = find_palette([shaded])
         assert len(palette.colors) == 1
         assert len(palette.warnings) == count, low
     assert "stands for very different shades" in palette.warnings[0]
@@ -188,7 +188,7 @@ def test_thin_soft_lines_give_their_pure_ink() -> None:
     rgb = np.full((80, 80, 3), (230, 180, 60), dtype=np.uint8)
     for x in range(6, 78, 6):  # 1.5 px wide: a core, and half of it beside
         rgb[:, x], rgb[:, x + 1] = (10, 10, 10), (120, 95, 35)
-    palette = extract_palette([np.dstack([rgb, np.full((80, 80), 255, np.uint8)])])
+    palette = find_palette([np.dstack([rgb, np.full((80, 80), 255, np.uint8)])])
     assert as_set(palette) == {(230, 180, 60), (10, 10, 10)}
 
 

@@ -6,7 +6,7 @@ import pytest
 from tests.palette.pictures import as_set, block, soft_stripes
 from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.paints.extract import extract_palette, pick_palette
+from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.places import with_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette, PaletteColor, Place
@@ -16,7 +16,7 @@ from toonset.palette.pixels.labels import nearest_colors
 def test_the_five_percent_rule_and_what_it_costs() -> None:
     red, green, blue = (200, 30, 40), (30, 160, 60), (20, 60, 180)
     picture = block((red, 90), (green, 6), (blue, 4))
-    palette = extract_palette([picture])
+    palette = find_palette([picture])
     assert [color.rgb for color in palette.colors] == [red, green]
     (dropped,) = palette.dropped
     assert dropped.rgb == blue
@@ -26,18 +26,18 @@ def test_the_five_percent_rule_and_what_it_costs() -> None:
         nearest_colors(np.array([blue], np.uint8), np.array([red, green], np.uint8))[0]
     )
     assert dropped.cost == pytest.approx(float(np.linalg.norm(away[0] - away[nearest])))
-    assert len(extract_palette([picture], PaletteOptions(min_share=0.03)).colors) == 3
+    assert len(find_palette([picture], PaletteOptions(min_share=0.03)).colors) == 3
 
 
 def test_all_pictures_count_together() -> None:
     front, back = block(((200, 30, 40), 100)), block(((200, 30, 40), 91), ((20, 60, 180), 9))
-    assert len(extract_palette([back]).colors) == 2
-    assert len(extract_palette([front, back]).colors) == 1
+    assert len(find_palette([back]).colors) == 2
+    assert len(find_palette([front, back]).colors) == 1
 
 
 def test_if_nothing_reaches_the_share_the_largest_is_kept_and_said() -> None:
     picture = block(((200, 30, 40), 40), ((20, 60, 180), 35), ((30, 160, 60), 25))
-    palette = extract_palette([picture], PaletteOptions(min_share=0.5))
+    palette = find_palette([picture], PaletteOptions(min_share=0.5))
     assert [color.rgb for color in palette.colors] == [(200, 30, 40)]
     assert palette.warnings == (
         "no colour reaches 50.0% of the pixels; the largest, with 40.0%, was kept alone: lower "
@@ -57,9 +57,9 @@ def test_hand_picked_colours_keep_their_order_and_say_their_share() -> None:
 
 def test_nothing_to_see_is_an_error() -> None:
     with pytest.raises(PaletteError, match="no picture given"):
-        extract_palette([])
+        find_palette([])
     with pytest.raises(PaletteError, match="no opaque pixel"):
-        extract_palette([np.zeros((9, 9, 4), dtype=np.uint8)])
+        find_palette([np.zeros((9, 9, 4), dtype=np.uint8)])
     with pytest.raises(PaletteError, match="--min-share: 5 is no share; give 0 to 1"):
         PaletteOptions(min_share=5.0)
     with pytest.raises(PaletteError, match="--max-colors: 0 colours; 1 to 255 are possible"):
@@ -71,7 +71,7 @@ def test_nothing_to_see_is_an_error() -> None:
 
 
 def test_evidence_says_what_one_colour_less_would_cost() -> None:
-    palette = extract_palette([block(((200, 30, 40), 60), ((20, 60, 180), 40))])
+    palette = find_palette([block(((200, 30, 40), 60), ((20, 60, 180), 40))])
     assert palette.evidence is not None
     assert palette.evidence.colors == 2
     assert palette.evidence.one_less > 1000
@@ -81,15 +81,15 @@ def test_evidence_says_what_one_colour_less_would_cost() -> None:
 def test_small_colours_are_kept_on_request() -> None:
     red, blue, green = (200, 30, 40), (20, 60, 180), (30, 160, 60)
     picture = block((red, 95), (blue, 3), (green, 2))
-    assert as_set(extract_palette([picture])) == {red}
+    assert as_set(find_palette([picture])) == {red}
     options = PaletteOptions(keep=((24, 64, 178),))  # near the blue that is there
-    assert as_set(extract_palette([picture], options)) == {red, blue}
+    assert as_set(find_palette([picture], options)) == {red, blue}
     with pytest.raises(
         PaletteError, match="--keep: #ffff00: no such colour was found; the nearest is"
     ):
-        extract_palette([picture], PaletteOptions(keep=((255, 255, 0),)))
+        find_palette([picture], PaletteOptions(keep=((255, 255, 0),)))
     all_three = PaletteOptions(min_share=0.0, max_colors=2, keep=(green,))
-    assert as_set(extract_palette([picture], all_three)) == {red, green}
+    assert as_set(find_palette([picture], all_three)) == {red, green}
     with pytest.raises(PaletteError, match="raise --max-colors"):
         PaletteOptions(max_colors=1, keep=(red, blue))
 
@@ -98,11 +98,11 @@ def test_a_colour_kept_in_the_place_of_another_is_said() -> None:
     red, blue = (200, 30, 40), (20, 60, 180)
     small = block((red, 97), (blue, 3))
     near = ((40, 85, 190),)  # 0.07 away in OKLab
-    (note,) = extract_palette([small], PaletteOptions(keep=near)).warnings
+    (note,) = find_palette([small], PaletteOptions(keep=near)).warnings
     assert note == "--keep: #2855be itself was not found; kept the nearest, #143cb4"
-    (note,) = extract_palette([block((red, 60), (blue, 40))], PaletteOptions(keep=near)).warnings
+    (note,) = find_palette([block((red, 60), (blue, 40))], PaletteOptions(keep=near)).warnings
     assert note.endswith("#143cb4, which the rule keeps anyway")
-    assert extract_palette([small], PaletteOptions(keep=(blue,))).warnings == ()
+    assert find_palette([small], PaletteOptions(keep=(blue,))).warnings == ()
 
 
 def test_a_found_palette_picked_by_hand_has_the_same_shares() -> None:
@@ -112,7 +112,7 @@ def test_a_found_palette_picked_by_hand_has_the_same_shares() -> None:
     rgba[:, 8:12, :3] = (0, 0, 0)
     rgba[:, [7, 12], :3] = rgba[:, [7, 12], :3] // 2  # the line's soft edges
     line[:, [7, 12]] = True
-    found = extract_palette([rgba], contours=[line])
+    found = find_palette([rgba], contours=[line])
     assert found.dropped == ()
     picked = pick_palette([rgba], found.rgb, [line])
     assert [color.share for color in picked.colors] == [color.share for color in found.colors]
@@ -124,7 +124,7 @@ def test_shades_stay_with_their_paint_and_what_is_left_out_goes_to_the_nearest()
     shaded = np.dstack([np.rint(ramp), np.full((40, 200), 255)]).astype(np.uint8)
     dark, blue = (100, 20, 50), (20, 60, 180)  # the dark one is nearest to some shades
     rgba = np.concatenate([shaded, block((dark, 60), (blue, 5))], axis=1)
-    found = extract_palette([rgba])
+    found = find_palette([rgba])
     assert [color.rgb for color in found.dropped] == [blue]
     picked = pick_palette([rgba], found.rgb)
     more = [p.share - f.share for p, f in zip(picked.colors, found.colors, strict=True)]
@@ -135,11 +135,11 @@ def test_shades_stay_with_their_paint_and_what_is_left_out_goes_to_the_nearest()
 
 def test_the_rule_names_the_least_share_of_all_pixels() -> None:
     rgba, line = lined(0)
-    palette = extract_palette([rgba], contours=[line])
+    palette = find_palette([rgba], contours=[line])
     assert "here 4.8 % of all its pixels" in palette.rule  # 96 % are no lines
     assert min(color.share for color in palette.colors) >= 0.048
-    assert "of the character's pixels" in extract_palette([rgba]).rule
-    assert "at most 2 colours" in extract_palette([rgba], PaletteOptions(max_colors=2)).rule
+    assert "of the character's pixels" in find_palette([rgba]).rule
+    assert "at most 2 colours" in find_palette([rgba], PaletteOptions(max_colors=2)).rule
 
 
 def lined(black_cloth: int) -> tuple[np.ndarray, np.ndarray]:
@@ -154,10 +154,10 @@ def test_lines_count_to_their_ink_and_do_not_push_others_out() -> None:
     rgba = block(((200, 30, 40), 60), ((0, 0, 0), 12), ((20, 60, 180), 3))
     line = np.zeros(rgba.shape[:2], dtype=bool)
     line[:, 60:72] = True
-    assert (20, 60, 180) not in as_set(extract_palette([rgba]))  # 4 %
+    assert (20, 60, 180) not in as_set(find_palette([rgba]))  # 4 %
     rgba, line = rgba[:, 10:], line[:, 10:]  # 4.6 % of all, 5.7 % of what is no line
-    assert (20, 60, 180) not in as_set(extract_palette([rgba]))
-    palette = extract_palette([rgba], contours=[line])
+    assert (20, 60, 180) not in as_set(find_palette([rgba]))
+    palette = find_palette([rgba], contours=[line])
     assert as_set(palette) == {(200, 30, 40), (0, 0, 0), (20, 60, 180)}
     assert palette.contour is not None
     assert palette.contour.share == pytest.approx(12 / 65)
@@ -167,18 +167,18 @@ def test_lines_count_to_their_ink_and_do_not_push_others_out() -> None:
 @pytest.mark.parametrize(("black_cloth", "stays"), [(0, False), (10, True)])
 def test_without_its_lines_black_stays_only_as_cloth(black_cloth: int, stays: bool) -> None:
     rgba, line = lined(black_cloth)
-    palette = extract_palette([rgba], PaletteOptions(contour=False), [line])
+    palette = find_palette([rgba], PaletteOptions(contour=False), [line])
     assert ((0, 0, 0) in as_set(palette)) == stays
     assert palette.contour is not None
     assert palette.contour.cloth == pytest.approx(black_cloth / (50 + black_cloth))
     if not stays:
         kept = PaletteOptions(contour=False, keep=((0, 0, 0),))
-        assert (0, 0, 0) in as_set(extract_palette([rgba], kept, [line]))
+        assert (0, 0, 0) in as_set(find_palette([rgba], kept, [line]))
 
 
 def test_left_out_colours_are_shown_where_they_are() -> None:
     pictures = [block(((200, 30, 40), 90)), block(((200, 30, 40), 90))]
     pictures[1][5:9, 20:26, :3] = (20, 60, 180)
     pictures[0][30:32, 3:5, :3] = (20, 60, 180)
-    palette = with_places(extract_palette(pictures), pictures)
+    palette = with_places(find_palette(pictures), pictures)
     assert [color.place for color in palette.dropped] == [Place(1, (20, 5, 6, 4))]

@@ -10,12 +10,12 @@ from bench.palette.cases import palette_cases, random_paints
 from tests.palette.pictures import as_set, block, soft_stripes
 from toonset.cli.common.palette_report import palette_lines
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.paints.extract import LEAST_LISTED, extract_palette
+from toonset.palette.paints.extract import LEAST_LISTED, find_palette
 from toonset.palette.paints.histogram import count_pixels
 from toonset.palette.paints.places import patches_of, pixels_of
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette, Place
-from toonset.palette.pixels.labels import label_image
+from toonset.palette.pixels.labels import label_pixels
 
 SKIN, HAIR, SHIRT, EYE = (242, 190, 150), (238, 187, 147), (30, 90, 160), (20, 190, 180)
 
@@ -50,7 +50,7 @@ def as_jpeg(picture: np.ndarray, quality: int) -> np.ndarray:
 def test_a_near_equal_colour_is_listed_with_what_it_looks_like(order: tuple) -> None:
     wide = {SKIN: 60, HAIR: 30, SHIRT: 40}
     assert 0.008 < away(SKIN, HAIR) < 0.015
-    palette = extract_palette([block(*((color, wide[color]) for color in order))])
+    palette = find_palette([block(*((color, wide[color]) for color in order))])
     assert as_set(palette) == {SKIN, SHIRT}
     (hair,) = palette.dropped
     assert hair.rgb == HAIR
@@ -63,22 +63,22 @@ def test_a_near_equal_colour_is_listed_with_what_it_looks_like(order: tuple) -> 
 
 def test_a_near_equal_colour_can_be_kept() -> None:
     picture = block((SKIN, 60), (HAIR, 30), (SHIRT, 40))
-    palette = extract_palette([picture], PaletteOptions(keep=(HAIR,)))
+    palette = find_palette([picture], PaletteOptions(keep=(HAIR,)))
     assert as_set(palette) == {SKIN, HAIR, SHIRT}
     assert palette.dropped == palette.warnings == ()
     assert {c.rgb: round(130 * c.share) for c in palette.colors} == {SKIN: 60, SHIRT: 40, HAIR: 30}
-    labels = label_image(picture, palette.rgb)
+    labels = label_pixels(picture, palette.rgb)
     assert np.array_equal(palette.rgb[labels[:, 4:-4]][5, 60:80], [HAIR] * 20)
 
 
 def test_a_near_equal_colour_under_the_rule_is_not_listed() -> None:
     picture = block((SKIN, 60), (HAIR, 3), (SHIRT, 40))
-    assert listed(extract_palette([picture])) == []
-    assert listed(extract_palette([picture], PaletteOptions(min_share=0.02))) == [HAIR]
+    assert listed(find_palette([picture])) == []
+    assert listed(find_palette([picture], PaletteOptions(min_share=0.02))) == [HAIR]
 
 
 def test_near_equal_colours_of_a_jpeg_are_listed() -> None:
-    palette = extract_palette([as_jpeg(block((SKIN, 64), (SHIRT, 40), (HAIR, 64)), 90)])
+    palette = find_palette([as_jpeg(block((SKIN, 64), (SHIRT, 40), (HAIR, 64)), 90)])
     assert len(palette.colors) == 2
     kept = min((color.rgb for color in palette.colors), key=lambda rgb: away(rgb, SKIN))
     (other,) = listed(palette)
@@ -92,15 +92,15 @@ def test_gradients_and_noise_have_no_near_equal_colours(levels: int) -> None:
     noisy = 200 + rng.normal(0, levels / 8, ramp.shape)
     for picture in (ramp, noisy):
         rgba = np.dstack([np.rint(picture), np.full(ramp.shape[:2], 255)]).astype(np.uint8)
-        assert listed(extract_palette([rgba])) == []
+        assert listed(find_palette([rgba])) == []
 
 
 def test_the_ends_of_an_uneven_gradient_are_no_near_equal_colours() -> None:
     ends = ((200, 120, 90), 60), ((206, 123, 93), 60)
     between = [((200 + i, 120 + i // 2, 90 + i // 2), 18) for i in range(1, 6)]
     rest = (SHIRT, 700)
-    assert listed(extract_palette([block(ends[0], *between, ends[1], rest)])) == []
-    (near,) = listed(extract_palette([block(*ends, rest)]))
+    assert listed(find_palette([block(ends[0], *between, ends[1], rest)])) == []
+    (near,) = listed(find_palette([block(*ends, rest)]))
     assert near in [color for color, _ in ends]
 
 
@@ -109,35 +109,35 @@ def test_the_ends_of_an_uneven_gradient_are_no_near_equal_colours() -> None:
 
 def test_tiny_features_of_an_own_colour_are_listed_and_can_be_kept() -> None:
     picture = with_spots(EYE, (50, 10), (70, 10))
-    palette = extract_palette([picture])
+    palette = find_palette([picture])
     assert as_set(palette) == {SKIN, SHIRT}
     (eye,) = palette.dropped
     assert (eye.rgb, eye.place) == (EYE, Place(0, (50, 10, 3, 3)))
     assert eye.share == pytest.approx(18 / 10400)
-    kept = extract_palette([picture], PaletteOptions(keep=(EYE,)))
+    kept = find_palette([picture], PaletteOptions(keep=(EYE,)))
     assert as_set(kept) == {SKIN, SHIRT, EYE}
     assert kept.dropped == kept.warnings == ()
 
 
 def test_a_feature_may_be_there_once_in_two_pictures() -> None:
     once = with_spots(EYE, (50, 10))
-    assert listed(extract_palette([once])) == []
-    assert listed(extract_palette([once, once[:, ::-1]])) == [EYE]
+    assert listed(find_palette([once])) == []
+    assert listed(find_palette([once, once[:, ::-1]])) == [EYE]
 
 
 def test_what_blends_and_shades_look_like_is_no_feature() -> None:
     middle, shade = (136, 140, 155), (226, 172, 132)
     assert 0.04 < away(SKIN, shade) < 0.08
     for color in (middle, shade):
-        assert listed(extract_palette([with_spots(color, (50, 10), (70, 10))])) == []
-    assert listed(extract_palette([soft_stripes(SKIN, SHIRT, EYE)])) == []
+        assert listed(find_palette([with_spots(color, (50, 10), (70, 10))])) == []
+    assert listed(find_palette([soft_stripes(SKIN, SHIRT, EYE)])) == []
 
 
 @pytest.mark.parametrize("seed", [5, 1000])
 def test_tiny_features_that_are_listed_are_true_colours(seed: int) -> None:
     for case in palette_cases(None, seed, quick=True):
         true = oklab_from_rgb(case.colors)
-        for color in extract_palette(case.images).dropped:
+        for color in find_palette(case.images).dropped:
             own = oklab_from_rgb(np.array(color.rgb, dtype=np.uint8))
             near = np.linalg.norm(true - own, axis=1).min() < 0.02
             assert near or color.share >= LEAST_LISTED, (case.name, case.group, color)
@@ -150,13 +150,13 @@ def test_large_spots_are_listed_in_a_jpeg_too_and_smears_are_not() -> None:
         picture[50:66, x : x + 16, :3] = EYE
     assert min(away(EYE, color) for color in paints) > 0.1
     noisy = as_jpeg(picture, 90)
-    assert [away(rgb, EYE) < 0.03 for rgb in listed(extract_palette([noisy]))] == [True]
+    assert [away(rgb, EYE) < 0.03 for rgb in listed(find_palette([noisy]))] == [True]
 
 
 def test_ink_that_no_pixel_shows_pure_is_listed() -> None:
     cases = palette_cases(None, 1007, quick=True)
     lined = next(case for case in cases if case.group == "150 px, lines, jpeg 80")
-    palette = extract_palette(lined.images)
+    palette = find_palette(lined.images)
     assert (0, 0, 0) in listed(palette)
     assert all(color.cost > 0 for color in palette.dropped)
 
@@ -205,24 +205,24 @@ def with_dots(color: tuple[int, int, int], *at: tuple[float, float], radius: flo
 
 @pytest.mark.parametrize("radius", [0.5, 0.8, 1.1])
 def test_spots_too_small_to_show_their_colour_are_warned_of(radius: float) -> None:
-    palette = extract_palette([with_dots(EYE, (50.3, 20.2), (80.4, 20.6), radius=radius)])
+    palette = find_palette([with_dots(EYE, (50.3, 20.2), (80.4, 20.6), radius=radius)])
     (warning,) = palette.warnings
     assert warning.startswith("2 spots such as picture 0 at (")
     assert "draw the sheet larger" in warning
 
 
 def test_a_single_small_spot_may_be_a_slip() -> None:
-    assert not extract_palette([with_dots(EYE, (50.3, 20.2), radius=0.8)]).warnings
+    assert not find_palette([with_dots(EYE, (50.3, 20.2), radius=0.8)]).warnings
 
 
 def test_small_spots_of_a_paint_are_no_unknown_colour() -> None:
-    palette = extract_palette([with_dots(SHIRT, (50.3, 20.2), (80.4, 20.6), radius=0.8)])
+    palette = find_palette([with_dots(SHIRT, (50.3, 20.2), (80.4, 20.6), radius=0.8)])
     assert not palette.warnings
 
 
 def test_small_spots_across_a_border_are_blends() -> None:
     soft = with_dots(SKIN, (199.7, 10.0), (200.4, 30.3), radius=0.8)
-    assert not extract_palette([soft]).warnings
+    assert not find_palette([soft]).warnings
 
 
 def test_spots_that_a_line_surrounds_are_blends_of_three() -> None:
@@ -230,22 +230,22 @@ def test_spots_that_a_line_surrounds_are_blends_of_three() -> None:
     both = np.array(SHIRT) * 0.4 + np.array(ink) * 0.35 + np.array(SKIN) * 0.25
     blend = (round(both[0]), round(both[1]), round(both[2]))
     spots = with_spots(blend, (50, 20), (80, 20), px=1)
-    assert extract_palette([spots]).warnings  # without the ink it is no blend of what there is
+    assert find_palette([spots]).warnings  # without the ink it is no blend of what there is
     spots[:, 100::8, :3] = ink
     spots[:, 100:101, :3] = SKIN
-    assert not extract_palette([spots]).warnings
+    assert not find_palette([spots]).warnings
 
 
 @pytest.mark.parametrize("other", [np.s_[:0], np.s_[:, :0], np.s_[:1], np.s_[:, :1], np.s_[:2]])
 def test_pictures_without_room_for_a_spot_have_none(other: tuple) -> None:
     spots = with_dots(EYE, (50.3, 20.2), (80.4, 20.6), radius=0.8)
-    assert extract_palette([spots, np.zeros_like(spots), spots[other]]).warnings
-    assert not extract_palette([spots[:2], spots[:, :2]]).warnings
+    assert find_palette([spots, np.zeros_like(spots), spots[other]]).warnings
+    assert not find_palette([spots[:2], spots[:, :2]]).warnings
 
 
 def test_texture_is_soon_given_up() -> None:
     picture = block((SKIN, 400), (SHIRT, 400))
     picture = np.tile(picture, (10, 1, 1))
     picture[2::5, 2::5, :3] = EYE
-    (warning,) = extract_palette([picture]).warnings
+    (warning,) = find_palette([picture]).warnings
     assert warning.startswith("at least 512 spots")

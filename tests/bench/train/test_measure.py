@@ -36,7 +36,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.score.metrics_view import Judges
 from toonset.nerf.train import box_rays
 from toonset.nerf.train.labelling import without_palette
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 
 # a grid in the whole box, of few rays a step: small scenes train in seconds
 QUICK = TrainOptions(device="cpu", carve=False, field="voxel", register=False, unbend=False)
@@ -165,8 +165,8 @@ def test_snapshots_are_the_field_as_it_was_and_cost_no_training_time() -> None:
 
     watch = Slow(time.perf_counter(), time.process_time(), carved=False)
     scene = without_palette(case().train)
-    watched = train(scene, options, watch=watch)
-    alone = train(scene, options)
+    watched = fit_field(scene, options, watch=watch)
+    alone = fit_field(scene, options)
     points = torch.rand(50, 3) - 0.5
     expected = alone.result.field(points)
     states = [trained for _, trained in watch.states()]

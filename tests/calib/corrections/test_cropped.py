@@ -7,14 +7,14 @@ import pytest
 import trimesh
 
 from bench.cases.bodies import random_body
-from toonset.calib.calibrate import calibrate
 from toonset.calib.corrections.cropped import at_cuts, ending_at, flat_sides
+from toonset.calib.find_cameras import find_cameras
 from toonset.calib.outline.correspondences import Drawing
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.mesh.load import save_obj
 from toonset.dataset.silhouettes.contour import drawn_contour
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
@@ -101,7 +101,7 @@ def test_feet_that_are_missing_do_not_shrink_the_figure(made, paper):
         without_feet(view, camera, paper) if i in (1, 3) else (view, camera)
         for i, (view, camera) in enumerate(zip(made.views, made.cameras, strict=True))
     ]
-    found = calibrate([view for view, _ in cut], made.mesh)
+    found = find_cameras([view for view, _ in cut], made.mesh)
     assert [c.view for c in found.cuts] == [made.views[1].name, made.views[3].name]
     assert all(c.lost_px == pytest.approx(LOST, abs=5) for c in found.cuts)
     assert found.verdict == "ok"
@@ -126,7 +126,7 @@ def test_a_closely_cropped_figure_is_whole(made):
         kept = view.rgba[: rows[-1] + 1]  # paper above, none below
         size = (kept.shape[1], kept.shape[0])
         pairs.append((replace(view, rgba=kept), camera.moved((0, 0), size)))
-    found = calibrate([view for view, _ in pairs], made.mesh)
+    found = find_cameras([view for view, _ in pairs], made.mesh)
     assert found.cuts == ()
     assert found.verdict == "ok"
 
@@ -144,9 +144,9 @@ def test_longer_legs_than_the_characters_are_no_cut(elevation):
         return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
     options = replace(OPTIONS, views=8, cell_px=200, elevation_deg=elevation)
-    views = split_sheet(make_turnaround(figure(1.0), options, 0).sheet).views
+    views = split_picture(make_turnaround(figure(1.0), options, 0).sheet).views
     assert any(side.side == "bottom" for view in views for side in flat_sides(view))
-    assert calibrate(views, figure(1.3)).cuts == ()
+    assert find_cameras(views, figure(1.3)).cuts == ()
 
 
 def test_calibrate_ends_the_picture_at_the_cut_and_says_so(toonset, made, tmp_path):

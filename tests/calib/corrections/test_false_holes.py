@@ -13,7 +13,7 @@ from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.mesh.load import save_obj
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.view import View
@@ -51,7 +51,8 @@ def filled(views, yaws, papers=None, verdict="ok", elevation: float = 0.0):
     looks = [SimpleNamespace(camera=camera_at(y, elevation), verdict=verdict) for y in yaws]
     found = cast("list[ViewCalibration]", looks)
     papers = papers or [WHITE] * len(views)
-    return without_false_holes(views, found, papers, slab())
+    views = [replace(view, paper=paper) for view, paper in zip(views, papers, strict=True)]
+    return without_false_holes(views, found, slab())
 
 
 def test_a_hole_that_the_back_does_not_show_is_paint():
@@ -116,12 +117,12 @@ def test_calibrate_fills_a_white_buckle_and_says_so(toonset, tmp_path):
     options = SynthOptions(views=4, cell_px=200, outline_px=0, elevation_deg=8)
     made = make_turnaround(random_body(11), options, 11)
     sheet = made.sheet.copy()
-    front = split_sheet(sheet).views[0]
+    front = split_picture(sheet).views[0]
     x, y, width, height = front.figure_box
     row, column = y + round(0.38 * height), x + width // 2
     sheet[row - 6 : row + 6, column - 6 : column + 6, :3] = 20
     sheet[row - 4 : row + 4, column - 4 : column + 4, :3] = 255
-    cut = split_sheet(sheet).views[0]
+    cut = split_picture(sheet).views[0]
     assert not cut.mask[row - cut.box[1], column - cut.box[0]]  # taken for a hole
     write_bytes(tmp_path / "sheet.png", encode_png(sheet))
     write_bytes(tmp_path / "body.obj", save_obj(made.mesh))

@@ -10,13 +10,13 @@ import pytest
 
 from bench.cases.bodies import random_body
 from bench.stability.damage import stretched
-from toonset.calib.calibrate import calibrate
 from toonset.calib.corrections.stretched import (
     Stretches,
     as_drawn,
     stretched_mannequin,
     unstretched,
 )
+from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import BIC_MARGIN, STRETCHED, TALLER
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.result import Calibration, CutOff, FlatSide
@@ -45,7 +45,7 @@ def test_each_drawing_is_seen_through_pixels_of_its_own(made: Turnaround) -> Non
         stretched(view, camera, growth[i]) if i in growth else (view, camera)
         for i, (view, camera) in enumerate(zip(made.views, made.cameras, strict=True))
     ]
-    found = calibrate([view for view, _ in pairs], made.mesh)
+    found = find_cameras([view for view, _ in pairs], made.mesh)
     assert proven(found) == {STRETCHED}
     assert found.verdict == "ok"
     points = made.mesh.vertices[::50]
@@ -61,7 +61,7 @@ def test_each_drawing_is_seen_through_pixels_of_its_own(made: Turnaround) -> Non
 def test_drawing_error_is_no_stretch(seed: int, looks: str) -> None:
     drawn = replace(OPTIONS, outline_px=2, warp_percent=1.2)
     made = make_turnaround(random_body(seed), drawn, seed)
-    found = calibrate(made.views, made.mesh)
+    found = find_cameras(made.views, made.mesh)
     gains = {rung.name: rung.bic_gain for rung in found.model.rungs}
     assert gains[looks] > BIC_MARGIN  # strong evidence by itself
     assert not proven(found)
@@ -70,7 +70,7 @@ def test_drawing_error_is_no_stretch(seed: int, looks: str) -> None:
 
 def test_a_lower_mannequin_is_made_as_tall_as_the_drawings(made: Turnaround) -> None:
     low = stretched_mannequin(made.mesh, Stretches((), np.log(0.85), ()))
-    found = calibrate(made.views, low)
+    found = find_cameras(made.views, low)
     assert proven(found) == {TALLER}
     assert found.verdict == "ok"
     assert {view.camera.pixel_aspect for view in found.views} == {1.0}
@@ -117,7 +117,7 @@ def test_a_picture_without_its_stretch_loses_nothing() -> None:
 
 
 def test_cuts_are_told_in_the_drawings_own_pixels(made: Turnaround) -> None:
-    found = calibrate(made.views, made.mesh)
+    found = find_cameras(made.views, made.mesh)
     shown = [unstretched(view, np.log(1.25)) for view in made.views]
     width, height = shown[0].rgba.shape[1::-1]
     side = FlatSide("right", width, ((40, 60),), at_edge=True)

@@ -8,18 +8,19 @@ import pytest
 from bench.stability.draws import warped
 from bench.stability.sheet import DrawnSheet
 from toonset.calib import pipeline
-from toonset.calib.calibrate import Calibration, calibrate
+from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import PROPORTIONS, UNSTEADY, UNSTEADY_MARGIN
 from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
+from toonset.calib.result import Calibration
 from toonset.calib.search.alternatives import WORTH, steadied
 from toonset.calib.search.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates
 from toonset.camera import rotation_distance
 
 
 def calibrated(sheet: DrawnSheet) -> Calibration:
-    return calibrate([view for view, _ in sheet.drawings], sheet.mesh)
+    return find_cameras([view for view, _ in sheet.drawings], sheet.mesh)
 
 
 def test_a_rival_that_only_drawing_error_makes_is_none() -> None:

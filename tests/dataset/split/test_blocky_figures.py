@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
-from toonset.calib.calibrate import calibrate
+from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.align import Fit
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose
@@ -17,7 +17,7 @@ from toonset.calib.search.hypotheses import (
     looks_alike_from_behind,
 )
 from toonset.camera import rotation_distance, rotation_from_angles
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
@@ -50,7 +50,7 @@ def stack() -> Mesh:
 def test_a_profile_that_is_a_rectangle_is_a_view(stack):
     options = SynthOptions(views=8, cell_px=200, outline_px=0)
     made = make_turnaround(stack, options, 0)
-    found = split_sheet(made.sheet)
+    found = split_picture(made.sheet)
     assert len(found.views) == 8
     assert not found.left_out
 
@@ -61,7 +61,7 @@ def test_a_patch_of_one_colour_is_none(stack):
     rows = np.flatnonzero((sheet[..., :3] != sheet[0, 0, :3]).any(axis=(1, 2)))
     wide = np.concatenate([sheet, np.broadcast_to(sheet[:1, :1], (len(sheet), 140, 4))], axis=1)
     wide[rows[0] : rows[-1], -120:-40, :3] = RED
-    found = split_sheet(wide)
+    found = split_picture(wide)
     assert len(found.views) == 4
     assert [patch.kind for patch in found.left_out] == ["swatch"]
 
@@ -72,7 +72,7 @@ def test_what_looks_alike_from_behind_is_ambiguous(stack):
         "distance_heights": 2.5,
     }  # no mirror twins, so that this alone counts
     options = SynthOptions(views=5, cell_px=200, outline_px=0, **near)
-    found = calibrate(make_turnaround(stack, options, 0).views, stack)
+    found = find_cameras(make_turnaround(stack, options, 0).views, stack)
     assert {view.verdict for view in found.views} == {"ambiguous"}
 
 

@@ -6,7 +6,7 @@ from bench.messy.sheet import make_messy_sheet
 from bench.split.cases import Drawn, SplitCase
 from bench.split.methods import by_toonset
 from bench.split.score import score
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 
 
 def fault(seed: int, *what: str) -> str:
@@ -18,7 +18,7 @@ def fault(seed: int, *what: str) -> str:
 @pytest.mark.parametrize("seed", [5001, 5016])
 def test_soft_shadows_of_any_strength_are_left_out(seed: int) -> None:
     assert fault(seed, "shadows") == ""
-    remarks = split_sheet(make_messy_sheet(seed, ("shadows",)).rgba).remarks
+    remarks = split_picture(make_messy_sheet(seed, ("shadows",)).rgba).remarks
     assert "shadows on the ground were left out" in remarks
 
 

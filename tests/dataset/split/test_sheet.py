@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.split.sheet import Sheet, SheetOptions, split_sheet
+from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
 from toonset.errors import SheetError
 
 WHITE = (255, 255, 255)
@@ -75,7 +75,7 @@ def row_of_four(
     return drawing
 
 
-def pasted(sheet: Sheet, shape: tuple[int, ...]) -> np.ndarray:
+def pasted(sheet: Segmentation, shape: tuple[int, ...]) -> np.ndarray:
     """Return the views' alpha laid back to their places."""
     alpha = np.zeros(shape[:2], dtype=np.uint8)
     for view in sheet.views:
@@ -85,7 +85,7 @@ def pasted(sheet: Sheet, shape: tuple[int, ...]) -> np.ndarray:
     return alpha
 
 
-def recomposed(sheet: Sheet, shape: tuple[int, ...], ground: tuple[int, ...]) -> np.ndarray:
+def recomposed(sheet: Segmentation, shape: tuple[int, ...], ground: tuple[int, ...]) -> np.ndarray:
     result = np.empty((*shape[:2], 3))
     result[:] = ground
     for view in sheet.views:
@@ -96,7 +96,7 @@ def recomposed(sheet: Sheet, shape: tuple[int, ...], ground: tuple[int, ...]) ->
     return result
 
 
-def main_colors(sheet: Sheet) -> list[int]:
+def main_colors(sheet: Segmentation) -> list[int]:
     """Return for every view which of COLORS its lower half has."""
     found = []
     for view in sheet.views:
@@ -110,7 +110,7 @@ def main_colors(sheet: Sheet) -> list[int]:
 @pytest.mark.parametrize("line", [0, 2.5])
 def test_laying_the_views_back_gives_the_sheet(ground: tuple[int, int, int], line: float) -> None:
     drawing = row_of_four(ground, line)
-    sheet = split_sheet(drawing.rgba)
+    sheet = split_picture(drawing.rgba)
     assert len(sheet.views) == 4
     assert sheet.background == ground
     assert sheet.sure > 0.99
@@ -122,7 +122,7 @@ def test_laying_the_views_back_gives_the_sheet(ground: tuple[int, int, int], lin
 @pytest.mark.parametrize("line", [0, 2.5])
 def test_alpha_is_the_true_coverage(ground: tuple[int, int, int], line: float) -> None:
     drawing = row_of_four(ground, line)
-    sheet = split_sheet(drawing.rgba)
+    sheet = split_picture(drawing.rgba)
     difference = np.abs(pasted(sheet, drawing.rgba.shape).astype(int) - drawing.coverage)
     edge = (drawing.coverage > 0) & (drawing.coverage < 255)
     assert difference[~edge].mean() < 0.2
@@ -132,7 +132,7 @@ def test_alpha_is_the_true_coverage(ground: tuple[int, int, int], line: float) -
 
 def test_edge_colours_are_pure() -> None:
     drawing = Drawing(100, 100).ellipse(50, 50, 30, 30, RED)
-    view = split_sheet(drawing.rgba).views[0]
+    view = split_picture(drawing.rgba).views[0]
     edge = (view.rgba[..., 3] > 60) & (view.rgba[..., 3] < 255)
     assert edge.sum() > 50
     assert np.abs(view.rgba[edge, :3].astype(int) - RED).max() <= 4
@@ -142,7 +142,7 @@ def test_pixel_art_stays_hard() -> None:
     art = np.random.default_rng(0).integers(0, 200, (12, 8, 3), dtype=np.uint8)
     picture = np.full((80, 60, 4), 255, dtype=np.uint8)
     picture[10:58, 14:46, :3] = art.repeat(4, axis=0).repeat(4, axis=1)
-    view = split_sheet(picture).views[0]
+    view = split_picture(picture).views[0]
     assert set(np.unique(view.rgba[..., 3])) == {0, 255}
     assert np.array_equal(view.rgba[view.mask][:, :3], picture[10:58, 14:46, :3].reshape(-1, 3))
 
@@ -150,7 +150,7 @@ def test_pixel_art_stays_hard() -> None:
 def test_a_transparent_sheet_is_cut_by_its_own_alpha() -> None:
     drawing = row_of_four()
     picture = np.dstack([drawing.rgba[..., :3], drawing.coverage])
-    sheet = split_sheet(picture)
+    sheet = split_picture(picture)
     assert sheet.background is None
     assert np.array_equal(pasted(sheet, picture.shape), drawing.coverage)
     assert main_colors(sheet) == [0, 1, 2, 3]
@@ -159,7 +159,7 @@ def test_a_transparent_sheet_is_cut_by_its_own_alpha() -> None:
 def test_transparency_counts_even_where_the_figure_fills_the_border() -> None:
     picture = np.full((80, 60, 4), (*RED, 255), dtype=np.uint8)
     picture[:20, :12] = (*BLUE, 0)  # hidden colour under no coverage
-    sheet = split_sheet(picture)
+    sheet = split_picture(picture)
     assert sheet.background is None
     assert np.array_equal(sheet.views[0].rgba[..., 3], picture[..., 3])
 
@@ -167,26 +167,26 @@ def test_transparency_counts_even_where_the_figure_fills_the_border() -> None:
 def test_a_stray_transparent_pixel_shows_paper() -> None:
     picture = row_of_four().rgba
     picture[3, 4] = (0, 0, 0, 0)
-    assert main_colors(split_sheet(picture)) == [0, 1, 2, 3]
-    assert split_sheet(picture).warnings == ()
+    assert main_colors(split_picture(picture)) == [0, 1, 2, 3]
+    assert split_picture(picture).warnings == ()
 
 
 def test_views_come_in_reading_order() -> None:
-    sheet = split_sheet(row_of_four().rgba)
+    sheet = split_picture(row_of_four().rgba)
     assert main_colors(sheet) == [0, 1, 2, 3]
     assert [view.name for view in sheet.views] == ["000.png", "001.png", "002.png", "003.png"]
 
 
 def test_mirroring_the_sheet_mirrors_the_order() -> None:
     mirrored = np.ascontiguousarray(row_of_four().rgba[:, ::-1])
-    assert main_colors(split_sheet(mirrored)) == [3, 2, 1, 0]
+    assert main_colors(split_picture(mirrored)) == [3, 2, 1, 0]
 
 
 @pytest.mark.parametrize("shift", [(0, 7), (11, 0), (23, 40)])
 def test_moving_the_drawings_moves_only_the_boxes(shift: tuple[int, int]) -> None:
     picture = row_of_four(line=2).rgba
     moved = np.pad(picture, ((shift[0], 3), (shift[1], 9), (0, 0)), constant_values=255)
-    before, after = split_sheet(picture), split_sheet(moved)
+    before, after = split_picture(picture), split_picture(moved)
     for old, new in zip(before.views, after.views, strict=True):
         assert np.array_equal(old.rgba, new.rgba)
         assert new.box == (old.box[0] + shift[1], old.box[1] + shift[0], *old.box[2:])
@@ -197,7 +197,7 @@ def test_two_rows_of_uneven_heights() -> None:
     drawing = Drawing(300, 260)
     for i, (x, y) in enumerate([(50, 66), (150, 60), (250, 70), (60, 190), (200, 196)]):
         drawing.ellipse(x, y, 20, 30 + 5 * (i % 3), COLORS[i % 4])
-    assert main_colors(split_sheet(drawing.rgba)) == [0, 1, 2, 3, 0]
+    assert main_colors(split_picture(drawing.rgba)) == [0, 1, 2, 3, 0]
 
 
 def test_apart_parts_join_and_captions_and_specks_do_not() -> None:
@@ -206,7 +206,7 @@ def test_apart_parts_join_and_captions_and_specks_do_not() -> None:
     drawing.ellipse(222, 120, 6, 2, BLUE)  # a hand beside the third
     drawing.text("FRONT", 20, 137)
     drawing.ellipse(350, 5, 1, 1, RED)
-    sheet = split_sheet(drawing.rgba)
+    sheet = split_picture(drawing.rgba)
     assert len(sheet.views) == 4
     assert (sheet.views[0].rgba[:10, :, 2] == 180).any()
     assert [left.kind for left in sheet.left_out] == ["text", "speck"]
@@ -219,7 +219,7 @@ def test_a_gap_between_arm_and_body_is_a_hole_and_an_eye_is_not() -> None:
     drawing = Drawing(140, 160).ellipse(70, 85, 40, 60, RED).hole(52, 100, 6, 20)
     drawing.ellipse(80, 50, 12, 8, WHITE)
     drawing.ellipse(80, 50, 4, 4, BLACK)  # the pupil: the white round it is an eye
-    view = split_sheet(drawing.rgba).views[0]
+    view = split_picture(drawing.rgba).views[0]
     x, y = view.box[:2]
     assert view.rgba[100 - y, 52 - x, 3] == 0
     assert view.rgba[50 - y, 71 - x, 3] == 255
@@ -228,13 +228,13 @@ def test_a_gap_between_arm_and_body_is_a_hole_and_an_eye_is_not() -> None:
 def test_a_white_shirt_without_contour_in_an_inked_drawing_is_no_hole() -> None:
     drawing = Drawing(140, 160).ellipse(70, 80, 40, 60, RED, 3)
     drawing.ellipse(70, 80, 20, 20, WHITE)
-    view = split_sheet(drawing.rgba).views[0]
+    view = split_picture(drawing.rgba).views[0]
     assert view.rgba[80 - view.box[1], 70 - view.box[0], 3] == 255
 
 
 def test_line_art_keeps_its_paper() -> None:
     drawing = Drawing(140, 160).ellipse(70, 85, 40, 60, WHITE, 3)
-    view = split_sheet(drawing.rgba).views[0]
+    view = split_picture(drawing.rgba).views[0]
     assert view.rgba[85 - view.box[1], 70 - view.box[0], 3] == 255
     assert view.line_width_px == pytest.approx(3, abs=0.4)
 
@@ -242,12 +242,12 @@ def test_line_art_keeps_its_paper() -> None:
 @pytest.mark.parametrize("line", [0, 2, 3, 5])
 def test_contour_width(line: float) -> None:
     drawing = Drawing(170, 230).ellipse(85, 120, 45, 90, SKIN, line)
-    view = split_sheet(drawing.rgba).views[0]
+    view = split_picture(drawing.rgba).views[0]
     assert view.line_width_px == pytest.approx(line, abs=0.5)
 
 
 def test_a_dark_figure_has_no_contour() -> None:
-    view = split_sheet(Drawing(170, 230).ellipse(85, 120, 45, 90, (20, 22, 30)).rgba).views[0]
+    view = split_picture(Drawing(170, 230).ellipse(85, 120, 45, 90, (20, 22, 30)).rgba).views[0]
     assert view.line_width_px == 0
 
 
@@ -258,7 +258,7 @@ def test_jpeg_noise_neither_makes_figures_nor_fattens_them(quality: int, line: f
     buffer = io.BytesIO()
     Image.fromarray(drawing.rgba[..., :3]).save(buffer, "JPEG", quality=quality)
     picture = np.asarray(Image.open(buffer).convert("RGBA"))
-    sheet = split_sheet(picture)
+    sheet = split_picture(picture)
     assert main_colors(sheet) == [0, 1, 2, 3]
     overlap = (pasted(sheet, picture.shape) >= 128) ^ (drawing.coverage >= 128)
     assert overlap.sum() < 0.01 * (drawing.coverage >= 128).sum()
@@ -269,10 +269,10 @@ def test_frame_and_guide_lines_are_no_figures() -> None:
     picture = np.pad(picture, ((9, 9), (9, 9), (0, 0)), constant_values=255)
     picture[3:5, 3:-3, :3] = picture[-5:-3, 3:-3, :3] = 90  # a frame
     picture[3:-3, 3:5, :3] = picture[3:-3, -5:-3, :3] = 90
-    bare = split_sheet(picture)
+    bare = split_picture(picture)
     assert main_colors(bare) == [0, 1, 2, 3]
     picture[70, 5:-5, :3] = (90, 160, 220)  # a guide at the height of the waists
-    ruled = split_sheet(picture)
+    ruled = split_picture(picture)
     assert main_colors(ruled) == [0, 1, 2, 3]
     for old, new in zip(bare.views, ruled.views, strict=True):
         assert (old.mask ^ new.mask).sum() < 0.02 * old.mask.sum()
@@ -282,14 +282,14 @@ def test_two_touching_figures_are_told() -> None:
     drawing = Drawing(420, 120)
     for x in (40, 110, 180, 290, 338):
         drawing.ellipse(x, 60, 25, 45, RED)
-    sheet = split_sheet(drawing.rgba)
+    sheet = split_picture(drawing.rgba)
     assert len(sheet.views) == 4
     assert sheet.warnings == ("view 003.png is unusually wide: do two figures touch?",)
 
 
 def test_a_single_figure_that_touches_the_border() -> None:
     drawing = Drawing(100, 120).ellipse(50, 70, 30, 60, RED)
-    sheet = split_sheet(drawing.rgba)
+    sheet = split_picture(drawing.rgba)
     assert len(sheet.views) == 1
     assert sheet.sure < 0.95
 
@@ -309,7 +309,7 @@ def test_a_single_figure_that_touches_the_border() -> None:
 )
 def test_sheets_without_figures_are_refused(picture: np.ndarray, fragment: str) -> None:
     with pytest.raises(SheetError, match=fragment):
-        split_sheet(picture.astype(np.uint8))
+        split_picture(picture.astype(np.uint8))
 
 
 def test_too_many_figures_are_refused() -> None:
@@ -318,5 +318,5 @@ def test_too_many_figures_are_refused() -> None:
         for column in range(5, 190, 18):
             picture[row : row + 10, column : column + 10, :3] = 0
     with pytest.raises(SheetError, match="found 121 figures, at most 64"):
-        split_sheet(picture)
-    assert len(split_sheet(picture, SheetOptions(most_figures=200)).views) == 121
+        split_picture(picture)
+    assert len(split_picture(picture, SheetOptions(most_figures=200)).views) == 121

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.messy.sheet import make_messy_sheet
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 
 
 def figure(height: int, shirt: tuple[int, int, int]) -> np.ndarray:
@@ -32,7 +32,7 @@ def sheet_of(*figures: np.ndarray) -> np.ndarray:
 def test_a_small_figure_of_the_same_kind_is_doubted(height: int) -> None:
     red = (200, 40, 40)
     views = [figure(280, red) for _ in range(4)]
-    sheet = split_sheet(sheet_of(*views, figure(height, red)))
+    sheet = split_picture(sheet_of(*views, figure(height, red)))
     assert len(sheet.views) == 4
     assert any("left out: if it is a view" in line for line in sheet.warnings)
 
@@ -41,7 +41,7 @@ def test_a_small_figure_in_other_colours_is_not() -> None:
     views = [figure(280, (200, 40, 40)) for _ in range(4)]
     other = figure(165, (40, 160, 60))
     other[(other < 255).any(axis=2)] = (90, 200, 40)
-    sheet = split_sheet(sheet_of(*views, other))
+    sheet = split_picture(sheet_of(*views, other))
     assert len(sheet.views) == 4
     assert sheet.warnings == ()
 
@@ -49,6 +49,6 @@ def test_a_small_figure_in_other_colours_is_not() -> None:
 @pytest.mark.parametrize("kind", ["heads", "props"])
 def test_few_heads_and_swords_are_doubted(kind: str) -> None:
     doubted = [
-        bool(split_sheet(make_messy_sheet(s, (kind,)).rgba).warnings) for s in range(7300, 7306)
+        bool(split_picture(make_messy_sheet(s, (kind,)).rgba).warnings) for s in range(7300, 7306)
     ]
     assert sum(doubted) <= 1

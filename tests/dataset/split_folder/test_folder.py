@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw
 from toonset.dataset.images.folder import natural_key, picture_files
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.silhouettes.line_width import contour_width_px
-from toonset.dataset.split.sheet import LeftOut, Sheet
+from toonset.dataset.split.sheet import LeftOut, Segmentation
 from toonset.dataset.split_folder.boxes import read_boxes
 from toonset.dataset.split_folder.checks import odd_files
 from toonset.dataset.split_folder.read import read_split
@@ -43,7 +43,7 @@ def cut() -> Split:
         rgba, box = figure(color), (10 + 70 * number, 5, 60, 100)
         views.append(View(rgba, box, contour_width_px(rgba), f"{number:03d}.png"))
     left = (LeftOut((1, 2, 30, 4), "text"),)
-    sheet = Sheet(tuple(views), (255, 255, 255), 1.0, ("two figures touch",), left)
+    sheet = Segmentation(tuple(views), (255, 255, 255), 1.0, ("two figures touch",), left)
     found = split_of_sheet("sheet.png", b"the file", (300, 110), sheet)
     return replace(found, labels=("front", "", "back", "90"))
 
@@ -270,7 +270,7 @@ def test_joined_sheets_number_through():
 
 def single(name: str, height: int, digest: str) -> Split:
     rgba = np.full((height, 20, 4), 255, np.uint8)
-    sheet = Sheet((View(rgba, (0, 0, 20, height), 0.0, "000.png"),), None, 1.0, ())
+    sheet = Segmentation((View(rgba, (0, 0, 20, height), 0.0, "000.png"),), None, 1.0, ())
     return split_of_sheet(name, digest.encode(), (20, height), sheet)
 
 

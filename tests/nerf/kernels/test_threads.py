@@ -13,7 +13,7 @@ from bench.cases.cases import train_cases
 from toonset.nerf.kernels.threads import SIDES, side_by_side, threads_in_use, use_threads
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.train.labelling import labelled
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 
 
 @pytest.fixture(autouse=True)
@@ -86,7 +86,7 @@ def test_one_and_two_threads_give_the_same_bits(carve: bool) -> None:
     found = []
     for count in (1, 2):
         use_threads(count, SIDES)
-        training = train(scene, options)
+        training = fit_field(scene, options)
         assert training.result.classifier is not None
         parameters = [training.result.field, training.result.classifier]
         found.append((training, [p for part in parameters for p in part.parameters()]))

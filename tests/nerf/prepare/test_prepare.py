@@ -7,7 +7,7 @@ import numpy as np
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import aligned
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 
 
 def test_drawings_that_agree_stay(balls) -> None:
@@ -59,7 +59,7 @@ def test_planes_are_smoother_where_drawings_were_bent_back(balls) -> None:
     variation = []
     for trusted in (False, True):
         options = TrainOptions(steps=30, register=not trusted, unbend=not trusted)
-        field = train(drawn, options).result.field
+        field = fit_field(drawn, options).result.field
         assert isinstance(field, TriplaneField)
         planes = field.planes.detach()
         variation.append(float(planes.diff(dim=0).abs().mean()))

@@ -14,7 +14,7 @@ from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.symmetry import ALIKE, completed, likeness, mirrored
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 
 FLAT = SynthOptions(cell_px=80, outline_px=0, elevation_deg=8)
 FRONT_SIDE_BACK = (0, 2, 4)
@@ -105,6 +105,6 @@ def test_a_training_sees_mirror_images_unless_it_is_told_not_to(
 ) -> None:
     plain = TrainOptions(device="cpu", carve=False, field="voxel", register=False, unbend=False)
     options = replace(plain, steps=1, symmetric=symmetric)
-    training = train(some(turn(3, symmetric=True), FRONT_SIDE_BACK), options)
+    training = fit_field(some(turn(3, symmetric=True), FRONT_SIDE_BACK), options)
     assert training.counts["views"] == views
     assert (training.symmetry is None) == (not symmetric)

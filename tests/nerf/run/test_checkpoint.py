@@ -30,7 +30,7 @@ from toonset.nerf.train.loop import Moment
 from toonset.nerf.train.progress import Status
 from toonset.nerf.train.result import Training
 from toonset.nerf.train.state import FitState
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 
 SIDE = 24
 PALETTE = np.array([[220, 40, 30], [30, 60, 200]], dtype=np.uint8)
@@ -91,14 +91,14 @@ def bits(training: Training) -> list[torch.Tensor]:
 
 @pytest.fixture(scope="module")
 def whole() -> Training:
-    return train(SCENE, OPTIONS)
+    return fit_field(SCENE, OPTIONS)
 
 
 @pytest.fixture(scope="module")
 def cut(tmp_path_factory: pytest.TempPathFactory) -> tuple[Training, FitState]:
     watch = onlooker(tmp_path_factory.mktemp("cut"), Cut)
     assert isinstance(watch, Cut)
-    return train(SCENE, OPTIONS, watch=watch), watch.state
+    return fit_field(SCENE, OPTIONS, watch=watch), watch.state
 
 
 def test_looking_on_changes_no_bit(
@@ -107,7 +107,7 @@ def test_looking_on_changes_no_bit(
     for name in ("CHECKPOINT_S", "FIRST_LOOK_S"):
         monkeypatch.setattr(f"toonset.nerf.run.monitor.{name}", 0.05)
     watch = onlooker(tmp_path)
-    watched = train(SCENE, OPTIONS, watch=watch)
+    watched = fit_field(SCENE, OPTIONS, watch=watch)
     assert {p.name for p in tmp_path.iterdir()} >= {"preview.png", "checkpoint.json"}
     assert watch.held_out
     assert 15 < held_out_psnr(whole.result, sample_of(HELD_OUT)) < 60
@@ -128,7 +128,7 @@ def test_a_resumed_training_ends_bit_identical(
     watch = onlooker(tmp_path)
     watch.start = checkpoint.state
     torch.rand(7)  # what else the process does with torch's generator
-    resumed = train(SCENE, OPTIONS, watch=watch)
+    resumed = fit_field(SCENE, OPTIONS, watch=watch)
     assert resumed.stopped == "steps"
     assert [s.loss for s in resumed.history] == [s.loss for s in whole.history]
     assert all(torch.equal(a, b) for a, b in zip(bits(whole), bits(resumed), strict=True))
@@ -137,7 +137,7 @@ def test_a_resumed_training_ends_bit_identical(
     # and every part of the state counts: without Adam's memory it ends elsewhere
     forgetful = {name: torch.zeros_like(values) for name, values in state.squares.items()}
     watch.start = replace(checkpoint.state, squares=forgetful)
-    other = train(SCENE, OPTIONS, watch=watch)
+    other = fit_field(SCENE, OPTIONS, watch=watch)
     assert not all(torch.equal(a, b) for a, b in zip(bits(whole), bits(other), strict=True))
 
 
@@ -245,12 +245,12 @@ def test_a_checkpoint_goes_on_with_its_own_scene_only(
     watch = onlooker(tmp_path)
     watch.start = replace(checkpoint.state, parameters={})
     with pytest.raises(BundleError, match="of another field"):
-        train(SCENE, replace(OPTIONS, steps=1), watch=watch)
+        fit_field(SCENE, replace(OPTIONS, steps=1), watch=watch)
 
 
 def test_a_training_whose_samples_move_resumes_bit_identical_too(tmp_path: Path) -> None:
     options = replace(OPTIONS, carve=False, steps=9)
-    whole = train(SCENE, options)
+    whole = fit_field(SCENE, options)
     states = []
 
     class After(Onlooker):
@@ -259,10 +259,10 @@ def test_a_training_whose_samples_move_resumes_bit_identical_too(tmp_path: Path)
             return INTERRUPTED if len(moment.history) == 4 else ""
 
     looking = Looking(quiet, lambda: False)
-    train(SCENE, options, watch=After(looking, SCENE, options))
+    fit_field(SCENE, options, watch=After(looking, SCENE, options))
     write_checkpoint(tmp_path, states[-1], options, SCENE)
     start = read_checkpoint(tmp_path).state
-    resumed = train(SCENE, options, watch=Onlooker(looking, SCENE, options, start))
+    resumed = fit_field(SCENE, options, watch=Onlooker(looking, SCENE, options, start))
     assert all(torch.equal(a, b) for a, b in zip(bits(whole), bits(resumed), strict=True))
 
 
@@ -282,7 +282,7 @@ def test_a_state_with_what_is_no_number_is_never_kept(
 
 def test_a_training_that_runs_away_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(loop, "TABLES_RATE", 1e6)
-    training = train(SCENE, OPTIONS)
+    training = fit_field(SCENE, OPTIONS)
     assert training.stopped.startswith(("diverged", "loss not finite", "parameters not finite"))
     assert "kept the state of step" in training.stopped
     assert all(bool(torch.isfinite(values).all()) for values in bits(training))

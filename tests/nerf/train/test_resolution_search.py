@@ -19,7 +19,7 @@ from toonset.nerf.train import resolution_search
 from toonset.nerf.train.labelling import without_palette
 from toonset.nerf.train.resolution_choice import Candidate, FieldChoice, chosen, shares_for
 from toonset.nerf.train.resolution_search import left_out
-from toonset.nerf.train.train import finest_cells, train
+from toonset.nerf.train.train import finest_cells, fit_field
 
 FEW = 4  # steps of a trial
 SHORT = TrainOptions(steps=2 * FEW, device="cpu", missing_views=0)
@@ -82,14 +82,14 @@ def test_few_drawings_that_agree_are_tried_on_coarser_planes(
 def test_some_trainings_try_nothing(
     few: Scene, quick: None, options: TrainOptions, why: str
 ) -> None:
-    choice = train(few, options).choice
+    choice = fit_field(few, options).choice
     assert choice is not None
     assert (choice.untried, choice.candidates) == (why, ())
     assert choice.cells == round(2 / 3 * finest_cells(few))
 
 
 def test_two_drawings_say_nothing_of_planes(few: Scene, quick: None) -> None:
-    choice = train(replace(few, frames=few.frames[:2]), SHORT).choice
+    choice = fit_field(replace(few, frames=few.frames[:2]), SHORT).choice
     assert choice is not None
     assert choice.untried == "too few drawings to leave one out"
 
@@ -105,7 +105,7 @@ def test_trials_see_the_other_drawings_only(
         return real(part, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr(resolution_search, "make_batches", noted)
-    choice = train(few, SHORT).choice
+    choice = fit_field(few, SHORT).choice
     assert choice is not None
     every, left = {frame.name for frame in few.frames}, set(choice.left_out)
     assert len(left) == 1
@@ -114,14 +114,14 @@ def test_trials_see_the_other_drawings_only(
 
 
 def test_the_choice_is_all_that_trials_change(few: Scene, quick: None, tmp_path: Path) -> None:
-    auto = train(few, SHORT)
+    auto = fit_field(few, SHORT)
     assert auto.choice is not None
     sizes = [(c.cells, c.parameters) for c in auto.choice.candidates]
     assert len(sizes) == 2
     assert sizes == sorted(sizes, reverse=True)
     assert auto.counts["parameters"] == dict(sizes)[auto.choice.cells]
-    assert train(few, SHORT).choice == auto.choice
-    told = train(few, replace(SHORT, resolution=auto.choice.cells))
+    assert fit_field(few, SHORT).choice == auto.choice
+    told = fit_field(few, replace(SHORT, resolution=auto.choice.cells))
     assert told.choice is None
     for name, values in auto.result.field.state_dict().items():
         assert torch.equal(values, told.result.field.state_dict()[name]), name
@@ -131,8 +131,8 @@ def test_the_choice_is_all_that_trials_change(few: Scene, quick: None, tmp_path:
 
 
 def test_many_drawings_that_agree_may_have_a_cell_per_pixel(scene: Scene, quick: None) -> None:
-    training = train(scene, SHORT)
-    finest = train(scene, replace(SHORT, field="triplane"))
+    training = fit_field(scene, SHORT)
+    finest = fit_field(scene, replace(SHORT, field="triplane"))
     assert training.choice is not None
     cells = [candidate.cells for candidate in training.choice.candidates]
     assert cells == [finest_cells(scene), round(2 / 3 * finest_cells(scene))]
@@ -151,4 +151,4 @@ def test_the_summary_has_the_evidence() -> None:
 
 
 def summary_of(choice: FieldChoice) -> str:
-    return summary(Path("run"), metrics() | {"planes": choice.to_json()})
+    return summary(Path("run"), metrics() | {"planes": choice.to_json()}, verbose=True)

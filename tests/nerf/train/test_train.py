@@ -34,7 +34,7 @@ from toonset.nerf.train.batches import Batch
 from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.loop import LEAST_STEPS
 from toonset.nerf.train.result import Training
-from toonset.nerf.train.train import train
+from toonset.nerf.train.train import fit_field
 from toonset.palette.names import name_of
 
 SIDE, FINE = 48, 3
@@ -87,7 +87,7 @@ def held_out(k: float = 0.15, unit: float = 1.0) -> Scene:
 
 @pytest.fixture(scope="module")
 def training() -> Training:
-    return train(labelled(train_scene())[0], QUICK)
+    return fit_field(labelled(train_scene())[0], QUICK)
 
 
 def mean_psnr(training: Training, test: Scene) -> float:
@@ -113,7 +113,7 @@ def test_new_views_are_predicted(training: Training) -> None:
 
 @pytest.mark.parametrize(("k", "unit"), [(0.0, 1.0), (0.15, 1000.0), (0.15, 0.001)])
 def test_orthographic_views_and_worlds_of_any_size(k: float, unit: float) -> None:
-    training = train(train_scene(k, unit), QUICK)
+    training = fit_field(train_scene(k, unit), QUICK)
     assert mean_psnr(training, held_out(k, unit)) > 23
 
 
@@ -122,7 +122,7 @@ def test_same_seed_same_bits_other_seed_other_bits() -> None:
     few = replace(QUICK, steps=5)
     states = []
     for options in (few, few, replace(few, seed=1)):
-        result = train(scene, options).result
+        result = fit_field(scene, options).result
         assert result.classifier is not None
         states.append([*result.field.parameters(), *result.classifier.parameters()])
     assert all(torch.equal(a, b) for a, b in zip(states[0], states[1], strict=True))
@@ -142,7 +142,7 @@ def test_a_loss_that_is_no_number_keeps_the_last_good_state(
         return (first * (float("nan") if next(calls) == 51 else 1.0), *rest)
 
     monkeypatch.setattr(gradients, "loss_terms", poisoned)
-    training = train(train_scene(), QUICK)
+    training = fit_field(train_scene(), QUICK)
     assert training.stopped == "loss not finite at step 25, kept the state of step 20"
     assert len(training.history) == 25
     assert all(bool(torch.isfinite(p).all()) for p in training.result.field.parameters())
@@ -150,7 +150,7 @@ def test_a_loss_that_is_no_number_keeps_the_last_good_state(
 
 
 def test_a_budget_ends_training() -> None:
-    training = train(train_scene(), replace(QUICK, steps=100_000, budget_s=0.5))
+    training = fit_field(train_scene(), replace(QUICK, steps=100_000, budget_s=0.5))
     assert training.stopped == "budget"
     assert LEAST_STEPS <= len(training.history) < 100_000
 
@@ -163,7 +163,7 @@ def test_a_budget_counts_what_comes_before_the_steps(monkeypatch: pytest.MonkeyP
         return real(*given)
 
     monkeypatch.setattr(train_module, "hull_of", slow)
-    training = train(train_scene(), replace(QUICK, steps=100_000, budget_s=0.9))
+    training = fit_field(train_scene(), replace(QUICK, steps=100_000, budget_s=0.9))
     assert training.stopped == "budget"
     assert len(training.history) == LEAST_STEPS  # none of it was left
 
@@ -174,18 +174,18 @@ def test_pictures_without_a_background_are_refused() -> None:
     rgba[..., 3] = 255
     frames = (*scene.frames[:2], replace(scene.frames[2], rgba=rgba), *scene.frames[3:])
     with pytest.raises(BundleError, match="no transparent background"):
-        train(replace(scene, frames=frames), QUICK)
+        fit_field(replace(scene, frames=frames), QUICK)
 
 
 def test_one_view_is_refused() -> None:
     with pytest.raises(BundleError, match="at least two views"):
-        train(scene_of([0.0], 0.0, 0.0), QUICK)
+        fit_field(scene_of([0.0], 0.0, 0.0), QUICK)
 
 
 def test_empty_pictures_are_passed_over() -> None:
     scene = train_scene()
     empty = replace(scene.frames[0], rgba=np.zeros_like(scene.frames[0].rgba))
-    training = train(replace(scene, frames=(*scene.frames, empty)), replace(QUICK, steps=2))
+    training = fit_field(replace(scene, frames=(*scene.frames, empty)), replace(QUICK, steps=2))
     assert len(training.history) == 2
 
 
@@ -272,7 +272,7 @@ def test_other_fields_are_trained_rendered_and_read_again(
     tmp_path: Path, options: TrainOptions, least: float
 ) -> None:
     scene, test = labelled(train_scene())[0], held_out()
-    training = train(scene, options)
+    training = fit_field(scene, options)
     write_run(tmp_path, training, replace(scene, frames=scene.frames[:1]))
     loaded, camera = read_field(tmp_path), test.frames[0].camera
     first, again = render(training.result, camera), render(loaded, camera)

@@ -22,7 +22,7 @@ from toonset.errors import PictureError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.palette import Palette, PaletteColor
 from toonset.palette.pixels import labels as labels_module
-from toonset.palette.pixels.labels import UNLABELLED, label_image, nearest_colors, nearest_labels
+from toonset.palette.pixels.labels import UNLABELLED, label_pixels, nearest_colors, nearest_labels
 
 RED, BLUE, INK, GREY = (200, 30, 40), (20, 60, 180), (0, 0, 0), (128, 128, 128)
 PALETTE = np.array([RED, BLUE, INK], dtype=np.uint8)
@@ -43,38 +43,38 @@ def between(a: tuple[int, int, int], b: tuple[int, int, int], share: float) -> t
 def test_the_blend_of_two_neighbours_has_no_label(share: float) -> None:
     picture = row(*[RED] * 6, between(RED, BLUE, share), *[BLUE] * 6)
     expected = np.array([0] * 6 + [UNLABELLED] + [1] * 6)
-    assert (label_image(picture, PALETTE) == expected).all()
-    assert (label_image(picture.transpose(1, 0, 2), PALETTE) == expected[:, None]).all()
+    assert (label_pixels(picture, PALETTE) == expected).all()
+    assert (label_pixels(picture.transpose(1, 0, 2), PALETTE) == expected[:, None]).all()
 
 
 def test_a_line_of_one_pixel_keeps_its_label_and_soft_lines_have_none() -> None:
     line = row(*[RED] * 6, INK, *[RED] * 6)
-    assert (label_image(line, PALETTE) == np.array([0] * 6 + [2] + [0] * 6)).all()
+    assert (label_pixels(line, PALETTE) == np.array([0] * 6 + [2] + [0] * 6)).all()
     faint = row(*[RED] * 6, between(RED, INK, 0.6), between(RED, INK, 0.7), *[RED] * 6)
-    assert (label_image(faint, PALETTE)[:, 6:8] == UNLABELLED).all()
-    assert (np.delete(label_image(faint, PALETTE), [6, 7], axis=1) == 0).all()
+    assert (label_pixels(faint, PALETTE)[:, 6:8] == UNLABELLED).all()
+    assert (np.delete(label_pixels(faint, PALETTE), [6, 7], axis=1) == 0).all()
 
 
 def test_a_blend_of_three_colours_has_no_label() -> None:
     picture = row(*[RED] * 6, *[BLUE] * 6, height=12)
     picture[6:, :, :3] = INK
     picture[6, 6, :3] = (80, 40, 70)
-    assert label_image(picture, PALETTE)[6, 6] == UNLABELLED
-    assert (label_image(picture, PALETTE) == UNLABELLED).sum() == 1
+    assert label_pixels(picture, PALETTE)[6, 6] == UNLABELLED
+    assert (label_pixels(picture, PALETTE) == UNLABELLED).sum() == 1
 
 
 def test_nothing_of_an_upscaled_sprite_is_a_blend() -> None:
     sprite = np.random.default_rng(1).integers(0, 256, (24, 24, 4), dtype=np.uint8)
     sprite[..., 3] = 255 * (sprite[..., 3] > 60)
     big = sprite.repeat(3, axis=0).repeat(3, axis=1)
-    found = label_image(big, PALETTE)
+    found = label_pixels(big, PALETTE)
     assert np.array_equal(found == UNLABELLED, big[..., 3] == 0)
 
 
 def test_what_is_not_wholly_the_characters_has_no_label() -> None:
     picture = row(*[RED] * 8)
     picture[:, 2, 3], picture[:, 3, 3] = 0, 200
-    found = label_image(picture, PALETTE)
+    found = label_pixels(picture, PALETTE)
     assert (found[:, 2:4] == UNLABELLED).all()
     assert (np.delete(found, [2, 3], axis=1) == 0).all()
 
@@ -87,7 +87,7 @@ def test_a_blend_that_equals_no_colour_nearby_is_not_given_a_stray_one() -> None
     clean = row(*[light] * 20, between(light, dark, 0.2), *[dark] * 20, height=60)
     noise = np.dstack([rng.normal(0, 4, (*clean.shape[:2], 3)), np.zeros(clean.shape[:2])])
     noisy = np.clip(clean + np.rint(noise), 0, 255).astype(np.uint8)
-    found = label_image(noisy, palette)
+    found = label_pixels(noisy, palette)
     assert (found[:, :19] == 0).all()
     assert (found[:, 22:] == 1).all()
     assert (found[:, 20] == UNLABELLED).mean() > 0.9
@@ -101,7 +101,7 @@ def test_synthetic_drawings_are_labelled_right(outline: float, seed: int) -> Non
     for view, truth, ink in zip(made.views, made.labels, made.ink, strict=True):
         wholly = view.rgba[..., 3] == 255
         truth = np.where((ink == 255) & wholly, len(made.palette), truth)
-        found = label_image(view.rgba, palette)
+        found = label_pixels(view.rgba, palette)
         pure, mixed = truth != UNLABELLED, (truth == UNLABELLED) & (view.rgba[..., 3] >= 250)
         assert (found[pure] == truth[pure]).mean() >= 0.995
         assert (found[mixed] == UNLABELLED).mean() >= 0.9
@@ -132,7 +132,7 @@ def test_nearest_in_oklab_is_the_brute_force_nearest() -> None:
 @pytest.mark.parametrize("shape", [(0, 5), (5, 0), (1, 1), (1, 9)])
 def test_tiny_pictures(shape: tuple[int, int]) -> None:
     picture = np.full((*shape, 4), 255, dtype=np.uint8)
-    assert label_image(picture, np.array([(250, 250, 250)], dtype=np.uint8)).shape == shape
+    assert label_pixels(picture, np.array([(250, 250, 250)], dtype=np.uint8)).shape == shape
 
 
 def chunks(data: bytes) -> list[tuple[bytes, bytes]]:

@@ -6,7 +6,7 @@ import pytest
 from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.figures.blobs import find_blobs
 from toonset.dataset.split.figures.swatch_strips import strip_seams
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 
 COLORS = [(200, 30, 40), (20, 60, 180), (236, 188, 155), (30, 120, 60)]
 
@@ -47,7 +47,7 @@ def test_a_rectangle_of_no_whole_number_of_cells_stays() -> None:
 @pytest.mark.parametrize("seed", [5001, 5015])
 def test_a_column_of_discs_beside_a_figure_is_no_part_of_it(seed: int) -> None:
     sheet = make_messy_sheet(seed, ("swatches",))
-    found = split_sheet(sheet.rgba)
+    found = split_picture(sheet.rgba)
     assert len(found.views) == len(sheet.boxes)
     assert [left.kind for left in found.left_out].count("swatch") >= 5
     for view, (_, _, width, _) in zip(found.views, sheet.boxes, strict=True):

@@ -8,7 +8,7 @@ import pytest
 
 from toonset.dataset.split.figures.blobs import find_blobs, find_mains
 from toonset.dataset.split.figures.grouping import group_blobs
-from toonset.dataset.split.sheet import split_sheet
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split.touching.parts import part_shared
 
 RED, SKIN = (200, 30, 40), (236, 188, 155)
@@ -42,7 +42,7 @@ def test_hands_that_meet_go_with_their_figures(apart: int) -> None:
     rgb = sheet_of(90, 90 + apart, 400)
     more, bodies, cuts = shared(rgb)
     assert (more, cuts, len(set(bodies.values()))) == (1, 1, 2)
-    sheet = split_sheet(np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)]))
+    sheet = split_picture(np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)]))
     assert [view.figure_box[2] for view in sheet.views] == pytest.approx([121] * 3, abs=6)
     assert "touching figures were cut apart (1)" in sheet.remarks
     assert sheet.warnings == ()  # each is nearer to its own body
@@ -51,12 +51,12 @@ def test_hands_that_meet_go_with_their_figures(apart: int) -> None:
 def test_hands_that_keep_their_distance_are_not_cut_or_doubted() -> None:
     rgb = sheet_of(90, 250, 410)
     assert shared(rgb) == (0, {}, 0)
-    assert split_sheet(np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)])).warnings == ()
+    assert split_picture(np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)])).warnings == ()
 
 
 def test_a_hand_as_near_to_the_next_body_is_doubted() -> None:
     rgb = sheet_of(90, 185, 400)
-    sheet = split_sheet(np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)]))
+    sheet = split_picture(np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)]))
     assert any("is it a part of" in line for line in sheet.warnings)
 
 

@@ -1,0 +1,170 @@
+"""Views and a mannequin to cameras: coarse hypotheses, contour alignment, the sheet together.
+
+1. templates: silhouettes of the mesh over yaw and elevation; the best overlaps start each view, and
+   the turns (or labels) that explain the whole sheet start all views
+2. contour alignment of every start at low resolution
+3. selections of one candidate per view, compared by a joint fit of the sheet
+4. the camera model, from orthography up; drawings that are stretched are begun anew without it
+   (`toonset.calib.corrections.stretched`); the mannequin's proportions where outlines
+   do not meet or a glance proves them
+5. rivals of the chosen cameras at full resolution: probabilities, uncertainties, verdicts
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from toonset.calib.corrections.stretched import (
+    as_drawn,
+    nothing_stretched,
+    stretched_mannequin,
+    unstretched,
+)
+from toonset.calib.evidence.coherence_state import state_of
+from toonset.calib.fit.model_selection import Rung
+from toonset.calib.fit.sheet_prior import Turn
+from toonset.calib.known import Known
+from toonset.calib.options import CalibrationOptions, Progress
+from toonset.calib.pipeline import Problem, SheetFit
+from toonset.calib.result import Calibration, CutOff
+from toonset.calib.search.hypotheses import Candidates
+from toonset.calib.search.templates import turns_visibly
+from toonset.calib.verdict.judge import (
+    judge_sheet,
+    judge_view,
+    with_elevations_in_mind,
+    with_labels_in_mind,
+    with_locks_in_mind,
+    with_sheet_in_mind,
+)
+from toonset.mesh import Mesh
+from toonset.view import View
+
+# Times that stretches are taken off: the first look at strong ones may miss a view
+MOST_UNSTRETCHED = 2
+
+
+def find_cameras(
+    views: Sequence[View],
+    mesh: Mesh,
+    options: CalibrationOptions = CalibrationOptions(),
+    progress: Progress = lambda step, share: None,
+    known: Known | None = None,
+) -> Calibration:
+    """Return one camera per view with its uncertainty.
+
+    Args:
+        views: the drawings, at least one.
+        mesh: the posed mannequin; world frame and units are its own.
+        options: search effort.
+        progress: called with the step's name and the share done.
+        known: what a person knows beforehand.
+
+    Raises:
+        CameraError, LandmarkError: what is known does not belong to the views or the mannequin.
+    """
+    known = known or Known()
+    known.check(views)
+    seconds: dict[str, float] = {}
+    stretches, taken = nothing_stretched(len(views)), list(views)
+    fitted = _fitted(taken, mesh, options, progress, known, seconds)
+    for _ in range(MOST_UNSTRETCHED):
+        with _timed(seconds, "joint"):
+            more = fitted.problem.stretches(fitted.rigid, fitted.cuts)
+        stretches = stretches.and_then(more)
+        if more.is_none:
+            break
+        taken = [unstretched(*pair) for pair in zip(views, stretches.views, strict=True)]
+        mannequin = stretched_mannequin(mesh, stretches)
+        fitted = _fitted(taken, mannequin, options, progress, known, seconds)
+    found = _judged(fitted, stretches.rungs, seconds)
+    return as_drawn(found, taken, views)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """A sheet whose cameras are found, before they are judged.
+
+    Attributes:
+        problem: with drawings that end at their cuts.
+        candidates: what else every view could be.
+        turn: where the views are meant to be seen from.
+        rigid: the fit with the mannequin as it is.
+        cuts: parts of figures that their pictures lack.
+    """
+
+    problem: Problem
+    candidates: Sequence[Candidates]
+    turn: Turn
+    rigid: SheetFit
+    cuts: tuple[CutOff, ...]
+
+
+def _fitted(
+    views: Sequence[View],
+    mesh: Mesh,
+    options: CalibrationOptions,
+    progress: Progress,
+    known: Known,
+    seconds: dict[str, float],
+) -> _Fitted:
+    with _timed(seconds, "prepare"):
+        problem = Problem.of(views, mesh, options, progress, known)
+    with _timed(seconds, "search"):
+        candidates, together = problem.search()
+    with _timed(seconds, "together"):
+        progress("together", 0.0)
+        sketch, turn, candidates = problem.together(candidates, together)
+    with _timed(seconds, "joint"):
+        progress("joint", 0.0)
+        whole = problem.rigid(sketch, turn)
+        problem, rigid, cuts = problem.cut_off(whole, turn)
+    return _Fitted(problem, candidates, turn, rigid, cuts)
+
+
+def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -> Calibration:
+    """Return the calibration; `rungs` are what has been said about stretches."""
+    problem = fitted.problem
+    with _timed(seconds, "joint"):
+        bent = problem.bent(fitted.rigid, fitted.turn)
+        joint, differs = bent.joint, bent.differs
+        model = replace(bent.model, rungs=(*rungs, *bent.model.rungs))
+    with _timed(seconds, "judge"):
+        problem.progress("judge", 0.0)
+        observable = turns_visibly(problem.templates)
+        state = state_of(problem.views, problem.cameras(joint), yaw_observable=observable)
+        bare = [drawing.inset(joint.offset) for drawing in problem.fine]
+        final = problem.rivals(bare, joint, model, fitted.candidates, differs=differs)
+        sure = problem.sheet.probabilities(final)
+        body = joint.body.surface
+        each = [
+            judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
+            for i, v in enumerate(problem.views)
+        ]
+        each = with_labels_in_mind(with_elevations_in_mind(each), problem.known.labels)
+        each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
+        contradict = problem.sheet.faces_contradict(final)
+        judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)
+    verdict, reason = judge_sheet(judged, state)
+    return Calibration(
+        judged,
+        model,
+        joint.offset,
+        joint.noise,
+        state.contradiction,
+        joint.body.surface.vertices + problem.surface.middle,
+        verdict,
+        reason,
+        seconds,
+        fitted.cuts,
+    )
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], step: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[step] = seconds.get(step, 0.0) + time.perf_counter() - start

@@ -1,0 +1,55 @@
+"""A calibration as a bundle on disk, with or without the palette of its drawings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from toonset.calib.result import Calibration
+from toonset.calib.verdict.overlay import draw_overlay
+from toonset.calib.verdict.report import calibration_dict
+from toonset.dataset.bundle.bundle import Bundle, bundle_folder, read_bundle
+from toonset.dataset.bundle.palette_files import write_palette
+from toonset.errors import BundleError
+from toonset.palette.extract import label_drawing
+from toonset.palette.palette import Palette
+from toonset.palette.pixels.ink_lines import find_contour
+
+
+def write_bundle(
+    folder: str | Path, found: Calibration, palette: Palette | None = None, *, force: bool = False
+) -> Bundle:
+    """Write a bundle and return it as it is read again; it appears whole or not at all.
+
+    Args:
+        folder: where; replaced as a whole with `force`.
+        found: of `calibrate`.
+        palette: of the drawings; written with label maps, as `toonset palette` does.
+        force: replace an existing bundle.
+
+    Raises:
+        OutputError: the folder exists and `force` is off, or cannot be written.
+    """
+    folder = Path(folder)
+    if found.mesh is None:
+        raise BundleError(f"{folder}: the calibration has no mannequin; make it with `calibrate`")
+    fitted = replace(found.mesh, vertices=found.mannequin)
+    cameras = [view.camera for view in found.views]
+    overlay = draw_overlay(found.drawings, found.mesh, found)
+    report = calibration_dict(found)
+    with bundle_folder(
+        folder, found.drawings, cameras, fitted, report, overlay, force=force
+    ) as place:
+        if palette is not None:
+            _write_labels(place, found, palette)
+    return read_bundle(folder)
+
+
+def _write_labels(folder: Path, found: Calibration, palette: Palette) -> None:
+    """Write palette, label maps and contour maps of the drawings."""
+    contours = [(view.name, find_contour(view.rgba)) for view in found.drawings]
+    labels = [
+        (view.name, label_drawing(view.rgba, contour, palette))
+        for view, (_, contour) in zip(found.drawings, contours, strict=True)
+    ]
+    write_palette(folder, palette, labels, contours)

@@ -1,0 +1,238 @@
+"""Load drawings: sheets, single views, folders of them, sprite strips, and split folders.
+
+Views are numbered through in the order given. A file without a figure stops everything: left out
+in silence it would shift the numbers and labels of all that follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.dataset.images.folder import picture_files
+from toonset.dataset.images.picture import decode_rgba
+from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
+from toonset.dataset.split_folder.checks import odd_files
+from toonset.dataset.split_folder.cutting import Cutting
+from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE, sheet_places
+from toonset.dataset.split_folder.read import read_split
+from toonset.dataset.split_folder.view_labels import parse_labels
+from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
+from toonset.errors import PictureError, SheetError
+from toonset.origin import InputFile, Origin
+from toonset.read import read_whole
+from toonset.view import View
+
+Picture = UInt8[np.ndarray, "height width 4"]
+Paths = str | Path | Sequence[str | Path]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The drawings of one or more sheets.
+
+    Attributes:
+        split: the views, and the sheets that they were cut from.
+        found: number of views before some were dropped.
+        pictures: per sheet, its pixels; None where only its views are left (a split folder).
+        files: what was read.
+        options: how the sheets were cut, as typed; only what was given.
+        notes: what a person should know of the files: changes, duplicates, uneven cells.
+        skipped: what folders hold besides, in words.
+    """
+
+    split: Split
+    found: int
+    pictures: tuple[Picture | None, ...]
+    files: tuple[InputFile, ...]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    skipped: tuple[str, ...] = ()
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """Return the drawings in sheet order, named 000.png, 001.png, ..."""
+        return self.split.views
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what a person should look at, for a view may be wrong.
+
+        All warnings count: of the splitter (figures that touch or are cut, a background that is
+        not plain) and of the files (copies, cells that do not divide the sheet, a changed folder).
+        What was left out of a sheet (text, frames, specks, dropped views) is no warning: it is
+        ordinary, and the overlay shows it. Nor is what a split folder says of its sheets: a person
+        has had the chance to look.
+        """
+        sheets = zip(self.split.sources, self.pictures, strict=True)
+        cut_now = [source for source, picture in sheets if picture is not None]
+        warned = [f"{source.name}: {text}" for source in cut_now for text in source.warnings]
+        return (*warned, *self.notes)
+
+
+def split_sheet(
+    sheet: Paths,
+    *,
+    boxes: str | Path | None = None,
+    grid: str = "",
+    background: str = "",
+    drop: str = "",
+    labels: str = "",
+) -> Sheet:
+    """Return the drawings of a character sheet, cut out with alpha.
+
+    Args:
+        sheet: a picture, several (one file per view, or several sheets), a folder of them, or a
+            folder that `toonset split` wrote.
+        boxes: file with the figures' boxes in sheet pixels: JSON, CSV or a split.json.
+        grid: equal cells, columns x rows, one figure in each: "8x1".
+        background: the paper's colour: "#rrggbb", "white" or "black".
+        drop: leave these out, as numbered without it: "3,5" or "3-5".
+        labels: what each view shows, in sheet order: "front,3q,side,back", yaws in degrees, "?".
+
+    Raises:
+        ToonsetError: a file is no picture or shows no figure, is given twice, a split folder is
+            broken, or an argument cannot be understood or does not fit the sheets.
+    """
+    paths = [sheet] if isinstance(sheet, str | Path) else sheet
+    cutting = Cutting(None if boxes is None else Path(boxes), grid, background, drop)
+    cutting.check()
+    return _labelled(_load([Path(path) for path in paths], cutting), labels)
+
+
+def _load(paths: Sequence[Path], cutting: Cutting) -> Sheet:
+    """Return the views of all sheets, in order and named through."""
+    places, skipped = sheet_places(paths)
+    parts = [
+        _of_split_folder(place) if options is None else _of_sheet(place, options)
+        for place, options in zip(places, _options_per_sheet(places, cutting), strict=True)
+    ]
+    whole = replace(_joined(parts), skipped=tuple(skipped))
+    if cutting.boxes is not None:
+        whole = replace(whole, files=(*whole.files, InputFile.of("boxes", cutting.boxes)))
+    kept = _dropped(whole, cutting.dropped)
+    if not any(place.is_dir() for place in places):  # a split folder has been looked at
+        kept = replace(kept, notes=(*kept.notes, *odd_files(kept.split)))
+    return _with_origin(replace(kept, options=cutting.as_options()))
+
+
+def _labelled(sheet: Sheet, text: str) -> Sheet:
+    """Return the views with labels as typed; without text, with those that they have.
+
+    Raises:
+        SheetError: not one label per view, or a word that is no direction.
+    """
+    if not text:
+        return sheet
+    kept, given = len(sheet.views), text.count(",") + 1
+    if sheet.found > kept and given != kept:
+        raise SheetError(
+            f"--views: {given} labels for {kept} views (--drop left {kept} of {sheet.found}); "
+            'give one per kept view in sheet order, "?" where you do not know'
+        )
+    parse_labels(text, kept)
+    words = [word.strip() for word in text.split(",")]
+    split = replace(sheet.split, labels=tuple("" if word == "?" else word for word in words))
+    views = tuple(
+        replace(v, label=label) for v, label in zip(split.views, split.labels, strict=True)
+    )
+    return replace(sheet, split=replace(split, views=views))
+
+
+def _with_origin(sheet: Sheet) -> Sheet:
+    """Return the sheet whose views know where they come from."""
+    split, origin = sheet.split, Origin(sheet.files, sheet.options)
+    views = tuple(
+        replace(
+            view,
+            label=label,
+            origin=origin,
+            paper=None if sheet.pictures[of] is None else split.sources[of].background,
+        )
+        for view, of, label in zip(split.views, split.source_of, split.labels, strict=True)
+    )
+    return replace(sheet, split=replace(split, views=views))
+
+
+def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOptions | None]:
+    """Return how every sheet is cut; None for a split folder, which is cut already."""
+    is_cut = [place.is_dir() for place in places]
+    if cutting.given and any(is_cut):
+        folder = places[is_cut.index(True)]
+        raise SheetError(
+            f"{cutting.given[0]}: {folder} is cut already; give the sheet that it was cut from"
+        )
+    common = SheetOptions(background_rgb=cutting.background_rgb, grid=cutting.cells)
+    options = [None if cut else common for cut in is_cut]
+    if cutting.boxes is None:
+        return options
+    boxes = read_boxes(cutting.boxes)
+    if len(boxes) != len(places):
+        raise SheetError(
+            f"--boxes: {cutting.boxes} has boxes of {len(boxes)} sheet(s), {len(places)} are "
+            "given; split sheet by sheet"
+        )
+    return [replace(common, boxes=of_sheet) for of_sheet in boxes]
+
+
+def _of_split_folder(folder: Path) -> Sheet:
+    split, notes = read_split(folder)
+    views = [("view", path) for path in picture_files(folder / IMAGES)[0]]
+    files = tuple(InputFile.of(*file) for file in (("split", folder / SPLIT_FILE), *views))
+    return Sheet(split, len(split.views), (None,) * len(split.sources), files, notes=notes)
+
+
+def _of_sheet(path: Path, options: SheetOptions) -> Sheet:
+    data = read_whole(path, "picture", PictureError)
+    picture = decode_rgba(data, path)
+    height, width = picture.shape[:2]
+    check_boxes(options.boxes, (width, height), "--boxes")
+    try:
+        found = split_picture(picture, options)
+    except SheetError as error:
+        raise SheetError(f"{path}: {error}") from error
+    split = split_of_sheet(path.name, data, (width, height), found)
+    files = (InputFile("sheet", path.name, split.sources[0].sha256),)
+    notes = _uneven_cells(path, (width, height), options.grid)
+    return Sheet(split, len(split.views), (picture,), files, notes=notes)
+
+
+def _uneven_cells(
+    path: Path, size_wh: tuple[int, int], grid: tuple[int, int] | None
+) -> tuple[str, ...]:
+    sides = zip(size_wh, grid or (1, 1), ("wide", "high"), strict=True)
+    return tuple(
+        f"{path.name}: {pixels} px {way}, which {count} cells do not divide evenly: is it the "
+        "right --grid?"
+        for pixels, count, way in sides
+        if pixels % count
+    )
+
+
+def _joined(parts: Sequence[Sheet]) -> Sheet:
+    split = joined([part.split for part in parts])
+    return Sheet(
+        split,
+        len(split.views),
+        tuple(picture for part in parts for picture in part.pictures),
+        tuple(file for part in parts for file in part.files),
+        notes=tuple(note for part in parts for note in part.notes),
+    )
+
+
+def _dropped(sheet: Sheet, dropped: frozenset[int]) -> Sheet:
+    unknown = [number for number in sorted(dropped) if number >= sheet.found]
+    if unknown:
+        raise SheetError(
+            f"--drop: there is no view {unknown[0]}; the {sheet.found} views are numbered from "
+            f"0 to {sheet.found - 1}, as in overlay.png"
+        )
+    if len(dropped) == sheet.found:
+        raise SheetError(f"--drop: leaves none of {sheet.found} views; keep at least one")
+    return replace(sheet, split=without(sheet.split, dropped))

@@ -1,0 +1,110 @@
+"""The pictures of one character: of a bundle, a split folder, other folders, or loose files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.dataset.bundle.transforms_read import NAMES, picture_paths
+from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.split_folder.places import is_split_folder, sheet_places
+from toonset.dataset.split_folder.read import read_split
+from toonset.errors import BundleError, SheetError
+
+Picture = UInt8[np.ndarray, "height width 4"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """The pictures of one character.
+
+    Attributes:
+        names: file name of each picture's label map.
+        pictures: the character on transparent ground.
+        notes: what a person should know of the files.
+    """
+
+    names: tuple[str, ...]
+    pictures: tuple[Picture, ...]
+    notes: tuple[str, ...]
+
+
+def bundle_of(places: Sequence[Path]) -> Path | None:
+    """Return the bundle's folder, or None where pictures, or folders of them, are given.
+
+    Raises:
+        BundleError: a bundle together with something else.
+    """
+    bundles = [place for place in places if _is_meant_as_bundle(place)]
+    if not bundles:
+        return None
+    if len(places) > 1:
+        raise BundleError(f"{bundles[0]}: a bundle stands alone; name one bundle, or only pictures")
+    return places[0].parent if places[0].suffix.lower() == ".json" else places[0]
+
+
+def load_pictures(places: Sequence[Path]) -> Pictures:
+    """Return the pictures that files and folders mean.
+
+    Raises:
+        BundleError: a bundle that cannot be read, or stands beside something else.
+        SheetError: a folder without pictures, or a split folder that is broken.
+        PictureError: a picture cannot be read.
+    """
+    notes: list[str] = []
+    if bundle_of(places) is not None:
+        paths = picture_paths(places[0])
+        names = tuple(f"{path.stem}.png" for path in paths)
+        if len(set(names)) < len(names):
+            raise BundleError(f"{places[0]}: two pictures have the same file name; rename one")
+        return Pictures(names, tuple(_loaded(path, notes) for path in paths), tuple(notes))
+    pictures: list[Picture] = []
+    found, skipped = sheet_places([_inner(place) for place in places])
+    notes += skipped
+    for place in found:
+        if place.is_dir():
+            split, changed = read_split(place)
+            notes += changed
+            pictures += [view.rgba for view in split.views]
+        else:
+            pictures.append(_loaded(place, notes))
+    names = tuple(f"{number:03d}.png" for number in range(len(pictures)))
+    return Pictures(names, tuple(pictures), tuple(notes))
+
+
+def _is_meant_as_bundle(place: Path) -> bool:
+    if place.is_dir():
+        marks = (*NAMES, "calibration.json")  # a bundle that has lost its cameras is broken
+        return any((place / name).is_file() for name in marks)
+    if place.suffix.lower() == ".json":
+        return place.name != "split.json"
+    return not place.suffix and not place.exists()  # the bundle's reader says so
+
+
+def _inner(place: Path) -> Path:
+    """Return the folder images/ of a folder that has one but neither cameras nor a split."""
+    images = place / "images"
+    return images if images.is_dir() and not is_split_folder(place) else place
+
+
+def _loaded(path: Path, notes: list[str]) -> Picture:
+    """Return a picture with its plain background made transparent, if it is opaque."""
+    picture = load_rgba(path)
+    if (picture[..., 3] < 255).any():
+        return picture
+    try:
+        segmentation = split_picture(picture)
+    except SheetError as error:
+        notes.append(f"{path.name}: every pixel counts as the character's ({error})")
+        return picture
+    whole = np.zeros_like(picture)
+    for view in segmentation.views:
+        x, y, width, height = view.box
+        window = whole[y : y + height, x : x + width]
+        window[view.rgba[..., 3] > 0] = view.rgba[view.rgba[..., 3] > 0]
+    return whole

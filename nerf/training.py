@@ -1,0 +1,170 @@
+"""A scene to a run: what `toonset train` does between reading a bundle and writing the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import torch
+
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.mask import check_cut_out, has_figure
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.kernels.threads import working_threads
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.prepare.symmetry import with_all_mirrored
+from toonset.nerf.prepare.view_coverage import guesses
+from toonset.nerf.run.checkpoint import Checkpoint, check_scene, versions
+from toonset.nerf.run.monitor import Looking, Onlooker
+from toonset.nerf.run.report import write_run
+from toonset.nerf.train.labelling import labelled, without_palette
+from toonset.nerf.train.memory import check_memory, memory_errors
+from toonset.nerf.train.result import HeldOut, Training
+from toonset.nerf.train.train import device_of, fit_field
+from toonset.palette.names import hex_of
+from toonset.write import new_folder
+
+
+class Listener(Protocol):
+    """Who is told how a training goes; a command's printer is one."""
+
+    def say(self, text: str) -> None:
+        """Take what a person should know."""
+
+    def detail(self, text: str) -> None:
+        """Take what is evidence."""
+
+    def progress(self, text: str) -> None:
+        """Take where the work stands."""
+
+
+class _Silence:
+    """A listener to whom nothing matters."""
+
+    def say(self, text: str) -> None:
+        pass
+
+    detail = progress = say
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A trained field and how it came about.
+
+    Attributes:
+        field: what `render`, `turntable`, `evaluate` and `surface_of` take.
+        training: history, evidence, seconds, counts.
+        scene: what was trained on, with the palette that was found.
+        test: held-out views; None: none.
+        held_out: what was seen of them on the way.
+        threads: that worked.
+    """
+
+    field: TrainedField
+    training: Training
+    scene: Scene
+    test: Scene | None
+    held_out: Sequence[HeldOut]
+    threads: int
+
+    def save(self, folder: str | Path, *, force: bool = False) -> dict[str, Any]:
+        """Write a run folder, whole or not at all; return the content of its metrics.json.
+
+        Raises:
+            OutputError: the folder exists and `force` is off, or cannot be written.
+        """
+        with (
+            new_folder(Path(folder), force=force) as place,
+            working_threads(self.threads),
+            memory_errors(),
+        ):
+            return write_run(place, self.training, self.scene, self.test, self.held_out)
+
+
+def train(
+    scene: Scene,
+    options: TrainOptions = TrainOptions(),
+    *,
+    palette: bool = True,
+    threads: int | None = None,
+    test: Scene | None = None,
+    listener: Listener | None = None,
+    looking: Looking | None = None,
+    resume: Checkpoint | None = None,
+) -> Run:
+    """Return a radiance field, and a classifier from its colours to the palette's.
+
+    Torch's threads and random numbers are afterwards as they were. On a CPU the same scene,
+    options and threads give the same bits, unless `options.budget_s` ends the training.
+
+    Args:
+        scene: posed drawings, as `read_bundle` or `write_bundle` returns them.
+        options: of the training.
+        palette: train labels, too; a palette is extracted where the scene has none.
+        threads: of the CPU; None: as many as torch is set to use.
+        test: held-out views to score.
+        listener: told what a person should know, evidence, and where the work stands.
+        looking: what is looked at while the field is fitted: previews, checkpoints, a wish to stop.
+        resume: an interrupted training to go on with.
+
+    Raises:
+        ToonsetError: fewer than two usable views, a picture that is opaque all over, cameras that
+            do not belong to the pictures, too little memory, or another scene than `resume`'s.
+        SetupError: a GPU was asked for and there is none.
+    """
+    told = listener or _Silence()
+    check_cut_out(scene)  # before a background's colours are a palette
+    for frame in scene.frames:
+        if not has_figure(frame):
+            told.say(f"{frame.name} shows no figure")
+    device = device_of(options.device)  # refused before anything is computed or said
+    with working_threads(threads) as count, _own_random_numbers(), memory_errors():
+        memory = check_memory(scene, options, device)
+        told.detail(f"{memory}; {count} CPU thread{'s' * (count > 1)}")
+        scene = _with_palette(scene, told) if palette else without_palette(scene)
+        onlooker = Onlooker(looking or Looking(test=test), scene, options)
+        if resume is not None:
+            _go_on(onlooker, resume, told)
+        for guess in guesses(with_all_mirrored(scene) if options.symmetric else scene):
+            told.say(guess)
+        training = fit_field(scene, options, told.progress, onlooker)
+    return Run(training.result, training, scene, test, onlooker.held_out, count)
+
+
+def _with_palette(scene: Scene, told: Listener) -> Scene:
+    """Return the scene with a palette, its own where it has one."""
+    if scene.palette is not None and any(frame.labels is not None for frame in scene.frames):
+        return scene
+    scene, found = labelled(scene)
+    told.say(f"palette, extracted: {' '.join(hex_of(color.rgb) for color in found.colors)}")
+    for warning in found.warnings:
+        told.say(f"palette: {warning}")
+    return scene
+
+
+def _go_on(onlooker: Onlooker, checkpoint: Checkpoint, told: Listener) -> None:
+    """Let a training begin where its checkpoint stands.
+
+    Raises:
+        BundleError: the checkpoint is of another scene.
+    """
+    folder = onlooker.looking.folder
+    check_scene(checkpoint, onlooker.scene, folder or Path("checkpoint"))
+    onlooker.start = checkpoint.state
+    told.say(f"going on after step {checkpoint.state.steps} of {checkpoint.options.steps}")
+    if checkpoint.record.versions != versions():
+        was = ", ".join(f"{name} {number}" for name, number in checkpoint.record.versions.items())
+        told.say(f"begun with {was}: the last digits may differ from an unbroken training's")
+
+
+@contextmanager
+def _own_random_numbers() -> Iterator[None]:
+    """Leave torch's random numbers as they were."""
+    state = torch.get_rng_state()
+    try:
+        yield
+    finally:
+        torch.set_rng_state(state)
