@@ -46,7 +46,7 @@ def mesh(
     from toonset.nerf.kernels.threads import use_threads
     from toonset.nerf.render.recolor import recolored
     from toonset.nerf.run.folder import read_field
-    from toonset.nerf.surface.export import check_mesh_files, mesh_files, write_mesh_files
+    from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
 
     check_mesh_files(out, force=force)

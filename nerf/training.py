@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import torch
+from threadpoolctl import threadpool_limits
 
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import check_cut_out, has_figure
@@ -121,7 +122,12 @@ def train(
         if not has_figure(frame):
             told.say(f"{frame.name} shows no figure")
     device = device_of(options.device)  # refused before anything is computed or said
-    with working_threads(threads) as count, _own_random_numbers(), memory_errors():
+    with (
+        working_threads(threads) as count,
+        threadpool_limits(1, user_api="blas"),
+        _own_random_numbers(),
+        memory_errors(),
+    ):
         memory = check_memory(scene, options, device)
         told.detail(f"{memory}; {count} CPU thread{'s' * (count > 1)}")
         scene = _with_palette(scene, told) if palette else without_palette(scene)

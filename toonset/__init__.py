@@ -1,3 +1,136 @@
-"""toonset: character sheets to cameras, palettes and radiance fields."""
+"""toonset: character sheets to cameras, palettes and radiance fields.
+
+import toonset as ts
+
+sheet   = ts.split_sheet("sheet.png")
+found   = ts.calibrate(sheet.views, ts.load_mesh("mannequin.obj"))
+palette = ts.extract_palette(found.drawings)
+bundle  = ts.write_bundle("bundle", found, palette)
+run     = ts.train(bundle.scene, ts.TrainOptions(seed=0))
+for i, camera in enumerate(ts.turntable(run.field, 36)):
+    ts.render(run.field, camera).save(f"{i:03d}.png")
+
+This is the whole public interface; what the commands do between reading their arguments and
+printing is behind it. Importing it loads nothing heavy: a name's module is imported when the name
+is used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from toonset.calib.calibrate import calibrate as calibrate
+    from toonset.calib.hints import Hints as Hints
+    from toonset.calib.result import Calibration as Calibration
+    from toonset.calib.write_bundle import write_bundle as write_bundle
+    from toonset.camera import Camera as Camera
+    from toonset.dataset.bundle.bundle import Bundle as Bundle
+    from toonset.dataset.bundle.bundle import read_bundle as read_bundle
+    from toonset.dataset.bundle.scene import Scene as Scene
+    from toonset.dataset.images.picture import load_rgba
+    from toonset.dataset.mesh.load import load_mesh as load_mesh
+    from toonset.dataset.split_folder.load import Sheet as Sheet
+    from toonset.dataset.split_folder.load import split_sheet as split_sheet
+    from toonset.errors import ToonsetError as ToonsetError
+    from toonset.mesh import Mesh as Mesh
+    from toonset.nerf.fields.trained_field import TrainedField as TrainedField
+    from toonset.nerf.options import TrainOptions as TrainOptions
+    from toonset.nerf.render.layers import Rendering as Rendering
+    from toonset.nerf.render.turntable import turntable as turntable
+    from toonset.nerf.render.views import render as render
+    from toonset.nerf.run.folder import read_field
+    from toonset.nerf.score.evaluate import evaluate as evaluate
+    from toonset.nerf.surface.surface import surface_of as surface_of
+    from toonset.nerf.training import Run as Run
+    from toonset.nerf.training import train as train
+    from toonset.palette.extract import extract_palette as extract_palette
+    from toonset.palette.extract import label_image as label_image
+    from toonset.palette.palette import Palette as Palette
+    from toonset.projection import project as project
+    from toonset.view import View as View
+
+    load_picture, read_run = load_rgba, read_field
+
+_PLACES = {  # public name -> module, and its name there if it is another
+    "Bundle": "dataset.bundle.bundle",
+    "Calibration": "calib.result",
+    "Camera": "camera",
+    "Hints": "calib.hints",
+    "Mesh": "mesh",
+    "Palette": "palette.palette",
+    "Rendering": "nerf.render.layers",
+    "Run": "nerf.training",
+    "Scene": "dataset.bundle.scene",
+    "Sheet": "dataset.split_folder.load",
+    "ToonsetError": "errors",
+    "TrainOptions": "nerf.options",
+    "TrainedField": "nerf.fields.trained_field",
+    "View": "view",
+    "calibrate": "calib.calibrate",
+    "evaluate": "nerf.score.evaluate",
+    "extract_palette": "palette.extract",
+    "label_image": "palette.extract",
+    "load_mesh": "dataset.mesh.load",
+    "load_picture": "dataset.images.picture:load_rgba",
+    "project": "projection",
+    "read_bundle": "dataset.bundle.bundle",
+    "read_run": "nerf.run.folder:read_field",
+    "render": "nerf.render.views",
+    "split_sheet": "dataset.split_folder.load",
+    "surface_of": "nerf.surface.surface",
+    "train": "nerf.training",
+    "turntable": "nerf.render.turntable",
+    "write_bundle": "calib.write_bundle",
+}
+
+__all__ = [
+    "Bundle",
+    "Calibration",
+    "Camera",
+    "Hints",
+    "Mesh",
+    "Palette",
+    "Rendering",
+    "Run",
+    "Scene",
+    "Sheet",
+    "ToonsetError",
+    "TrainOptions",
+    "TrainedField",
+    "View",
+    "__version__",
+    "calibrate",
+    "evaluate",
+    "extract_palette",
+    "label_image",
+    "load_mesh",
+    "load_picture",
+    "project",
+    "read_bundle",
+    "read_run",
+    "render",
+    "split_sheet",
+    "surface_of",
+    "train",
+    "turntable",
+    "write_bundle",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name, importing the module that holds it."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, there = _PLACES[name].partition(":")
+    found = getattr(importlib.import_module(f"{__name__}.{module}"), there or name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """Return the public names, for completion."""
+    return sorted(__all__)

@@ -6,6 +6,10 @@ Rotations are kornia's `So3`, the division is its `project_points_z1`: with the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
 import torch
 from jaxtyping import Float
 from kornia.geometry.camera import PinholeCamera, project_points_z1, unproject_points_z1
@@ -15,6 +19,57 @@ from torch import Tensor
 from toonset.camera import Camera
 
 
+@dataclass(frozen=True, eq=False)
+class CameraTensors:
+    """Several cameras as tensors, any of which may require gradients.
+
+    Attributes:
+        rotation: camera_from_world.
+        target: world points on the optical axes, at whose depth `scale_uv` holds.
+        center: pixels at which the targets appear.
+        scale_uv: pixels per world unit along u and v.
+        k: 1 / distance between camera centre and target; 0 = orthographic.
+    """
+
+    rotation: Float[Tensor, "views 3 3"]
+    target: Float[Tensor, "views 3"]
+    center: Float[Tensor, "views 2"]
+    scale_uv: Float[Tensor, "views 2"]
+    k: Float[Tensor, " views"]
+
+    @classmethod
+    def of(cls, cameras: Sequence[Camera], like: Tensor | None = None) -> CameraTensors:
+        """Return cameras as tensors of the device and dtype of `like` (default: CPU, float64)."""
+        kind = torch.zeros((), dtype=torch.float64) if like is None else like
+        columns = (
+            [camera.rotation for camera in cameras],
+            [camera.target for camera in cameras],
+            [camera.center for camera in cameras],
+            [(camera.scale, camera.scale * camera.pixel_aspect) for camera in cameras],
+            [camera.k for camera in cameras],
+        )
+        return cls(*(torch.as_tensor(np.array(column)).to(kind) for column in columns))
+
+
+def project(
+    cameras: CameraTensors | Sequence[Camera], points: Float[Tensor, "#views points 3"]
+) -> Float[Tensor, "views points 2"]:
+    """Return the pixels of world points in several cameras.
+
+    Differentiable with respect to the points and every tensor of the cameras, on any device, for
+    orthographic (k = 0) and pinhole cameras alike. Points at or behind a pinhole's centre have no
+    pixel: NaN.
+
+    Args:
+        cameras: one per view.
+        points: (views, points, 3) world coordinates, or (1, points, 3) for the same in all views.
+    """
+    if not isinstance(cameras, CameraTensors):
+        cameras = CameraTensors.of(cameras, points)
+    offsets = points - cameras.target[:, None]
+    return project_offsets(cameras.rotation, cameras.center, cameras.scale_uv, cameras.k, offsets)
+
+
 def rotate(
     rotation: Float[Tensor, "views 3 3"], turn: Float[Tensor, "views 3"]
 ) -> Float[Tensor, "views 3 3"]:
@@ -22,7 +77,7 @@ def rotate(
     return So3.exp(turn).matrix() @ rotation
 
 
-def project(
+def project_offsets(
     rotation: Float[Tensor, "views 3 3"],
     center: Float[Tensor, "views 2"],
     scale_uv: Float[Tensor, "views 2"],

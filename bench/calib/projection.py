@@ -102,7 +102,9 @@ def _torch_ways(
     def at(step: torch.Tensor) -> torch.Tensor:  # (poses, 7): each row moves its own pose only
         turned = projection.rotate(rotation, step[:, :3])
         grown = (scale * step[:, 5].exp())[:, None].expand(-1, 2)
-        return projection.project(turned, shift + step[:, 3:5], grown, k + step[:, 6], met_t)
+        return projection.project_offsets(
+            turned, shift + step[:, 3:5], grown, k + step[:, 6], met_t
+        )
 
     def slopes() -> list[torch.Tensor]:
         zero = torch.zeros(len(poses), 7, dtype=rotation.dtype)
@@ -110,7 +112,7 @@ def _torch_ways(
         return [torch.func.jvp(at, (zero,), (direction,))[1] for direction in along]
 
     both = scale[:, None].expand(-1, 2)
-    return lambda: projection.project(rotation, shift, both, k, ends_t), slopes
+    return lambda: projection.project_offsets(rotation, shift, both, k, ends_t), slopes
 
 
 def _ms(work: Callable[[], object], repeats: int) -> float:

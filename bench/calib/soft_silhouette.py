@@ -26,7 +26,7 @@ from bench.cases.cases import CalibCase
 from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.nerf.surface.decimate import decimated
-from toonset.projection import project, rotate
+from toonset.projection import project_offsets, rotate
 from toonset.view import View
 
 GRID = 80  # side of the pictures that are compared, in pixels
@@ -87,7 +87,7 @@ def descended(
         turned = rotate(rotation, raw[:, :3])
         sizes = (scale * (LOG_SCALE * raw[:, 5]).exp())[:, None].expand(-1, 2)
         middles = center + SHIFT_PX * raw[:, 3:5]
-        pixels = project(turned, middles, sizes, torch.zeros(len(views)), points)
+        pixels = project_offsets(turned, middles, sizes, torch.zeros(len(views)), points)
         loss = missed(soft_silhouette(pixels, faces, GRID), target).sum()
         loss.backward()
         adam.step()

@@ -31,7 +31,9 @@ COMPRESSION = 4  # of 0 to 9: as small as 6 on noisy pictures and a quarter fast
 PNG_END = b"IEND\xaeB`\x82"
 
 
-def load_rgba(path: Path, max_pixels: int = MAX_PIXELS) -> UInt8[np.ndarray, "height width 4"]:
+def load_rgba(
+    path: str | Path, max_pixels: int = MAX_PIXELS
+) -> UInt8[np.ndarray, "height width 4"]:
     """Return a picture as sRGB with straight alpha, upright, 8 bit per channel.
 
     Args:
@@ -42,6 +44,7 @@ def load_rgba(path: Path, max_pixels: int = MAX_PIXELS) -> UInt8[np.ndarray, "he
         PictureError: the file is missing, unreadable, damaged, cut off, too large, animated, or
             of a kind whose colours cannot be told (CMYK without a profile, 32 bit, Lab).
     """
+    path = Path(path)
     return decode_rgba(read_whole(path, "picture", PictureError), path, max_pixels)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
@@ -33,6 +35,7 @@ class TrainedField:
         size_px: longest side of the training pictures, for turntables.
         ink: contour lines that were taken off the drawings; None: there were none.
         keys: bends that were taken out of the drawings; None: there were none.
+        kept: what renderings prepare for the next one; not part of the field.
     """
 
     field: Field
@@ -45,3 +48,4 @@ class TrainedField:
     size_px: int
     ink: InkStyle | None = None
     keys: KeyWarps | None = None
+    kept: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)

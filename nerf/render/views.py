@@ -36,10 +36,10 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     Contour lines that were taken off the drawings are drawn again, as wide as there.
 
     Args:
-        source: a trained field; several views are faster from one `Baked.of(field)`.
+        source: a trained field; what is prepared for its first view is kept for the next ones.
         camera: where it is seen from.
     """
-    baked = source if isinstance(source, Baked) else Baked.of(source)
+    baked = source if isinstance(source, Baked) else _baked(source)
     trained = baked.trained
     width, height = camera.size_wh
     sight = Sight.of(baked, camera)
@@ -57,6 +57,14 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     seen[:, chosen] = more.mean(dim=2)
     means = seen.numpy(), None if shares is None else shares.numpy()
     return _with_lines(_rendering(*means, camera, trained))
+
+
+def _baked(field: TrainedField) -> Baked:
+    """Return what a field's views share; made for the first of them, and kept with the field."""
+    if "baked" not in field.kept:
+        field.kept["baked"] = Baked.of(field)
+    baked: Baked = field.kept["baked"]
+    return baked
 
 
 def _grid(height: int, width: int) -> Float[Tensor, "2 pixels"]:

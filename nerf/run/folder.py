@@ -109,12 +109,13 @@ def model_of(trained: TrainedField) -> bytes:
     return save(packed(trained))
 
 
-def read_field(folder: Path) -> TrainedField:
+def read_field(folder: str | Path) -> TrainedField:
     """Return the field of a run folder.
 
     Raises:
         BundleError: a file is missing or damaged, or holds what no training writes.
     """
+    folder = Path(folder)
     config_file, model_file = folder / CONFIG, folder / MODEL
     for file in (config_file, model_file):
         if not file.is_file():

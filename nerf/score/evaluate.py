@@ -45,10 +45,26 @@ class ScoredView:
     errors: dict[str, Float[np.ndarray, "height width"]]
 
 
-def evaluate(trained: TrainedField, test: Scene) -> dict[str, Any]:
-    """Return the figures of held-out views alone; see `report`."""
+def evaluate(
+    trained: TrainedField,
+    test: Scene,
+    training: Scene | None = None,
+    progress: Progress = lambda text: None,
+) -> dict[str, Any]:
+    """Return figures of renderings beside pictures: the content of evaluation.json.
+
+    PSNR, SSIM, FLIP, LPIPS and more, whole over white and inside the mask; a figure that cannot be
+    said is None, `absent` says why.
+
+    Args:
+        trained: the field.
+        test: held-out views.
+        training: the scene that it was trained on, to be scored apart.
+        progress: told which view is rendered.
+    """
     judges = load_judges()
-    return report(score_views(trained, test, judges), (), judges.absent)
+    own = () if training is None else score_views(trained, training, judges, progress)
+    return report(score_views(trained, test, judges, progress), own, judges.absent)
 
 
 def score_views(

@@ -6,10 +6,8 @@ colours are equally likely. Neighbours share the cuts, so the surface stays clos
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int
 from scipy import ndimage
 from skimage.measure import marching_cubes
 
@@ -17,27 +15,11 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.surface.color import label_probabilities
 from toonset.nerf.surface.cut import cut
 from toonset.nerf.surface.decimate import decimated
+from toonset.nerf.surface.files import Surface
 from toonset.nerf.surface.solid import SOLID_FROM, Solid, solid_of
 
 ROUNDS = 2  # of averaging colours over neighbours: specks go, borders come out smooth
 FINER = 4  # times as many faces as wanted are enough to choose from
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """A closed, oriented triangle surface in the mesh frame (+Y up, the character faces +Z).
-
-    Attributes:
-        vertices: (n, 3) world coordinates.
-        faces: (m, 3) counter-clockwise as seen from outside; no two vertices at one place.
-        labels: (m,) palette colour of every face.
-        palette: (colors, 3) sRGB.
-    """
-
-    vertices: Float[np.ndarray, "vertices 3"]
-    faces: Int[np.ndarray, "faces 3"]
-    labels: Int[np.ndarray, " faces"]
-    palette: UInt8[np.ndarray, "colors 3"]
 
 
 def surface_of(trained: TrainedField, faces: int | None = None) -> Surface:

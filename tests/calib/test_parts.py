@@ -20,7 +20,7 @@ from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import SheetError
 from toonset.mesh import Mesh
-from toonset.projection import project as torch_project
+from toonset.projection import project_offsets as torch_project
 from toonset.projection import rotate
 from toonset.view import View
 

@@ -112,7 +112,8 @@ def test_held_out_views_are_looked_at_and_reported(bundle: Path, toonset, tmp_pa
     assert all(reason in done.err for reason in done.json["verdict"]["reasons"])
     assert done.json["test"]["psnr"] == pytest.approx(done.json["train"]["psnr"])
     assert "left" in done.err  # how long it will take
-    without = toonset("train", bundle, "-o", tmp_path / "o", *FAST, "--json", "--no-palette")
+    flags = ("--json", "--no-palette", "--verbose")
+    without = toonset("train", bundle, "-o", tmp_path / "o", *FAST, *flags)
     assert without.json["test"] is not None  # found beside the bundle's pictures
     assert "memory: about" in without.err
 

@@ -8,7 +8,7 @@ import torch
 
 from toonset import frames
 from toonset.camera import Camera, rotation_from_angles
-from toonset.projection import kornia_pinholes, project, rotate, unproject
+from toonset.projection import kornia_pinholes, project_offsets, rotate, unproject
 
 POINTS = np.random.default_rng(0).uniform(-0.8, 0.8, (60, 3))
 
@@ -66,7 +66,7 @@ def batch(views):
 def test_torch_projection_equals_numpy_and_inverts():
     views = [camera(k) for k in (0.0, 1e-6, 0.2)]
     rotation, center, scale, k, offsets = batch(views)
-    pixels = project(rotation, center, scale, k, offsets)
+    pixels = project_offsets(rotation, center, scale, k, offsets)
     for i, view in enumerate(views):
         np.testing.assert_allclose(pixels[i], view.project(POINTS)[0], atol=1e-9)
     depth = torch.from_numpy(np.stack([v.project(POINTS)[1] for v in views]))
@@ -77,7 +77,7 @@ def test_torch_projection_equals_numpy_and_inverts():
 def test_torch_projection_has_no_pixel_behind_a_pinhole():
     rotation, center, scale, k, offsets = batch([camera(0.2)])
     behind = offsets - 8.0 * rotation[:, 2][:, None]
-    assert torch.isnan(project(rotation, center, scale, k, behind)).all()
+    assert torch.isnan(project_offsets(rotation, center, scale, k, behind)).all()
 
 
 def test_torch_projection_is_differentiable_through_k_zero():
@@ -85,7 +85,9 @@ def test_torch_projection_is_differentiable_through_k_zero():
 
     def pixels(turn, shift, log_scale, depth_k):
         turned = rotate(rotation, turn)
-        return project(turned, center + shift, scale * log_scale.exp(), k + depth_k, offsets[:, :5])
+        return project_offsets(
+            turned, center + shift, scale * log_scale.exp(), k + depth_k, offsets[:, :5]
+        )
 
     zeros = [torch.zeros(s, dtype=torch.float64, requires_grad=True) for s in ((1, 3), (1, 2))]
     zeros += [torch.zeros(s, dtype=torch.float64, requires_grad=True) for s in ((1, 1), (1,))]

@@ -23,13 +23,14 @@ from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.surface.cut import cut
 from toonset.nerf.surface.decimate import decimated
-from toonset.nerf.surface.export import (
+from toonset.nerf.surface.files import (
+    Surface,
     check_mesh_files,
     mesh_files,
     split_by_label,
     write_mesh_files,
 )
-from toonset.nerf.surface.surface import Surface, surface_of
+from toonset.nerf.surface.surface import surface_of
 
 PALETTE = np.array([[200, 40, 40], [40, 80, 200], [250, 240, 10]], dtype=np.uint8)
 RADIUS, VOXEL, CELLS = 1.0, 0.085, 31

@@ -10,6 +10,7 @@ World axes are glTF's own: +Y up, the character faces +Z.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +19,42 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.errors import OutputError
-from toonset.nerf.surface.surface import Surface
 from toonset.palette.names import hex_of
 from toonset.write import write_bytes
 
 KINDS = (".glb", ".obj", ".ply")
 CELL_PX = 8  # of the palette's texture: neighbours do not bleed into a colour's middle
 NAME = "figure"
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A closed, oriented triangle surface in the mesh frame (+Y up, the character faces +Z).
+
+    Attributes:
+        vertices: (n, 3) world coordinates.
+        faces: (m, 3) counter-clockwise as seen from outside; no two vertices at one place.
+        labels: (m,) palette colour of every face.
+        palette: (colors, 3) sRGB.
+    """
+
+    vertices: Float[np.ndarray, "vertices 3"]
+    faces: Int[np.ndarray, "faces 3"]
+    labels: Int[np.ndarray, " faces"]
+    palette: UInt8[np.ndarray, "colors 3"]
+
+    def save(self, path: str | Path, *, force: bool = False) -> dict[str, int]:
+        """Write a .glb, .obj or .ply file and what belongs to it; return the sizes by name.
+
+        Raises:
+            OutputError: the name says no kind of mesh, a file is there and `force` is off, or the
+                place cannot be written.
+        """
+        path = Path(path)
+        check_mesh_files(path, force=force)
+        files = mesh_files(self, path)
+        write_mesh_files(files, path)
+        return {name: len(data) for name, data in files.items()}
 
 
 def mesh_files(surface: Surface, path: Path) -> dict[str, bytes]:
