@@ -41,13 +41,13 @@ from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import CutOff
-from toonset.calib.search.alternatives import steadied
 from toonset.calib.search.hypotheses import (
     Candidates,
     half_turned,
     level_twins,
     looks_alike_from_behind,
     refine,
+    steadied,
     with_twins,
 )
 from toonset.calib.search.selection import SKETCHED, TogetherSearch, with_k
@@ -65,9 +65,7 @@ COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
 COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held back may be far
-# Typical coverage below which proportions are tried without a glance: it may be another body.
-# Right bodies with 1.2 % drawing error have 0.98 and more. On 144 synthetic sheets with another
-# body's mannequin rotations are 9.6 degrees off (p95), with 0.93 they were 13.7
+# Typical coverage below which proportions are tried without a glance (docs/decisions.md)
 SAME_BODY_COVERAGE = 0.96
 FEWEST_TO_GLANCE = 3  # two drawings are explained by many bodies
 # Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them

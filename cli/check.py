@@ -13,9 +13,11 @@ from toonset.errors import BundleError
 if TYPE_CHECKING:
     from toonset.dataset.bundle.problem_log import Problem, ProblemLog
 
+
 RUN, SPLIT, CAMERAS = "run", "split", "cameras"
 MARKS = ((RUN, "config.json"), (RUN, "model.safetensors"), (SPLIT, "split.json"))
 BAD = 2  # exit code, as of any other bad input
+SHOWN_METRICS = ("psnr", "psnr_mask", "ssim")
 
 
 def info(
@@ -33,7 +35,6 @@ def info(
     Also of a run folder, a folder of `toonset split`, and cameras of other programs. Pictures are
     not looked into; `toonset check` does that.
     """
-    from toonset.cli.common.info_folders import summarise_run, summarise_split
     from toonset.cli.common.info_text import bundle_text, run_text, split_text
 
     printer = Printer(as_json, quiet)
@@ -50,7 +51,6 @@ def info(
 
 
 def _summarise_bundle(path: Path) -> dict[str, Any]:
-    from toonset.cli.common.info_folders import summarise_run
     from toonset.dataset.bundle.summary import runs_of, summarise
     from toonset.errors import ToonsetError
 
@@ -149,3 +149,72 @@ def kind_of(path: Path) -> str:
             "`toonset calibrate`, `split` or `train` has written (`toonset import` reads others)"
         )
     return kind
+
+
+def summarise_run(folder: Path) -> dict[str, Any]:
+    """Return what a run folder says of itself; the field is not loaded.
+
+    Raises:
+        BundleError: config.json or metrics.json cannot be read.
+    """
+    from toonset.dataset.bundle.summary import sizes
+    from toonset.json_file import read_json
+
+    config = _table(read_json(folder / "config.json"))
+    metrics = _table(read_json(folder / "metrics.json"))
+    field, scene = _table(config.get("field")), _table(config.get("scene"))
+    verdict = _table(metrics.get("verdict"))
+    return {
+        "kind": "run",
+        "path": str(folder),
+        "steps": metrics.get("steps"),
+        "stopped": metrics.get("stopped"),
+        "fit": {k: v for k, v in _table(metrics.get("train")).items() if k in SHOWN_METRICS},
+        "verdict": verdict.get("verdict"),
+        "reasons": verdict.get("reasons", []),
+        "views": scene.get("views"),
+        "palette": field.get("palette"),
+        "options": config.get("options"),
+        "versions": config.get("versions"),
+        "bytes": sizes(folder),
+    }
+
+
+def summarise_split(folder: Path) -> dict[str, Any]:
+    """Return what split.json says, and which pictures came and went since.
+
+    The pictures are not looked into.
+
+    Raises:
+        SheetError: split.json cannot be read.
+    """
+    from toonset.dataset.bundle.summary import sizes
+    from toonset.dataset.images.folder import picture_files
+    from toonset.dataset.split_folder.places import IMAGES
+    from toonset.dataset.split_folder.write import read_records
+
+    sheets, views = read_records(folder)
+    place = folder / IMAGES
+    there = [path.name for path in picture_files(place)[0]] if place.is_dir() else []
+    known = [view.name for view in views]
+    return {
+        "kind": "split",
+        "path": str(folder),
+        "sheets": [
+            {
+                "name": sheet.name,
+                "size_wh": list(sheet.size_wh),
+                "warnings": list(sheet.warnings),
+                "left_out": [{"kind": one.kind, "box": list(one.box)} for one in sheet.left_out],
+            }
+            for sheet in sheets
+        ],
+        "views": [view.model_dump(mode="json") for view in views],
+        "gone": [name for name in known if name not in there],
+        "new": [name for name in there if name not in known],
+        "bytes": sizes(folder),
+    }
+
+
+def _table(value: Any) -> dict[str, Any]:
+    return value if isinstance(value, dict) else {}

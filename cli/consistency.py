@@ -33,8 +33,7 @@ def consistency(
     from toonset.cli.common.output import check_output
     from toonset.dataset.bundle.transforms import read_scene
     from toonset.dataset.images.picture import encode_png
-    from toonset.nerf.prepare.consistency import consistency_of
-    from toonset.nerf.prepare.consistency_picture import consistency_picture
+    from toonset.nerf.prepare.consistency import consistency_of, consistency_picture
     from toonset.write import new_folder, write_bytes, write_json
 
     printer = Printer(as_json, quiet)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -29,13 +28,6 @@ COLMAP_PANEL = "COLMAP"
 ASTRAY_PX = 0.1  # a principal point is worth a word from here
 
 
-class Layout(StrEnum):
-    """Which COLMAP reads it."""
-
-    new = "new"
-    old = "old"
-
-
 def export(
     bundle: Annotated[
         Path,
@@ -54,13 +46,13 @@ def export(
         typer.Option("--text", help="Write .txt files, not .bin.", rich_help_panel=COLMAP_PANEL),
     ] = False,
     layout: Annotated[
-        Layout,
+        Literal["new", "old"],
         typer.Option(
             "--layout",
             help="old: without rigs and frames, as COLMAP before 3.12.",
             rich_help_panel=COLMAP_PANEL,
         ),
-    ] = Layout.new,
+    ] = "new",
     centre: Annotated[
         bool,
         typer.Option(
@@ -80,7 +72,7 @@ def export(
     Where a format has no orthographic camera, such views become pinholes 100 body heights away, and
     how far these may be off is printed. The exact cameras are in toonset.json.
     """
-    if to != Format.colmap and (text or centre or layout != Layout.new):
+    if to != Format.colmap and (text or centre or layout != "new"):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
     from toonset.dataset.bundle.bundle import mannequin_of
     from toonset.dataset.bundle.transforms import transforms_file
@@ -97,7 +89,7 @@ def export(
     if body is not None and target.wants_points:
         printer.progress("colouring points")
         points = _points(body, views, seed, is_given=mesh is not None)
-    job = Job(out, views, points, body, text, layout == Layout.old, force)
+    job = Job(out, views, points, body, text, layout == "old", force)
     _report(printer, to, job, target.write(job))
 
 

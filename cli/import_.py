@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -22,13 +21,6 @@ if TYPE_CHECKING:
     from toonset.dataset.importers.to_bundle import ImportReport
 
 WRITTEN = ("transforms.json", "images", "mannequin.obj")
-
-
-class Up(StrEnum):
-    """Which way is up in the world that is read."""
-
-    y = "y"
-    z = "z"
 
 
 def import_(
@@ -56,8 +48,9 @@ def import_(
         typer.Option("--mesh", help="The mannequin, in the world that is read."),
     ] = None,
     up: Annotated[
-        Up, typer.Option("--up", help="z: turn a world of Blender's (+Z up, front -Y) to ours.")
-    ] = Up.y,
+        Literal["y", "z"],
+        typer.Option("--up", help="z: turn a world of Blender's (+Z up, front -Y) to ours."),
+    ] = "y",
     force: ForceFlag = False,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
@@ -75,7 +68,7 @@ def import_(
     check_output(out, [path, images, masks, mesh], WRITTEN, force=force)
     imported = read_import(path, images, masks)
     body = mannequin_of(path.parent if path.is_file() else path, mesh)
-    report = write_imported(out, imported, body, z_up=up == Up.z, force=force)
+    report = write_imported(out, imported, body, z_up=up == "z", force=force)
     printer.say(_summary(imported, report, has_mannequin=body is not None))
     values = {"bundle": out, "format": imported.program, "views": list(report.views)}
     printer.result({**values, "opaque": list(report.opaque), "masked": report.masked}, str(out))

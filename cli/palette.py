@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -15,6 +14,7 @@ from toonset.cli.common.output import (
     JsonFlag,
     Printer,
     QuietFlag,
+    VerboseFlag,
     check_output,
 )
 
@@ -25,20 +25,6 @@ WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette
 FOLDERS = ("labels", "contours")
 BUNDLE, OUT = Path("bundle"), Path("palette")
 CHOICE_PANEL = "Choice of colours"
-
-
-class Method(StrEnum):
-    """Who finds the colours."""
-
-    toonset = "toonset"
-    extcolors = "extcolors"
-
-
-class ColorSpace(StrEnum):
-    """In which the nearest colour of a pixel is meant."""
-
-    rgb = "rgb"
-    oklab = "oklab"
 
 
 def palette(
@@ -89,16 +75,17 @@ def palette(
         ),
     ] = True,
     method: Annotated[
-        Method,
+        Literal["toonset", "extcolors"],
         typer.Option(
             "--method",
             help="Ours, or the paper's tool for comparison.",
             rich_help_panel=CHOICE_PANEL,
         ),
-    ] = Method.toonset,
+    ] = "toonset",
     space: Annotated[
-        ColorSpace, typer.Option("--space", help="In which labels are the nearest colour.")
-    ] = ColorSpace.rgb,
+        Literal["rgb", "oklab"],
+        typer.Option("--space", help="In which labels are the nearest colour."),
+    ] = "rgb",
     out: Annotated[
         Path | None,
         typer.Option(
@@ -111,6 +98,7 @@ def palette(
     force: ForceFlag = False,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
+    verbose: VerboseFlag = False,
 ) -> None:
     """List the colours that make up at least 5 % of the character, and label every pixel.
 
@@ -123,7 +111,7 @@ def palette(
     from toonset.palette.pixels.ink_lines import find_contour
     from toonset.write import new_folder
 
-    printer = Printer(as_json, quiet)
+    printer = Printer(as_json, quiet, verbose)
     places = inputs or [BUNDLE]
     bundle = bundle_of(places)
     target = out or bundle or OUT
@@ -134,20 +122,22 @@ def palette(
     for note in drawn.notes:
         printer.say(note)
     contours = [find_contour(picture) for picture in drawn.pictures]
-    found = choose_palette(drawn.pictures, contours, options, colors, method.value)
+    found = choose_palette(drawn.pictures, contours, options, colors, method)
     pairs = zip(drawn.pictures, contours, strict=True)
-    labels = [label_drawing(*pair, found, space.value) for pair in pairs]
+    labels = [label_drawing(*pair, found, space) for pair in pairs]
     named = [list(zip(drawn.names, maps, strict=True)) for maps in (labels, contours)]
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
         write_palette(folder, found, *named)
-    _report(found, target, printer)
+    _report(found, target, printer, in_bundle=target == bundle)
 
 
-def _report(found: Palette, target: Path, printer: Printer) -> None:
+def _report(found: Palette, target: Path, printer: Printer, *, in_bundle: bool) -> None:
     from toonset.cli.common.palette_report import palette_lines
     from toonset.palette.formats.registry import to_json
 
     for warning in found.warnings:
         printer.say(warning)
-    text = "\n".join([*palette_lines(found), str(target)])
+    after = f"; next: toonset train {target}" if in_bundle else ""
+    lines = palette_lines(found, verbose=printer.verbose)
+    text = "\n".join([*lines, f"{target}: look at palette.png{after}"])
     printer.result({"out": target, **to_json(found)}, text)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from toonset.cli.common.host import AUTO, checked
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -19,7 +20,6 @@ from toonset.cli.common.output import (
 )
 from toonset.cli.common.train_place import Place
 from toonset.cli.common.train_run import Request, run
-from toonset.cli.common.train_threads import AUTO, checked
 
 DEVICES = ("auto", "cpu", "cuda")
 INKS = ("paint", "redraw")

@@ -9,11 +9,13 @@ from typing import Any, Literal, get_args
 LAYERS = ("rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
 FieldName = Literal["auto", "triplane", "mlp", "voxel", "hull"]
 FIELDS: tuple[FieldName, ...] = get_args(FieldName)
+PRESETS = ("fast", "paper")
+PAPER_STEPS = 2000
 
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """Settings of `toonset.nerf.train.train.train`; `None` means chosen from the scene.
+    """Settings of `toonset.train`; `None` means chosen from the scene.
 
     Attributes:
         steps: optimiser steps; half as many again give 0.1 dB more on eight views of 150 px.
@@ -59,10 +61,6 @@ class TrainOptions:
     unbend: bool = True
     symmetric: bool = True
     ink: bool = False
-
-
-PRESETS = ("fast", "paper")
-PAPER_STEPS = 2000
 
 
 def preset(name: str) -> dict[str, Any]:

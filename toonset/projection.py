@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Float
-from kornia.geometry.camera import PinholeCamera, project_points_z1, unproject_points_z1
+from kornia.geometry.camera import project_points_z1, unproject_points_z1
 from kornia.geometry.liegroup import So3
 from torch import Tensor
 
@@ -110,18 +110,3 @@ def unproject(
     relative_depth = (1 + k[:, None] * depth)[..., None]
     local = unproject_points_z1(plane, relative_depth)[..., :2]
     return torch.cat([local, depth[..., None]], dim=-1) @ rotation
-
-
-def kornia_pinholes(cameras: list[Camera]) -> PinholeCamera:
-    """Return pinhole cameras as kornia's batched `PinholeCamera` (float64).
-
-    Raises:
-        CameraError: one is orthographic; call `Camera.as_pinhole` first.
-    """
-    intrinsics = torch.eye(4, dtype=torch.float64).repeat(len(cameras), 1, 1)
-    intrinsics[:, :3, :3] = torch.stack([torch.from_numpy(camera.K) for camera in cameras])
-    extrinsics = torch.stack([torch.from_numpy(camera.camera_from_world) for camera in cameras])
-    width, height = (
-        torch.tensor([float(camera.size_wh[axis]) for camera in cameras]) for axis in (0, 1)
-    )
-    return PinholeCamera(intrinsics, extrinsics, height, width)

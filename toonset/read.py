@@ -38,6 +38,10 @@ FOREIGN_FORMATS = (
     (b"GIF8", "a GIF picture"),
     (b"\x7fELF", "a program"),
 )
+MAX_DEPTH = 64  # camera files nest eight deep
+LARGEST_INT = 2**63  # beyond, other programs' integers end
+MAX_DIGITS = 400  # as a float's longest; Python itself refuses 4300
+BOM = b"\xef\xbb\xbf"
 
 
 def read_whole(
@@ -87,12 +91,6 @@ def describe(data: bytes) -> str:
         return "an SVG drawing"
     is_text = b"\0" not in head and sum(byte < 9 for byte in head) == 0
     return "text" if is_text else "of an unknown kind"
-
-
-MAX_DEPTH = 64  # camera files nest eight deep
-LARGEST_INT = 2**63  # beyond, other programs' integers end
-MAX_DIGITS = 400  # as a float's longest; Python itself refuses 4300
-BOM = b"\xef\xbb\xbf"
 
 
 def parse_json(data: bytes, where: str, error_type: type[ToonsetError]) -> Any:

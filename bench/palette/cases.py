@@ -19,10 +19,9 @@ from jaxtyping import Float, UInt8
 
 from bench.cases.bodies import random_body
 from toonset.dataset.mesh.load import load_mesh
-from toonset.dataset.synthetic.flat_colors import flat_palette
 from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.dataset.synthetic.options import SynthOptions
-from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
+from toonset.dataset.synthetic.turnaround import Turnaround, flat_palette, make_turnaround
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
 from toonset.palette.colors import oklab_from_rgb

@@ -16,9 +16,8 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from bench.palette.cases import characters
-from toonset.dataset.synthetic.flat_colors import flat_palette
 from toonset.dataset.synthetic.options import SynthOptions
-from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
+from toonset.dataset.synthetic.turnaround import Turnaround, flat_palette, make_turnaround
 from toonset.mesh import Mesh
 from toonset.palette.pixels.labels import UNLABELLED
 

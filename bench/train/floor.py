@@ -22,7 +22,7 @@ from torch import Tensor
 
 from bench.cases.cases import train_cases
 from bench.train.growth import growths, print_growth
-from toonset.cli.common.allocator import keep_freed_memory
+from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.fields.classifier import HIDDEN as CLASSIFIER_WIDTH
 from toonset.nerf.fields.classifier import PaletteClassifier

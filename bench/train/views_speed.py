@@ -28,9 +28,8 @@ from toonset.nerf.hull.march import clip, rays_of
 from toonset.nerf.kernels.compositing import compositing_weights
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.supersample import places_within
 from toonset.nerf.render.turntable import turntable
-from toonset.nerf.render.views import render
+from toonset.nerf.render.views import places_within, render
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.score.metrics import psnr_of
 from toonset.nerf.train.labelling import labelled

@@ -23,9 +23,7 @@ from toonset.errors import CameraError
 from toonset.view import View
 
 OFFSETS = np.radians(np.linspace(-15, 15, 11))
-# Root mean square error on 15 sheets (2 seeds each) with outlines off by 1.2 % of the cell, shifts
-# and scales by 1 %: 2.9, 2.9 and 3.1 degrees for yaws off by 2, 6 and 12 degrees (mean +2).
-SIGMA = math.radians(3.0)
+SIGMA = math.radians(3.0)  # as measured, see docs/decisions.md
 PROVEN = 0.005  # of the height: contradiction by which both ends must be worse than the smallest
 
 

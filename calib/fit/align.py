@@ -29,9 +29,7 @@ MERGED = np.radians(3.0)  # starts this near to each other go to the same optimu
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
 EFFECTIVE_POINTS = 40.0  # weight of a view's outline against the priors, in points
-# Independent outline errors per view when rival poses are compared: fitted on 40 synthetic drawn
-# sheets so that the rivals' probabilities score best.
-INDEPENDENT_POINTS = 10.0
+INDEPENDENT_POINTS = 10.0  # outline errors of a view when rival poses are compared
 
 
 @dataclass(frozen=True)

@@ -40,11 +40,9 @@ WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
 # Of bodies whose outlines lack something, hair or a bag, and of those that nearly meet
 BODY_WIDTHS, NEAR_BODY_WIDTHS = np.geomspace(0.04, 0.015, 8), np.geomspace(0.04, 0.01, 10)
 BODY_ELEVATION = np.radians(1.5)  # half of `Spreads.elevation`: a bent body can look tilted
-# Where outlines nearly meet, a glance says whether proportions are worth a fit: drawing error of 1
-# to 2 % gains up to 90 (75 sheets), arms 5 degrees higher or heads 10 % larger 218 and more (10)
+# Where outlines nearly meet, a glance says whether proportions are worth a fit (docs/decisions.md)
 GLANCE_WIDTHS, GLANCE_MARGIN = np.array([0.02, 0.015]), 120.0
-# Drawings so far off a bent body look like another body to any: drawing error of 2 % leaves 1.0 to
-# 1.4 % and gains 21 to 198 (7 sheets of 16), other bodies drawn with 1.5 % leave 0.9 % at most
+# Drawings so far off a bent body look like another body to any (docs/decisions.md)
 UNSTEADY, UNSTEADY_MARGIN = 0.009, 200.0
 
 ORTHOGRAPHIC, SCALES = "orthographic", "orthographic, a scale per view"

@@ -35,8 +35,7 @@ TURN_VIEWS = 4  # fewer views make no turn
 TURN_STARTS = 36  # of the first view's yaw
 TURN_SIGMA = np.radians(8.0)  # of a view about its place
 P_TURN = 0.5  # before looking: half of all sheets are evenly spaced turns
-# Of the turns: start at the front, at the back; the others start anywhere. A habit of artists is no
-# evidence: at 4 to 1 it chooses between twins, but alone it leaves them ambiguous.
+# Of the turns: start at the front, at the back; the others start anywhere (docs/decisions.md)
 P_FRONT_FIRST, P_BACK_FIRST = 0.4, 0.1
 UNLIKELY = 20.0  # nats: hypotheses this far behind are not asked about paint
 

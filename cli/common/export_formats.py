@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,97 +48,66 @@ class Target:
     """One row of the table.
 
     Attributes:
-        write: writes it; returns the views as they were written.
+        writer: module and function below `toonset.dataset.exporters`.
         written: patterns of the names in its folder.
-        wants_points: whether coloured points of the mannequin are part of it.
+        takes: what of a job it takes besides folder, views, mesh and force.
+        fixed: arguments that make it this format.
         is_exact: whether it holds orthographic cameras.
         hint: what a person should know before the next step.
     """
 
-    write: Callable[[Job], Sequence[ExportView]]
+    writer: str
     written: tuple[str, ...]
-    wants_points: bool = False
+    takes: tuple[str, ...] = ()
+    fixed: Mapping[str, bool] = field(default_factory=dict)
     is_exact: bool = False
     hint: str = ""
 
+    @property
+    def wants_points(self) -> bool:
+        """Return whether coloured points of the mannequin are part of it."""
+        return "points" in self.takes
 
-def _colmap(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.colmap import write_colmap
-
-    how = {"text": job.text, "old_layout": job.old_layout, "force": job.force}
-    write_colmap(job.out, job.views, job.points, job.mesh, **how)
-    return job.views
-
-
-def _nerfstudio(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.nerfstudio import write_transforms
-
-    write_transforms(job.out, job.views, job.points, job.mesh, force=job.force)
-    return job.views
-
-
-def _instant_ngp(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.nerfstudio import write_transforms
-
-    write_transforms(job.out, job.views, None, job.mesh, instant_ngp=True, force=job.force)
-    return job.views
-
-
-def _blender_synthetic(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
-
-    return write_blender_synthetic(job.out, job.views, job.points, job.mesh, force=job.force)
-
-
-def _blender(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.blender import write_blender_script
-
-    return write_blender_script(job.out, job.views, job.mesh, force=job.force)
-
-
-def _gltf(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.gltf import write_gltf
-
-    return write_gltf(job.out, job.views, job.mesh, force=job.force)
-
-
-def _opencv(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.opencv import write_opencv
-
-    write_opencv(job.out, job.views, job.mesh, force=job.force)
-    return job.views
-
-
-def _opencv_xml(job: Job) -> Sequence[ExportView]:
-    from toonset.dataset.exporters.opencv import write_opencv
-
-    write_opencv(job.out, job.views, job.mesh, xml=True, force=job.force)
-    return job.views
+    def write(self, job: Job) -> Sequence[ExportView]:
+        """Write it; return the views as they were written."""
+        module, name = self.writer.split(":")
+        write = getattr(import_module(f"toonset.dataset.exporters.{module}"), name)
+        given = {name: getattr(job, name) for name in self.takes} | dict(self.fixed)
+        written = write(job.out, job.views, mesh=job.mesh, force=job.force, **given)
+        return job.views if written is None else written
 
 
 TARGETS = {
-    Format.colmap: Target(_colmap, (*BESIDE, "masks", "sparse"), wants_points=True),
+    Format.colmap: Target(
+        "colmap:write_colmap",
+        (*BESIDE, "masks", "sparse"),
+        takes=("points", "text", "old_layout"),
+    ),
     Format.nerfstudio: Target(
-        _nerfstudio,
+        "nerfstudio:write_transforms",
         (*BESIDE, "transforms.json", "sparse_pc.ply"),
-        wants_points=True,
+        takes=("points",),
         hint="to keep the world as it is: ns-train METHOD nerfstudio-data --data FOLDER "
         "--orientation-method none --center-method none --auto-scale-poses False",
     ),
-    Format.instant_ngp: Target(_instant_ngp, (*BESIDE, "transforms.json")),
+    Format.instant_ngp: Target(
+        "nerfstudio:write_transforms",
+        (*BESIDE, "transforms.json"),
+        fixed={"instant_ngp": True},
+    ),
     Format.blender_synthetic: Target(
-        _blender_synthetic,
+        "blender_synthetic:write_blender_synthetic",
         (*BESIDE[1:], "train", "transforms_*.json", "points3d.ply"),
-        wants_points=True,
+        takes=("points",),
         hint="val and test name the pictures of train: a turnaround has no others",
     ),
     Format.blender: Target(
-        _blender,
+        "blender:write_blender_script",
         (*BESIDE, "import_cameras.py"),
         is_exact=True,
         hint="run it: blender --python import_cameras.py",
     ),
-    Format.gltf: Target(_gltf, (*BESIDE, "scene.glb"), is_exact=True),
-    Format.opencv: Target(_opencv, (*BESIDE, "cameras.yml")),
-    Format.opencv_xml: Target(_opencv_xml, (*BESIDE, "cameras.xml")),
+    Format.gltf: Target("gltf:write_gltf", (*BESIDE, "scene.glb"), is_exact=True),
+    Format.opencv: Target("opencv:write_opencv", (*BESIDE, "cameras.yml")),
+    Format.opencv_xml: Target("opencv:write_opencv", (*BESIDE, "cameras.xml"), fixed={"xml": True}),
 }

@@ -8,14 +8,17 @@ if TYPE_CHECKING:
     from toonset.palette.palette import DroppedColor, Evidence, Palette
 
 HUNDRED = 100.0
+MOST_NAMED = 6  # left-out colours; more are counted
 PIXELS = 4096  # for which the evidence counts bits
 LEAST_BITS = 1.0  # less decides nothing
 LEAST_SHARE = 0.0005  # what rounds to 0.1 %
 
 
-def palette_lines(found: Palette) -> list[str]:
-    """Return a line per colour, then the rule, lines, left-out colours and why so many."""
+def palette_lines(found: Palette, *, verbose: bool) -> list[str]:
+    """Return a line per colour, then what is left out; if verbose, the rule and the evidence."""
     lines = [_line(color.rgb, color.share, color.name) for color in found.colors]
+    if not verbose:
+        return [*lines, *_left_out(found)]
     lines.append(f"shares are of all the character's pixels; rule: {found.rule}")
     lines += _contour_lines(found)
     if found.dropped:
@@ -24,6 +27,17 @@ def palette_lines(found: Palette) -> list[str]:
     if found.evidence is not None:
         lines.append(_evidence_line(found.evidence))
     return lines
+
+
+def _left_out(found: Palette) -> list[str]:
+    from toonset.palette.names import hex_of
+
+    if not found.dropped:
+        return []
+    names = [f"{hex_of(color.rgb)} {color.name}" for color in found.dropped[:MOST_NAMED]]
+    more = [f"{len(found.dropped) - MOST_NAMED} more"] if len(found.dropped) > MOST_NAMED else []
+    first = hex_of(found.dropped[0].rgb)
+    return [f"left out by the rule: {', '.join([*names, *more])} (--keep '{first}' keeps one)"]
 
 
 def _evidence_line(evidence: Evidence) -> str:

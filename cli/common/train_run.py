@@ -7,13 +7,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toonset.cli.common.allocator import keep_freed_memory
+from toonset.cli.common.host import keep_freed_memory, threads_of
 from toonset.cli.common.output import Printer
 from toonset.cli.common.train_place import Place
-from toonset.cli.common.train_printer import Voice
-from toonset.cli.common.train_stop import Stopper
 from toonset.cli.common.train_summary import summary
-from toonset.cli.common.train_threads import threads_of
+from toonset.cli.common.train_watch import Stopper, Voice
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:

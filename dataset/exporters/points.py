@@ -23,6 +23,12 @@ from toonset.mesh import Mesh
 
 OUTSIDE = 0.03  # of the body height: drawn outlines differ from the mannequin's by so much
 BEHIND = 0.01  # of the body height: a point deeper than the surface by more is hidden
+PLY_VERTEX = np.dtype(
+    [
+        *((name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")),
+        *((name, "u1") for name in ("red", "green", "blue")),
+    ]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,14 +156,6 @@ def _cells(
     column, row = np.floor(np.clip(finite, -1, max(size_wh))).astype(np.intp).T
     within = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     return np.clip(column, 0, width - 1), np.clip(row, 0, height - 1), within
-
-
-PLY_VERTEX = np.dtype(
-    [
-        *((name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")),
-        *((name, "u1") for name in ("red", "green", "blue")),
-    ]
-)
 
 
 def encode_ply(points: TrackedPoints) -> bytes:

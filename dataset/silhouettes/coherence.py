@@ -36,9 +36,7 @@ from toonset.errors import CameraError
 from toonset.view import View
 
 TOLERANCE = 0.01  # of the height: a faithful drawing's outline is this far off
-# Between faultless and damaged sheets. Six characters, outlines off by 1.2 % of the cell, yaws by 3
-# degrees: both are exceeded in 0 of 24 sheets of eight views and 1 of 24 of five; with one camera
-# 45 degrees off in 24 and 21.
+# Between faultless and damaged sheets (docs/decisions.md)
 ODD_BLAME = 0.75
 ODD_CONTRADICTION = 0.012  # of the height
 

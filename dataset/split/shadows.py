@@ -31,6 +31,12 @@ GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, n
 TONE = 0.03  # of the paper's light: tones so near are one
 BESIDE = 0.12  # of a shadow's border that is paper
 OFTEN = 0.75  # of the views that show a shadow, if one does
+DARKEST = 0.25  # of the paper's light
+LIGHTEST = 0.998
+OFF_PAPER = 2.0  # levels, beyond the noise: a channel dimmed otherwise is paint
+STEEPEST = 0.06  # of the light per cell: a shadow's inside is smooth
+BLACK = 40  # levels: a shadow on transparency is no lighter
+OPAQUE = 230  # alpha: and less opaque
 
 
 def find_shadows(
@@ -213,14 +219,6 @@ def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray, depth
         and largest[cv2.CC_STAT_AREA] >= WHOLE * own
         and (shadow & filled).sum() <= ENCLOSED * shadow.sum()
     )
-
-
-DARKEST = 0.25  # of the paper's light
-LIGHTEST = 0.998
-OFF_PAPER = 2.0  # levels, beyond the noise: a channel dimmed otherwise is paint
-STEEPEST = 0.06  # of the light per cell: a shadow's inside is smooth
-BLACK = 40  # levels: a shadow on transparency is no lighter
-OPAQUE = 230  # alpha: and less opaque
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from toonset.errors import PaletteError, SheetError, UsageError
-from toonset.palette.formats.typed import rgb_of_typed
+from toonset.palette.formats.hex import rgb_of_typed
 
 MOST_CELLS = 1000  # a sheet of letters or a tile map is no character sheet
 

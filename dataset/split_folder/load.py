@@ -137,26 +137,19 @@ def _labelled(sheet: Sheet, text: str) -> Sheet:
             'give one per kept view in sheet order, "?" where you do not know'
         )
     parse_labels(text, kept)
-    words = [word.strip() for word in text.split(",")]
-    split = replace(sheet.split, labels=tuple("" if word == "?" else word for word in words))
-    views = tuple(
-        replace(v, label=label) for v, label in zip(split.views, split.labels, strict=True)
-    )
-    return replace(sheet, split=replace(split, views=views))
+    words = ["" if word.strip() == "?" else word.strip() for word in text.split(",")]
+    pairs = zip(sheet.views, words, strict=True)
+    views = tuple(replace(view, label=word) for view, word in pairs)
+    return replace(sheet, split=replace(sheet.split, views=views))
 
 
 def _with_origin(sheet: Sheet) -> Sheet:
     """Return the sheet whose views know where they come from."""
     split, origin = sheet.split, Origin(sheet.files, sheet.options)
-    views = tuple(
-        replace(
-            view,
-            label=label,
-            origin=origin,
-            paper=None if sheet.pictures[of] is None else split.sources[of].background,
-        )
-        for view, of, label in zip(split.views, split.source_of, split.labels, strict=True)
-    )
+    cut_now = [picture is not None for picture in sheet.pictures]
+    papers = [split.sources[of].background if cut_now[of] else None for of in split.source_of]
+    pairs = zip(split.views, papers, strict=True)
+    views = tuple(replace(view, origin=origin, paper=paper) for view, paper in pairs)
     return replace(sheet, split=replace(split, views=views))
 
 

@@ -13,7 +13,7 @@ split.json only knows where a picture came from. When both disagree:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -73,10 +73,9 @@ def read_split(folder: Path) -> tuple[Split, tuple[str, ...]]:
             found.append(source)
         record = picture.record
         source_of.append(len(found) - 1 if source or record is None else record.sheet)
-        views.append(view)
+        views.append(replace(view, label=(record.label if record else None) or ""))
         notes += [f"{folder}: {picture.shown} {note}"] if note else []
-    labels = tuple((p.record.label if p.record else None) or "" for p in pictures)
-    return Split(tuple(found), numbered(views), tuple(source_of), labels), tuple(notes)
+    return Split(tuple(found), numbered(views), tuple(source_of)), tuple(notes)
 
 
 def _pictures(folder: Path) -> tuple[list[_Picture], tuple[str, ...]]:

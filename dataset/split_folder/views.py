@@ -9,7 +9,6 @@ from hashlib import sha256
 from toonset.dataset.split.sheet import LeftOut, Segmentation
 from toonset.view import View
 
-UNKNOWN_LABEL = "?"
 DROPPED = "dropped"  # what was left out by hand
 
 
@@ -44,20 +43,16 @@ class Split:
         sources: the sheets.
         views: in order, named 000.png, 001.png, ...
         source_of: per view, the position of its sheet in `sources`.
-        labels: per view, what it shows ("front", "90"); "" where nobody has said.
     """
 
     sources: tuple[Source, ...]
     views: tuple[View, ...]
     source_of: tuple[int, ...]
-    labels: tuple[str, ...]
 
     @property
-    def label_text(self) -> str:
-        """Return the labels as --views takes them; empty where there are none."""
-        if not any(self.labels):
-            return ""
-        return ",".join(label or UNKNOWN_LABEL for label in self.labels)
+    def labels(self) -> tuple[str, ...]:
+        """Return per view what it shows ("front", "90"); "" where nobody has said."""
+        return tuple(view.label for view in self.views)
 
 
 def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segmentation) -> Split:
@@ -79,8 +74,7 @@ def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segm
         sheet.left_out,
         sheet.remarks,
     )
-    count = len(sheet.views)
-    return Split((source,), sheet.views, (0,) * count, ("",) * count)
+    return Split((source,), sheet.views, (0,) * len(sheet.views))
 
 
 def joined(parts: Sequence[Split]) -> Split:
@@ -92,8 +86,7 @@ def joined(parts: Sequence[Split]) -> Split:
         source_of += [index + len(sources) for index in part.source_of]
         sources += part.sources
         views += part.views
-    labels = tuple(label for part in parts for label in part.labels)
-    return Split(tuple(sources), numbered(views), tuple(source_of), labels)
+    return Split(tuple(sources), numbered(views), tuple(source_of))
 
 
 def without(split: Split, dropped: frozenset[int]) -> Split:
@@ -111,7 +104,6 @@ def without(split: Split, dropped: frozenset[int]) -> Split:
         tuple(sources),
         numbered([split.views[number] for number in kept]),
         tuple(split.source_of[number] for number in kept),
-        tuple(split.labels[number] for number in kept),
     )
 
 

@@ -18,10 +18,7 @@ from toonset.nerf.kernels.adam import Adam, Group
 from toonset.nerf.kernels.volume import Volume, add_bending, along_axes, inner
 
 # Weights of the Laplacian at the start and, from 8 views on, at the end: stiff, the surface leaves
-# what no outline asks for, soft, it meets the outlines. Outlines of held-out views lie 0.32 px from
-# it, with 1.0 throughout 0.37 px (8 drawings; mean of 7 development characters' root mean squares).
-# Fewer views ask for less, and more must be guessed: soft ends render 0.2 dB worse with 4 drawings
-# and 0.7 dB with 3
+# what no outline asks for, soft, it meets the outlines (docs/decisions.md)
 STIFF, SOFT, REFERENCE_VIEWS = 1.0, 0.1, 8
 STEPS, RATE, LAST_RATE = 100, 0.1, 0.1  # of Adam; the rate decays exponentially to a tenth
 PYRAMID = (1, 2, 4, 8)  # coarse voxels per cell of each level

@@ -31,9 +31,8 @@ from toonset.nerf.hull.support import agreement, agreement_within
 from toonset.nerf.kernels.threads import side_by_side
 
 LEVEL = 0.5
-# Support from which all of a point's density counts. Rays that graze a border see it at length and
-# make it opaque: ending at LEVEL it left figures too wide. New views gain 0.1 dB whole and in the
-# mask with 0.7 (6 development characters, 2 seeds), as much with 0.75, less with 0.6 and 0.85
+# Support from which all of a point's density counts; at LEVEL, rays that graze a border would make
+# figures too wide (docs/decisions.md)
 FULL = 0.7
 EDGE = 0.02  # support from which a point can be part of the figure's soft border
 BLOCK = 4  # voxels along a block's edge

@@ -16,9 +16,7 @@ from toonset.nerf.hull.tolerance import HullEvidence, choose_missing
 from toonset.nerf.options import TrainOptions
 
 VOXELS_PER_PX, VOXELS = 1.8, (64, 300)
-# Views that hold each other's thin parts back: with them as wide as they cover pixels, 8 views gain
-# 0.15 dB (mean of six), 4 lose 0.25 (thirteen)
-WIDE_FROM = 6
+WIDE_FROM = 6  # views from which thin parts are as wide as they cover pixels (docs/decisions.md)
 LEVELS = 15  # of support above 0: a border lies within 0.03 px, in a quarter less of a saved model
 SLACK = 1.5  # times the outlines' disagreement: as far as the surface may leave the hull
 

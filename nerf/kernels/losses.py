@@ -15,9 +15,7 @@ from toonset.palette.pixels.labels import UNLABELLED
 
 BACKDROP = 0.5  # grey behind the figure in training: neither white nor black parts hide holes
 OPACITY_WEIGHT = 0.1
-# Times the smoothness. On drawn sheets, 16 costs 0.09 dB and 1 costs 0.24 (n = 4 development
-# characters), 250 costs 0.06 (n = 2).
-DISAGREEING = 64.0
+DISAGREEING = 64.0  # times the smoothness, of drawings that disagree (docs/decisions.md)
 REFERENCE_VIEWS = 8  # views for which `TrainOptions.smoothness` is stated
 OPAQUE_ENOUGH = 0.05  # opacity below which a rendered colour means nothing
 

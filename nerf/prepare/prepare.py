@@ -21,10 +21,7 @@ from toonset.nerf.prepare.registration import Registration, registered
 from toonset.nerf.prepare.unwarp import Unbending, unbent
 from toonset.nerf.prepare.warp_back import KeyWarps
 
-# Outlines this near agree. Cameras that were 1 or 5 % too large, shifted by 1 or 2 % or 5 degrees
-# off leave 0.03 once they are set right; smoothed no more than exact drawings, they give 0.8 to
-# 2 dB more (10 of 10 scenes of two bodies). At 0.6 px more smoothing is worth 0.1 dB (one scene)
-AGREE_PX = 0.1
+AGREE_PX = 0.1  # outlines this near agree (docs/decisions.md)
 
 
 @dataclass(frozen=True, eq=False)

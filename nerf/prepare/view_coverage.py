@@ -13,9 +13,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import figure_px
 
-# Between neighbouring drawings: a third of the turn. Three even drawings lose 5 dB by that; 100 to
-# 115 degrees among eight drawings lose nothing.
-WIDE = math.radians(119)
+WIDE = math.radians(119)  # between neighbouring drawings, a third of the turn (docs/decisions.md)
 FEW_OUTLINES = math.radians(75)  # of half a turn without one: four even views lose 5 dB by that
 DEPTHLESS = math.radians(150)  # then a body may come out four times as deep as it is wide
 

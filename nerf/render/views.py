@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from toonset.camera import Camera
@@ -22,10 +23,12 @@ from toonset.nerf.render.labels import NONE, labels_of, palette_shares
 from toonset.nerf.render.layers import Rendering
 from toonset.nerf.render.line_drawing import draw_ink, ink_scale, inked
 from toonset.nerf.render.rays import Sight
-from toonset.nerf.render.supersample import borders, places_within
 from toonset.palette.pixels.labels import UNLABELLED
 
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
+RAYS_PER_SIDE = 2  # of a pixel on a border
+TOLERANCE = 0.15  # difference of neighbours that makes a border
+CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 
 @torch.no_grad()
@@ -97,3 +100,33 @@ def _rendering(
         labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
     rgb = np.ascontiguousarray(np.moveaxis(mean[:3], 0, -1))
     return Rendering(rgb, alpha, depth, labels, shares, camera, field)
+
+
+def borders(
+    values: Float[np.ndarray, "channels height width"],
+    labels: Int[np.ndarray, "height width"],
+) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels that differ from one of their four neighbours.
+
+    Args:
+        values: what is seen at the pixels' centres, in [0, 1]: colour, opacity.
+        labels: differ or not.
+    """
+    found = _range(labels.astype(np.float32)) > 0
+    for channel in values:
+        found |= _range(channel) > TOLERANCE
+    return found
+
+
+def _range(values: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    return cv2.dilate(values, CROSS) - cv2.erode(values, CROSS)
+
+
+def places_within(
+    chosen: Bool[np.ndarray, "height width"], side: int = RAYS_PER_SIDE
+) -> Float[np.ndarray, "n rays 2"]:
+    """Return where `side` x `side` rays go through each chosen pixel (first centre at 0.5)."""
+    rows, columns = np.nonzero(chosen)
+    part = (np.arange(side) + 0.5) / side
+    down, right = (grid.reshape(-1) for grid in np.meshgrid(part, part, indexing="ij"))
+    return np.stack([columns[:, None] + right, rows[:, None] + down], axis=-1)

@@ -19,6 +19,9 @@ WIDEST_PX = 4096.0
 Byte = Annotated[int, Field(ge=0, le=255)]
 Label = Annotated[int, Field(ge=0, lt=UNLABELLED)]
 Width = Annotated[float, Field(ge=0, le=WIDEST_PX)]
+VALUES = len(Warp.none().numbers)
+MOST_VIEWS = 4096
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 class InkRecord(BaseModel):
@@ -42,12 +45,6 @@ class InkRecord(BaseModel):
     def style(self) -> InkStyle:
         """Return the style of the record."""
         return InkStyle(**self.model_dump())
-
-
-VALUES = len(Warp.none().numbers)
-MOST_VIEWS = 4096
-
-Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 class WarpRecord(BaseModel):

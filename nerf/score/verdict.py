@@ -29,11 +29,7 @@ from toonset.palette.pixels.labels import UNLABELLED
 from toonset.view import over_white
 
 OK, WEAK = "ok", "weak"
-# A pixel out of place in a figure of 830. Of three bodies' scenes that are drawn wrong in fifteen
-# ways, ever so little or a lot (`bench stability --seed 1000`), 1 of 107 leaves more whose new
-# views are within 1 dB of those from exact drawings; of those that lose 3 dB, twice the error's
-# power, 91 of 98 leave more or are refused.
-MOST_OFF = 0.0012
+MOST_OFF = 0.0012  # a pixel out of place in a figure of 830 (docs/decisions.md)
 BLENDS = 0.3  # of the figures' pixels; clean drawings of 80 px have 0.2, larger ones fewer
 STANDS_OUT = 2.0  # times the sheet's: a drawing that is named
 

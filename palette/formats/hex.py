@@ -2,6 +2,9 @@
 
 Source: paint.net documentation, "Working with palettes": comments begin with ";", eight digits are
 alpha, red, green, blue.
+
+A colour as a person types it is a code, or one of the two words that mean only one colour: nobody's
+"red" is #ff0000, and the drawing's own is in the palette.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from toonset.palette.palette import Palette
 
 HEX = re.compile(r"#?([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 WITH_ALPHA = re.compile(r"#?([0-9a-fA-F]{2})([0-9a-fA-F]{6})")
+WORDS = {"white": (255, 255, 255), "black": (0, 0, 0)}
 
 
 def rgb_of_hex(word: object, where: str) -> RGB:
@@ -58,3 +62,17 @@ def _color(word: str, paint_net: bool, where: str) -> NamedColor | None:
     if match is None:
         return NamedColor(rgb_of_hex(word, where))
     return NamedColor(rgb_of_hex(match[2], where)) if int(match[1], 16) else None
+
+
+def is_color(word: str) -> bool:
+    """Return whether a word is a colour."""
+    return word.lower() in WORDS or HEX.fullmatch(word) is not None
+
+
+def rgb_of_typed(word: str, where: str) -> RGB:
+    """Return the colour of "#rrggbb", "#rgb" (the # may be left out), "white" or "black".
+
+    Raises:
+        PaletteError: anything else.
+    """
+    return WORDS[word.lower()] if word.lower() in WORDS else rgb_of_hex(word, where)

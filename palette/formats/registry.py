@@ -15,13 +15,12 @@ from toonset.errors import PaletteError
 from toonset.palette.formats.aco import read_aco
 from toonset.palette.formats.ase import read_ase, to_ase
 from toonset.palette.formats.gpl import read_gpl, to_gpl
-from toonset.palette.formats.hex import read_hex, to_hex
+from toonset.palette.formats.hex import is_color, read_hex, rgb_of_typed, to_hex
 from toonset.palette.formats.json import read_json, to_json
 from toonset.palette.formats.kpl import MAX_BYTES as MAX_KPL_BYTES
 from toonset.palette.formats.kpl import read_kpl
 from toonset.palette.formats.pal import read_pal
 from toonset.palette.formats.text import without_mark
-from toonset.palette.formats.typed import is_color, rgb_of_typed
 from toonset.palette.named import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.read import describe, read_whole

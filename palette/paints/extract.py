@@ -19,12 +19,10 @@ from toonset.palette.names import hex_of, name_of
 from toonset.palette.paints.areas import paint_areas
 from toonset.palette.paints.clusters import Paint, find_paints
 from toonset.palette.paints.histogram import Histogram, count_pixels
-from toonset.palette.paints.lone_spots import lone_spot_notes
-from toonset.palette.paints.near_equal import near_equal_paints
 from toonset.palette.paints.places import patches_of, pixels_of
 from toonset.palette.paints.select import Amount, PaletteOptions, choose, measure, with_wanted
-from toonset.palette.paints.tiny_paints import tiny_paints
-from toonset.palette.paints.wide_paints import wide_paint_notes
+from toonset.palette.paints.small_features import near_equal_paints, tiny_paints
+from toonset.palette.paints.warnings import lone_spot_notes, wide_paint_notes
 from toonset.palette.palette import (
     MAX_COLORS,
     ContourColor,

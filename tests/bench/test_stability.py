@@ -89,7 +89,7 @@ def test_a_refused_and_a_crashed_sheet_are_results(sheet, monkeypatch):
         def broken(*_arguments, error=error):
             raise error
 
-        monkeypatch.setattr(stability, "calibrate", broken)
+        monkeypatch.setattr(stability, "find_cameras", broken)
         result, picture = run_sheet(sweep, 0, 0)
         assert picture.startswith(b"\x89PNG")
         assert [view.verdict for view in result.views] == [verdict] * 3

@@ -8,7 +8,7 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.cli.common.palette_report import palette_lines
-from toonset.cli.palette import Method, palette
+from toonset.cli.palette import palette
 from toonset.cli.split import split
 from toonset.dataset.bundle.transforms import read_scene, transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png
@@ -50,10 +50,14 @@ def test_a_bundle_gets_its_palette_and_labels(
     monkeypatch.chdir(tmp_path)
     palette()
     shown = capsys.readouterr().out.splitlines()
-    assert shown[:2] == ["#c81e28   70.0 %  red", "#143cb4   30.0 %  royal blue"]
+    colors = ["#c81e28   70.0 %  red", "#143cb4   30.0 %  royal blue"]
+    assert shown == [*colors, "bundle: look at palette.png; next: toonset train bundle"]
+    palette(verbose=True)
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[:2] == colors
     assert shown[2].startswith("shares are of all the character's pixels; rule: at least 5 % of")
     assert shown[3].startswith("2 colours describe the drawing most briefly")
-    assert shown[4:] == ["bundle"]
+    assert shown[4].startswith("bundle: look at")
     scene = read_scene(tmp_path / "bundle")
     assert scene.palette is not None
     assert scene.palette.tolist() == [list(RED), list(BLUE)]
@@ -108,6 +112,9 @@ def test_pictures_go_into_a_folder_of_their_own(
 def test_what_is_dropped_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bundle = make_bundle(tmp_path / "b")
     palette([bundle], min_share=0.5)
+    said = capsys.readouterr().out
+    assert "left out by the rule: #143cb4 royal blue (--keep '#143cb4' keeps one)\n" in said
+    palette([bundle], min_share=0.5, verbose=True)
     lines = capsys.readouterr().out.splitlines()
     assert "rule: at least 50 % of the character's pixels" in lines[1]
     assert lines[2].startswith("left out")
@@ -117,7 +124,7 @@ def test_what_is_dropped_is_printed(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_the_number_of_colours_is_explained_without_empty_figures() -> None:
     red = PaletteColor(RED, 1.0, "red")
     said = [
-        palette_lines(Palette((red,), "r", evidence=Evidence(*evidence)))[-1]
+        palette_lines(Palette((red,), "r", evidence=Evidence(*evidence)), verbose=True)[-1]
         for evidence in [(8, 233.4, 14.2), (8, 0.3, 14.2), (1, 98274.0, 87.0)]
     ]
     for number, colors in zip(("8", "8", "1"), said, strict=True):
@@ -207,7 +214,7 @@ def test_a_left_out_colour_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFix
     rgba = outlined()
     rgba[20:24, 30:36, :3] = (250, 220, 50)
     write_bytes(tmp_path / "a.png", encode_png(rgba))
-    palette([tmp_path / "a.png"], out=tmp_path / "without")
+    palette([tmp_path / "a.png"], out=tmp_path / "without", verbose=True)
     shown = capsys.readouterr().out
     assert "picture 0 at (30, 20), 6 x 4 px" in shown
     palette([tmp_path / "a.png"], keep="#fadc32", out=tmp_path / "with")
@@ -217,9 +224,9 @@ def test_a_left_out_colour_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_the_papers_tool_can_be_asked(tmp_path: Path) -> None:
     write_bytes(tmp_path / "a.png", encode_png(figure()))
-    palette([tmp_path / "a.png"], method=Method.extcolors, out=tmp_path / "out")
+    palette([tmp_path / "a.png"], method="extcolors", out=tmp_path / "out")
     content = json.loads((tmp_path / "out" / "palette.json").read_text())
     assert content["rule"].startswith("extcolors, tolerance 32")
     assert [color["hex"] for color in content["colors"]] == ["#c81e28", "#143cb4"]
     with pytest.raises(UsageError, match="--keep belongs to --method toonset"):
-        palette([tmp_path / "a.png"], method=Method.extcolors, keep="#fff", out=tmp_path / "o")
+        palette([tmp_path / "a.png"], method="extcolors", keep="#fff", out=tmp_path / "o")

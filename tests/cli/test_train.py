@@ -13,11 +13,10 @@ from pathlib import Path
 import pytest
 import torch
 
-from toonset.cli.common import train_threads
-from toonset.cli.common.train_printer import LOG_S, Pace
+from toonset.cli.common import host
+from toonset.cli.common.host import measured
 from toonset.cli.common.train_run import RESUMED_AS
-from toonset.cli.common.train_stop import Stopper
-from toonset.cli.common.train_threads import measured
+from toonset.cli.common.train_watch import LOG_S, Pace, Stopper
 from toonset.nerf.kernels.threads import use_threads
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
@@ -170,7 +169,7 @@ def test_threads_are_a_number_or_auto(text: str, toonset, bundle: Path):
 
 
 def test_auto_is_a_thread_per_side_where_there_are_cores_and_tries_nothing(monkeypatch):
-    monkeypatch.setattr(train_threads, "_rate", lambda _: pytest.fail("nothing to try"))
+    monkeypatch.setattr(host, "_rate", lambda _: pytest.fail("nothing to try"))
     with _threads_as_before():
         assert [measured(most) for most in (1, 2, 3)] == [1, 2, 2]
 
@@ -187,7 +186,7 @@ def test_auto_doubles_further_threads_while_that_pays(
     monkeypatch: pytest.MonkeyPatch, rates: dict[int, float], threads: int
 ) -> None:
     disturbed = itertools.cycle([0.5, 1, 1, 1, 1, 0.5, 1])  # another program, now and then
-    monkeypatch.setattr(train_threads, "_rate", lambda count: rates[count] * next(disturbed))
+    monkeypatch.setattr(host, "_rate", lambda count: rates[count] * next(disturbed))
     with _threads_as_before():
         assert measured(8) == threads
 

@@ -58,7 +58,10 @@ def test_a_near_equal_colour_is_listed_with_what_it_looks_like(order: tuple) -> 
     assert hair.cost == pytest.approx(away(SKIN, HAIR))
     before = sum(wide[color] for color in order[: order.index(HAIR)])
     assert hair.place == Place(0, (before, 0, 30, 40))
-    assert any(", looks like #f2be96 and is counted" in line for line in palette_lines(palette))
+    assert any(
+        ", looks like #f2be96 and is counted" in line
+        for line in palette_lines(palette, verbose=True)
+    )
 
 
 def test_a_near_equal_colour_can_be_kept() -> None:

@@ -161,7 +161,7 @@ def test_methods_get_their_labels_and_their_cache(monkeypatch: pytest.MonkeyPatc
         seen.append((len(os.listdir(os.environ["TOONSET_CACHE"])), known))
         return answer(case.rotations)
 
-    monkeypatch.setattr(calib, "calibrate", watched)
+    monkeypatch.setattr(calib, "find_cameras", watched)
     records = bench_calibration([case], 0, quick=True)
     (plain, labelled, cold) = seen
     assert (plain[0], labelled[0], cold[0]) == (1, 1, 0)
@@ -180,7 +180,7 @@ def test_a_drawing_alone_is_a_sheet_of_its_own(monkeypatch: pytest.MonkeyPatch) 
         return answer(case.rotations[len(seen) - 1][None])
 
     monkeypatch.setattr(calib, "QUICK", ("each drawing alone",))
-    monkeypatch.setattr(calib, "calibrate", watched)
+    monkeypatch.setattr(calib, "find_cameras", watched)
     records = bench_calibration([case], 0, quick=True)
     own = by_metric([r for r in records if r.method == "each drawing alone"])
     assert seen == [1, 1, 1, 1]
@@ -195,7 +195,7 @@ def test_constants_are_other_for_a_method_alone(monkeypatch: pytest.MonkeyPatch)
         raise KeyError
 
     monkeypatch.setattr(calib, "QUICK", ("templates every 20 deg",))
-    monkeypatch.setattr(calib, "calibrate", watched)
+    monkeypatch.setattr(calib, "find_cameras", watched)
     with pytest.raises(KeyError):
         bench_calibration([even_case()], 0, quick=True)
     assert seen == [(len(templates.grid()) // 2, 1)]

@@ -76,7 +76,7 @@ def test_sprites_without_a_mesh_are_asked_for_their_bin(
     sprites: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = calibration_at(20, 70, 0, 0)
-    monkeypatch.setattr("bench.cases.sprites.calibrate", lambda *_, **__: found)
+    monkeypatch.setattr("bench.cases.sprites.find_cameras", lambda *_, **__: found)
     records = bench_sprites(sprite_cases(sprites), 0)
     free = {r.metric: r for r in records if (r.group, r.method) == (MANNEQUIN, "default")}
     assert (free["right 45 deg bin"].value, free["right 45 deg bin"].n) == (0.5, 4)
@@ -100,7 +100,7 @@ def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
 ):
     out = tmp_path / "out"
     found = calibration_at(1, 88, 180, 9)
-    monkeypatch.setattr("bench.cases.sprites.calibrate", lambda *_, **__: found)
+    monkeypatch.setattr("bench.cases.sprites.find_cameras", lambda *_, **__: found)
     command = ("calib", "--sprites", sprites, "--quiet", "-o", out)
     done = bench(*command, "--only", "exact")
     assert done.code == 0, done

@@ -10,8 +10,7 @@ from scipy import ndimage
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.nerf.hull.fairing import faired, sheets
-from toonset.nerf.hull.fairing_distance import UNKNOWN, signed_distance, squared_distance
+from toonset.nerf.hull.fairing import UNKNOWN, faired, sheets, signed_distance, squared_distance
 from toonset.nerf.hull.fairing_fit import Contacts, Pyramid
 from toonset.nerf.hull.hull import Hull, carve
 from toonset.nerf.hull.tolerance import mask_iou

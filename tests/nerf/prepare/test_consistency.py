@@ -8,8 +8,7 @@ from dataclasses import replace
 import pytest
 
 from toonset.errors import BundleError
-from toonset.nerf.prepare.consistency import consistency_of
-from toonset.nerf.prepare.consistency_picture import CELL, TEXT, consistency_picture
+from toonset.nerf.prepare.consistency import CELL, TEXT, consistency_of, consistency_picture
 
 
 def test_report_of_a_perfect_sheet(balls) -> None:

@@ -21,8 +21,7 @@ from toonset.nerf.render.cast import OPAQUE_FROM, cast
 from toonset.nerf.render.normals import normal_picture, normals_of
 from toonset.nerf.render.rays import Sight
 from toonset.nerf.render.recolor import repainted
-from toonset.nerf.render.supersample import borders, places_within
-from toonset.nerf.render.views import render
+from toonset.nerf.render.views import borders, places_within, render
 
 SHAPE, VOXEL = (20, 28, 16), 0.1
 LOW = np.array([-1.0, -1.4, -0.8])

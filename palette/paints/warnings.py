@@ -1,9 +1,14 @@
-"""Spots of a colour too small to show it: eyes and highlights of a pixel or two.
+"""Warn of colours that the palette cannot tell: too small, or shaded throughout.
 
-A colour is read from flat paint. A spot narrower than that has only blends of it, with what lies
+Spots too small: a colour is read from flat paint. A spot narrower than that has only blends of it,
+    with what lies
 around and with a line, and nothing says which colour they are blends of. But that there is another
 colour can be told where the spot lies alone in one paint: no known paint, blended with the paint
 around and with the lines' ink, gives what is seen.
+
+Paints too wide: shades that run into each other are one paint, however far they run, as a gradient
+must be. Where a drawing is shaded throughout and has little flat paint, even different things can
+so become one.
 """
 
 from __future__ import annotations
@@ -15,7 +20,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int32, UInt8
 
-from toonset.palette.colors import even_oklab_from_rgb
+from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb, oklab_from_rgb
 from toonset.palette.names import hex_of
 from toonset.palette.paints.blends import reach_of
 from toonset.palette.paints.clusters import UNLIKE, Paint
@@ -31,6 +36,7 @@ ALL = 1e4  # weight, beside levels, of the demand that a blend's shares add up t
 
 Rgb = UInt8[np.ndarray, " 3"]
 Boxes = Int32[np.ndarray, "n 4"]  # left, top, width, height
+WIDE = 10 * JUST_NOTICEABLE  # in OKLab: a fifth of the way from black to white
 
 
 def lone_spot_notes(histogram: Histogram, paints: Sequence[Paint]) -> tuple[str, ...]:
@@ -123,3 +129,29 @@ def _apart(pixel: Rgb, around: Rgb, paints: Sequence[Paint], noise: int) -> floa
     blends = ([*always, number] for number in range(len(known)))
     parts = (np.vstack([known[blend].T, np.full(len(blend), ALL)]) for blend in blends)
     return min(float(nnls(part, seen)[1]) for part in parts) - reach_of(noise)
+
+
+def wide_paint_notes(
+    histogram: Histogram, paints: Sequence[Paint], least: float
+) -> tuple[str, ...]:
+    """Return what a person should know of paints with much that looks unlike them.
+
+    Args:
+        histogram: of the character.
+        paints: those that are kept.
+        least: share of the flat pixels, 0 to 1, that are too far from their paint to be silent.
+    """
+    total = int(histogram.flat.sum())
+    notes = []
+    for paint in paints:
+        shades = oklab_from_rgb(histogram.colors[paint.members])
+        own = oklab_from_rgb(np.array(paint.rgb, dtype=np.uint8))
+        far = np.linalg.norm(shades - own, axis=1) > WIDE
+        share = float(histogram.flat[paint.members] @ far) / total
+        if share > 0 and share >= least:
+            notes.append(
+                f"{hex_of(paint.rgb)}: stands for very different shades ({100 * share:.0f} % of "
+                "the flat pixels look unlike it), as in a drawing shaded throughout; name the "
+                "colours with --colors"
+            )
+    return tuple(notes)
