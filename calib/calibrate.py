@@ -20,15 +20,14 @@ from toonset.calib.landmarks.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import Calibration
-from toonset.dataset.bundle.transforms import transforms_file
+from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.mannequin.files import landmarks_path
 from toonset.dataset.mannequin.landmark_file import read_known_points
 from toonset.dataset.mannequin.make import default_mannequin
 from toonset.dataset.mannequin.options import MannequinOptions
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
-from toonset.origin import InputFile
-from toonset.view import View
+from toonset.view import InputFile, View
 
 LEAST_HEIGHT = 0.01  # of the width; flatter, nothing can be told from its outline
 PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless")

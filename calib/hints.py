@@ -10,7 +10,7 @@ from typing import Any
 from toonset.calib.from_landmarks import landmarks_of_every_view
 from toonset.calib.known import LOCKS, Known
 from toonset.camera import Camera
-from toonset.dataset.bundle.transforms import read_cameras
+from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.mannequin.landmark_file import Landmarks, read_landmarks
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.errors import CameraError, UsageError

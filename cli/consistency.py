@@ -31,7 +31,7 @@ def consistency(
     from yellow to red. Exit code 3 where a drawing stands out.
     """
     from toonset.cli.common.output import check_output
-    from toonset.dataset.bundle.transforms import read_scene
+    from toonset.dataset.bundle.read_scene import read_scene
     from toonset.dataset.images.picture import encode_png
     from toonset.nerf.prepare.consistency import consistency_of, consistency_picture
     from toonset.write import new_folder, write_bytes, write_json

@@ -68,7 +68,7 @@ def evaluate(
     within 2 px. "-": the run or the picture has no such thing, or a package is missing; the JSON
     says why.
     """
-    from toonset.dataset.bundle.transforms import read_scene
+    from toonset.dataset.bundle.read_scene import read_scene
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.score.evaluate import report, score_views
     from toonset.nerf.score.metrics_view import load_judges
@@ -110,7 +110,7 @@ def _write(
 
 def _training_scene(run: Path, bundle: Path | None) -> tuple[Scene | None, str | None]:
     """Return the frames that the run was trained on, or why they are not known."""
-    from toonset.dataset.bundle.transforms import read_scene
+    from toonset.dataset.bundle.read_scene import read_scene
     from toonset.errors import BundleError, ToonsetError
     from toonset.json_file import read_json
     from toonset.nerf.score.evaluate import chosen_frames

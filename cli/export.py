@@ -75,7 +75,7 @@ def export(
     if to != Format.colmap and (text or centre or layout != "new"):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
     from toonset.dataset.bundle.bundle import mannequin_of
-    from toonset.dataset.bundle.transforms import transforms_file
+    from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.exporters.common import read_views
     from toonset.dataset.exporters.pinhole import centred
 

@@ -190,7 +190,7 @@ def _cameras(
     elevation: float,
     size: int | None,
 ) -> Named:
-    from toonset.dataset.bundle.transforms import read_cameras
+    from toonset.dataset.bundle.transforms_read import read_cameras
     from toonset.errors import BundleError
     from toonset.nerf.render.turntable import turntable
 

@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from toonset.palette.named import RGB, clean_name
-from toonset.palette.names import hex_of
+from toonset.palette.names import RGB, clean_name, hex_of
 from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
 
 PAGE, INK, QUIET, EDGE = (250, 250, 250), (30, 30, 30), (95, 95, 95), (190, 190, 190)

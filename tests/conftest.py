@@ -204,7 +204,8 @@ def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from toonset.dataset.bundle.bundle import bundle_folder
     from toonset.dataset.images.picture import encode_indexed_png
     from toonset.dataset.mesh.load import load_mesh
-    from toonset.palette.formats.registry import to_gpl, to_json
+    from toonset.palette.formats.gpl import to_gpl
+    from toonset.palette.formats.json import to_json
     from toonset.palette.palette import Palette, PaletteColor
     from toonset.view import View
     from toonset.write import write_bytes, write_json

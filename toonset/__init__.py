@@ -55,82 +55,47 @@ if TYPE_CHECKING:
 
     load_picture, read_run = load_rgba, read_field
 
-_PLACES = {  # public name -> module, and its name there if it is another
-    "Bundle": "dataset.bundle.bundle",
-    "Calibration": "calib.result",
-    "Camera": "camera",
-    "Hints": "calib.hints",
-    "Mesh": "mesh",
-    "Palette": "palette.palette",
-    "Rendering": "nerf.render.layers",
-    "Run": "nerf.training",
-    "Scene": "dataset.bundle.scene",
-    "Sheet": "dataset.split_folder.load",
-    "ToonsetError": "errors",
-    "TrainOptions": "nerf.options",
-    "TrainedField": "nerf.fields.trained_field",
-    "View": "view",
-    "calibrate": "calib.calibrate",
-    "evaluate": "nerf.score.evaluate",
-    "extract_palette": "palette.extract",
-    "label_image": "palette.extract",
-    "load_mesh": "dataset.mesh.load",
-    "load_picture": "dataset.images.picture:load_rgba",
-    "project": "projection",
-    "read_bundle": "dataset.bundle.bundle",
-    "read_run": "nerf.run.folder:read_field",
-    "render": "nerf.render.views",
-    "split_sheet": "dataset.split_folder.load",
-    "surface_of": "nerf.surface.surface",
-    "train": "nerf.training",
-    "turntable": "nerf.render.turntable",
-    "write_bundle": "calib.write_bundle",
+_PLACES = {  # module -> its public names; "name=there" where it is called otherwise there
+    "calib.calibrate": "calibrate",
+    "calib.hints": "Hints",
+    "calib.result": "Calibration",
+    "calib.write_bundle": "write_bundle",
+    "camera": "Camera",
+    "dataset.bundle.bundle": "Bundle read_bundle",
+    "dataset.bundle.scene": "Scene",
+    "dataset.images.picture": "load_picture=load_rgba",
+    "dataset.mesh.load": "load_mesh",
+    "dataset.split_folder.load": "Sheet split_sheet",
+    "errors": "ToonsetError",
+    "mesh": "Mesh",
+    "nerf.fields.trained_field": "TrainedField",
+    "nerf.options": "TrainOptions",
+    "nerf.render.layers": "Rendering",
+    "nerf.render.turntable": "turntable",
+    "nerf.render.views": "render",
+    "nerf.run.folder": "read_run=read_field",
+    "nerf.score.evaluate": "evaluate",
+    "nerf.surface.surface": "surface_of",
+    "nerf.training": "Run train",
+    "palette.extract": "extract_palette label_image",
+    "palette.palette": "Palette",
+    "projection": "project",
+    "view": "View",
 }
-
-__all__ = [
-    "Bundle",
-    "Calibration",
-    "Camera",
-    "Hints",
-    "Mesh",
-    "Palette",
-    "Rendering",
-    "Run",
-    "Scene",
-    "Sheet",
-    "ToonsetError",
-    "TrainOptions",
-    "TrainedField",
-    "View",
-    "__version__",
-    "calibrate",
-    "evaluate",
-    "extract_palette",
-    "label_image",
-    "load_mesh",
-    "load_picture",
-    "project",
-    "read_bundle",
-    "read_run",
-    "render",
-    "split_sheet",
-    "surface_of",
-    "train",
-    "turntable",
-    "write_bundle",
-]
 
 
 def __getattr__(name: str) -> Any:
     """Return a public name, importing the module that holds it."""
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, _, there = _PLACES[name].partition(":")
-    found = getattr(importlib.import_module(f"{__name__}.{module}"), there or name)
-    globals()[name] = found
-    return found
+    for module, names in _PLACES.items():
+        for public, _, there in (entry.partition("=") for entry in names.split()):
+            if public == name:
+                found = getattr(importlib.import_module(f"{__name__}.{module}"), there or public)
+                globals()[name] = found
+                return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
     """Return the public names, for completion."""
-    return sorted(__all__)
+    names = (entry.partition("=")[0] for names in _PLACES.values() for entry in names.split())
+    return sorted(["__version__", *names])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Float
-from kornia.geometry.camera import project_points_z1, unproject_points_z1
+from kornia.geometry.camera import project_points_z1
 from kornia.geometry.liegroup import So3
 from torch import Tensor
 
@@ -95,18 +95,3 @@ def project_offsets(
     plane = project_points_z1(torch.cat([local[..., :2], safe[..., None]], dim=-1))
     pixels = center[:, None] + scale_uv[:, None] * plane
     return torch.where(seen[..., None], pixels, torch.nan)
-
-
-def unproject(
-    rotation: Float[Tensor, "views 3 3"],
-    center: Float[Tensor, "views 2"],
-    scale_uv: Float[Tensor, "views 2"],
-    k: Float[Tensor, " views"],
-    pixels: Float[Tensor, "views points 2"],
-    depth: Float[Tensor, "views points"],
-) -> Float[Tensor, "views points 3"]:
-    """Return points relative to each target from pixels and depth past the target's plane."""
-    plane = (pixels - center[:, None]) / scale_uv[:, None]
-    relative_depth = (1 + k[:, None] * depth)[..., None]
-    local = unproject_points_z1(plane, relative_depth)[..., :2]
-    return torch.cat([local, depth[..., None]], dim=-1) @ rotation

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.errors import SheetError
-from toonset.origin import Origin
 
 VISIBLE = 16  # alpha: fainter is a file's noise
 
@@ -99,3 +102,36 @@ def over_white(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "
     """Return a straight-alpha picture over white, in [0, 1]."""
     values = rgba.astype(np.float64) / 255
     return values[..., :3] * values[..., 3:] + 1 - values[..., 3:]
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that a result depends on.
+
+    Attributes:
+        role: "sheet", "view", "mesh", ...
+        name: without its folder, so that results are the same wherever it lies.
+        sha256: of its bytes.
+    """
+
+    role: str
+    name: str
+    sha256: str
+
+    @classmethod
+    def of(cls, role: str, path: Path) -> InputFile:
+        """Return the record of a file on disk."""
+        return cls(role, path.name, sha256(path.read_bytes()).hexdigest())
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """Where the views of one or more sheets come from.
+
+    Attributes:
+        files: in the order in which they were given.
+        options: how the sheets were cut, as typed; only what was given.
+    """
+
+    files: tuple[InputFile, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)

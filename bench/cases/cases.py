@@ -17,8 +17,8 @@ from jaxtyping import Float
 
 from bench.cases.bodies import random_body
 from toonset import frames
+from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.dataset.bundle.transforms import read_scene
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.split.sheet import split_picture

@@ -66,7 +66,7 @@ class Request:
 
 def run(request: Request, printer: Printer) -> int:
     """Train, write the run and print the result; return the exit code."""
-    from toonset.dataset.bundle.transforms import read_scene
+    from toonset.dataset.bundle.read_scene import read_scene
     from toonset.nerf.run.monitor import Looking
     from toonset.nerf.training import train
 

@@ -1,9 +1,9 @@
-"""transforms.json, both ways: nerfstudio / instant-ngp / Blender-style files and cameras.
+"""Write transforms.json: nerfstudio / instant-ngp / Blender-style files and cameras.
 
 A frame holds `transform_matrix` (world_from_camera, OpenGL axes) and pinhole intrinsics, its own or
 the file's. An orthographic view is written as a far pinhole with the bound of its error in pixels;
 the exact native camera stands under the frame's `toonset` key and is preferred on reading.
-Here is the writing, and the one door to reading.
+Here is the writing; `transforms_read` has the cameras, `read_scene` the pictures.
 """
 
 from __future__ import annotations
@@ -14,18 +14,7 @@ from typing import Any
 from toonset import frames as conventions
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
-from toonset.dataset.bundle.read_scene import read_scene
-from toonset.dataset.bundle.transforms_read import picture_paths, read_cameras, transforms_file
 from toonset.dataset.bundle.transforms_schema import SCHEMA, VERSION
-
-__all__ = [
-    "FAR_HEIGHTS",
-    "picture_paths",
-    "read_cameras",
-    "read_scene",
-    "transforms_dict",
-    "transforms_file",
-]
 
 FAR_HEIGHTS = 100.0  # body heights to the far pinhole that stands for an orthographic view
 

@@ -25,9 +25,8 @@ from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
 from toonset.errors import PictureError, SheetError
-from toonset.origin import InputFile, Origin
 from toonset.read import read_whole
-from toonset.view import View
+from toonset.view import InputFile, Origin, View
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Paths = str | Path | Sequence[str | Path]

@@ -12,8 +12,7 @@ from toonset.errors import PaletteError
 from toonset.nerf.fields.trained_field import NO_PALETTE, TrainedField
 from toonset.palette.formats.hex import is_color, rgb_of_typed
 from toonset.palette.formats.registry import parse_colors
-from toonset.palette.named import RGB
-from toonset.palette.names import hex_of, name_of
+from toonset.palette.names import RGB, hex_of, name_of
 from toonset.palette.pixels.labels import nearest_colors
 
 

@@ -13,7 +13,7 @@ import struct
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.cie_lab import rgb_from_lab
-from toonset.palette.named import RGB, NamedColor, clean_name, level, no_cmyk, within
+from toonset.palette.names import RGB, NamedColor, clean_name, level, no_cmyk, within
 
 CMYK_SPACES = (2, 9)
 BOOKS = {3: "Pantone", 4: "Focoltone", 5: "Trumatch", 6: "Toyo", 10: "HKS", 12: "DIC"}

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.cie_lab import rgb_from_lab
-from toonset.palette.named import RGB, NamedColor, clean_name, level, no_cmyk, within
+from toonset.palette.names import RGB, NamedColor, clean_name, level, no_cmyk, within
 from toonset.palette.palette import Palette
 
 MAGIC = b"ASEF"

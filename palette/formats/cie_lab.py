@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from toonset.palette.colors import srgb_from_linear
-from toonset.palette.named import RGB
+from toonset.palette.names import RGB
 
 WHITE_D50 = np.array([0.3457 / 0.3585, 1.0, (1 - 0.3457 - 0.3585) / 0.3585])
 D65_FROM_D50 = np.array(

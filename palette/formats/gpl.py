@@ -10,7 +10,7 @@ import re
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.text import lines_of
-from toonset.palette.named import NamedColor, clean_name, levels_of
+from toonset.palette.names import NamedColor, clean_name, levels_of
 from toonset.palette.palette import Palette
 
 MAGIC = "GIMP Palette"

@@ -13,7 +13,7 @@ import re
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.text import lines_of
-from toonset.palette.named import RGB, NamedColor
+from toonset.palette.names import RGB, NamedColor
 from toonset.palette.palette import Palette
 
 HEX = re.compile(r"#?([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")

@@ -6,8 +6,7 @@ from typing import Any
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.hex import rgb_of_hex
-from toonset.palette.named import NamedColor, clean_name
-from toonset.palette.names import hex_of
+from toonset.palette.names import NamedColor, clean_name, hex_of
 from toonset.palette.palette import Palette
 from toonset.read import parse_json
 

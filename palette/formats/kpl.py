@@ -20,7 +20,7 @@ import numpy as np
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.cie_lab import rgb_from_lab, rgb_from_linear
-from toonset.palette.named import RGB, NamedColor, clean_name, level, no_cmyk, one_line, within
+from toonset.palette.names import RGB, NamedColor, clean_name, level, no_cmyk, one_line, within
 
 COLORSET = "colorset.xml"
 MAX_MEMBERS = 64  # two XML files and a profile per colour space

@@ -12,7 +12,7 @@ import struct
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.text import lines_of
-from toonset.palette.named import NamedColor, levels_of
+from toonset.palette.names import NamedColor, levels_of
 
 JASC, RIFF = b"JASC-PAL", b"RIFF"
 

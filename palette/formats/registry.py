@@ -21,21 +21,9 @@ from toonset.palette.formats.kpl import MAX_BYTES as MAX_KPL_BYTES
 from toonset.palette.formats.kpl import read_kpl
 from toonset.palette.formats.pal import read_pal
 from toonset.palette.formats.text import without_mark
-from toonset.palette.named import NamedColor
+from toonset.palette.names import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.read import describe, read_whole
-
-__all__ = [
-    "FORMATS",
-    "WRITTEN",
-    "encode_palette",
-    "parse_colors",
-    "parse_named_colors",
-    "to_ase",
-    "to_gpl",
-    "to_hex",
-    "to_json",
-]
 
 SHOWN = 80  # characters of what was typed, in messages
 

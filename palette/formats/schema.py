@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from toonset.errors import PaletteError
 from toonset.palette.formats.hex import rgb_of_hex
 from toonset.palette.formats.json import NAME, VERSION
-from toonset.palette.named import RGB, clean_name, one_line
+from toonset.palette.names import RGB, clean_name, one_line
 from toonset.palette.palette import (
     MAX_COLORS,
     ContourColor,

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from toonset.cli.main import VERBS
-from toonset.dataset.bundle.transforms import read_cameras
+from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.mesh.load import load_mesh, save_obj
 
 BUNDLE_FILES = {"transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"}

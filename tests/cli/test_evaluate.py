@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.dataset.bundle.transforms import read_scene
 from toonset.nerf.score.evaluate import ScoredView, chosen_frames, report
 from toonset.nerf.score.evaluation_picture import (
     CAPTION_PX,

@@ -13,7 +13,8 @@ import pytest
 
 import toonset.calib.pipeline as library
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
-from toonset.dataset.bundle.transforms import read_cameras, transforms_dict
+from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.mannequin.landmark_formats import SCHEMA
 from toonset.dataset.mesh.load import load_mesh
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.cli.common.palette_report import palette_lines
-from toonset.cli.palette import palette
+from toonset.cli.palette import palette, palette_lines
 from toonset.cli.split import split
-from toonset.dataset.bundle.transforms import read_scene, transforms_dict
+from toonset.dataset.bundle.read_scene import read_scene
+from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png
 from toonset.errors import ToonsetError, UsageError
 from toonset.palette.palette import Evidence, Palette, PaletteColor

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from toonset.palette.named import RGB
+from toonset.palette.names import RGB
 from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
 from toonset.palette.swatch_image import LARGE, PAGE, SMALL, broken, draw_swatches, drawable
 

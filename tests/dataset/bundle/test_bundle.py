@@ -15,8 +15,7 @@ from PIL import Image
 
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.check import bundle_problems
-from toonset.dataset.bundle.read_scene import read_contour
-from toonset.dataset.bundle.transforms import read_scene
+from toonset.dataset.bundle.read_scene import read_contour, read_scene
 from toonset.dataset.bundle.transforms_read import read_frames
 from toonset.errors import BundleError, ToonsetError
 from toonset.read import parse_json

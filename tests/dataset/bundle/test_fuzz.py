@@ -21,8 +21,8 @@ import pytest
 from PIL import Image
 
 from toonset.dataset.bundle.check import bundle_problems
+from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.summary import summarise
-from toonset.dataset.bundle.transforms import read_scene
 from toonset.errors import ToonsetError
 
 JSON_FILES = ("transforms.json", "calibration.json", "palette.json")

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.transforms import read_cameras, read_scene, transforms_dict
+from toonset.dataset.bundle.read_scene import read_scene
+from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import encode_png
 from toonset.errors import BundleError
 from toonset.write import write_bytes, write_json

@@ -20,7 +20,7 @@ from tests.dataset.importers.imported_views import (
     views_all_round,
 )
 from toonset.camera import Camera
-from toonset.dataset.bundle.transforms import read_scene
+from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
 from toonset.dataset.exporters.colmap import write_colmap
 from toonset.dataset.exporters.nerfstudio import write_transforms

@@ -15,7 +15,7 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
-from toonset.dataset.bundle.transforms import read_cameras
+from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import load_indexed_png, load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.synthetic import gl_render

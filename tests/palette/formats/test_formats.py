@@ -15,7 +15,7 @@ from toonset.palette.formats.cie_lab import rgb_from_lab, rgb_from_linear
 from toonset.palette.formats.gpl import read_gpl, to_gpl
 from toonset.palette.formats.kpl import read_kpl
 from toonset.palette.formats.pal import read_pal
-from toonset.palette.named import NamedColor
+from toonset.palette.names import NamedColor
 from toonset.palette.palette import Palette, PaletteColor
 
 RED, GREY = NamedColor((255, 0, 128), "Hi"), NamedColor((128, 128, 128), "")

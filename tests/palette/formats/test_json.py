@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toonset.errors import PaletteError
-from toonset.palette.formats.registry import parse_colors, to_json
+from toonset.palette.formats.json import to_json
+from toonset.palette.formats.registry import parse_colors
 from toonset.palette.formats.schema import palette_of, read_palette_json
 from toonset.palette.palette import (
     ContourColor,

@@ -8,15 +8,15 @@ import pytest
 from PIL.GimpPaletteFile import GimpPaletteFile
 
 from toonset.errors import PaletteError
+from toonset.palette.formats.gpl import to_gpl
+from toonset.palette.formats.json import to_json
 from toonset.palette.formats.registry import (
     WRITTEN,
     encode_palette,
     parse_colors,
     parse_named_colors,
-    to_gpl,
-    to_json,
 )
-from toonset.palette.named import NamedColor
+from toonset.palette.names import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor
 
 PALETTE = Palette(
