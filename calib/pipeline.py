@@ -41,13 +41,13 @@ from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import CutOff
+from toonset.calib.search.alternatives import steadied
 from toonset.calib.search.hypotheses import (
     Candidates,
     half_turned,
     level_twins,
     looks_alike_from_behind,
     refine,
-    steadied,
     with_twins,
 )
 from toonset.calib.search.selection import SKETCHED, TogetherSearch, with_k

@@ -2,9 +2,6 @@
 
 A candidate's negative log-likelihood is n / 2 * log(cost), noise profiled out, with the number n of
 independent outline errors.
-
-Aligned to one outline alone, a camera bends to what the artist drew wrongly, so the alternatives
-that count are refined again with the sheet's drawing error integrated out.
 """
 
 from __future__ import annotations
@@ -15,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.align import INDEPENDENT_POINTS, Fit, align_all, measure
-from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
+from toonset.calib.fit.align import INDEPENDENT_POINTS, Fit, align_all
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, silhouette_mask
 from toonset.calib.outline.pose import Pose, project
@@ -27,8 +23,6 @@ OTHER = np.radians(15.0)  # an alternative this far away is another camera
 MIRROR = np.radians(15.0)  # a candidate this near to the twin's rotation is the twin
 LOOK_PX = 192  # picture in which a pose and its twin are compared
 ALIKE = 0.99  # overlap from which two silhouettes are one; a bag at one side makes it 0.94
-WIDTHS = np.full(5, 0.01)  # robust ones over the figure's height: rivals are near an optimum
-WORTH = 6.0  # nats behind the best: rivals farther behind do not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,34 +120,3 @@ def _look_alike(surface: Surface, pose: Pose, other: Pose) -> bool:
         for p in (replace(q, shift=np.full(2, LOOK_PX / 2), scale=scale) for q in (pose, other))
     )
     return float((a & b).sum() / max((a | b).sum(), 1)) >= ALIKE
-
-
-def steadied(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -> Candidates:
-    """Return a view's candidates, those that count refined under the sheet's drawing error.
-
-    The chosen camera is among them, as it is and refined like them. Its twin stays: no error of a
-    drawing makes it.
-
-    Args:
-        drawing: at full resolution, the sheet's offset taken off.
-        joint: the sheet's fit.
-        index: of the view.
-        found: refined to the outline alone.
-    """
-    pose, surface = joint.poses[index], joint.body.surface
-    doubtful = [
-        number
-        for number, (fit, energy) in enumerate(zip(found.fits, found.energies, strict=True))
-        if energy < WORTH
-        and not is_twin(pose, fit.pose)
-        and rotation_distance(fit.pose.rotation, pose.rotation) > OTHER
-    ]
-    if not doubtful:
-        return found
-    problem = JointProblem([drawing])
-    kept = [fit for number, fit in enumerate(found.fits) if number not in doubtful]
-    kept.append(measure(drawing, surface, drawing.pose_in(pose)))
-    for start in [pose, *(found.fits[number].pose for number in doubtful)]:
-        fit = problem.fit(joint.body, [start], WIDTHS, SheetModel("given"), joint.noise)
-        kept.append(measure(drawing, surface, drawing.pose_in(fit.poses[0])))
-    return Candidates.of(kept)

@@ -14,7 +14,8 @@ from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import Calibration
-from toonset.calib.search.hypotheses import MIRROR, OTHER, SAME_POSE, WORTH, Candidates, steadied
+from toonset.calib.search.alternatives import WORTH, steadied
+from toonset.calib.search.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates
 from toonset.camera import rotation_distance
 
 

@@ -321,7 +321,7 @@ def test_example_sheet_mannequin_and_cameras_belong_together() -> None:
 
 @pytest.mark.slow
 def test_example_is_what_its_script_makes(tmp_path: Path) -> None:
-    script = EXAMPLES / "make_character.py"
+    script = EXAMPLES / "making" / "make_character.py"
     subprocess.run([sys.executable, str(script), str(tmp_path)], check=True)
     for name in ("mannequin.obj", "truth.json"):
         assert (tmp_path / name).read_bytes() == (EXAMPLES / name).read_bytes()

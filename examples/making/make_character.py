@@ -1,9 +1,9 @@
 """Make the example: our own character, its turnaround sheet, its mannequin and the true cameras.
 
-    python examples/make_character.py [FOLDER]
+    python examples/making/make_character.py [FOLDER]
 
 writes sheet.png, mannequin.obj, truth.json (the cameras) and character.obj (too large to be kept in
-the repository) to FOLDER, by default beside this file.
+the repository) to FOLDER, by default beside the numbered examples.
 """
 
 from __future__ import annotations
@@ -42,4 +42,4 @@ def rounded(mesh: Mesh) -> Mesh:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1])
