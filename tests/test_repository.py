@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-import shlex
 import shutil
 import subprocess
 import tomllib
@@ -12,7 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import typer.main
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -21,7 +19,6 @@ import toonset
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST_BYTES = 300_000
 LOCKS = ("requirements.lock", "bootstrap.lock")
-RUN_COMMANDS = {"demo", "test", "lint"}  # what ./run knows beyond toonset's verbs
 
 # Spelled in pieces, so that this file passes its own test.
 REGISTRY = re.compile(
@@ -189,63 +186,3 @@ def test_lock_answers_every_declared_dependency() -> None:
 def test_both_locks_build_with_the_same_setuptools() -> None:
     pins = [str(locked(name)["setuptools"][0][0]) for name in LOCKS]
     assert pins[0] == pins[1]
-
-
-# ---- commands that the documents and ./run show -------------------------------------------------
-
-
-def shown_commands(document: str) -> list[list[str]]:
-    """Return each `./run ...` or `toonset ...` line of the ```sh blocks, split into words."""
-    text = (ROOT / document).read_text(encoding="utf-8")
-    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    lines = "".join(blocks).replace("\\\n", " ").splitlines()
-    words = [shlex.split(line.removeprefix("$ "), comments=True) for line in lines]
-    return [line[1:] for line in words if line and line[0] in {"./run", "toonset"}]
-
-
-def steps_of_the_demo() -> list[list[str]]:
-    text = (ROOT / "run").read_text(encoding="utf-8")
-    return [shlex.split(line)[1:] for line in re.findall(r"^ +(step [a-z].*)$", text, re.MULTILINE)]
-
-
-def complaint(words: list[str]) -> str:
-    """Return what toonset, or the bench, would not understand in a command line; empty if fine."""
-    from bench.__main__ import app as bench
-    from toonset.cli.main import VERBS, app
-
-    verb = next((word for word in words if not word.startswith("-")), None)
-    if verb is None or verb in RUN_COMMANDS:
-        return ""
-    if verb not in (*VERBS, "bench"):
-        return f"no verb {verb}"
-    if verb == "bench":
-        command = typer.main.get_command(bench)
-    else:
-        command = typer.main.get_group(app).commands[verb]
-    known = {name for parameter in command.params for name in parameter.opts} | {"-h", "--help"}
-    known |= {name for parameter in command.params for name in parameter.secondary_opts}
-    used = {word.split("=")[0] for word in words if re.match(r"--?[a-z]", word)}
-    unknown = sorted(used - known)
-    return f"{verb}: no option {', '.join(unknown)}" if unknown else ""
-
-
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md"])
-def test_shown_commands_exist(document: str) -> None:
-    commands = shown_commands(document)
-    assert commands
-    assert [c for words in commands if (c := complaint(words))] == []
-
-
-def test_demo_commands_exist() -> None:
-    steps = steps_of_the_demo()
-    assert [words[0] for words in steps] == ["calibrate", "palette", "train", "render"]
-    assert [c for words in steps if (c := complaint(words))] == []
-
-
-@pytest.mark.parametrize("words", [["paint", "x.png"], ["calibrate", "x.png", "--mush", "m.obj"]])
-def test_wrong_commands_are_seen(words: list[str]) -> None:
-    assert complaint(words)
-
-
-def test_readme_has_no_placeholders() -> None:
-    assert not re.search(r"@[A-Z]+@", (ROOT / "README.md").read_text(encoding="utf-8"))
