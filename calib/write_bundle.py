@@ -9,9 +9,8 @@ from toonset.calib.result import Calibration
 from toonset.calib.verdict.overlay import draw_overlay
 from toonset.calib.verdict.report import calibration_dict
 from toonset.dataset.bundle.bundle import Bundle, bundle_folder, read_bundle
-from toonset.dataset.bundle.palette_files import write_palette
+from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.errors import BundleError
-from toonset.palette.extract import label_drawing
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
 
@@ -41,15 +40,7 @@ def write_bundle(
         folder, found.drawings, cameras, fitted, report, overlay, force=force
     ) as place:
         if palette is not None:
-            _write_labels(place, found, palette)
+            pictures = [view.rgba for view in found.drawings]
+            names = [view.name for view in found.drawings]
+            write_labelled(place, palette, names, pictures, [find_contour(p) for p in pictures])
     return read_bundle(folder)
-
-
-def _write_labels(folder: Path, found: Calibration, palette: Palette) -> None:
-    """Write palette, label maps and contour maps of the drawings."""
-    contours = [(view.name, find_contour(view.rgba)) for view in found.drawings]
-    labels = [
-        (view.name, label_drawing(view.rgba, contour, palette))
-        for view, (_, contour) in zip(found.drawings, contours, strict=True)
-    ]
-    write_palette(folder, palette, labels, contours)

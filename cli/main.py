@@ -1,7 +1,7 @@
 """The `toonset` program: verbs, errors to exit codes, nothing heavy imported before a verb runs.
 
-Exit codes: 0 fine; 1 our bug; 2 bad input or usage; 3 done, but a view or a run is weak or
-ambiguous; 130 interrupted.
+Exit codes: 0 fine; 1 our bug; 2 bad input or usage; 3 done, but a person should look (a view or a
+run is not ok, a cut is doubtful, a drawing contradicts the others); 130 interrupted.
 """
 
 from __future__ import annotations

@@ -110,9 +110,9 @@ def palette(
     Writes palette.json, .gpl, .ase, .hex, .png, labels/ and contours/ into the bundle, replacing
     those of an earlier run; for images and other folders, or with -o, into a folder of their own.
     """
-    from toonset.dataset.bundle.palette_files import write_palette
+    from toonset.dataset.bundle.palette_files import write_labelled
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
-    from toonset.palette.extract import choose_palette, label_drawing, options_of
+    from toonset.palette.extract import choose_palette, options_of
     from toonset.palette.pixels.ink_lines import find_contour
     from toonset.write import new_folder
 
@@ -128,11 +128,8 @@ def palette(
         printer.say(note)
     contours = [find_contour(picture) for picture in drawn.pictures]
     found = choose_palette(drawn.pictures, contours, options, colors, method)
-    pairs = zip(drawn.pictures, contours, strict=True)
-    labels = [label_drawing(*pair, found, space) for pair in pairs]
-    named = [list(zip(drawn.names, maps, strict=True)) for maps in (labels, contours)]
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
-        write_palette(folder, found, *named)
+        write_labelled(folder, found, drawn.names, drawn.pictures, contours, space)
     _report(found, target, printer, in_bundle=target == bundle)
 
 

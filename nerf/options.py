@@ -30,7 +30,7 @@ class TrainOptions:
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
         field: what is fitted: "auto", planes with a small decoder, as coarse as predicts left-out
-            drawings well (`nerf.field_choice`); "triplane", one cell per pixel; or, to compare
+            drawings well (`resolution_search`); "triplane", one cell per pixel; or, to compare
             with, a network alone, a grid of voxels, or the hull with the drawings' colours (nothing
             is fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the

@@ -3,7 +3,7 @@
 A method is a setting of the search, or something that a person says beforehand. Seconds are those
 of `calibrate` alone, in this process, after imports; with the mannequin's templates in the cache
 as from its second sheet on, except where a method is about just that. Baselines start at the
-nominal angles, or are told landmarks; see `bench.calib.baselines` and `calib_soft`.
+nominal angles, or are told landmarks; see `bench.calib.baselines` and `soft_silhouette`.
 """
 
 from __future__ import annotations

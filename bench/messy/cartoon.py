@@ -59,7 +59,7 @@ def cartoon_cast(
     floats: bool,
     heads: bool,
 ) -> Cast:
-    """Return a flat cartoon character's turnaround; arguments as of `messy_solids.solid_cast`."""
+    """Return a flat cartoon character's turnaround; arguments as of `solids.solid_cast`."""
     parts = _character(np.random.default_rng(number), colors, floats)
     head = [part for part in parts if part.group != "body"]
     yaws = [2 * math.pi * i / views for i in range(views)]

@@ -2,7 +2,7 @@
 
 A character is drawn all round, its drawings are laid out in rows, and the sheet is made difficult:
 paper, shadows, captions, arrows, swatches, frames, props, head studies, figures that touch, line
-art, JPEG. Every difficulty has a name (`messy_options.DIFFICULTIES`) and can be drawn alone. The
+art, JPEG. Every difficulty has a name (`options.DIFFICULTIES`) and can be drawn alone. The
 truth is what each figure shows of itself: with its floating parts, without shadows and lettering.
 """
 
@@ -63,7 +63,7 @@ def make_messy_sheet(
 
     Args:
         seed: of everything random.
-        difficulties: which of `messy_options.DIFFICULTIES`; none = a random mixture.
+        difficulties: which of `options.DIFFICULTIES`; none = a random mixture.
         options: see `MessyOptions`.
 
     Raises:

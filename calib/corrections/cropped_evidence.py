@@ -21,7 +21,7 @@ LEAST_LOST_PX = 1.5  # less is a sole that lies between two pixels
 MET = 0.005**2  # cost under which a figure at the picture's edge is whole
 EXPLAINED = 0.5  # of the cost, under which a cut at the picture's edge explains the outline
 FARTHER = 2.0  # times what it does elsewhere the mannequin goes on beyond a cut
-SAME_SCALE = 0.02  # views of a sheet differ by 1 % (`ties.Spreads`)
+SAME_SCALE = 0.02  # views of a sheet differ by 1 % (`sheet_prior.Spreads`)
 
 Cuts = list[tuple[int, CutOff]]  # with the view's number
 

@@ -1,6 +1,6 @@
 """How far all cameras of a sheet look down too little or too much, from the drawings alone.
 
-A common error of elevation is what drawings contradict most (see `calib.coherence`): a foot in
+A common error of elevation is what drawings contradict most (see `coherence_state`): a foot in
 front goes down when seen from above, the same foot goes up when seen from behind, and the profile
 views say how far in front it is. A mannequin of other proportions cannot know that as well.
 

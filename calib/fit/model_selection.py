@@ -1,9 +1,8 @@
-"""No more camera, and no more body, than the drawings ask for: a ladder of models, by BIC.
+"""No more camera, and no more body, than the drawings ask for: models from simple to rich, by BIC.
 
-1. orthographic, one scale
-2. orthographic, a scale per view
-3. perspective, one distance for the sheet
-4. perspective, a distance per view
+1. orthographic, one scale: where everything begins
+2. perspective, one distance for the sheet
+3. if that is proven: perspective, a distance per view; if not: orthographic, a scale per view
 with drawings and a mannequin that are stretched, where that is proven
 (`toonset.calib.corrections.stretched`), and the mannequin's proportions (which have priors of their
 own and therefore pay Akaike's 2 per number instead of BIC's log(samples)), where its outline is

@@ -3,7 +3,7 @@
 One drawing of a character whose mannequin has another body fits the mannequin best from a wrong
 side; eight drawings together do not. Every view's silhouette is compared with every template,
 whatever its shift; the mismatch counts mannequin outside of the drawing in full and drawing outside
-of the mannequin (hair, skirt, sword) at a third, and a turn's score is its sum over the views.
+of the mannequin (hair, skirt, sword) at 0.3, and a turn's score is its sum over the views.
 """
 
 from __future__ import annotations

@@ -11,8 +11,9 @@
     contours/000.png   8-bit grey per picture: how much of a pixel is drawn line
     run/               a trained field
 
-The folder appears whole or not at all. It holds no time, no path and no name of a machine: the same
-input, options, seed and versions give the same bytes, wherever it is made or moved to.
+The folder appears whole or not at all. It holds no path and no name of a machine and, but for the
+seconds in run/, no time: the same input, options, seed and versions give the same bytes, wherever
+it is made or moved to.
 """
 
 from __future__ import annotations

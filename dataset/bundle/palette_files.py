@@ -16,8 +16,10 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
+from toonset.palette.extract import label_drawing
 from toonset.palette.formats.registry import encode_palette
 from toonset.palette.palette import Palette
+from toonset.palette.pixels.labels import Space
 from toonset.palette.swatch_image import draw_swatches
 from toonset.write import new_folder, write_bytes
 
@@ -25,6 +27,21 @@ PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
 COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs
 
 Maps = Sequence[tuple[str, UInt8[np.ndarray, "_ _"]]]
+
+
+def write_labelled(
+    folder: Path,
+    palette: Palette,
+    names: Sequence[str],
+    pictures: Sequence[UInt8[np.ndarray, "_ _ rgba=4"]],
+    contours: Sequence[UInt8[np.ndarray, "_ _"]],
+    space: Space = "rgb",
+) -> None:
+    """Label pictures whose contour maps are known, and write all; see `write_palette`."""
+    drawn = zip(pictures, contours, strict=True)
+    labels = [label_drawing(picture, contour, palette, space) for picture, contour in drawn]
+    named = [list(zip(names, maps, strict=True)) for maps in (labels, contours)]
+    write_palette(folder, palette, *named)
 
 
 def write_palette(folder: Path, palette: Palette, labels: Maps, contours: Maps = ()) -> None:

@@ -7,7 +7,7 @@ split.json only knows where a picture came from. When both disagree:
 - a picture was renamed: it keeps its box and label, its name gives its place in the order;
 - a picture was repainted at the same size: it keeps its box and label, its line is measured again;
 - a picture was repainted at another size, or is new: it is a sheet of its own, of one figure;
-- a crop was changed: refused, for the picture is cut already (`--boxes split.json` cuts it anew).
+- a crop's size was changed: refused, the picture is cut already (`--boxes split.json` cuts anew).
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """What happens to drawings before a field is fitted to them.
 
-Each only where the drawings ask for it: cameras that were estimated turn (`azimuth`),
-they follow drawings that were placed or sized off (`registration`), drawings that bend are unbent
-(`warp`), contour lines are taken off (`ink`). What was taken away is kept, to be given back to
-renderings.
+Each only where the drawings ask for it: cameras that were estimated turn (`refine_yaw`), they
+    follow
+drawings that were placed or sized off (`registration`), drawings that bend are unbent (`unwarp`),
+contour lines are taken off (`toonset.nerf.lines.remove`). What was taken away is kept, to be given
+back to renderings.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Minimised over each camera's shift, growth and yaw and the common perspective, by Gauss-Newton:
 
     sum over rim points and other views of rho(r / sigma)^2 / CORRELATED
-      + |shift, growth|^2 / tau^2 + (yaw / its sigma)^2 + (log k / its sigma)^2
+      + |shift, 2 growth|^2 / tau^2 + (yaw / its sigma)^2 + (log k / its sigma)^2
 
 with r of `toonset.dataset.silhouettes.tangency`, noise and tau as in
 `toonset.dataset.silhouettes.register`. What outlines cannot tell is left as it was: the mean yaw,

@@ -46,9 +46,9 @@ def find_palette(
     """Return the colours of a character, the most frequent first.
 
     Left out, and listed, are paints under the rule, colours that look like another although much is
-    painted with them (`near_equal`), and those of tiny features (`tiny_paints`). To keep one of
-    these takes it out of the paint that it counts for otherwise. Spots too small to show their
-    colour (`lone_spots`) are warned of.
+    painted with them (`near_equal_paints`), and those of tiny features (`tiny_paints`). To keep one
+    of these takes it out of the paint that it counts for otherwise. Spots too small to show their
+    colour (`lone_spot_notes`) are warned of.
 
     The result does not depend on the order or orientation of the pictures. If no colour reaches the
     least share, the largest one is kept and a warning says so.

@@ -1,10 +1,9 @@
 """Warn of colours that the palette cannot tell: too small, or shaded throughout.
 
-Spots too small: a colour is read from flat paint. A spot narrower than that has only blends of it,
-    with what lies
-around and with a line, and nothing says which colour they are blends of. But that there is another
-colour can be told where the spot lies alone in one paint: no known paint, blended with the paint
-around and with the lines' ink, gives what is seen.
+Spots too small: a colour is read from flat paint. A spot narrower than that has only blends of it
+with what lies around and with a line, and nothing says which colour they are blends of. But that
+there is another colour can be told where the spot lies alone in one paint: no known paint, blended
+with the paint around and with the lines' ink, gives what is seen.
 
 Paints too wide: shades that run into each other are one paint, however far they run, as a gradient
 must be. Where a drawing is shaded throughout and has little flat paint, even different things can

@@ -1,8 +1,7 @@
 """Figures that touch or overlap a little: cut apart where the evidence says that two meet.
 
-Cuts are cheap ways from the top to the bottom (`touching_paths`) through what is seen of a patch
-(`touching_sight`); which one is right, and whether a person should look at it, is decided in
-`touching_choice`.
+Cuts are cheap ways from the top to the bottom (`seams`) through what is seen of a patch (`costs`);
+which one is right, and whether a person should look at it, is decided in `selection`.
 """
 
 from __future__ import annotations
