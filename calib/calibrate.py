@@ -25,7 +25,7 @@ from toonset.dataset.mannequin.files import landmarks_path
 from toonset.dataset.mannequin.landmark_file import read_known_points
 from toonset.dataset.mannequin.make import default_mannequin
 from toonset.dataset.mannequin.options import MannequinOptions
-from toonset.errors import MeshError
+from toonset.errors import MeshError, UsageError
 from toonset.mesh import Mesh
 from toonset.view import InputFile, View
 
@@ -53,10 +53,11 @@ def calibrate(
         progress: called with the step's name and the share of it that is done.
 
     Raises:
-        ToonsetError: a mannequin that lies, or hints that contradict each other or do not belong
-            to the views or the mannequin.
+        ToonsetError: no view, two of one name, a mannequin that lies, or hints that contradict
+            each other or do not belong to the views or the mannequin.
     """
     hints.check()
+    _check_names([view.name for view in views])
     body = _Body.of(mesh)
     known = known_of(hints, views, body.points_for(hints))
     with threadpool_limits(1, user_api="blas"):  # more only wait, and change the last digits
@@ -116,6 +117,17 @@ def _check_upright(mesh: Mesh) -> None:
         )
 
 
+def _check_names(names: Sequence[str]) -> None:
+    if not names:
+        raise UsageError("calibrate: no view; give the views of `split_sheet`")
+    double = next((name for name in names if names.count(name) > 1), None)
+    if double:
+        raise UsageError(
+            f"calibrate: two views are called {double}; split all sheets in one call of "
+            "`split_sheet`, which numbers them through"
+        )
+
+
 def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
     """Return what the landmarks say of the views that have any."""
     if not known.landmarks:
@@ -127,6 +139,8 @@ def _origin(views: Sequence[View], body: _Body, hints: Hints, seed: int) -> dict
     """Return what calibration.json says of where its cameras come from."""
     origins = list(dict.fromkeys(view.origin for view in views if view.origin is not None))
     files = [file for origin in origins for file in origin.files]
+    if body.mesh.path is not None and body.mesh.sha256:
+        files.append(InputFile("mesh", body.mesh.path.name, body.mesh.sha256))
     files += [InputFile.of(*each) for each in _hint_files(body.mesh, hints)]
     cut = origins[0].options if origins else {}
     made = {} if body.looks is None else {"mannequin": asdict(body.looks)}
@@ -141,8 +155,8 @@ def _origin(views: Sequence[View], body: _Body, hints: Hints, seed: int) -> dict
 
 
 def _hint_files(mesh: Mesh, hints: Hints) -> list[tuple[str, Path]]:
-    """Return role and path of every file besides the drawings that the cameras depend on."""
-    files = [] if mesh.path is None else [("mesh", mesh.path)]
+    """Return role and path of every file that says what is known."""
+    files = []
     if hints.landmarks is not None:
         files.append(("landmarks", Path(hints.landmarks)))
         if mesh.path is not None and landmarks_path(mesh.path).exists():

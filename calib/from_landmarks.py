@@ -21,13 +21,7 @@ from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.search.hypotheses import is_twin
-from toonset.calib.verdict.judge import (
-    FAILED_COVERAGE,
-    SURE,
-    WEAK_ANGLE,
-    angle_sigmas,
-    judge_sheet,
-)
+from toonset.calib.verdict.judge import FAILED_COVERAGE, SURE, WEAK_ANGLE, angle_sigmas, judge_sheet
 from toonset.camera import angles_from_rotation
 from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.dataset.silhouettes.contour import drawn_contour
@@ -41,9 +35,7 @@ MOST_RMS = 0.05  # of the figure's height; farther off, the pairs are not this m
 
 
 def calibrate_by_landmarks(
-    views: Sequence[View],
-    mesh: Mesh,
-    landmarks: Sequence[Landmarks | None],
+    views: Sequence[View], mesh: Mesh, landmarks: Sequence[Landmarks | None]
 ) -> Calibration:
     """Return one camera per view from its landmarks; no outline is fitted.
 

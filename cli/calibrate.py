@@ -68,12 +68,7 @@ def calibrate(
     ] = None,
     labels: Annotated[
         str,
-        typer.Option(
-            "--views",
-            metavar="LABELS",
-            help=LABELS_HELP,
-            rich_help_panel=KNOWN_PANEL,
-        ),
+        typer.Option("--views", metavar="LABELS", help=LABELS_HELP, rich_help_panel=KNOWN_PANEL),
     ] = "",
     landmarks: Annotated[
         Path | None,
@@ -134,11 +129,13 @@ def calibrate(
     from toonset.calib.verdict.report import calibration_dict
     from toonset.calib.write_bundle import write_bundle
     from toonset.dataset.mesh.load import load_mesh
+    from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
 
     lock = tuple(lock.value for lock in locked or ())
     hints = Hints(labels, landmarks, landmarks_only, init, lock)
     hints.check()
+    Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet, verbose)
     check_output(out, [*sheets, mesh, landmarks, init, boxes], WRITTEN, force=force)
     body = None if mesh is None else load_mesh(mesh)
@@ -146,12 +143,13 @@ def calibrate(
         sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
     )
 
+    _say_inputs(sheet, body, printer)
+
     def progress(step: str, done: float) -> None:
         printer.progress(f"{step} {done:.0%}" if done else step)
 
     found = find(sheet.views, body, hints, seed=seed, progress=progress)
     write_bundle(out, found, force=force)
-    _say_inputs(sheet, body, printer)
     _say_result(found, out, printer)
     printer.result({"bundle": out, **calibration_dict(found)}, str(out))
     if not found.is_certain:

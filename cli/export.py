@@ -30,16 +30,14 @@ ASTRAY_PX = 0.1  # a principal point is worth a word from here
 
 def export(
     bundle: Annotated[
-        Path,
-        typer.Argument(metavar="BUNDLE", help="A bundle, or a folder with transforms.json."),
+        Path, typer.Argument(metavar="BUNDLE", help="A bundle, or a folder with transforms.json.")
     ],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],
     to: Annotated[Format, typer.Option("--to", help="Format.")] = Format.colmap,
     mesh: Annotated[
-        Path | None,
-        typer.Option("--mesh", help="The mannequin (default: the bundle's own)."),
+        Path | None, typer.Option("--mesh", help="The mannequin (default: the bundle's own).")
     ] = None,
     text: Annotated[
         bool,

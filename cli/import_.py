@@ -44,8 +44,7 @@ def import_(
         typer.Option("--masks", help="Folder of masks, white where the figure is: NAME.png."),
     ] = None,
     mesh: Annotated[
-        Path | None,
-        typer.Option("--mesh", help="The mannequin, in the world that is read."),
+        Path | None, typer.Option("--mesh", help="The mannequin, in the world that is read.")
     ] = None,
     up: Annotated[
         Literal["y", "z"],

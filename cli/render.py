@@ -160,11 +160,12 @@ def _style(
     from dataclasses import replace
 
     from toonset.errors import BundleError
+    from toonset.nerf.fields.trained_field import NO_BENDS, NO_LINES
 
     if "ink" in layers and (trained.ink is None or not lines):
-        raise BundleError("run: its drawings have no contour lines; leave --layer ink out")
+        raise BundleError(NO_LINES)
     if as_drawn and trained.keys is None:
-        raise BundleError("run: its drawings were not bent; leave --as-drawn out")
+        raise BundleError(NO_BENDS)
     return trained if lines else replace(trained, ink=None)
 
 

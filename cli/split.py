@@ -37,8 +37,7 @@ def split(
     sheets: Annotated[
         list[Path],
         typer.Argument(
-            metavar="SHEET",
-            help="Character sheets, files of one view each, or folders of them.",
+            metavar="SHEET", help="Character sheets, files of one view each, or folders of them."
         ),
     ],
     boxes: BoxesOption = None,
@@ -64,10 +63,12 @@ def split(
     with the options below or in images/ itself (delete, rename, repaint), and give the folder to
     `toonset calibrate`. Exit code 3 when something is doubtful; the files are written then too.
     """
+    from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
     from toonset.dataset.split_folder.overlay import draw_sheet
     from toonset.dataset.split_folder.write import write_split
 
+    Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet)
     check_output(out, [*sheets, boxes], WRITTEN, force=force)
     sheet = split_sheet(

@@ -21,7 +21,6 @@ from toonset.cli.common.output import (
 from toonset.cli.common.train_place import Place
 from toonset.cli.common.train_run import Request, run
 
-DEVICES = ("auto", "cpu", "cuda")
 INKS = ("paint", "redraw")
 WHILE_PANEL = "While it runs"
 MOST_BUDGET_S = 1e9
@@ -38,8 +37,7 @@ def train(
         ),
     ] = None,
     steps: Annotated[
-        int | None,
-        typer.Option("--steps", min=1, help="Optimiser steps (default: 400)."),
+        int | None, typer.Option("--steps", min=1, help="Optimiser steps (default: 400).")
     ] = None,
     budget: Annotated[
         float | None,
@@ -79,8 +77,7 @@ def train(
         bool, typer.Option("--as-placed", help="Trust the cameras: do not register drawings.")
     ] = False,
     as_turned: Annotated[
-        bool,
-        typer.Option("--as-turned", help="Trust calibration's yaws: do not turn its cameras."),
+        bool, typer.Option("--as-turned", help="Trust calibration's yaws: do not turn its cameras.")
     ] = False,
     as_bent: Annotated[
         bool, typer.Option("--as-bent", help="Trust the outlines: do not unbend drawings.")
@@ -99,8 +96,7 @@ def train(
     ] = False,
     device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
     threads: Annotated[
-        str,
-        typer.Option("--threads", help="CPU threads, or auto: as many as make it faster here."),
+        str, typer.Option("--threads", help="CPU threads, or auto: as many as make it faster here.")
     ] = AUTO,
     test: Annotated[
         Path | None,
@@ -141,7 +137,7 @@ def train(
     are written then too. Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says
     how to go on.
     """
-    from toonset.nerf.options import FIELDS, PRESETS
+    from toonset.nerf.options import DEVICES, FIELDS, PRESETS
     from toonset.nerf.options import preset as preset_options
 
     _check_choice(device, DEVICES, "--device")

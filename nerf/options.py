@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
+from toonset.errors import UsageError
+
 # What can be seen of a rendering.
 LAYERS = ("rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
 FieldName = Literal["auto", "triplane", "mlp", "voxel", "hull"]
 FIELDS: tuple[FieldName, ...] = get_args(FieldName)
+DEVICES = ("auto", "cpu", "cuda")
 PRESETS = ("fast", "paper")
+LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
+LEAST |= {"smoothness": 0, "palette_weight": 0}
 PAPER_STEPS = 2000
 
 
@@ -35,14 +40,16 @@ class TrainOptions:
             is fitted then).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over any backdrop.
-        fair: take the fairest surface inside the hull instead of the hull with its corners.
-        register: let cameras follow drawings that were placed or sized off.
-        turn: let cameras that calibration estimated turn, by its sigmas; `register` off keeps them.
-        unbend: bend drawings back that disagree with the others' outlines.
+        fair: take the fairest surface inside the hull instead of the hull with its corners
+            (off: --as-carved).
+        register: let cameras follow drawings that were placed or sized off (off: --as-placed).
+        turn: let cameras that calibration estimated turn, by its sigmas; `register` off keeps them
+            (off: --as-turned).
+        unbend: bend drawings back that disagree with the others' outlines (off: --as-bent).
         symmetric: where drawings show that the body is its own mirror image, flip them for the side
-            that no drawing shows.
-        ink: take contour lines off before, and draw them again in renderings: cleaner, but small
-            eyes and mouths may go with the lines.
+            that no drawing shows (off: --one-sided).
+        ink: take contour lines off before, and draw them again in renderings (--ink redraw):
+            cleaner, but small eyes and mouths may go with the lines.
     """
 
     steps: int = 400
@@ -61,6 +68,21 @@ class TrainOptions:
     unbend: bool = True
     symmetric: bool = True
     ink: bool = False
+
+    def check(self) -> None:
+        """Refuse what means nothing.
+
+        Raises:
+            UsageError: a number out of range, no such field, no such device.
+        """
+        for name, least in LEAST.items():
+            value = getattr(self, name)
+            if value is not None and not least <= value < 2**63:
+                raise UsageError(f"{name}: {value} is out of range; {least} is the least")
+        for name, choices in {"field": FIELDS, "device": DEVICES}.items():
+            if getattr(self, name) not in choices:
+                known = ", ".join(choices)
+                raise UsageError(f"{name}: {getattr(self, name)!r} is none of {known}")
 
 
 def preset(name: str) -> dict[str, Any]:

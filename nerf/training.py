@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import check_cut_out, has_figure
+from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import working_threads
 from toonset.nerf.options import TrainOptions
@@ -98,7 +99,8 @@ def train(
 ) -> Run:
     """Return a radiance field, and a classifier from its colours to the palette's.
 
-    Torch's threads and random numbers are afterwards as they were. On a CPU the same scene,
+    Torch's threads and random numbers are afterwards as they were; they are the process's own, so
+    make one such call at a time. On a CPU the same scene,
     options and threads give the same bits, unless `options.budget_s` ends the training.
 
     Args:
@@ -114,8 +116,12 @@ def train(
     Raises:
         ToonsetError: fewer than two usable views, a picture that is opaque all over, cameras that
             do not belong to the pictures, too little memory, or another scene than `resume`'s.
+        UsageError: an option or a number of threads that means nothing.
         SetupError: a GPU was asked for and there is none.
     """
+    options.check()
+    if threads is not None and threads < 1:
+        raise UsageError(f"threads: {threads}; 1 or more are needed")
     told = listener or _Silence()
     check_cut_out(scene)  # before a background's colours are a palette
     for frame in scene.frames:

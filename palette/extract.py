@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import get_args
 
 import numpy as np
 from jaxtyping import UInt8
@@ -66,14 +67,30 @@ def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb")
         view: a drawing, or an RGBA picture.
         palette: the colours.
         space: in which the nearest colour is meant: "rgb" or "oklab".
+
+    Raises:
+        PaletteError: it is neither a view nor an RGBA picture.
+        UsageError: no such space.
     """
+    if space not in get_args(Space):
+        raise UsageError(f"--space: {space!r} is none of {', '.join(get_args(Space))}")
     picture = picture_of(view)
     return label_drawing(picture, find_contour(picture), palette, space)
 
 
 def picture_of(view: View | Picture) -> Picture:
-    """Return the pixels of a drawing."""
-    return view.rgba if isinstance(view, View) else view
+    """Return the pixels of a drawing.
+
+    Raises:
+        PaletteError: it is neither a view nor an RGBA picture.
+    """
+    rgba = view.rgba if isinstance(view, View) else np.asarray(view)
+    if rgba.ndim != 3 or rgba.shape[2] != 4 or rgba.dtype != np.uint8:
+        raise PaletteError(
+            f"a drawing is {rgba.dtype} of shape {rgba.shape}; a view, or RGBA bytes (height, "
+            "width, 4) as `load_picture` returns them, are needed"
+        )
+    return rgba
 
 
 def options_of(min_share: float, max_colors: int, keep: str, *, contour: bool) -> PaletteOptions:

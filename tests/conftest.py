@@ -43,6 +43,7 @@ class Outcome:
     code: int
     out: str
     err: str
+    program: str = "toonset"
 
     @property
     def json(self) -> Any:
@@ -55,7 +56,7 @@ class Outcome:
         assert self.code == 2, self
         assert self.out == "", self
         program, _, reason = self.err.partition(": ")
-        assert program in ("toonset", "bench"), self
+        assert program == self.program, self
         assert self.err.count("\n") == 1, self
         assert self.err.endswith("\n"), self
         assert self.err[:-1].isprintable(), self
@@ -77,7 +78,7 @@ def run_here(*arguments: object, program: str = "toonset") -> Outcome:
         code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
     finally:
         sys.argv = before
-    return Outcome(code, out.getvalue(), err.getvalue())
+    return Outcome(code, out.getvalue(), err.getvalue(), program)
 
 
 def run_shell(*arguments: object, **options: Any) -> Outcome:

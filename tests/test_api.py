@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
+import random
+import signal
 import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
+import cv2
 import numpy as np
 import pytest
 import torch
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import toonset as ts
 from toonset.nerf.kernels.threads import working_threads
@@ -32,10 +38,24 @@ def test_every_public_name_is_there_and_documented() -> None:
 
 
 def test_type_checkers_see_the_names_that_are_there() -> None:
-    text = Path(ts.__file__).read_text(encoding="utf-8")
-    block = text[text.index("if TYPE_CHECKING:") : text.index("_PLACES = ")]
-    for name in set(dir(ts)) - {"__version__"}:
-        assert f" as {name}\n" in block or f"{name}, " in block or f" {name} = " in block, name
+    tree = ast.parse(Path(ts.__file__).read_text(encoding="utf-8"))
+    block = next(node.body for node in tree.body if isinstance(node, ast.If))
+    imports = [node for node in block if isinstance(node, ast.ImportFrom)]
+    seen = {(node.module, alias.name) for node in imports for alias in node.names}
+    renamed = [node for node in block if isinstance(node, ast.Assign)]
+    shown = {alias.asname for node in imports for alias in node.names if alias.asname}
+    shown |= {name.id for node in renamed for name in ast.walk(node.targets[0]) if is_name(name)}
+    assert shown == set(dir(ts)) - {"__version__"}
+    places = {
+        (f"toonset.{module}", entry.split("=")[-1])
+        for module, names in ts._PLACES.items()
+        for entry in names.split()
+    }
+    assert places == seen
+
+
+def is_name(node: ast.AST) -> TypeGuard[ast.Name]:
+    return isinstance(node, ast.Name)
 
 
 @pytest.mark.parametrize("line", ["import toonset", "import toonset; toonset.__version__"])
@@ -179,21 +199,28 @@ def small_scene(bundle: Path) -> Path:
 
 @pytest.fixture
 def host() -> Iterator[dict[str, Any]]:
-    """Check after a test that torch, BLAS and warnings are set as before."""
-    from threadpoolctl import threadpool_info
+    """Check after a test that torch, BLAS, OpenCV, signals and warnings are set as before."""
 
     def state() -> dict[str, Any]:
         return {
             "torch threads": torch.get_num_threads(),
             "torch random": torch.get_rng_state().tolist(),
-            "blas": [(i["filepath"], i["num_threads"]) for i in threadpool_info()],
+            "numpy random": str(np.random.get_state()),  # noqa: NPY002
+            "random": random.getstate(),
+            "opencv threads": cv2.getNumThreads(),
+            "signals": [signal.getsignal(sign) for sign in (signal.SIGINT, signal.SIGTERM)],
+            "blas": {i["filepath"]: i["num_threads"] for i in threadpool_info()},
             "filters": list(warnings.filters),
             "environment": {k: v for k, v in os.environ.items() if k != "PYTEST_CURRENT_TEST"},
         }
 
-    before = state()
-    yield before
-    assert state() == before
+    import scipy.linalg  # noqa: F401  # a BLAS of its own
+
+    with threadpool_limits(2, user_api="blas"):  # all other tests run with one
+        before = state()
+        assert 2 in before["blas"].values()
+        yield before
+        assert state() == before
 
 
 def test_calls_leave_the_host_as_it_was(
@@ -204,6 +231,36 @@ def test_calls_leave_the_host_as_it_was(
     run = ts.train(ts.read_bundle(bundle).scene, ts.TrainOptions(steps=2, device="cpu"), threads=3)
     run.save(tmp_path / "run")
     ts.render(run.field, ts.turntable(run.field, 1)[0])
+    ts.extract_palette(sheet.views)
+    ts.surface_of(run.field, 500)
+    ts.evaluate(run.field, ts.read_bundle(bundle).scene)
+
+
+def test_a_field_that_changes_is_rendered_anew(run: Path) -> None:
+    field = ts.read_run(run)
+    camera = ts.turntable(field, 1)[0]
+    before = ts.render(field, camera).rgb
+    with torch.no_grad():
+        for values in field.field.parameters():
+            values.mul_(0.5)
+    assert not np.allclose(ts.render(field, camera).rgb, before)
+
+
+def test_the_same_bytes_with_blas_on_two_threads(
+    found: ts.Calibration, drawn: Path, tmp_path: Path
+) -> None:
+    code = (
+        "import sys, toonset as ts\n"
+        "folder, out = sys.argv[1:]\n"
+        "sheet = ts.split_sheet(folder + '/sheet.png')\n"
+        "found = ts.calibrate(sheet.views, ts.load_mesh(folder + '/mannequin.obj'))\n"
+        "ts.write_bundle(out, found, ts.extract_palette(found.drawings))\n"
+    )
+    free = os.environ | {"OPENBLAS_NUM_THREADS": "2"}
+    command = [sys.executable, "-c", code, str(drawn), str(tmp_path / "two")]
+    subprocess.run(command, check=True, env=free, timeout=300)
+    ts.write_bundle(tmp_path / "one", found, ts.extract_palette(found.drawings))
+    assert_same_files(tmp_path / "one", tmp_path / "two")
 
 
 def test_threads_are_those_of_the_block_alone() -> None:
@@ -257,6 +314,70 @@ def test_arguments_that_contradict_each_other(drawn: Path, toonset: Any) -> None
     assert "see `toonset split -h`" in said
     with pytest.raises(ts.ToonsetError, match="'hat' is none of yaw, elevation"):
         ts.Hints(lock=("hat",)).check()
+
+
+A_NAME: Any = "sheet.png"  # of another type than is asked for
+NO_MEANING = [
+    (lambda s, f: ts.split_sheet([]), "no sheet"),
+    (lambda s, f: ts.calibrate([]), "no view"),
+    (lambda s, f: ts.calibrate([*s.views, *s.views]), "two views are called 000.png"),
+    (lambda s, f: ts.extract_palette(A_NAME), "a drawing is <U1"),
+    (lambda s, f: ts.extract_palette([s.views[0].rgba[..., :3]]), "RGBA bytes"),
+    (
+        lambda s, f: ts.label_image(s.views[0], f.palette, space=A_NAME),
+        "'sheet.png' is none of rgb",
+    ),
+    (lambda s, f: ts.turntable(f, 0), "0 views"),
+    (lambda s, f: ts.surface_of(f, -5), "faces: -5; 100 or more"),
+    (lambda s, f: ts.render(f, ts.turntable(f, 1)[0]).picture("ink"), "no contour lines"),
+]
+NO_OPTIONS = [
+    ({"steps": 0}, "steps: 0 is out of range; 1 is the least"),
+    ({"seed": -1}, "seed: -1"),
+    ({"seed": 2**70}, "seed: "),
+    ({"budget_s": float("nan")}, "budget_s: nan"),
+    ({"resolution": 0}, "resolution: 0"),
+    ({"field": "bogus"}, "field: 'bogus' is none of auto, triplane"),
+    ({"device": "tpu"}, "device: 'tpu' is none of auto, cpu, cuda"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), NO_MEANING)
+def test_calls_that_mean_nothing_are_refused(call: Any, words: str, drawn: Path, run: Path) -> None:
+    with pytest.raises(ts.ToonsetError, match=words):
+        call(ts.split_sheet(drawn / "sheet.png"), ts.read_run(run))
+
+
+@pytest.mark.parametrize(("options", "words"), NO_OPTIONS)
+def test_options_out_of_range_are_refused(
+    options: dict[str, Any], words: str, bundle: Path
+) -> None:
+    with pytest.raises(ts.ToonsetError, match=words):
+        ts.train(ts.read_bundle(bundle).scene, ts.TrainOptions(**options))
+    with pytest.raises(ts.ToonsetError, match="threads: 0"):
+        ts.train(ts.read_bundle(bundle).scene, threads=0)
+
+
+def test_a_library_call_removes_no_file_of_its_host(bundle: Path, tmp_path: Path) -> None:
+    from toonset.nerf.run.monitor import Looking
+
+    kept = tmp_path / "mine" / "notes.txt"
+    kept.parent.mkdir()
+    kept.write_text("mine")
+    scene, options = ts.read_bundle(bundle).scene, ts.TrainOptions(steps=1, device="cpu")
+    ts.train(scene, options, looking=Looking(folder=kept.parent))
+    assert kept.read_text() == "mine"
+
+
+def test_the_recorded_hash_is_of_the_mesh_that_was_fitted(drawn: Path, tmp_path: Path) -> None:
+    file = tmp_path / "body.obj"
+    file.write_bytes((drawn / "mannequin.obj").read_bytes())
+    mesh = ts.load_mesh(file)
+    digest = sha256(file.read_bytes()).hexdigest()
+    file.unlink()
+    found = ts.calibrate(ts.split_sheet(drawn / "single.png").views, mesh)
+    recorded = {entry["role"]: entry["sha256"] for entry in found.origin["inputs"]}
+    assert recorded["mesh"] == digest
 
 
 # ---- kornia's geometry

@@ -82,6 +82,11 @@ def test_readme_is_one_page() -> None:
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
+def test_no_placeholder_is_left(document: str) -> None:
+    assert not re.search(r"@[A-Z]+@", text_of(document))
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
 def test_links_lead_somewhere(document: str) -> None:
     links = re.findall(r"\]\(([^)#]+)\)|src=\"([^\"]+)\"", text_of(document))
     places = [one or other for one, other in links if "://" not in one + other]

@@ -158,8 +158,7 @@ def test_a_python_without_ensurepip_gets_the_install_line(checkout: Path, tmp_pa
     shutil.rmtree(checkout / ".venv")
     bare = tmp_path / "python3"
     program(
-        bare,
-        f'case "$*" in *ensurepip*) exit 1 ;; esac\nexec {shlex.quote(sys.executable)} "$@"',
+        bare, f'case "$*" in *ensurepip*) exit 1 ;; esac\nexec {shlex.quote(sys.executable)} "$@"'
     )
     done = run(checkout, "calibrate", PYTHON=str(bare))
     assert done.returncode == 2
@@ -198,10 +197,7 @@ def test_a_second_call_waits_for_the_one_that_sets_up(checkout: Path) -> None:
     ],
 )
 def test_all_adds_the_slow_tests(checkout: Path, words: list[str], asked: str) -> None:
-    python_that(
-        checkout,
-        'case "$*" in -) exit 0 ;; *pytest*) printf "[%s]" "$@"; exit 5 ;; esac',
-    )
+    python_that(checkout, 'case "$*" in -) exit 0 ;; *pytest*) printf "[%s]" "$@"; exit 5 ;; esac')
     done = run(checkout, *words, cwd=checkout.parent)
     assert (done.returncode, done.stdout) == (5, asked)
 

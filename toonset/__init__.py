@@ -10,9 +10,9 @@ run     = ts.train(bundle.scene, ts.TrainOptions(seed=0))
 for i, camera in enumerate(ts.turntable(run.field, 36)):
     ts.render(run.field, camera).save(f"{i:03d}.png")
 
-This is the whole public interface; what the commands do between reading their arguments and
-printing is behind it. Importing it loads nothing heavy: a name's module is imported when the name
-is used.
+This is the whole public interface: the road of a sheet from drawings to new views, with the bytes
+that the commands write. Exports, films and new colours are the commands' own. Importing it loads
+nothing heavy: a name's module is imported when the name is used.
 """
 
 from __future__ import annotations

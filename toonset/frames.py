@@ -19,9 +19,7 @@ OPENGL_FROM_OPENCV.setflags(write=False)
 OPENCV_PIXEL_OFFSET = 0.5  # ours = OpenCV's + 0.5
 
 
-def opencv_pose_from_opengl(
-    transform_matrix: Float[np.ndarray, "4 4"],
-) -> Float[np.ndarray, "4 4"]:
+def opencv_pose_from_opengl(transform_matrix: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
     """Return world_from_camera (OpenCV axes) of a NeRF `transform_matrix` (OpenGL axes)."""
     return np.asarray(transform_matrix, dtype=np.float64) @ OPENGL_FROM_OPENCV
 

@@ -24,6 +24,7 @@ class Mesh:
         part_names: name of each part number.
         name: where it came from, for messages.
         path: its file, if it has one.
+        sha256: of the file's bytes.
     """
 
     vertices: Float[np.ndarray, "vertices 3"]
@@ -33,6 +34,7 @@ class Mesh:
     part_names: tuple[str, ...] = ("body",)
     name: str = "mesh"
     path: Path | None = None
+    sha256: str = ""
 
     def __post_init__(self) -> None:
         """Refuse what is no surface.

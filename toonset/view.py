@@ -77,10 +77,7 @@ class View:
         rgba = straight(cv2.resize(premultiplied(self.rgba), size_wh, interpolation=way))
         left, top, right, bottom = np.array(self.ends) * np.tile(by, 2)
         return replace(
-            self,
-            rgba=rgba,
-            box=(*self.box[:2], *size_wh),
-            ends=(left, top, right, bottom),
+            self, rgba=rgba, box=(*self.box[:2], *size_wh), ends=(left, top, right, bottom)
         )
 
 

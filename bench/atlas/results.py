@@ -14,14 +14,7 @@ from bench.atlas.figures import Kind, Trial, TriedPage, TriedStep
 from bench.atlas.palette import CLOSE, LISTED, PalettePage
 from bench.atlas.palette import WARNED as PALETTE_WARNED
 from bench.atlas.run import AnyPage, Result, TriedStepResult, all_pages
-from bench.atlas.training import (
-    CRASHED,
-    REFUSED,
-    REPAIRED,
-    SILENT,
-    TrainPage,
-    Tried,
-)
+from bench.atlas.training import CRASHED, REFUSED, REPAIRED, SILENT, TrainPage, Tried
 from bench.atlas.training import WARNED as TRAIN_WARNED
 from bench.charts.chart import COLORS
 from bench.stability.steps import SheetResult, StepResult

@@ -19,6 +19,7 @@ from jaxtyping import Bool, UInt8
 from bench.atlas.scenes import DrawnScene, draw_scene
 from bench.stability.page import Page
 from bench.stability.sheet import Step
+from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.images.picture import encode_png
 from toonset.errors import ToonsetError
@@ -91,6 +92,7 @@ def _base_tried(seed: int) -> tuple[Tried, bytes]:
 
 def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
     began = time.perf_counter()
+    keep_freed_memory()
     use_threads(1)  # figures must not depend on the machine's cores
     scene: DrawnScene | None = None
     try:

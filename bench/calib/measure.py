@@ -20,12 +20,7 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float
 
-from bench.calib.baselines import (
-    BASELINES,
-    Baseline,
-    Placed,
-    nominal_rotations,
-)
+from bench.calib.baselines import BASELINES, Baseline, Placed, nominal_rotations
 from bench.calib.figures import (
     NOT_PLACED,
     MeasuredSheet,

@@ -145,11 +145,7 @@ def _arms(
     parts: list[Part] = []
     for side in (-1, 1):
         top = (side * 0.7 * width, shoulder - 0.05, 0.0)
-        end = (
-            top[0] + side * length * math.sin(angle),
-            top[1] - length * math.cos(angle),
-            0.03,
-        )
+        end = (top[0] + side * length * math.sin(angle), top[1] - length * math.cos(angle), 0.03)
         if not floats:
             parts.append(Limb(top, end, 0.3 * width, 0.22 * width, shirt))
         parts.append(Ball(end, (0.032, 0.034, 0.032), skin))

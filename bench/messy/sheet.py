@@ -17,14 +17,7 @@ from jaxtyping import UInt8
 from bench.messy.canvas import Canvas
 from bench.messy.cast import brief_of, cast_of
 from bench.messy.figure import Rgb, tight_window
-from bench.messy.ground import (
-    DARK,
-    ground_colors,
-    ground_picture,
-    luma,
-    shadow,
-    through_jpeg,
-)
+from bench.messy.ground import DARK, ground_colors, ground_picture, luma, shadow, through_jpeg
 from bench.messy.layout import Layout, Placed, lay_out
 from bench.messy.margins import Margins, furnish, plan_margins
 from bench.messy.options import GROUNDS, MessyOptions, checked, in_order, mixture

@@ -135,9 +135,7 @@ def _painted_body(seed: int) -> Mesh:
     return replace(body, face_colors=np.array(paints, dtype=np.uint8)[part.reshape(-1)])
 
 
-def _truth(
-    drawn: Turnaround,
-) -> tuple[UInt8[np.ndarray, "colors 3"], Float[np.ndarray, " colors"]]:
+def _truth(drawn: Turnaround) -> tuple[UInt8[np.ndarray, "colors 3"], Float[np.ndarray, " colors"]]:
     """Return the colours, the ink's last where there is one, and the area that each covers."""
     colors, face_labels = flat_palette(drawn.mesh)
     areas = np.zeros(len(colors) + 1)

@@ -17,7 +17,7 @@ from jaxtyping import UInt8
 
 from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
 from bench.records.record import Record, summarise, table
-from toonset.palette.pixels.antialias import opaque_pixels
+from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED, label_pixels, nearest_labels
 
@@ -99,7 +99,7 @@ def _score_labels(samples: Samples, case: LabelCase, method: str, labeller: Labe
 def _score_mixed(
     samples: Samples, case: LabelCase, method: str, found: np.ndarray, metric: str
 ) -> None:
-    opaque = opaque_pixels(case.rgba)
+    opaque = case.rgba[..., 3] >= OPAQUE
     marked, mixed = opaque & (found == UNLABELLED), opaque & (case.truth == UNLABELLED)
     samples[case.group, method, f"{metric}, recall"].append(_percent(marked & mixed, mixed))
     if marked.any():

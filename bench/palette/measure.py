@@ -119,9 +119,7 @@ def sheet_of_size(
 
 
 def _all_seconds(
-    timed: dict[int, PaletteCase],
-    sizes: Sequence[tuple[int, int]],
-    progress: Callable[[str], None],
+    timed: dict[int, PaletteCase], sizes: Sequence[tuple[int, int]], progress: Callable[[str], None]
 ) -> dict[tuple[str, str], list[float]]:
     """Return processor seconds per sheet and method, from a decoded picture on.
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.kernels.threads import SIDES, use_threads
 from toonset.nerf.options import TrainOptions
@@ -81,4 +82,5 @@ def print_growth(rows: Iterable[Growth]) -> None:
 
 
 def _two_threads() -> None:
+    keep_freed_memory()
     use_threads(SIDES, SIDES)

@@ -147,9 +147,7 @@ def _drawn(mesh: Mesh, frame: Frame) -> Drawn:
     return Drawn(frame.camera, colors, _depth(mesh, frame.camera.resized(samples)), samples)
 
 
-def _under_pixels(
-    drawing: Drawn,
-) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+def _under_pixels(drawing: Drawn) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
     """Return a surface point under every pixel that the figure covers by half, and its colour."""
     middle = slice(drawing.samples // 2, None, drawing.samples)
     fine = drawing.camera.resized(drawing.samples)
@@ -159,9 +157,7 @@ def _under_pixels(
     return fine.unproject(pixels[shown], depth[shown]), colors[:, :3] / colors[:, 3:]
 
 
-def _normals(
-    points: Float[np.ndarray, "height width 3"],
-) -> Float[np.ndarray, "height width 3"]:
+def _normals(points: Float[np.ndarray, "height width 3"]) -> Float[np.ndarray, "height width 3"]:
     """Return unit normals of the surface that a picture of points shows, of either sign."""
     normal = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
     return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), LEAST**2)

@@ -190,10 +190,7 @@ COLUMNS = (
         *("seconds per rendered view", "s", "lower", "s a view", "{:.2f}"),
         lambda run: run.render_seconds,
     ),
-    Column(
-        *("parameters", "1", "lower", "", ""),
-        lambda run: run.parameters or None,
-    ),
+    Column(*("parameters", "1", "lower", "", ""), lambda run: run.parameters or None),
     Column(
         *("model size", "kB", "lower", "model kB", "{:.0f}"),
         lambda run: run.model_bytes / 1000 or None,

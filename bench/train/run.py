@@ -17,6 +17,7 @@ from bench.train.mannequin_fit import fitted_mannequin
 from bench.train.mannequin_views import mannequin_view, paint_mannequin
 from bench.train.plan import METHODS, Job, PaletteChoice, Preparation, subset
 from toonset.camera import rotation_distance
+from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError, ToonsetError
 from toonset.nerf.fields.trained_field import TrainedField
@@ -92,6 +93,7 @@ class RunResult:
 def run_job(job: Job, judges: Judges, look: Look = lambda *_: None) -> RunResult:
     """Return what training and rendering of one job gives; a refusal is a result, too."""
     case, method = subset(job.case, job.views), METHODS[job.method]
+    keep_freed_memory()  # as the command does: seconds count
     use_threads(1)  # neither figures nor CPU seconds may depend on the machine's cores
     try:
         if method.mannequin:

@@ -83,9 +83,7 @@ def _resized(
     return oklab_from_rgb(rgb.astype(np.uint8)), mixed[..., 3] >= 0.5
 
 
-def _widest_runs(
-    mask: np.ndarray,
-) -> tuple[Int[np.ndarray, " height"], Int[np.ndarray, " height"]]:
+def _widest_runs(mask: np.ndarray) -> tuple[Int[np.ndarray, " height"], Int[np.ndarray, " height"]]:
     """Return first column and end of every row's widest run of ones; (0, 0) where there is none."""
     steps = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, first = np.nonzero(steps == 1)

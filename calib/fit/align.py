@@ -58,10 +58,7 @@ class Fit:
 
 
 def align(
-    drawing: Drawing,
-    surface: Surface,
-    start: Pose,
-    widths: Float[np.ndarray, " iterations"],
+    drawing: Drawing, surface: Surface, start: Pose, widths: Float[np.ndarray, " iterations"]
 ) -> Fit:
     """Return `start` (full-size pixels) refined by one Gauss-Newton step per entry of `widths`.
 

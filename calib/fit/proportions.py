@@ -96,11 +96,7 @@ def as_it_is(surface: Surface) -> Body:
 
 def _prior() -> Float[np.ndarray, "p p"]:
     own = np.concatenate(
-        [
-            np.full(2 * BANDS, SCALE_SIGMA),
-            np.full(2 * BANDS - 2, MOVE_SIGMA),
-            np.full(3, ARM_SIGMA),
-        ]
+        [np.full(2 * BANDS, SCALE_SIGMA), np.full(2 * BANDS - 2, MOVE_SIGMA), np.full(3, ARM_SIGMA)]
     )
     precision = np.diag(own**-2)
     for block in range(3):  # widths, depths, positions forward

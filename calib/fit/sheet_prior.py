@@ -121,9 +121,7 @@ def anchors(
     elevation = ties["elevation"]
     views = len(elevation.values)
     mean = np.full((1, views), 1 / views)
-    known = [
-        (Tie(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)), prior.sigma),
-    ]
+    known = [(Tie(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)), prior.sigma)]
     if turn is not None and turn.anchored and "yaw" in ties:
         yaw = ties["yaw"]
         placed = np.isfinite(turn.places)

@@ -78,11 +78,7 @@ def pinhole_starts(points: Points, pixels: Pixels, near: Pose) -> list[Pose]:
 
 
 def solve_pinhole(
-    points: Points,
-    pixels: Pixels,
-    principal: Float[np.ndarray, " 2"],
-    focal_px: float,
-    method: int,
+    points: Points, pixels: Pixels, principal: Float[np.ndarray, " 2"], focal_px: float, method: int
 ) -> Pose | None:
     """Return OpenCV's pose for a known pinhole, or None where it finds none before the camera.
 

@@ -57,11 +57,7 @@ def silhouette_mask(
 
 
 def rim_at(
-    surface: Surface,
-    pose: Pose,
-    size_wh: tuple[int, int],
-    spacing_px: float,
-    subpixels: int = 1,
+    surface: Surface, pose: Pose, size_wh: tuple[int, int], spacing_px: float, subpixels: int = 1
 ) -> Rim:
     """Return the points of the surface on its outer silhouette, seen from `pose`.
 

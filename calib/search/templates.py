@@ -109,9 +109,7 @@ def pose_on_box(templates: Templates, index: int, box: Float[np.ndarray, " 4"]) 
     return Pose(templates.rotations[index], shift, scale)
 
 
-def normalised(
-    view: View,
-) -> tuple[Float[np.ndarray, "cell cell"], Float[np.ndarray, " 4"]]:
+def normalised(view: View) -> tuple[Float[np.ndarray, "cell cell"], Float[np.ndarray, " 4"]]:
     """Return a drawing's coverage in the templates' cell, and its box in the picture."""
     mask = view.mask
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))

@@ -79,9 +79,7 @@ class Target:
 
 TARGETS = {
     Format.colmap: Target(
-        "colmap:write_colmap",
-        (*BESIDE, "masks", "sparse"),
-        takes=("points", "text", "old_layout"),
+        "colmap:write_colmap", (*BESIDE, "masks", "sparse"), takes=("points", "text", "old_layout")
     ),
     Format.nerfstudio: Target(
         "nerfstudio:write_transforms",
@@ -91,9 +89,7 @@ TARGETS = {
         "--orientation-method none --center-method none --auto-scale-poses False",
     ),
     Format.instant_ngp: Target(
-        "nerfstudio:write_transforms",
-        (*BESIDE, "transforms.json"),
-        fixed={"instant_ngp": True},
+        "nerfstudio:write_transforms", (*BESIDE, "transforms.json"), fixed={"instant_ngp": True}
     ),
     Format.blender_synthetic: Target(
         "blender_synthetic:write_blender_synthetic",

@@ -76,6 +76,8 @@ def run(request: Request, printer: Printer) -> int:
     options = _options(request, checkpoint)
     scene = read_scene(request.bundle)
     test = None if request.test is None else read_scene(request.test)
+    if checkpoint is None:
+        place.clear()
     keep_freed_memory()
     stopper = Stopper(printer)
     tell = Voice(printer).tell

@@ -35,11 +35,7 @@ SCRIPT_NAME = "import_cameras.py"
 
 
 def write_blender_script(
-    folder: Path,
-    views: Sequence[ExportView],
-    mesh: Mesh | None = None,
-    *,
-    force: bool = False,
+    folder: Path, views: Sequence[ExportView], mesh: Mesh | None = None, *, force: bool = False
 ) -> tuple[ExportView, ...]:
     """Write import_cameras.py and what it reads; the folder appears whole or not at all.
 

@@ -96,11 +96,7 @@ def largest_error_px(views: Sequence[ExportView]) -> float:
 
 
 def write_views(
-    folder: Path,
-    kind: str,
-    views: Sequence[ExportView],
-    pictures: Sequence[str],
-    mesh: Mesh | None,
+    folder: Path, kind: str, views: Sequence[ExportView], pictures: Sequence[str], mesh: Mesh | None
 ) -> None:
     """Write every view's RGBA picture, and what stands beside all exports (see `write_beside`)."""
     for view, picture in zip(views, pictures, strict=True):

@@ -47,11 +47,7 @@ PLANE_FACES = np.array([[0, 1, 2], [0, 2, 3]])  # counter-clockwise as the camer
 
 
 def write_gltf(
-    folder: Path,
-    views: Sequence[ExportView],
-    mesh: Mesh | None = None,
-    *,
-    force: bool = False,
+    folder: Path, views: Sequence[ExportView], mesh: Mesh | None = None, *, force: bool = False
 ) -> tuple[ExportView, ...]:
     """Write a GLB scene; the folder appears whole or not at all.
 

@@ -178,9 +178,4 @@ def _resampled(
 def _opencv_matrix(factors: Pair, shift_px: Pair) -> Float[np.ndarray, "2 3"]:
     """Return the map between pixels with integer centres: f (u + 0.5) + shift - 0.5."""
     fx, fy = factors
-    return np.array(
-        [
-            [fx, 0, shift_px[0] + (fx - 1) / 2],
-            [0, fy, shift_px[1] + (fy - 1) / 2],
-        ]
-    )
+    return np.array([[fx, 0, shift_px[0] + (fx - 1) / 2], [0, fy, shift_px[1] + (fy - 1) / 2]])

@@ -130,11 +130,7 @@ def _visible(
 
 def _look_up(
     rgba: UInt8[np.ndarray, "height width 4"], pixels: Float[np.ndarray, "n 2"]
-) -> tuple[
-    Float[np.ndarray, " n"],
-    Float[np.ndarray, " n"],
-    UInt8[np.ndarray, "n 3"],
-]:
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], UInt8[np.ndarray, "n 3"]]:
     """Return px to the figure, px inside of it, and the colour of its nearest pixel."""
     height, width = rgba.shape[:2]
     figure = np.pad(rgba[..., 3] >= 128, 1)  # a figure cut off by the frame ends there

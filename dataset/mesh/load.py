@@ -8,6 +8,8 @@ faces share edges; vertices that no face uses are dropped.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +45,8 @@ def load_mesh(path: str | Path, max_bytes: int = MAX_BYTES, max_faces: int = MAX
     """
     path = Path(path)
     data = read_whole(path, "mesh", MeshError, max_bytes)
-    return mesh_of_soup(_read(data, path, max_faces), path)
+    mesh = mesh_of_soup(_read(data, path, max_faces), path)
+    return replace(mesh, sha256=sha256(data).hexdigest())
 
 
 def save_obj(mesh: Mesh) -> bytes:

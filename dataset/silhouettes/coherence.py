@@ -115,9 +115,7 @@ def coherence(views: Sequence[View], cameras: Sequence[Camera]) -> SheetCoherenc
     return SheetCoherence(found, whole)
 
 
-def _blame(
-    sampled: Sequence[Float[np.ndarray, "views _ t"]],
-) -> Float[np.ndarray, " views"]:
+def _blame(sampled: Sequence[Float[np.ndarray, "views _ t"]]) -> Float[np.ndarray, " views"]:
     """Return per view the share of the contradictions in which it is needed.
 
     Without view j its own outline contradicts nothing and it excludes no point of the others.

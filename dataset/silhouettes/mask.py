@@ -17,9 +17,7 @@ OPAQUE = 128  # alpha from which a pixel belongs to the figure
 FAINT = 0.02  # coverage below which nothing is there
 
 
-def mask_of(
-    rgba: UInt8[np.ndarray, "height width 4"],
-) -> Bool[np.ndarray, "height width"]:
+def mask_of(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
     """Return the figure's pixels."""
     return rgba[..., 3] >= OPAQUE
 

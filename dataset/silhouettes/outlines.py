@@ -126,9 +126,7 @@ def sample(
     return found[0, :, 0].numpy()
 
 
-def signed_distance(
-    alpha: Float[np.ndarray, "height width"],
-) -> Float[np.ndarray, "height width"]:
+def signed_distance(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
     """Return the distance to the rim (alpha 1/2) in pixels, > 0 inside.
 
     What is too thin to cover half a pixel, as a cape's corner seen from its edge, has no rim, but

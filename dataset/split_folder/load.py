@@ -24,7 +24,7 @@ from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
-from toonset.errors import PictureError, SheetError
+from toonset.errors import PictureError, SheetError, UsageError
 from toonset.read import read_whole
 from toonset.view import InputFile, Origin, View
 
@@ -100,6 +100,8 @@ def split_sheet(
             broken, or an argument cannot be understood or does not fit the sheets.
     """
     paths = [sheet] if isinstance(sheet, str | Path) else sheet
+    if not paths:
+        raise UsageError("split_sheet: no sheet; give a picture, several, or a folder")
     cutting = Cutting(None if boxes is None else Path(boxes), grid, background, drop)
     cutting.check()
     return _labelled(_load([Path(path) for path in paths], cutting), labels)

@@ -66,13 +66,7 @@ def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segm
     """
     digest = sha256(data).hexdigest()
     source = Source(
-        name,
-        digest,
-        size_wh,
-        sheet.background,
-        sheet.warnings,
-        sheet.left_out,
-        sheet.remarks,
+        name, digest, size_wh, sheet.background, sheet.warnings, sheet.left_out, sheet.remarks
     )
     return Split((source,), sheet.views, (0,) * len(sheet.views))
 

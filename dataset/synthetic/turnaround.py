@@ -165,9 +165,7 @@ def _draw_cell(
     return draw(*bent, palette, options.outline_px, options.supersample)
 
 
-def flat_palette(
-    mesh: Mesh,
-) -> tuple[UInt8[np.ndarray, "colors 3"], Int[np.ndarray, " faces"]]:
+def flat_palette(mesh: Mesh) -> tuple[UInt8[np.ndarray, "colors 3"], Int[np.ndarray, " faces"]]:
     """Return the mesh's colours, largest surface first, and the index of every face's colour.
 
     A mesh without colours is grey; more than 64 colours are reduced to 64 by median cut.

@@ -128,10 +128,7 @@ COAT_BODY = common(
     below((0, 0.535, 0), (0, -1, 0)),
 )
 SLEEVE_LONG = cone((0.13, 0.9, 0), (0.37, 0.63, 0.02), 0.062, 0.098)
-SLEEVE = common(
-    SLEEVE_LONG,
-    below((0.345, 0.66, 0.02), (0.66, -0.75, 0.05)),
-)
+SLEEVE = common(SLEEVE_LONG, below((0.345, 0.66, 0.02), (0.66, -0.75, 0.05)))
 PALM = blended(
     0.02,
     cone((0.33, 0.68, 0.02), (0.385, 0.605, 0.025), 0.045, 0.06),

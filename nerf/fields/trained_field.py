@@ -18,6 +18,8 @@ from toonset.nerf.prepare.warp_back import KeyWarps
 NO_PALETTE = (
     "run: was trained without palette; train again without --no-palette and without --field hull"
 )
+NO_LINES = "run: its drawings have no contour lines; leave --layer ink out"
+NO_BENDS = "run: its drawings were not bent; leave --as-drawn out"
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,11 +94,7 @@ def _shrunk(alpha: Float[Tensor, "height width"], radius: int) -> Float[Tensor, 
 
 
 def _contacts(
-    hull: Hull,
-    factor: int,
-    outside: Volume,
-    cameras: Sequence[Camera],
-    alphas: Sequence[Tensor],
+    hull: Hull, factor: int, outside: Volume, cameras: Sequence[Camera], alphas: Sequence[Tensor]
 ) -> Contacts:
     most = max(1, OUTLINE_RAYS // len(cameras))
     parts = []
@@ -122,10 +118,7 @@ def outline_points(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray
     """
     padded = np.pad(alpha, 1)
     points = []
-    for first, second, axis in (
-        (padded[:-1], padded[1:], 1),
-        (padded[:, :-1], padded[:, 1:], 0),
-    ):
+    for first, second, axis in ((padded[:-1], padded[1:], 1), (padded[:, :-1], padded[:, 1:], 0)):
         crossing = (first >= LEVEL) != (second >= LEVEL)
         rows, columns = np.nonzero(crossing)
         place = np.stack([columns, rows], axis=1) - 0.5
@@ -218,9 +211,7 @@ def squared_distance(cells: Bool[Tensor, "x y z"], reach: int) -> Int16[Tensor, 
 
 
 def _between(
-    support: Float[Tensor, "x y z"],
-    beside: Bool[Tensor, "x y z"],
-    distance: Float[Tensor, " n"],
+    support: Float[Tensor, "x y z"], beside: Bool[Tensor, "x y z"], distance: Float[Tensor, " n"]
 ) -> Float[Tensor, " n"]:
     """Return how far from the voxels beside the surface the support is LEVEL, where it says so."""
     at = beside.nonzero()

@@ -92,10 +92,7 @@ def _depth(hull: Hull, camera: Camera) -> Float[np.ndarray, "height width"]:
 
 
 def lined_pairs(
-    frames: Sequence[Frame],
-    pens: Sequence[Strokes],
-    lines: Sequence[Lines],
-    hints: Sequence[Hints],
+    frames: Sequence[Frame], pens: Sequence[Strokes], lines: Sequence[Lines], hints: Sequence[Hints]
 ) -> Pairs:
     """Return the pairs of labels whose borders, away from depth jumps, are mostly under ink.
 

@@ -21,13 +21,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.lines.explain import (
-    Hints,
-    Pairs,
-    depth_hints,
-    lined_pairs,
-    on_borders,
-)
+from toonset.nerf.lines.explain import Hints, Pairs, depth_hints, lined_pairs, on_borders
 from toonset.nerf.lines.nearest import distance_to, nearest, parts
 from toonset.nerf.lines.strokes import (
     Lines,

@@ -57,7 +57,7 @@ class Registration(Alignment):
             "views": [
                 {"shift_px": [round(v, 4) for v in view.shift_px], "scale": round(view.scale, 6)}
                 for view in self.views
-            ],
+            ]
         }
 
 

@@ -11,8 +11,8 @@ from jaxtyping import Float, UInt8
 
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
-from toonset.errors import PaletteError, ToonsetError
-from toonset.nerf.fields.trained_field import NO_PALETTE, TrainedField
+from toonset.errors import BundleError, PaletteError, ToonsetError
+from toonset.nerf.fields.trained_field import NO_BENDS, NO_LINES, NO_PALETTE, TrainedField
 from toonset.nerf.options import LAYERS
 from toonset.nerf.prepare.warp_back import give_back
 from toonset.nerf.render.depth_levels import DepthLevels
@@ -65,8 +65,10 @@ class Rendering:
             as_drawn: bend it as the drawings were, which training had bent back.
 
         Raises:
-            ToonsetError: there is no such layer, or it needs a palette and there is none.
+            ToonsetError: there is no such layer, or the run has no palette, lines or bends for it.
         """
+        if as_drawn and self.field.keys is None:
+            raise BundleError(NO_BENDS)
         if layer not in LAYERS:
             raise ToonsetError(f"layer {layer!r} is none of {', '.join(LAYERS)}; choose one")
         made: dict[str, Callable[[], Layer]] = {
@@ -160,9 +162,13 @@ def alpha_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
 
 
 def ink_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
-    """Return the contour lines alone, in their colour; nothing where there are none."""
+    """Return the contour lines alone, in their colour.
+
+    Raises:
+        BundleError: the drawings have none.
+    """
     if rendering.ink is None or rendering.ink_rgb is None:
-        return np.zeros((*rendering.alpha.shape, 4), dtype=np.uint8)
+        raise BundleError(NO_LINES)
     color = np.array(rendering.ink_rgb) / 255.0
     return color_picture(rendering.ink[..., None] * color, rendering.ink)
 

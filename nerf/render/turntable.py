@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from toonset.camera import Camera
+from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import Hull
 
@@ -23,7 +24,12 @@ def turntable(
         count: number of views, yaw rising.
         elevation: radians, > 0 looks down.
         size: side of the square pictures, px; None: as the training pictures.
+
+    Raises:
+        UsageError: no view, or pictures without a pixel.
     """
+    if count < 1 or (size is not None and size < 1):
+        raise UsageError(f"turntable: {count} views of {size} px; 1 or more of each are needed")
     side = size or trained.size_px
     low, high = filled_box(trained.hull)
     target = (low + high) / 2

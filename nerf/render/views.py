@@ -31,8 +31,6 @@ TOLERANCE = 0.15  # difference of neighbours that makes a border
 CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 
-@torch.no_grad()
-@one_thread()
 def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     """Return the view of `camera`, orthographic or pinhole, of any size.
 
@@ -42,7 +40,12 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
         source: a trained field; what is prepared for its first view is kept for the next ones.
         camera: where it is seen from.
     """
-    baked = source if isinstance(source, Baked) else _baked(source)
+    return _render(source if isinstance(source, Baked) else _baked(source), camera)
+
+
+@torch.no_grad()
+@one_thread()
+def _render(baked: Baked, camera: Camera) -> Rendering:
     trained = baked.trained
     width, height = camera.size_wh
     sight = Sight.of(baked, camera)
@@ -63,9 +66,11 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
 
 
 def _baked(field: TrainedField) -> Baked:
-    """Return what a field's views share; made for the first of them, and kept with the field."""
-    if "baked" not in field.kept:
-        field.kept["baked"] = Baked.of(field)
+    """Return what a field's views share: kept with the field, made anew when its values change."""
+    models = [model for model in (field.field, field.classifier) if model is not None]
+    state = [values._version for model in models for values in model.parameters()]
+    if field.kept.get("state") != state:
+        field.kept.update(state=state, baked=Baked.of(field))
     baked: Baked = field.kept["baked"]
     return baked
 
@@ -103,8 +108,7 @@ def _rendering(
 
 
 def borders(
-    values: Float[np.ndarray, "channels height width"],
-    labels: Int[np.ndarray, "height width"],
+    values: Float[np.ndarray, "channels height width"], labels: Int[np.ndarray, "height width"]
 ) -> Bool[np.ndarray, "height width"]:
     """Return the pixels that differ from one of their four neighbours.
 

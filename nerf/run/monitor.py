@@ -7,7 +7,6 @@ look comes often and an expensive one seldom. None of it changes the training by
 from __future__ import annotations
 
 import copy
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -49,8 +48,7 @@ class Looking:
         tell: called with the status after every step.
         stop: whether somebody wants the training to end.
         test: held-out views; None: none.
-        folder: where previews and checkpoints go; made with the first of them. What an earlier
-            training left there is removed when a new one begins.
+        folder: where previews and checkpoints go; made with the first of them.
         preview_every_s: seconds of training between previews; None: none.
     """
 
@@ -87,8 +85,6 @@ class Onlooker:
         """
         if self.start is not None:
             _check_fits(self.start, trained)
-        elif self.looking.folder is not None:
-            shutil.rmtree(self.looking.folder, ignore_errors=True)
         begun = 0.0 if self.start is None else self.start.seconds
         self._trained = trained
         self._views = [] if self.looking.test is None else sample_of(self.looking.test)
@@ -174,10 +170,7 @@ def _smaller(frame: Frame) -> Frame:
     mean[..., :3] *= 255 / np.maximum(mean[..., 3:], 1e-9)
     camera = frame.camera
     camera = replace(
-        camera,
-        scale=camera.scale / block,
-        center=camera.center / block,
-        size_wh=(columns, rows),
+        camera, scale=camera.scale / block, center=camera.center / block, size_wh=(columns, rows)
     )
     return Frame(frame.name, camera, (mean + 0.5).clip(0, 255).astype(np.uint8))
 

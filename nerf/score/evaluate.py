@@ -107,12 +107,7 @@ def report(
         "ink_tolerance_px": TOLERANCE_PX,
     }
     training_part = _section(training) if training else None
-    return {
-        **_section(held_out),
-        "training": training_part,
-        "absent": absent,
-        "settings": settings,
-    }
+    return {**_section(held_out), "training": training_part, "absent": absent, "settings": settings}
 
 
 def _section(views: Sequence[ScoredView]) -> dict[str, Any]:

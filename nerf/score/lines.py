@@ -36,9 +36,7 @@ def line_f1(
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
-def line_pixels(
-    rgba: UInt8[np.ndarray, "height width 4"],
-) -> Bool[np.ndarray, "height width"]:
+def line_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
     """Return which pixels are dark and part of something thin, over white.
 
     Thin is what a morphological closing fills (the black-hat transform).

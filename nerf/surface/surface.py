@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 from scipy import ndimage
 from skimage.measure import marching_cubes
 
+from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.surface.color import label_probabilities
 from toonset.nerf.surface.cut import cut
@@ -19,6 +20,7 @@ from toonset.nerf.surface.files import Surface
 from toonset.nerf.surface.solid import SOLID_FROM, Solid, solid_of
 
 ROUNDS = 2  # of averaging colours over neighbours: specks go, borders come out smooth
+FEWEST = 100  # triangles that show any figure
 FINER = 4  # times as many faces as wanted are enough to choose from
 
 
@@ -32,7 +34,10 @@ def surface_of(trained: TrainedField, faces: int | None = None) -> Surface:
     Raises:
         BundleError: the field shows nothing.
         PaletteError: the run was trained without palette.
+        UsageError: fewer than 100 triangles asked for.
     """
+    if faces is not None and faces < FEWEST:
+        raise UsageError(f"faces: {faces}; {FEWEST} or more are needed to close a figure")
     solid = solid_of(trained)
     vertices, corners = _triangles(solid)
     rounds = ROUNDS
@@ -47,9 +52,7 @@ def surface_of(trained: TrainedField, faces: int | None = None) -> Surface:
     return Surface(vertices, corners, labels, trained.palette)
 
 
-def _triangles(
-    solid: Solid,
-) -> tuple[Float[np.ndarray, "vertices 3"], Int[np.ndarray, "faces 3"]]:
+def _triangles(solid: Solid) -> tuple[Float[np.ndarray, "vertices 3"], Int[np.ndarray, "faces 3"]]:
     """Return the level set; faces turn counter-clockwise as seen from where values are low."""
     # a value at the level itself would put several vertices at one place
     at_level = np.abs(solid.values - SOLID_FROM) < 1e-4

@@ -89,7 +89,7 @@ def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> F
     cells = [max(1, round(share * finest)) for share in shares]
     left = left_out(shown)
     kept = [frame for frame in frames if frame not in left]
-    torch.manual_seed(ground.options.seed)
+    torch.default_generator.manual_seed(ground.options.seed)
     fields = [build(count) for count in cells]
     tasks = [partial(_tried, ground, kept, left, field) for field in fields]
     candidates = tuple(side_by_side(tasks))

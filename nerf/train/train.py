@@ -83,7 +83,7 @@ def fit_field(
     clock = [time.perf_counter()]
     options, device = _resolved(options), device_of(options.device)
     check_cut_out(scene)
-    torch.manual_seed(options.seed)
+    torch.default_generator.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")
     ready = prepared(scene, options)
@@ -98,7 +98,7 @@ def fit_field(
     if options.field == "auto" and options.resolution is None:
         tell("choosing the planes")
         choice = _choice(ready.scene, hull, weights, options, device, agree=ready.agree)
-        torch.manual_seed(options.seed)
+        torch.default_generator.manual_seed(options.seed)
     cells = choice.cells if choice else None
     clock.append(time.perf_counter())
     tell("laying out the rays")

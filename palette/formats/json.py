@@ -45,10 +45,7 @@ def to_json(palette: Palette) -> dict[str, Any]:
         ],
         "warnings": list(palette.warnings),
         "contour": contour
-        and {
-            **_record(contour.rgb, contour.share, contour.name),
-            "cloth": round(contour.cloth, 6),
-        },
+        and {**_record(contour.rgb, contour.share, contour.name), "cloth": round(contour.cloth, 6)},
         "evidence": evidence
         and {
             "colors": evidence.colors,

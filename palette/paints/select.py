@@ -104,9 +104,7 @@ def with_wanted(
 
 
 def measure(
-    paints: Sequence[Paint],
-    areas: Areas,
-    options: PaletteOptions,
+    paints: Sequence[Paint], areas: Areas, options: PaletteOptions
 ) -> tuple[list[Amount], int | None]:
     """Return every paint's amount, and which paint is the lines' ink (None without lines).
 

@@ -57,11 +57,6 @@ class Paints:
     apart: Float[np.ndarray, "colors colors"]
 
 
-def opaque_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels that the figure covers wholly."""
-    return rgba[..., 3] >= OPAQUE
-
-
 def settle_borders(
     nearest: UInt8[np.ndarray, "height width"],
     rgba: UInt8[np.ndarray, "height width 4"],

@@ -19,14 +19,7 @@ from bench.messy.figure import (
 )
 from bench.messy.ground import through_jpeg
 from bench.messy.layout import reach
-from bench.messy.options import (
-    DIFFICULTIES,
-    EXCLUSIVE,
-    GROUNDS,
-    MessyOptions,
-    checked,
-    mixture,
-)
+from bench.messy.options import DIFFICULTIES, EXCLUSIVE, GROUNDS, MessyOptions, checked, mixture
 from bench.messy.sheet import MessySheet, make_messy_sheet
 from bench.messy.solids import solid_cast
 from toonset.errors import SheetError

@@ -36,10 +36,7 @@ def cameras_text(content: str) -> Callable[[Path], Any]:
 # what is done to the bundle -> what every reader of its cameras must say
 BAD_CAMERAS: dict[str, tuple[Callable[[Path], Any], str]] = {
     "gone": (lambda b: (b / "transforms.json").unlink(), "holds no transforms.json; run `toonset"),
-    "no folder": (
-        lambda b: shutil.rmtree(b),
-        "bundle: does not exist; give a bundle folder",
-    ),
+    "no folder": (lambda b: shutil.rmtree(b), "bundle: does not exist; give a bundle folder"),
     "no json": (cameras_text("{"), "is no valid JSON"),
     "a list": (cameras_text("[]"), "transforms.json: the whole: Input should be a valid dict"),
     "no frames": (cameras_text('{"frames": []}'), "field frames: "),

@@ -176,11 +176,7 @@ def test_auto_is_a_thread_per_side_where_there_are_cores_and_tries_nothing(monke
 
 @pytest.mark.parametrize(
     ("rates", "threads"),
-    [
-        ({2: 130, 4: 140, 8: 300}, 2),
-        ({2: 130, 4: 180, 8: 200}, 4),
-        ({2: 130, 4: 180, 8: 240}, 8),
-    ],
+    [({2: 130, 4: 140, 8: 300}, 2), ({2: 130, 4: 180, 8: 200}, 4), ({2: 130, 4: 180, 8: 240}, 8)],
 )
 def test_auto_doubles_further_threads_while_that_pays(
     monkeypatch: pytest.MonkeyPatch, rates: dict[int, float], threads: int

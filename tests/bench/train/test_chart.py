@@ -32,10 +32,7 @@ def test_mean_curves() -> None:
 
 
 def test_the_figure_has_a_panel_per_condition() -> None:
-    one = [
-        result(NEAREST, Seen(0, 0, 18.0)),
-        result("default", Seen(1, 1, 20), Seen(4, 4, 30)),
-    ]
+    one = [result(NEAREST, Seen(0, 0, 18.0)), result("default", Seen(1, 1, 20), Seen(4, 4, 30))]
     others = [replace(run, group=f"drawn {n}") for n in range(3) for run in one]
     small = Image.open(io.BytesIO(draw_curves(one, "n")))
     large = Image.open(io.BytesIO(draw_curves([*one, *others], "n")))

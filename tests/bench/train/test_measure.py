@@ -230,9 +230,7 @@ def test_what_had_nothing_to_do_is_not_left_out_by_training_again(
     assert len(default.curve) == 1  # followed with the most views only
 
 
-def test_a_refused_training_is_noted_and_the_others_go_on(
-    short_methods: dict[str, Method],
-) -> None:
+def test_a_refused_training_is_noted_and_the_others_go_on(short_methods: dict[str, Method]) -> None:
     alike = case()
     one_side = tuple(alike.train.frames[0] for _ in range(8))
     broken = replace(alike, train=replace(alike.train, frames=one_side))

@@ -81,9 +81,7 @@ def test_a_lower_mannequin_is_made_as_tall_as_the_drawings(made: Turnaround) -> 
         assert rotation_distance(fit.camera.rotation, camera.rotation) < np.radians(1.0)
 
 
-def test_an_outline_without_its_stretch_is_that_of_the_drawing_without_it(
-    made: Turnaround,
-) -> None:
+def test_an_outline_without_its_stretch_is_that_of_the_drawing_without_it(made: Turnaround) -> None:
     view = made.views[0]
     tall, _ = stretched(view, made.cameras[0], TALL)
     across, down = np.array(tall.rgba.shape[1::-1]) / view.rgba.shape[1::-1]

@@ -132,8 +132,7 @@ def test_calibrations_of_version_1_are_read(older, place: Path):
 
 
 @pytest.mark.parametrize(
-    ("name", "newest"),
-    [("transforms", 1), ("calibration", 2), ("palette", 1)],
+    ("name", "newest"), [("transforms", 1), ("calibration", 2), ("palette", 1)]
 )
 def test_a_newer_major_version_is_refused_by_name(name, newest, place: Path):
     edit(place, f"{name}.json", lambda c: c.update(schema=f"toonset-{name}/{newest}.7", new=[1]))

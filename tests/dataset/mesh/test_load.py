@@ -197,10 +197,7 @@ def test_gltf_skin_is_shown_in_its_rest_pose(tmp_path: Path) -> None:
             "meshes": [
                 {
                     "primitives": [
-                        {
-                            "attributes": {"POSITION": 0, "JOINTS_0": 3, "WEIGHTS_0": 4},
-                            "indices": 1,
-                        }
+                        {"attributes": {"POSITION": 0, "JOINTS_0": 3, "WEIGHTS_0": 4}, "indices": 1}
                     ]
                 }
             ],

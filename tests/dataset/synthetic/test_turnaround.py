@@ -225,10 +225,7 @@ def test_mesh_without_colours_is_grey_and_a_gradient_is_reduced() -> None:
     many = np.stack([np.arange(360) % 256, np.arange(360) // 2, np.full(360, 9)], axis=1)
     body = figure()
     repeated = replace(
-        body,
-        faces=np.tile(body.faces, (10, 1)),
-        face_parts=None,
-        face_colors=many.astype(np.uint8),
+        body, faces=np.tile(body.faces, (10, 1)), face_parts=None, face_colors=many.astype(np.uint8)
     )
     assert 32 <= len(make_turnaround(repeated, SMALL, 0).palette) <= 64
 

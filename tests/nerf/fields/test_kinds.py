@@ -26,11 +26,7 @@ from toonset.nerf.train.gradients import gradients_of
 from toonset.nerf.train.loss import Model, Weights, loss_terms, render_batch
 
 BOX = Box(np.array([-3.0, 10.0, 0.5]), np.array([1.0, 18.0, 2.5]))
-SPECS = (
-    FieldSpec("triplane", 9, 5, 6),
-    FieldSpec("voxel", 7, 4, 0),
-    FieldSpec("mlp", 1, 2, 8),
-)
+SPECS = (FieldSpec("triplane", 9, 5, 6), FieldSpec("voxel", 7, 4, 0), FieldSpec("mlp", 1, 2, 8))
 
 
 def made(spec: FieldSpec, seed: int = 0) -> Field:

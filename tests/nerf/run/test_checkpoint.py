@@ -17,13 +17,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.checkpoint import check_scene, read_checkpoint, scene_digest, write_checkpoint
-from toonset.nerf.run.monitor import (
-    INTERRUPTED,
-    Looking,
-    Onlooker,
-    held_out_psnr,
-    sample_of,
-)
+from toonset.nerf.run.monitor import INTERRUPTED, Looking, Onlooker, held_out_psnr, sample_of
 from toonset.nerf.train import loop
 from toonset.nerf.train.carved_rays import PRUNE_AFTER
 from toonset.nerf.train.loop import Moment
@@ -212,10 +206,7 @@ def change(**values: object) -> Callable[[Path], None]:
     ],
 )
 def test_a_damaged_checkpoint_gets_one_clear_line(
-    cut: tuple[Training, FitState],
-    damage: Callable[[Path], object],
-    message: str,
-    tmp_path: Path,
+    cut: tuple[Training, FitState], damage: Callable[[Path], object], message: str, tmp_path: Path
 ) -> None:
     write_checkpoint(tmp_path, cut[1], OPTIONS, SCENE)
     damage(tmp_path)
