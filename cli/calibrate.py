@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -143,12 +144,16 @@ def calibrate(
         sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
     )
 
-    _say_inputs(sheet, body, printer)
+    @cache
+    def say_inputs() -> None:  # once, when nothing of them is refused any more
+        _say_inputs(sheet, body, printer)
 
     def progress(step: str, done: float) -> None:
+        say_inputs()
         printer.progress(f"{step} {done:.0%}" if done else step)
 
     found = find(sheet.views, body, hints, seed=seed, progress=progress)
+    say_inputs()
     write_bundle(out, found, force=force)
     _say_result(found, out, printer)
     printer.result({"bundle": out, **calibration_dict(found)}, str(out))
