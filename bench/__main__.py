@@ -26,9 +26,9 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     SeedOption,
-    check_output,
 )
 from toonset.cli.main import run
+from toonset.write import check_output
 
 WRITTEN = (*RESULTS, WRONG_SPLITS)
 

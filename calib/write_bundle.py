@@ -8,11 +8,12 @@ from pathlib import Path
 from toonset.calib.result import Calibration
 from toonset.calib.verdict.overlay import draw_overlay
 from toonset.calib.verdict.report import calibration_dict
-from toonset.dataset.bundle.bundle import Bundle, bundle_folder, read_bundle
+from toonset.dataset.bundle.bundle import WRITTEN, Bundle, bundle_folder, read_bundle
 from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.errors import BundleError
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
+from toonset.write import check_output
 
 
 def write_bundle(
@@ -27,9 +28,12 @@ def write_bundle(
         force: replace an existing bundle.
 
     Raises:
-        OutputError: the folder exists and `force` is off, or cannot be written.
+        BundleError: `found` has no mannequin.
+        OutputError: the folder exists and `force` is off or it holds what no bundle does, or it
+            cannot be written.
     """
     folder = Path(folder)
+    check_output(folder, [], WRITTEN, force=force)
     if found.mesh is None:
         raise BundleError(f"{folder}: the calibration has no mannequin; make it with `calibrate`")
     fitted = replace(found.mesh, vertices=found.mannequin)

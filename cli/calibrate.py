@@ -24,18 +24,14 @@ from toonset.cli.common.output import (
     QuietFlag,
     SeedOption,
     VerboseFlag,
-    check_output,
 )
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.calib.result import Calibration
     from toonset.dataset.split_folder.load import Sheet
     from toonset.mesh import Mesh
 
-WRITTEN = (
-    *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
-    *("palette.*", "labels", "contours", "run", "run.unfinished"),  # what later verbs put beside
-)
 UNCERTAIN = 3  # exit code: files are written, but a view is not certain
 KNOWN_PANEL = "What you know"
 
@@ -129,6 +125,7 @@ def calibrate(
     from toonset.calib.hints import Hints
     from toonset.calib.verdict.report import calibration_dict
     from toonset.calib.write_bundle import write_bundle
+    from toonset.dataset.bundle.bundle import WRITTEN
     from toonset.dataset.mesh.load import load_mesh
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet

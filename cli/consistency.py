@@ -30,11 +30,10 @@ def consistency(
     Writes consistency.json and consistency.png: what no shape that all drawings share explains,
     from yellow to red. Exit code 3 where a drawing stands out.
     """
-    from toonset.cli.common.output import check_output
     from toonset.dataset.bundle.read_scene import read_scene
     from toonset.dataset.images.picture import encode_png
     from toonset.nerf.prepare.consistency import consistency_of, consistency_picture
-    from toonset.write import new_folder, write_bytes, write_json
+    from toonset.write import check_output, new_folder, write_bytes, write_json
 
     printer = Printer(as_json, quiet)
     folder = out or (bundle if bundle.is_dir() else bundle.parent) / "consistency"

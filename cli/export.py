@@ -16,8 +16,8 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     SeedOption,
-    check_output,
 )
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.dataset.exporters.common import ExportView

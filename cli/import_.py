@@ -7,14 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    check_output,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.dataset.importers.detect import Imported

@@ -15,8 +15,8 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     VerboseFlag,
-    check_output,
 )
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.palette.palette import DroppedColor, Evidence, Palette

@@ -7,14 +7,8 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    check_output,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.write import check_output
 
 WRITTEN = ("planes.json", "plane_*.png", "hull.png")
 

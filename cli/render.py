@@ -8,15 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    check_output,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
 from toonset.nerf.options import LAYERS
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.camera import Camera

@@ -16,14 +16,8 @@ from toonset.cli.common.cutting import (
     DropOption,
     GridOption,
 )
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    check_output,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.dataset.split_folder.load import Sheet

@@ -14,9 +14,9 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     SeedOption,
-    check_output,
 )
 from toonset.dataset.synthetic.options import SynthOptions
+from toonset.write import check_output
 
 WRITTEN = ("sheet.png", "views", "labels", "ink", "mannequin.obj", "truth.json")
 DEFAULT = SynthOptions()

@@ -73,12 +73,17 @@ class TrainOptions:
         """Refuse what means nothing.
 
         Raises:
-            UsageError: a number out of range, no such field, no such device.
+            UsageError: a number out of range, a switch that is neither on nor off, no such field
+                or device.
         """
-        for name, least in LEAST.items():
+        for name, kind in TrainOptions.__annotations__.items():
             value = getattr(self, name)
-            if value is not None and not least <= value < 2**63:
-                raise UsageError(f"{name}: {value} is out of range; {least} is the least")
+            if kind == "bool" and not isinstance(value, bool):
+                raise UsageError(f"{name}: {value!r} is neither True nor False")
+            if name in LEAST and value is not None:
+                number = isinstance(value, int if "int" in kind else int | float)
+                if not number or not LEAST[name] <= value < 2**63:
+                    raise UsageError(f"{name}: {value} is out of range; {LEAST[name]} is the least")
         for name, choices in {"field": FIELDS, "device": DEVICES}.items():
             if getattr(self, name) not in choices:
                 known = ", ".join(choices)

@@ -20,6 +20,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.symmetry import with_all_mirrored
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.run.checkpoint import Checkpoint, check_scene, versions
+from toonset.nerf.run.manifest import WRITTEN
 from toonset.nerf.run.monitor import Looking, Onlooker
 from toonset.nerf.run.report import write_run
 from toonset.nerf.train.labelling import labelled, without_palette
@@ -27,7 +28,7 @@ from toonset.nerf.train.memory import check_memory, memory_errors
 from toonset.nerf.train.result import HeldOut, Training
 from toonset.nerf.train.train import device_of, fit_field
 from toonset.palette.names import hex_of
-from toonset.write import new_folder
+from toonset.write import check_output, new_folder
 
 
 class Listener(Protocol):
@@ -76,8 +77,10 @@ class Run:
         """Write a run folder, whole or not at all; return the content of its metrics.json.
 
         Raises:
-            OutputError: the folder exists and `force` is off, or cannot be written.
+            OutputError: the folder exists and `force` is off or it holds what no run does, or it
+                cannot be written.
         """
+        check_output(Path(folder), [], WRITTEN, force=force)
         with (
             new_folder(Path(folder), force=force) as place,
             working_threads(self.threads),
@@ -120,6 +123,8 @@ def train(
         SetupError: a GPU was asked for and there is none.
     """
     options.check()
+    if not isinstance(palette, bool):
+        raise UsageError("palette: True or False is needed; a bundle's own palette is used")
     if threads is not None and threads < 1:
         raise UsageError(f"threads: {threads}; 1 or more are needed")
     told = listener or _Silence()

@@ -338,6 +338,8 @@ NO_OPTIONS = [
     ({"budget_s": float("nan")}, "budget_s: nan"),
     ({"resolution": 0}, "resolution: 0"),
     ({"field": "bogus"}, "field: 'bogus' is none of auto, triplane"),
+    ({"steps": 1.5}, "steps: 1.5 is out of range"),
+    ({"ink": "paint"}, "ink: 'paint' is neither True nor False"),
     ({"device": "tpu"}, "device: 'tpu' is none of auto, cpu, cuda"),
 ]
 
@@ -367,6 +369,26 @@ def test_a_library_call_removes_no_file_of_its_host(bundle: Path, tmp_path: Path
     scene, options = ts.read_bundle(bundle).scene, ts.TrainOptions(steps=1, device="cpu")
     ts.train(scene, options, looking=Looking(folder=kept.parent))
     assert kept.read_text() == "mine"
+
+
+def test_force_replaces_nothing_but_earlier_results(
+    found: ts.Calibration, bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = tmp_path / "mine" / "notes.txt"
+    kept.parent.mkdir()
+    kept.write_text("mine")
+    scene, options = ts.read_bundle(bundle).scene, ts.TrainOptions(steps=1, device="cpu")
+    run = ts.train(scene, options)
+    with pytest.raises(ts.ToonsetError, match="holds 'notes"):
+        ts.write_bundle(kept.parent, found, force=True)
+    with pytest.raises(ts.ToonsetError, match="holds 'notes"):
+        run.save(kept.parent, force=True)
+    monkeypatch.chdir(ts.write_bundle(tmp_path / "made", found).folder)
+    with pytest.raises(ts.ToonsetError, match="the current folder"):
+        ts.write_bundle(".", found, force=True)
+    assert kept.read_text() == "mine"
+    ts.write_bundle(tmp_path / "again", found)
+    ts.write_bundle(tmp_path / "again", found, force=True)
 
 
 def test_the_recorded_hash_is_of_the_mesh_that_was_fitted(drawn: Path, tmp_path: Path) -> None:

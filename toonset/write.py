@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import fnmatch
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from toonset.errors import OutputError
+
+LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -69,6 +72,42 @@ def new_folder(path: Path, *, force: bool = False) -> Iterator[Path]:
         raise _output_error(path, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_output(
+    out: Path, inputs: Iterable[Path | None], written: Sequence[str], *, force: bool
+) -> None:
+    """Refuse, before any work, an output folder that must not be written or replaced.
+
+    --force replaces a whole folder, so it is held to folders that this verb has written before: a
+    folder with drawings in it, or the one that the user works in, is never taken away.
+
+    Args:
+        out: the folder to write.
+        inputs: what the command reads.
+        written: patterns of the names that the verb writes into its folder.
+        force: replace an existing folder.
+
+    Raises:
+        OutputError: the folder exists and `force` is off, or it holds anything but earlier results
+            of this verb, or an input, or the current folder, or it cannot be written.
+    """
+    check_new_folder(out, force=force)
+    if not out.is_dir():
+        return
+    names = (*written, *LEFT_BY_DESKTOPS)
+    entries = sorted(entry.name for entry in out.iterdir())
+    foreign = [n for n in entries if not any(fnmatch.fnmatchcase(n, p) for p in names)]
+    if foreign:
+        raise OutputError(
+            f"{out}: holds {foreign[0]!r}, which this command does not write, so --force does not "
+            "replace it; choose another -o"
+        )
+    kept = [Path(), *(path for path in inputs if path is not None and path.exists())]
+    for path in kept:
+        if entries and path.resolve().is_relative_to(out.resolve()):
+            what = "the current folder" if path == Path() else str(path)
+            raise OutputError(f"{out}: holds {what}, --force would delete it; choose another -o")
 
 
 def check_new_folder(path: Path, *, force: bool = False) -> None:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 from bench.commands.charts import REPORT, file_name
 from toonset import __version__
-from toonset.cli.common.output import check_output
 from toonset.errors import BundleError
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from bench.atlas.figures import TriedPage

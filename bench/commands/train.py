@@ -17,8 +17,9 @@ from bench.commands.charts import WRITTEN as RESULTS
 from bench.commands.charts import file_name, result_files
 from bench.commands.chosen import DEFAULT_COUNT, Chosen
 from toonset import __version__
-from toonset.cli.common.output import Printer, check_output
+from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from bench.cases.cases import TrainCase

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import fnmatch
 import json
 import sys
 import time
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-
-from toonset.errors import OutputError
 
 OUTPUT_PANEL = "Output"  # of the help
 JsonFlag = Annotated[
@@ -38,45 +34,6 @@ ForceFlag = Annotated[
 ]
 
 SECONDS_BETWEEN_LOG_LINES = 5.0
-LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")
-
-
-def check_output(
-    out: Path, inputs: Iterable[Path | None], written: Sequence[str], *, force: bool
-) -> None:
-    """Refuse, before any work, an output folder that must not be written or replaced.
-
-    --force replaces a whole folder, so it is held to folders that this verb has written before: a
-    folder with drawings in it, or the one that the user works in, is never taken away.
-
-    Args:
-        out: the folder to write.
-        inputs: what the command reads.
-        written: patterns of the names that the verb writes into its folder.
-        force: replace an existing folder.
-
-    Raises:
-        OutputError: the folder exists and `force` is off, or it holds anything but earlier results
-            of this verb, or an input, or the current folder, or it cannot be written.
-    """
-    from toonset.write import check_new_folder
-
-    check_new_folder(out, force=force)
-    if not out.is_dir():
-        return
-    names = (*written, *LEFT_BY_DESKTOPS)
-    entries = sorted(entry.name for entry in out.iterdir())
-    foreign = [n for n in entries if not any(fnmatch.fnmatchcase(n, p) for p in names)]
-    if foreign:
-        raise OutputError(
-            f"{out}: holds {foreign[0]!r}, which this command does not write, so --force does not "
-            "replace it; choose another -o"
-        )
-    kept = [Path(), *(path for path in inputs if path is not None and path.exists())]
-    for path in kept:
-        if entries and path.resolve().is_relative_to(out.resolve()):
-            what = "the current folder" if path == Path() else str(path)
-            raise OutputError(f"{out}: holds {what}, --force would delete it; choose another -o")
 
 
 @dataclass

@@ -12,18 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toonset.cli.common.output import check_output
 from toonset.errors import BundleError, OutputError
+from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.nerf.run.checkpoint import Checkpoint
 
-WRITTEN = (
-    *("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png"),
-    "manifest.json",
-)
 CHECKPOINT = "checkpoint.json"
-UNFINISHED = (*WRITTEN, CHECKPOINT, "checkpoint-*.safetensors", ".*.tmp")
+BESIDE = (CHECKPOINT, "checkpoint-*.safetensors", ".*.tmp")  # in an unfinished run
 
 
 @dataclass(frozen=True)
@@ -50,6 +46,8 @@ class Place:
             OutputError: one of the folders holds something to keep.
             BundleError: there is nothing to resume.
         """
+        from toonset.nerf.run.manifest import WRITTEN
+
         check_output(self.run, inputs, WRITTEN, force=self.force)
         kept = (self.unfinished / CHECKPOINT).is_file()
         if resume and not kept:
@@ -62,7 +60,7 @@ class Place:
                 f"{self.unfinished}: holds an unfinished training; go on with --resume, or begin "
                 "anew with --force"
             )
-        check_output(self.unfinished, inputs, UNFINISHED, force=True)
+        check_output(self.unfinished, inputs, (*WRITTEN, *BESIDE), force=True)
 
     def clear(self) -> None:
         """Remove what is left of an unfinished training; `check` has looked into it."""

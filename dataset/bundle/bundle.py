@@ -44,6 +44,10 @@ from toonset.write import new_folder, write_bytes, write_json
 
 MANNEQUIN, OVERLAY, CALIBRATION = "mannequin.obj", "overlay.png", "calibration.json"
 LABELS, CONTOURS, IMAGES = "labels", "contours", "images"
+WRITTEN = (
+    *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
+    *("palette.*", "labels", "contours", "run", "run.unfinished"),  # what later verbs put beside
+)
 
 
 def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:

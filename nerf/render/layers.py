@@ -11,7 +11,7 @@ from jaxtyping import Float, UInt8
 
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
-from toonset.errors import BundleError, PaletteError, ToonsetError
+from toonset.errors import BundleError, OutputError, PaletteError, ToonsetError
 from toonset.nerf.fields.trained_field import NO_BENDS, NO_LINES, NO_PALETTE, TrainedField
 from toonset.nerf.options import LAYERS
 from toonset.nerf.prepare.warp_back import give_back
@@ -116,8 +116,10 @@ class Rendering:
         """Write a layer as a PNG file; the file appears whole or not at all.
 
         Raises:
-            ToonsetError: see `picture`; or the file cannot be written.
+            ToonsetError: see `picture`; or the file is no .png, or cannot be written.
         """
+        if Path(path).suffix.lower() != ".png":
+            raise OutputError(f"{path}: a rendering is a PNG; give a name that ends in .png")
         write_bytes(Path(path), self.png(layer, as_drawn=as_drawn)[0])
 
 

@@ -20,6 +20,7 @@ from toonset.write import write_json
 
 FILE = "manifest.json"
 SCHEMA, VERSION = "toonset-run", 1
+WRITTEN = ("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png", FILE)
 
 
 class _Entry(BaseModel):
