@@ -19,8 +19,11 @@ COLUMNS = {  # of the table: heading, number format
     "psnr": ("PSNR dB", "{:.2f}"),
     "psnr_mask": ("in mask", "{:.2f}"),
     "psnr_shift": ("+-2 px", "{:.2f}"),
+    "psnr_blocks": ("blocks", "{:.2f}"),
     "ssim": ("SSIM", "{:.4f}"),
     "flip": ("FLIP", "{:.4f}"),
+    "sharpness": ("sharp", "{:.2f}"),
+    "dirt": ("dirt", "{:.2f}"),
     "haarpsi": ("HaarPSI", "{:.4f}"),
     "lpips": ("LPIPS", "{:.4f}"),
     "silhouette_iou": ("outline", "{:.1%}"),
@@ -57,7 +60,9 @@ def evaluate(
     """Compare renderings with held-out pictures, and apart from them with the training drawings.
 
     Everything over white; "in mask" counts the pixels that the drawing covers. "+-2 px" is the best
-    PSNR over shifts of the whole picture by up to 2 px, "outline" the overlap of the silhouettes,
+    PSNR over shifts of the whole picture by up to 2 px, "blocks" the same with a shift for every
+    block of 16 px, "sharp" the mean gradient over the truth's, "dirt" the gradient where the truth
+    is flat (levels per px), "outline" the overlap of the silhouettes,
     "labels" the share of unmixed pixels with the right palette colour, "lines" the F1 of dark lines
     within 2 px. "-": the run or the picture has no such thing, or a package is missing; the JSON
     says why.
@@ -138,7 +143,9 @@ def _text(result: dict[str, Any]) -> str:
 
 
 def _table(section: dict[str, Any]) -> list[str]:
-    layers = [name for name in ("rgb", "palette") if section[name] is not None]
+    from toonset.nerf.score.evaluate import LAYERS
+
+    layers = [name for name in LAYERS if section[name] is not None]
     shown = {
         key: column
         for key, column in COLUMNS.items()

@@ -43,7 +43,7 @@ def render(
     ] = None,
     layers: Annotated[
         list[str] | None,
-        typer.Option("--layer", help=f"{', '.join(LAYERS)}; repeatable (default: rgb)."),
+        typer.Option("--layer", help=f"{', '.join(LAYERS)}; repeatable (see above)."),
     ] = None,
     recolor: Annotated[
         list[str] | None,
@@ -62,6 +62,13 @@ def render(
     lines: Annotated[
         bool, typer.Option("--lines/--no-lines", help="Draw the sheet's contour lines.")
     ] = True,
+    ink_width: Annotated[
+        float | None,
+        typer.Option("--ink-width", min=0.1, max=100, help="Of the drawn outline, sheet px."),
+    ] = None,
+    ink_color: Annotated[
+        str | None, typer.Option("--ink-color", help="Of the drawn outline, e.g. '#402010'.")
+    ] = None,
     as_drawn: Annotated[
         bool,
         typer.Option("--as-drawn", help="Bend views as the nearest drawings were bent by hand."),
@@ -84,21 +91,22 @@ def render(
 ) -> None:
     """Render a trained run: one PNG per camera and layer, and files of a whole turntable.
 
-    The default layer is the field's own colour. `palette` (the default with --recolor or --palette)
-    shows palette colours only; `normal` codes x, y, z of the world as red, green, blue,
+    `drawn` puts views together from the drawings and draws their outline anew; it is the default of
+    turntables of sheets with outlines. `rgb`, the default else, is the field's own colour.
+    `palette` (the default else with --recolor or --palette) shows palette colours only; `normal` codes x, y, z of the world as red, green, blue,
     `normal-camera` right, up and towards the viewer; `depth` has 16 bits, which depth.json turns
     into world units. Several layers are written as NAME-LAYER.png.
     """
     printer = Printer(as_json, quiet)
     repaint = bool(recolor or palette)
-    wanted = layers or ["palette" if repaint else "rgb"]
-    _check_arguments(cameras, views, wanted, repaint=repaint)
+    _check_arguments(cameras, views, layers, repaint=repaint)
     if cameras is not None and (elevation is not None or size is not None):
         raise typer.BadParameter("--elevation and --size belong to --turntable")
 
     from toonset.nerf.kernels.threads import use_threads
     from toonset.nerf.render.files import rendered_files
-    from toonset.nerf.render.recolor import recolored, repainted
+    from toonset.nerf.render.layers import default_layer
+    from toonset.nerf.render.recolor import recolored, repainted, with_pen
     from toonset.nerf.run.folder import read_field
     from toonset.write import new_folder, write_bytes
 
@@ -107,7 +115,10 @@ def render(
     check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
+    wanted = layers or [default_layer(trained) if views else "rgb"]
+    wanted = ["palette"] if repaint and wanted == ["rgb"] else wanted
     trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
+    trained = with_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     files = rendered_files(trained, named, wanted, together, printer.progress, as_drawn=as_drawn)
     sizes: dict[str, int] = {}
@@ -154,28 +165,37 @@ def _style(
     from dataclasses import replace
 
     from toonset.errors import BundleError
-    from toonset.nerf.fields.trained_field import NO_BENDS, NO_LINES
+    from toonset.nerf.fields.trained_field import NO_BENDS, NO_DRAWINGS, NO_LINES
 
-    if "ink" in layers and (trained.ink is None or not lines):
+    drawings = trained.drawings
+    lined = trained.ink is not None or (drawings is not None and drawings.outline is not None)
+    if "ink" in layers and not (lined and lines):
         raise BundleError(NO_LINES)
+    if "drawn" in layers and drawings is None:
+        raise BundleError(NO_DRAWINGS)
     if as_drawn and trained.keys is None:
         raise BundleError(NO_BENDS)
-    return trained if lines else replace(trained, ink=None)
+    if lines:
+        return trained
+    bare = None if drawings is None else replace(drawings, pen=None)
+    return replace(trained, ink=None, drawings=bare)
 
 
 def _check_arguments(
-    cameras: Path | None, views: int | None, layers: list[str], *, repaint: bool
+    cameras: Path | None, views: int | None, layers: list[str] | None, *, repaint: bool
 ) -> None:
     if (cameras is None) == (views is None):
         raise typer.BadParameter("give either --cameras transforms.json or --turntable N")
+    if layers is None:
+        return
     for layer in layers:
         if layer not in LAYERS:
             names = ", ".join(LAYERS)
             raise typer.BadParameter(f"{layer!r} is none of {names}", param_hint="--layer")
     if len(set(layers)) < len(layers):
         raise typer.BadParameter("names a layer twice", param_hint="--layer")
-    if repaint and not {"palette", "labels"} & set(layers):
-        raise typer.BadParameter("colours can be replaced on --layer palette only")
+    if repaint and not {"drawn", "palette", "labels"} & set(layers):
+        raise typer.BadParameter("colours can be replaced on --layer drawn and palette only")
 
 
 def _cameras(

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 from toonset.errors import UsageError
 
 # What can be seen of a rendering.
-LAYERS = ("rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
+LAYERS = ("drawn", "rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
 FieldName = Literal["auto", "triplane", "mlp", "voxel", "hull"]
 FIELDS: tuple[FieldName, ...] = get_args(FieldName)
 DEVICES = ("auto", "cpu", "cuda")

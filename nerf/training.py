@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,12 +16,15 @@ from toonset.dataset.silhouettes.mask import check_cut_out, has_figure
 from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import working_threads
+from toonset.nerf.look.build import drawings_of
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.symmetry import with_all_mirrored
 from toonset.nerf.prepare.view_coverage import guesses
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.views import render
 from toonset.nerf.run.checkpoint import Checkpoint, check_scene, versions
 from toonset.nerf.run.manifest import WRITTEN
-from toonset.nerf.run.monitor import Looking, Onlooker
+from toonset.nerf.run.monitor import INTERRUPTED, Looking, Onlooker
 from toonset.nerf.run.report import write_run
 from toonset.nerf.train.labelling import labelled, without_palette
 from toonset.nerf.train.memory import check_memory, memory_errors
@@ -148,7 +151,20 @@ def train(
         for guess in guesses(with_all_mirrored(scene) if options.symmetric else scene):
             told.say(guess)
         training = fit_field(scene, options, told.progress, onlooker)
+        if training.stopped != INTERRUPTED:
+            told.progress("laying the drawings over the field")
+            training = replace(training, result=_with_drawings(training, scene))
     return Run(training.result, training, scene, test, onlooker.held_out, count)
+
+
+def _with_drawings(training: Training, scene: Scene) -> TrainedField:
+    """Return the field with what the drawn look is made of."""
+    baked = Baked.of(training.result)
+    drawn = [frame.rgba for frame in scene.frames]
+    found = drawings_of(
+        training.prepared.scene, drawn, lambda camera: render(baked, camera).depth
+    )
+    return replace(training.result, drawings=found)
 
 
 def _with_palette(scene: Scene, told: Listener) -> Scene:

@@ -42,7 +42,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@options kernels",
         "hull",
         "lines",
-        "prepare",
+        "prepare look",
         "fields",
         "render surface train",
         "score",

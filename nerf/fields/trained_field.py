@@ -13,12 +13,16 @@ from toonset.nerf.fields.base import Field
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.lines.remove import InkStyle
+from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.prepare.warp_back import KeyWarps
 
 NO_PALETTE = (
     "run: was trained without palette; train again without --no-palette and without --field hull"
 )
 NO_LINES = "run: its drawings have no contour lines; leave --layer ink out"
+NO_DRAWINGS = (
+    "run: holds no drawings, so it has no drawn look; train again, or render --layer rgb"
+)
 NO_BENDS = "run: its drawings were not bent; leave --as-drawn out"
 
 
@@ -37,6 +41,7 @@ class TrainedField:
         size_px: longest side of the training pictures, for turntables.
         ink: contour lines that were taken off the drawings; None: there were none.
         keys: bends that were taken out of the drawings; None: there were none.
+        drawings: what the drawn look is made of; None: the run holds none.
         kept: what renderings prepare for the next one; not part of the field.
     """
 
@@ -50,4 +55,5 @@ class TrainedField:
     size_px: int
     ink: InkStyle | None = None
     keys: KeyWarps | None = None
+    drawings: Drawings | None = None
     kept: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)

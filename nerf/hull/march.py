@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.nerf.hull.hull import BLOCK, EDGE, Hull
+from toonset.nerf.hull.hull import BLOCK, EDGE, LEVEL, Hull
 
 RAYS_PER_CHUNK = 1 << 12  # intermediate arrays stay in cache
 SPARE_STRIDES = 2  # looked up at first beyond those that would be enough if every step counted
@@ -154,6 +154,18 @@ def order_in_ray(ray: Int[Tensor, " n"], rays: int) -> Int[Tensor, " n"]:
     counts = torch.bincount(ray, minlength=rays)
     first = counts.cumsum(0) - counts
     return torch.arange(len(ray)) - first[ray]
+
+
+def surface_depth(hull: Hull, camera: Camera) -> Float[np.ndarray, "height width"]:
+    """Return the depth of the hull's surface past the camera's target, nan beside it."""
+    width, height = camera.size_wh
+    near = np.flatnonzero(pixels_near(camera, hull).reshape(-1))
+    rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2)[near], hull)
+    samples = march(rays, hull, hull.voxel, 1, LEVEL)
+    depth = np.full(width * height, np.nan)
+    points = samples.points.numpy().astype(np.float64) - camera.target
+    depth[near[samples.ray.numpy()]] = points @ camera.rotation[2]
+    return depth.reshape(height, width)
 
 
 def _march_chunk(rays: Rays, hull: Hull, step: float, most: int, level: float) -> Samples:

@@ -9,10 +9,9 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.hull.hull import LEVEL, Hull, carve
-from toonset.nerf.hull.march import march, pixels_near, rays_of
+from toonset.nerf.hull.hull import carve
+from toonset.nerf.hull.march import surface_depth
 from toonset.nerf.lines.nearest import distance_to
 from toonset.nerf.lines.strokes import Lines, Strokes
 from toonset.palette.pixels.labels import UNLABELLED
@@ -53,7 +52,7 @@ def depth_hints(scene: Scene, width_px: float) -> tuple[list[Hints], float]:
     height = float(hull.inside.any(dim=2).any(dim=0).sum()) * hull.voxel
     hints = []
     for frame in scene.frames:
-        edges = step_edges(_depth(hull, frame.camera), JUMP * height)
+        edges = step_edges(surface_depth(hull, frame.camera), JUMP * height)
         reach = SLIP * height * frame.camera.scale + width_px / 2
         hints.append(Hints(edges, distance_to(edges), reach))
     return hints, JUMP * height
@@ -77,18 +76,6 @@ def _row_steps(depth: np.ndarray, jump: float) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         edges[2:-2] = np.abs(wide) - slope > jump
     return edges
-
-
-def _depth(hull: Hull, camera: Camera) -> Float[np.ndarray, "height width"]:
-    """Return the depth of the hull's surface past the target, nan beside it."""
-    width, height = camera.size_wh
-    near = np.flatnonzero(pixels_near(camera, hull).reshape(-1))
-    rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2)[near], hull)
-    samples = march(rays, hull, hull.voxel, 1, LEVEL)
-    depth = np.full(width * height, np.nan)
-    points = samples.points.numpy().astype(np.float64) - camera.target
-    depth[near[samples.ray.numpy()]] = points @ camera.rotation[2]
-    return depth.reshape(height, width)
 
 
 def lined_pairs(

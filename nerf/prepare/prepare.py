@@ -15,8 +15,10 @@ from typing import Any
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.dataset.silhouettes.mask import mask_of
+from toonset.nerf.hull.hull import Hull
 from toonset.nerf.lines.remove import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.prepare.paint import Repainting, with_paint_agreed
 from toonset.nerf.prepare.refine_yaw import Turning, turned
 from toonset.nerf.prepare.registration import Registration, registered
 from toonset.nerf.prepare.unwarp import Unbending, unbent
@@ -35,6 +37,7 @@ class Prepared:
         registration: how cameras moved; None: switched off.
         unbending: how drawings were bent; None: switched off.
         ink: the contour lines that were taken off; None: there are none, or switched off.
+        repainting: what their paint said of bends and colours; None: drawings were not bent.
     """
 
     scene: Scene
@@ -42,6 +45,7 @@ class Prepared:
     registration: Registration | None
     unbending: Unbending | None
     ink: InkStyle | None
+    repainting: Repainting | None = None
 
     @property
     def apart_px(self) -> float:
@@ -87,6 +91,7 @@ class Prepared:
             "turning": None if turning is None else turning.to_json(),
             "registration": None if registration is None else registration.to_json(),
             "unbending": None if unbending is None else unbending.to_json(),
+            "repainting": None if self.repainting is None else self.repainting.to_json(),
             "ink": None if self.ink is None else asdict(self.ink),
         }
 
@@ -103,6 +108,22 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
     if options.ink and scene.palette is not None:
         straight, ink = without_ink(straight, scene)
     return Prepared(straight, turning, registration, unbending, ink)
+
+
+def repainted(ready: Prepared, drawn: Scene, hull: Hull) -> Prepared:
+    """Return bent drawings bent and tinted further, so that their paint agrees over a hull.
+
+    Args:
+        ready: where its drawings did not bend, it is returned as it is.
+        drawn: what it was prepared from.
+        hull: of its drawings.
+    """
+    unbending = ready.unbending
+    if unbending is None or not unbending.applied:
+        return ready
+    scene, warps, found = with_paint_agreed(drawn, ready.scene, unbending.warps, hull)
+    unbending = replace(unbending, warps=warps)
+    return replace(ready, scene=scene, unbending=unbending, repainting=found)
 
 
 def _agreeing(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,14 @@ from jaxtyping import Float, UInt8
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.errors import BundleError, OutputError, PaletteError, ToonsetError
-from toonset.nerf.fields.trained_field import NO_BENDS, NO_LINES, NO_PALETTE, TrainedField
+from toonset.nerf.fields.trained_field import (
+    NO_BENDS,
+    NO_DRAWINGS,
+    NO_LINES,
+    NO_PALETTE,
+    TrainedField,
+)
+from toonset.nerf.look.blend import DrawnView, Geometry, drawn_view
 from toonset.nerf.options import LAYERS
 from toonset.nerf.prepare.warp_back import give_back
 from toonset.nerf.render.depth_levels import DepthLevels
@@ -24,7 +32,7 @@ from toonset.write import write_bytes
 Picture = UInt8[np.ndarray, "height width 4"]
 Layer = UInt8[np.ndarray, "height width *channels"]
 
-BENT = ("rgb", "palette", "labels")  # layers that can be bent as the drawings were
+BENT = ("drawn", "rgb", "palette", "labels")  # layers that can be bent as the drawings were
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +65,18 @@ class Rendering:
     ink: Float[np.ndarray, "height width"] | None = None
     ink_rgb: tuple[int, int, int] | None = None
 
+    @cached_property
+    def drawn(self) -> DrawnView:
+        """Return the view put together from the drawings.
+
+        Raises:
+            BundleError: the run holds none.
+        """
+        if self.field.drawings is None:
+            raise BundleError(NO_DRAWINGS)
+        view = Geometry(self.camera, self.alpha, self.depth, self.rgb, self.shares)
+        return drawn_view(self.field.drawings, view, self.field.palette)
+
     def picture(self, layer: str = "rgb", *, as_drawn: bool = False) -> Layer:
         """Return one layer as RGBA with straight alpha, or as a label map.
 
@@ -72,6 +92,7 @@ class Rendering:
         if layer not in LAYERS:
             raise ToonsetError(f"layer {layer!r} is none of {', '.join(LAYERS)}; choose one")
         made: dict[str, Callable[[], Layer]] = {
+            "drawn": lambda: color_picture(self.drawn.rgb, self.drawn.alpha),
             "rgb": lambda: color_picture(self.rgb, self.alpha),
             "palette": lambda: palette_picture(self, self.field.palette),
             "labels": lambda: label_picture(self),
@@ -123,6 +144,12 @@ class Rendering:
         write_bytes(Path(path), self.png(layer, as_drawn=as_drawn)[0])
 
 
+def default_layer(trained: TrainedField) -> str:
+    """Return the layer that people look at: "drawn" where the drawings have outlines."""
+    drawings = trained.drawings
+    return "rgb" if drawings is None or drawings.outline is None else "drawn"
+
+
 def color_picture(
     premultiplied: Float[np.ndarray, "height width 3"], alpha: Float[np.ndarray, "height width"]
 ) -> UInt8[np.ndarray, "height width 4"]:
@@ -169,6 +196,11 @@ def ink_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
     Raises:
         BundleError: the drawings have none.
     """
+    if rendering.ink is None and rendering.field.drawings is not None:
+        pen = rendering.field.drawings.pen
+        if pen is not None:
+            lines = rendering.drawn.ink
+            return color_picture(lines[..., None] * (np.array(pen.rgb) / 255.0), lines)
     if rendering.ink is None or rendering.ink_rgb is None:
         raise BundleError(NO_LINES)
     color = np.array(rendering.ink_rgb) / 255.0

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from toonset.errors import PaletteError
-from toonset.nerf.fields.trained_field import NO_PALETTE, TrainedField
+from toonset.errors import BundleError, PaletteError
+from toonset.nerf.fields.trained_field import NO_LINES, NO_PALETTE, TrainedField
+from toonset.nerf.look.outline import Outline
 from toonset.palette.formats.hex import is_color, rgb_of_typed
 from toonset.palette.formats.registry import parse_colors
 from toonset.palette.names import RGB, hex_of, name_of
@@ -46,6 +47,28 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
             raise PaletteError(f"{where}: the palette has {has}; choose one of them")
         palette[old.index(known)] = rgb_of_typed(words[1].strip(), where)
     return replace(trained, palette=palette)
+
+
+def with_pen(trained: TrainedField, width_px: float | None, color: str | None) -> TrainedField:
+    """Return the run with the outline of its drawn look drawn by another pen.
+
+    Args:
+        trained: the run.
+        width_px: of the line, pixels of the drawings; None: as it was drawn.
+        color: of the line, hex; None: as it was drawn.
+
+    Raises:
+        BundleError: its drawings have no outline, or lines are switched off.
+        PaletteError: `color` is none.
+    """
+    if width_px is None and color is None:
+        return trained
+    if trained.drawings is None or trained.drawings.pen is None:
+        raise BundleError(NO_LINES)
+    pen = trained.drawings.pen
+    rgb = pen.rgb if color is None else rgb_of_typed(color, "--ink-color")
+    pen = Outline(rgb, pen.width_px if width_px is None else width_px)
+    return replace(trained, drawings=replace(trained.drawings, pen=pen))
 
 
 def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> TrainedField:

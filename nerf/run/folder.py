@@ -3,6 +3,8 @@
     model.safetensors   parameters of field and classifier, and the hull
     config.json         what is needed to build them, and the resolved options
     metrics.json        how training went
+    drawings.png        the drawings as they were trained on, side by side
+    drawings.safetensors  the surface's depth in each, and how far their paint lies apart
     history.csv         every step's losses
     preview.png         four views of the result
     manifest.json       the SHA-256 of them all
@@ -13,15 +15,14 @@ shape, type and value before use, then that the files are those that were writte
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import torch
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from safetensors import SafetensorError
-from safetensors.torch import load, save
-from torch import Tensor
+from safetensors.torch import save
 
 from toonset.errors import BundleError
 from toonset.json_file import read_json, validation_reason
@@ -30,6 +31,14 @@ from toonset.nerf.fields.build import build_field
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import Hull
+from toonset.nerf.run.drawings import (
+    PICTURES,
+    SURFACES,
+    DrawingsRecord,
+    load_tensors,
+    read_drawings,
+    write_drawings,
+)
 from toonset.nerf.run.manifest import check_manifest
 from toonset.nerf.run.records import InkRecord, KeysRecord
 from toonset.nerf.run.tensors import packed, unpack
@@ -38,7 +47,6 @@ from toonset.write import write_bytes
 CONFIG, MODEL = "config.json", "model.safetensors"
 FORMAT = 2
 MOST_CELLS = 512  # along one side, of planes and hull alike
-MAX_MODEL_BYTES = 512 * 2**20
 
 
 class FieldRecord(BaseModel):
@@ -59,6 +67,7 @@ class FieldRecord(BaseModel):
     size_px: int = Field(ge=1, le=16384)
     ink: InkRecord | None = None
     keys: KeysRecord | None = None
+    drawings: DrawingsRecord | None = None
 
     @classmethod
     def of(cls, trained: TrainedField) -> FieldRecord:
@@ -82,6 +91,7 @@ class FieldRecord(BaseModel):
             size_px=trained.size_px,
             ink=None if trained.ink is None else InkRecord.of(trained.ink),
             keys=None if trained.keys is None else KeysRecord.of(trained.keys),
+            drawings=None if trained.drawings is None else DrawingsRecord.of(trained.drawings),
         )
 
 
@@ -101,6 +111,8 @@ def write_field(folder: Path, trained: TrainedField, about: dict[str, Any]) -> d
     """
     record = FieldRecord.of(trained)
     write_bytes(folder / MODEL, model_of(trained))
+    if trained.drawings is not None:
+        write_drawings(folder, trained.drawings)
     return {"format": FORMAT, "field": record.model_dump(mode="json"), **about}
 
 
@@ -120,10 +132,15 @@ def read_field(folder: str | Path) -> TrainedField:
     for file in (config_file, model_file):
         if not file.is_file():
             raise BundleError(f"{file}: does not exist; `toonset train` writes run folders")
-    trained = _empty(_record(config_file))
-    unpack(_load(model_file), trained, str(model_file))
-    check_manifest(folder, (CONFIG, MODEL))
-    return trained
+    record = _record(config_file)
+    trained = _empty(record)
+    unpack(load_tensors(model_file), trained, str(model_file))
+    if record.drawings is None:
+        check_manifest(folder, (CONFIG, MODEL))
+        return trained
+    drawings = read_drawings(folder, record.drawings)
+    check_manifest(folder, (CONFIG, MODEL, PICTURES, SURFACES))
+    return replace(trained, drawings=drawings)
 
 
 def _record(file: Path) -> FieldRecord:
@@ -162,14 +179,3 @@ def _empty(record: FieldRecord) -> TrainedField:
         None if record.ink is None else record.ink.style,
         None if record.keys is None else record.keys.keys(),
     )
-
-
-def _load(file: Path) -> dict[str, Tensor]:
-    try:
-        if file.stat().st_size > MAX_MODEL_BYTES:
-            raise BundleError(f"{file}: larger than {MAX_MODEL_BYTES >> 20} MiB; not a toonset run")
-        return load(file.read_bytes())
-    except OSError as error:
-        raise BundleError(f"{file}: cannot be read ({error.strerror})") from error
-    except (SafetensorError, ValueError, KeyError) as error:
-        raise BundleError(f"{file}: is damaged ({error}); train again") from error

@@ -20,7 +20,10 @@ from toonset.write import write_json
 
 FILE = "manifest.json"
 SCHEMA, VERSION = "toonset-run", 1
-WRITTEN = ("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png", FILE)
+WRITTEN = (
+    *("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png"),
+    *("drawings.png", "drawings.safetensors", FILE),
+)
 
 
 class _Entry(BaseModel):

@@ -19,7 +19,7 @@ from toonset.dataset.images.picture import encode_png
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import side_by_side, threads_in_use
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.layers import color_picture
+from toonset.nerf.render.layers import color_picture, default_layer
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import write_field
@@ -130,7 +130,8 @@ def preview(source: TrainedField | Baked) -> np.ndarray:
     baked = source if isinstance(source, Baked) else Baked.of(source)
     cameras = turntable(baked.trained, PREVIEW_VIEWS, PREVIEW_ELEVATION)
     views = side_by_side([partial(render, baked, camera) for camera in cameras])
-    pictures = [over_white(color_picture(view.rgb, view.alpha)) for view in views]
+    layer = default_layer(baked.trained)
+    pictures = [over_white(view.picture(layer)) for view in views]
     return (np.concatenate(pictures, axis=1) * 255 + 0.5).astype(np.uint8)
 
 

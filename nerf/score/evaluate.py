@@ -12,7 +12,7 @@ from jaxtyping import Float, UInt8
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.layers import Rendering, color_picture, palette_picture
+from toonset.nerf.render.layers import color_picture, palette_picture
 from toonset.nerf.render.views import render
 from toonset.nerf.score.flip import PIXELS_PER_DEGREE
 from toonset.nerf.score.labels import score_labels
@@ -21,7 +21,7 @@ from toonset.nerf.score.metrics import MOST_SHIFT_PX, Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
 from toonset.palette.pixels.labels import label_pixels
 
-LAYERS = ("rgb", "palette")  # the field's own colour; in palette colours
+LAYERS = ("drawn", "rgb", "palette")  # from the drawings; the field's colour; in palette colours
 Progress = Callable[[str], None]
 
 
@@ -32,7 +32,8 @@ class ScoredView:
     Attributes:
         name: of the picture.
         drawn: (height, width, 4) the truth.
-        pictures: per layer, the rendering; no "palette" without palette.
+        pictures: per layer, the rendering; no "palette" without palette, no "drawn" of a run that
+            holds no drawings.
         figures: per layer, as `toonset.nerf.score.metrics_view` names them, with label_accuracy and
             label_miou.
         errors: per layer, (height, width) error in [0, 1].
@@ -98,7 +99,7 @@ def report(
 ) -> dict[str, Any]:
     """Return all figures as plain data.
 
-    `rgb` and `palette` (None without) are means over the held-out views, `views` has each of them;
+    `drawn`, `rgb` and `palette` (None without) are means over the held-out views, `views` has each of them;
     `training` is the same for the views trained on, or None. `absent` says why a metric is null.
     """
     settings = {
@@ -124,23 +125,32 @@ def _section(views: Sequence[ScoredView]) -> dict[str, Any]:
 def _scored(baked: Baked, scene: Scene, frame: Frame, judges: Judges) -> ScoredView:
     trained, view = baked.trained, render(baked, frame.camera)
     pictures = {"rgb": color_picture(view.rgb, view.alpha)}
+    labels = {"rgb": view.labels}
+    if trained.drawings is not None:
+        pictures = {"drawn": view.picture("drawn"), **pictures}
+        labels["drawn"] = view.drawn.palette_labels(len(trained.drawings.palette))
     if trained.palette is not None:
         pictures["palette"] = palette_picture(view, trained.palette)
-    labels = _label_figures(trained, scene, frame, view)
+        labels["palette"] = view.labels
     figures, errors = {}, {}
     for layer, picture in pictures.items():
         found, errors[layer] = figures_of(picture, frame.rgba, judges)
-        figures[layer] = found | labels
+        figures[layer] = found | _label_figures(trained, scene, frame, labels[layer])
     return ScoredView(frame.name, frame.rgba, pictures, figures, errors)
 
 
-def _label_figures(trained: TrainedField, scene: Scene, frame: Frame, view: Rendering) -> Figures:
+def _label_figures(
+    trained: TrainedField,
+    scene: Scene,
+    frame: Frame,
+    labels: UInt8[np.ndarray, "height width"] | None,
+) -> Figures:
     score = None
-    if trained.palette is not None and view.labels is not None:
+    if trained.palette is not None and labels is not None:
         own = scene.palette is not None and np.array_equal(scene.palette, trained.palette)
         true = frame.labels if own else None
         true = label_pixels(frame.rgba, trained.palette) if true is None else true
-        score = score_labels(view.labels, true)
+        score = score_labels(labels, true)
     return {
         "label_accuracy": None if score is None else score.accuracy,
         "label_miou": None if score is None else score.miou,

@@ -19,7 +19,7 @@ RIM = 0.02  # of the picture's longest side, shown round the figure
 GAP_PX, TEXT_PX = 8, 14
 HEADING_PX, CAPTION_PX = 2 * TEXT_PX + 3 * GAP_PX, TEXT_PX + 2 * GAP_PX
 WHITE, BLACK, GREY = (255, 255, 255), (20, 20, 20), (110, 110, 110)
-TITLES = {"rgb": "rendered", "palette": "in palette colours"}
+TITLES = {"drawn": "drawn look", "rgb": "field", "palette": "in palette colours"}
 
 Rgb = UInt8[np.ndarray, "height width 3"]
 
@@ -54,7 +54,7 @@ def _section(
         y, x = HEADING_PX + i // COLUMNS * height, i % COLUMNS * width
         sheet[y : y + height, x : x + width] = block
     more = f", the worst {len(chosen)} of {len(views)}" if len(chosen) < len(views) else ""
-    columns = ["drawn", *(TITLES[layer] for layer in layers), f"{errors_are}, black 0, white 1"]
+    columns = ["truth", *(TITLES[layer] for layer in layers), f"{errors_are}, black 0, white 1"]
     image = Image.fromarray(sheet)
     pen = ImageDraw.Draw(image)
     pen.text((GAP_PX, 4), f"{heading}{more}, worst first", BLACK, font=font_of(TEXT_PX + 3))

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from toonset.dataset.silhouettes.mask import mask_of
+from toonset.nerf.score.appearance import block_psnr, dirt, sharpness
 from toonset.nerf.score.flip import FlipMap, load_flip
 from toonset.nerf.score.lines import line_f1
 from toonset.nerf.score.lpips import Lpips, load_lpips
@@ -58,6 +60,9 @@ def figures_of(
         "ssim_mask": ssim_inside(a, b, mask),
         "psnr_shift": shifted,
         "psnr_shift_mask": shifted_inside,
+        "psnr_blocks": block_psnr(a, b),
+        "sharpness": sharpness(a, b, mask_of(drawn)),
+        "dirt": dirt(a, b, mask_of(drawn)),
         "flip": flip,
         "flip_mask": flip_inside,
         "haarpsi": haarpsi(a, b),

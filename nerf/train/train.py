@@ -29,8 +29,8 @@ from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.prepare import prepared
-from toonset.nerf.prepare.symmetry import completed
+from toonset.nerf.prepare.prepare import prepared, repainted
+from toonset.nerf.prepare.symmetry import completed, with_mirrored
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
@@ -87,12 +87,14 @@ def fit_field(
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")
     ready = prepared(scene, options)
-    scene, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
+    whole, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
-    hull, evidence = open_box(scene), NO_EVIDENCE
+    hull, evidence = open_box(whole), NO_EVIDENCE
     if options.carve:
-        hull, evidence = hull_of(scene, options, ready.apart_px)
+        hull, evidence = hull_of(whole, options, ready.apart_px)
+        ready = repainted(ready, scene, hull)
+    scene = with_mirrored(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None:

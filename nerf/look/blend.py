@@ -1,0 +1,353 @@
+"""A new view out of the drawings that flank it: colours by labels that they vote on.
+
+Every place of the surface is looked up in the two drawings beside the view, each shifted towards
+the other by its share of how far they lie apart (`paint_flow`). Their labels and the field's vote;
+the colour is the mean of the candidates that carry the label which won, so shades survive and
+nothing is mixed across labels. What neither shows is taken from a third drawing, then the field.
+
+Source: Debevec, Taylor and Malik 1996 (view-dependent texture mapping); Eisemann et al. 2008
+("Floating textures").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from toonset.camera import Camera
+from toonset.nerf.lines.nearest import nearest
+from toonset.nerf.look.drawings import (
+    CRUMB,
+    STEP,
+    Drawings,
+    Seen,
+    Texture,
+    crisp_depth,
+    look_up,
+    taken,
+)
+from toonset.nerf.look.outline import crisp_outline
+from toonset.nerf.look.paint_flow import NEIGHBOURS
+from toonset.palette.pixels.labels import UNLABELLED
+
+SOLID = 0.5  # opacity from which a pixel shows the surface
+OPAQUE = 0.6  # opacity from which a field's colour is its own
+FIELD_VOTE = 0.25  # beside 1 of the drawings together
+SOFT_PX = 0.8  # sigma over which votes are shared
+FEATHER_PX = 4.0  # beside an outline or a step, a drawing shows what the next one may not
+LEAST_TRUST = 0.1
+SIDE_VOTE, OWN_VOTE = 0.5, 0.3  # of a third drawing, of the field: only where nothing better is
+STRAY = 4e-4  # of the squared height: smaller patches are no drawing's
+SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
+THIRDS = 2  # further drawings that are asked
+OWN = 0.12  # radians off a drawing's own camera, in which the view becomes the drawing
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """What a view shows of the field.
+
+    Attributes:
+        camera: of the view.
+        alpha: (height, width) opacity in [0, 1].
+        depth: (height, width) past the camera's target, nan where nothing is seen.
+        rgb: (height, width, 3) premultiplied colour in [0, 1].
+        shares: (height, width, colors) of every palette colour; None without palette.
+    """
+
+    camera: Camera
+    alpha: Float[np.ndarray, "height width"]
+    depth: Float[np.ndarray, "height width"]
+    rgb: Float[np.ndarray, "height width 3"]
+    shares: Float[np.ndarray, "height width colors"] | None
+
+    def crop(self, rows: slice, columns: slice) -> Geometry:
+        """Return a part of the view."""
+        at = (rows, columns)
+        size = (columns.stop - columns.start, rows.stop - rows.start)
+        return Geometry(
+            self.camera.moved((columns.start, rows.start), size),
+            self.alpha[at],
+            self.depth[at],
+            self.rgb[at],
+            None if self.shares is None else self.shares[at],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnView:
+    """A view in the drawn look.
+
+    Attributes:
+        rgb: (height, width, 3) premultiplied colour in [0, 1], lines included.
+        alpha: (height, width) coverage in [0, 1].
+        ink: (height, width) share of every pixel that lines cover.
+        labels: (height, width) of `Drawings.paints`.
+        by_field: share of the figure's pixels that no drawing shows.
+    """
+
+    rgb: Float[np.ndarray, "height width 3"]
+    alpha: Float[np.ndarray, "height width"]
+    ink: Float[np.ndarray, "height width"]
+    labels: UInt8[np.ndarray, "height width"]
+    by_field: float
+
+    def palette_labels(self, colors: int) -> UInt8[np.ndarray, "height width"]:
+        """Return the labels of a palette's colours; 255 beside the figure and on other ink."""
+        shown = (self.alpha >= SOLID) & (self.labels < colors)
+        return np.where(shown, self.labels, UNLABELLED).astype(np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """What one source says of every pixel."""
+
+    color: Float[np.ndarray, "h w 3"]
+    label: UInt8[np.ndarray, "h w"]
+    weight: Float[np.ndarray, "h w"]
+
+
+def flanking(cameras: list[Camera], camera: Camera) -> tuple[int, int, float]:
+    """Return the two drawings beside a view, and the first one's share.
+
+    The first is the nearest, the second stands on the view's other side; shares are linear in the
+    angle along the arc between them. Where nothing stands on the other side both are the same.
+    """
+    forward = camera.rotation[2]
+    theirs = np.stack([own.rotation[2] for own in cameras])
+    angles = np.arccos(np.clip(theirs @ forward, -1, 1))
+    first = int(angles.argmin())
+    sideways = theirs - (theirs @ forward)[:, None] * forward
+    near = np.arccos(np.clip(theirs @ theirs[first], -1, 1)) < NEIGHBOURS
+    across = (sideways @ sideways[first] < 0) & near
+    across[first] = False
+    if not across.any():
+        return first, first, 1.0
+    second = int(np.where(across, angles, np.inf).argmin())
+    start, end = theirs[first], theirs[second]
+    turn = end - (end @ start) * start
+    turn /= max(float(np.linalg.norm(turn)), 1e-12)
+    along = float(np.arctan2(forward @ turn, forward @ start))
+    whole = float(np.arctan2(end @ turn, end @ start))
+    return first, second, 1 - float(np.clip(along / max(whole, 1e-9), 0, 1))
+
+
+def drawn_view(
+    drawings: Drawings, view: Geometry, palette: UInt8[np.ndarray, "colors 3"] | None = None
+) -> DrawnView:
+    """Return a view of the field in the look of its drawings.
+
+    Args:
+        drawings: of the field.
+        view: of the field.
+        palette: colours to show instead of the drawings' own, in the same order; tones of a paint
+            keep their distance from it.
+    """
+    height, width = view.alpha.shape
+    result = DrawnView(
+        np.zeros((height, width, 3), np.float32),
+        np.zeros((height, width), np.float32),
+        np.zeros((height, width), np.float32),
+        np.zeros((height, width), np.uint8),
+        0.0,
+    )
+    box = _box(view.alpha > 0)
+    if box is None:
+        return result
+    part = _drawn(drawings, view.crop(*box))
+    if palette is not None and len(palette) == len(drawings.palette):
+        part = _repainted(part, (palette - drawings.palette.astype(np.float32)) / 255)
+    for name in ("rgb", "alpha", "ink", "labels"):
+        getattr(result, name)[box] = getattr(part, name)
+    return replace(result, by_field=part.by_field)
+
+
+def _box(mask: Bool[np.ndarray, "height width"], room: int = 4) -> tuple[slice, slice] | None:
+    if not mask.any():
+        return None
+    sides = []
+    for axis, size in ((1, mask.shape[0]), (0, mask.shape[1])):
+        found = np.flatnonzero(mask.any(axis=axis))
+        sides.append(slice(max(0, int(found[0]) - room), min(size, int(found[-1]) + 1 + room)))
+    return sides[0], sides[1]
+
+
+def _drawn(drawings: Drawings, view: Geometry) -> DrawnView:
+    camera, pen = view.camera, drawings.pen
+    points = camera.unproject(camera.pixel_grid(), crisp_depth(view.depth))
+    figure_px = drawings.height * camera.scale
+    cameras = [texture.camera for texture in drawings.textures]
+    first, second, share = flanking(cameras, camera)
+    candidates, covered, own = _candidates(drawings, view, points, (first, second, share))
+    color, labels = _voted(candidates, view, len(drawings.paints), STRAY * figure_px**2)
+    scale = camera.scale / cameras[first].scale
+    line_px = pen.width_px * scale if pen else 0.0
+    turn = float(np.arccos(np.clip(cameras[first].rotation[2] @ camera.rotation[2], -1, 1)))
+    part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
+    soft = view.alpha
+    if part > 0:
+        whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
+        soft = soft + part * (whole[..., 3] - soft)
+    alpha, ink = crisp_outline(soft, line_px, figure_px)
+    solid = view.alpha > SOLID
+    by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
+    if solid.any():
+        at = nearest(solid)
+        color, labels = color[at], labels[at]
+    drawn_with = np.array(pen.rgb if pen else (0, 0, 0)) / np.float32(255)
+    rgb = color * (alpha - ink)[..., None] + ink[..., None] * drawn_with
+    if part > 0 and pen == drawings.outline:  # the drawing's own line, too
+        rgb = rgb + part * (np.minimum(whole[..., :3], whole[..., 3:]) - rgb)
+        alpha = alpha + part * (whole[..., 3] - alpha)
+    return DrawnView(rgb, alpha, ink, labels, by_field)
+
+
+def _repainted(view: DrawnView, change: Float[np.ndarray, "colors 3"]) -> DrawnView:
+    """Return the view with every palette colour changed; pixels between two get some of both."""
+    if not change.any():
+        return view
+    own = np.concatenate([change, np.zeros((256 - len(change), 3), np.float32)])[view.labels]
+    own = cv2.blur(own, (3, 3))
+    body = view.alpha - view.ink
+    rgb = (view.rgb + own * body[..., None]).clip(0, 1)
+    return replace(view, rgb=np.minimum(rgb, view.alpha[..., None]))
+
+
+def _eased(part: float) -> float:
+    return part * part * (3 - 2 * part)
+
+
+def _candidates(
+    drawings: Drawings,
+    view: Geometry,
+    points: Float[np.ndarray, "h w 3"],
+    between: tuple[int, int, float],
+) -> tuple[list[_Candidate], Bool[np.ndarray, "h w"], Seen]:
+    """Return what drawings and field say, the pixels that drawings show, and the first's places."""
+    first, second, share = between
+    there = np.isfinite(view.depth)
+    textures = drawings.textures
+    slack, least = STEP * drawings.height, CRUMB * (drawings.height * view.camera.scale) ** 2
+    flow = None
+    found = drawings.flow(first, second) if first != second else None
+    if found is not None:
+        flow = np.float32(found[1]) * found[0].at(points)
+    covered, candidates = np.zeros(there.shape, dtype=bool), []
+    own = None
+    for number, part, weight in ((first, -(1 - share), share), (second, share, 1 - share)):
+        if own is not None and weight == 0:
+            continue
+        texture = textures[number]
+        seen = look_up(texture, points, slack, least)
+        own = own or seen
+        mask = seen.mask & there
+        places = seen.moved(flow, part)
+        trust = _trust(taken(texture.room, places, cv2.INTER_LINEAR)) * _feathered(mask)
+        candidates.append(_candidate(texture, places, np.float32(weight) * trust))
+        covered |= mask
+    assert own is not None
+    for number in _others(drawings, view.camera, (first, second)):
+        if (covered | ~there).all():
+            break
+        seen = look_up(textures[number], points, slack, least)
+        gap = seen.mask & there & ~covered
+        if gap.any():
+            weight = SIDE_VOTE * gap.astype(np.float32)
+            candidates.append(_candidate(textures[number], (seen.x, seen.y), weight))
+            covered |= gap
+    candidates.append(_of_field(view, drawings, covered))
+    return candidates, covered, own
+
+
+def _others(drawings: Drawings, camera: Camera, used: tuple[int, int]) -> list[int]:
+    forward = np.stack([view.camera.rotation[2] for view in drawings.views])
+    angles = np.arccos(np.clip(forward @ camera.rotation[2], -1, 1))
+    order = [int(i) for i in np.argsort(angles) if i not in used and angles[i] < SIDE]
+    return order[:THIRDS]
+
+
+def _candidate(
+    texture: Texture, places: tuple[np.ndarray, np.ndarray], weight: Float[np.ndarray, "h w"]
+) -> _Candidate:
+    color = taken(texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
+    return _Candidate(color, taken(texture.labels, places, cv2.INTER_NEAREST), weight)
+
+
+def _of_field(
+    view: Geometry, drawings: Drawings, covered: Bool[np.ndarray, "h w"]
+) -> _Candidate:
+    color = (view.rgb / np.maximum(view.alpha, 0.2)[..., None]).clip(0, 1).astype(np.float32)
+    if (view.alpha > OPAQUE).any():
+        color = color[nearest(view.alpha > OPAQUE)]
+    paints = drawings.paints / np.float32(255)
+    label = ((color[..., None, :] - paints) ** 2).sum(axis=-1).argmin(axis=-1).astype(np.uint8)
+    return _Candidate(color, label, np.where(covered, 0, OWN_VOTE).astype(np.float32))
+
+
+def _trust(room_px: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+    return 1 - (1 - LEAST_TRUST) * np.exp(-((room_px / FEATHER_PX) ** 2))
+
+
+def _feathered(mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+    """Return a mask that fades inwards, so that a drawing ends without a seam."""
+    soft = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
+    return ((2 * soft - 1).clip(0, 1) + 0.02) * mask
+
+
+def _voted(
+    candidates: list[_Candidate], view: Geometry, paints: int, least_px: float
+) -> tuple[Float[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
+    """Return the colour and the label that candidates agree on."""
+    votes = np.zeros((*view.alpha.shape, paints), np.float32)
+    if view.shares is not None:
+        votes[..., : view.shares.shape[-1]] = FIELD_VOTE * view.shares
+    rows, columns = np.indices(view.alpha.shape, sparse=True)
+    for one in candidates:
+        votes[rows, columns, one.label] += one.weight
+    votes = cv2.GaussianBlur(votes, (0, 0), SOFT_PX).reshape(votes.shape)
+    winner = votes.argmax(axis=-1).astype(np.uint8)
+    weights = [one.weight * (one.label == winner) for one in candidates]
+    total = np.sum(weights, axis=0)
+    for one, weight in zip(candidates, weights, strict=True):  # none of the label: all of them
+        weight += 1e-4 * one.weight * (total < 1e-4)
+    total = np.maximum(np.sum(weights, axis=0), 1e-9)
+    color = sum(
+        ((weight / total)[..., None] * one.color for one, weight in zip(candidates, weights)),
+        np.zeros((1, 1, 3), np.float32),
+    )
+    kept = ~_stray(winner, candidates, paints, least_px) & (view.alpha > SOLID)
+    if kept.any():
+        at = nearest(kept)
+        return color[at], winner[at]
+    return color, winner
+
+
+def _stray(
+    winner: UInt8[np.ndarray, "h w"],
+    candidates: list[_Candidate],
+    paints: int,
+    least_px: float,
+) -> Bool[np.ndarray, "h w"]:
+    """Return small patches of one label that no single drawing shows as such."""
+    drop = np.zeros(winner.shape, dtype=bool)
+    for label in range(paints):
+        count, part, about, _ = cv2.connectedComponentsWithStats(
+            (winner == label).astype(np.uint8), connectivity=8
+        )
+        small = about[:, cv2.CC_STAT_AREA] < least_px
+        small[0] = False
+        if not small.any():
+            continue
+        known = np.zeros(count, dtype=bool)
+        for one in candidates[:2]:
+            _, other, theirs, _ = cv2.connectedComponentsWithStats(
+                (one.label == label).astype(np.uint8), connectivity=8
+            )
+            alike = (other > 0) & (theirs[other, cv2.CC_STAT_AREA] <= 3 * least_px)
+            share = np.bincount(part.ravel(), alike.ravel(), count) / about[:, cv2.CC_STAT_AREA]
+            known |= share > SOLID
+        drop |= (small & ~known)[part]
+    return drop

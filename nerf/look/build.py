@@ -1,0 +1,60 @@
+"""Drawings for the drawn look, from those that a field was trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.silhouettes.mask import has_figure, mask_of
+from toonset.nerf.kernels.threads import side_by_side
+from toonset.nerf.look.drawings import Drawing, Drawings, levels_of
+from toonset.nerf.look.outline import outline_of
+from toonset.nerf.look.paint_flow import Depths, pair_flows
+
+COARSE, MOST_COLORS = 32, 12  # levels of a channel that count as one; colours
+
+
+def drawings_of(
+    ready: Scene, drawn: Sequence[UInt8[np.ndarray, "height width 4"]], depth_of: Depths
+) -> Drawings | None:
+    """Return what the drawn look needs; None where no drawing, or no field, shows a figure.
+
+    Args:
+        ready: the drawings as they were trained on.
+        drawn: the same before they were bent, which blurs lines: the outline is measured there.
+        depth_of: the field's surface as a camera sees it, nan where there is none.
+    """
+    frames = [frame for frame in ready.frames if has_figure(frame)]
+    if not frames:
+        return None
+    depths = side_by_side([partial(depth_of, frame.camera) for frame in frames])
+    seen = np.concatenate([depth[np.isfinite(depth)] for depth in depths])
+    if not len(seen):
+        return None
+    extent = (float(seen.min()), float(seen.max()))
+    pairs = zip(frames, depths, strict=True)
+    views = tuple(Drawing(f.camera, f.rgba, levels_of(depth, extent)) for f, depth in pairs)
+    heights = [_tall(frame.rgba) / frame.camera.scale for frame in frames]
+    palette = ready.palette if ready.palette is not None else _common_colors(views)
+    height = float(np.median(heights))
+    line = outline_of(drawn)
+    found = Drawings(views, (), line, line, palette, height, extent)
+    return replace(found, flows=pair_flows(found, depth_of))
+
+
+def _tall(rgba: UInt8[np.ndarray, "height width 4"]) -> int:
+    rows = np.flatnonzero(mask_of(rgba).any(axis=1))
+    return int(rows[-1] - rows[0] + 1)
+
+
+def _common_colors(views: Sequence[Drawing]) -> UInt8[np.ndarray, "colors 3"]:
+    """Return the commonest colours, for drawings without a palette."""
+    shown = np.concatenate([view.rgba[mask_of(view.rgba), :3] for view in views])
+    coarse, count = np.unique(shown // COARSE, axis=0, return_counts=True)
+    common = coarse[np.argsort(-count, kind="stable")[:MOST_COLORS]]
+    return (common * COARSE + COARSE // 2).astype(np.uint8)

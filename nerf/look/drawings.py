@@ -1,0 +1,249 @@
+"""A sheet's drawings as projective textures, and what another view sees of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float16, Shaped, UInt8
+
+from toonset.camera import Camera
+from toonset.dataset.silhouettes.mask import mask_of
+from toonset.nerf.lines.explain import step_edges
+from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
+from toonset.nerf.look.outline import Outline, without_crumbs
+from toonset.palette.pixels.labels import nearest_labels
+
+SOFT_PX = 1.5  # beyond the outline, in which paint and ink are mixed
+STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
+MOST_ROOM_PX = 50.0
+CRUMB = 3e-4  # of the squared height of the figure: smaller patches that are seen are noise
+INK_LIKE = 60  # sum of channels: a palette colour so near to the ink is the ink's
+SQUARE = np.ones((3, 3), dtype=np.uint8)
+
+Places = tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """One drawing, agreeing with the others, and the surface that it shows.
+
+    Attributes:
+        camera: that saw it.
+        rgba: (height, width, 4) sRGB with straight alpha.
+        levels: (height, width) depth of the field's surface, 1 to 255 over `Drawings.depths`; 0
+            where there is none.
+    """
+
+    camera: Camera
+    rgba: UInt8[np.ndarray, "height width 4"]
+    levels: UInt8[np.ndarray, "height width"]
+
+
+@dataclass(frozen=True, eq=False)
+class PairFlow:
+    """How far what two neighbours paint lies apart, seen from half way between them.
+
+    Attributes:
+        pair: the drawings' numbers.
+        camera: half way; one pixel of `flow` is one of its.
+        flow: (h, w, 2) F in pixels of the drawings: see `toonset.nerf.look.paint_flow`.
+    """
+
+    pair: tuple[int, int]
+    camera: Camera
+    flow: Float16[np.ndarray, "h w 2"]
+
+    def at(self, points: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, "rows columns 2"]:
+        """Return F at world points; beyond the picture that of its edge."""
+        pixels, _, _ = self.camera.project(points)
+        x, y = (np.nan_to_num(pixels[..., k] - 0.5).astype(np.float32) for k in (0, 1))
+        return taken(self.flow.astype(np.float32), (x, y), cv2.INTER_LINEAR)
+
+
+@dataclass(frozen=True, eq=False)
+class Drawings:
+    """What the drawn look is made of.
+
+    Attributes:
+        views: the drawings that show a figure.
+        flows: of neighbouring drawings.
+        outline: the line round the figures; None: there is none.
+        pen: draws the line round new views; None: there is none.
+        palette: (colors, 3) of the drawings' labels.
+        height: of the figure, world units.
+        depths: the nearest and the farthest, past the cameras' targets, world units.
+    """
+
+    views: tuple[Drawing, ...]
+    flows: tuple[PairFlow, ...]
+    outline: Outline | None
+    pen: Outline | None
+    palette: UInt8[np.ndarray, "colors 3"]
+    height: float
+    depths: tuple[float, float]
+
+    @cached_property
+    def paints(self) -> UInt8[np.ndarray, "paints 3"]:
+        """Return the palette, and the ink behind it where no palette colour is like it."""
+        if self.outline is None:
+            return self.palette
+        ink = np.array([self.outline.rgb])
+        like = np.abs(self.palette.astype(int) - ink).sum(axis=1) < INK_LIKE
+        return self.palette if like.any() else np.concatenate([self.palette, ink.astype(np.uint8)])
+
+    @cached_property
+    def textures(self) -> tuple[Texture, ...]:
+        """Return the drawings, ready to be looked up."""
+        width = self.outline.width_px if self.outline else 0.0
+        return tuple(
+            _texture(view, depth_of(view.levels, self.depths), self.paints, width, self.height)
+            for view in self.views
+        )
+
+    def flow(self, i: int, j: int) -> tuple[PairFlow, float] | None:
+        """Return the flow of two drawings and its sign; None where none was measured."""
+        for found in self.flows:
+            if found.pair in ((i, j), (j, i)):
+                return found, 1.0 if found.pair == (i, j) else -1.0
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """One drawing, ready to be looked up from other views.
+
+    Attributes:
+        camera: that saw it.
+        whole: (height, width, 4) premultiplied, in [0, 1].
+        paint: (height, width, 3) straight colour in [0, 1]; the band of the outline, and all beyond
+            it, holds the nearest paint inside.
+        labels: (height, width) of this paint.
+        far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it.
+        room: (height, width) pixels to the outline or the nearest step in depth.
+    """
+
+    camera: Camera
+    whole: Float[np.ndarray, "height width 4"]
+    paint: Float[np.ndarray, "height width 3"]
+    labels: UInt8[np.ndarray, "height width"]
+    far: Float[np.ndarray, "height width"]
+    room: Float[np.ndarray, "height width"]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Where places of the surface lie in one drawing.
+
+    Attributes:
+        x, y: (h, w) column and row, the first pixel's centre at 0.
+        mask: (h, w) the drawing shows the place.
+    """
+
+    x: Float[np.ndarray, "h w"]
+    y: Float[np.ndarray, "h w"]
+    mask: Bool[np.ndarray, "h w"]
+
+    def moved(self, flow: Float[np.ndarray, "h w 2"] | None, part: float) -> Places:
+        """Return the places with `part` of a displacement added, pixels of the drawing."""
+        if flow is None or part == 0:
+            return self.x, self.y
+        return self.x + np.float32(part) * flow[..., 0], self.y + np.float32(part) * flow[..., 1]
+
+
+def levels_of(
+    depth: Float[np.ndarray, "height width"], depths: tuple[float, float]
+) -> UInt8[np.ndarray, "height width"]:
+    """Return depth (nan: none) in levels of `Drawing`."""
+    low, high = depths
+    part = (depth - low) / max(high - low, 1e-12)
+    return np.where(np.isfinite(depth), np.rint(np.nan_to_num(part) * 254) + 1, 0).astype(np.uint8)
+
+
+def depth_of(
+    levels: UInt8[np.ndarray, "height width"], depths: tuple[float, float]
+) -> Float[np.ndarray, "height width"]:
+    """Return what `levels_of` has rounded."""
+    low, high = depths
+    return np.where(levels > 0, low + (levels - 1.0) / 254 * (high - low), np.nan)
+
+
+def _texture(
+    view: Drawing,
+    depth: Float[np.ndarray, "height width"],
+    paints: UInt8[np.ndarray, "paints 3"],
+    outline_px: float,
+    height: float,
+) -> Texture:
+    mask = mask_of(view.rgba)
+    inside = depth_inside(mask)
+    inner = inside >= outline_px + SOFT_PX
+    at = nearest(inner if inner.any() else mask)
+    opaque = view.rgba.copy()
+    opaque[..., 3] = 255
+    whole = view.rgba / np.float32(255)
+    whole[..., :3] *= whole[..., 3:]
+    seen = np.isfinite(depth)
+    far = np.where(seen, cv2.dilate(filled(depth), SQUARE), -np.inf)
+    to_step = distance_to(step_edges(depth, STEP * height))
+    room = np.minimum(inside, to_step).clip(0, MOST_ROOM_PX)
+    return Texture(
+        view.camera,
+        whole,
+        opaque[at][..., :3] / np.float32(255),
+        nearest_labels(opaque, paints)[at],
+        far.astype(np.float32),
+        room.astype(np.float32),
+    )
+
+
+def look_up(
+    texture: Texture,
+    points: Float[np.ndarray, "h w 3"],
+    slack: float,
+    least_px: float,
+) -> Seen:
+    """Return where places of the surface lie in a drawing, and which of them it shows.
+
+    Args:
+        texture: the drawing.
+        points: world.
+        slack: world units that a place may lie behind the drawing's own surface.
+        least_px: smaller patches and pinholes of what it shows are noise.
+    """
+    pixels, depth, front = texture.camera.project(points)
+    x, y = (np.nan_to_num(pixels[..., k] - 0.5, nan=-1e4).astype(np.float32) for k in (0, 1))
+    border = cv2.BORDER_CONSTANT
+    far = cv2.remap(texture.far, x, y, cv2.INTER_NEAREST, borderMode=border, borderValue=-np.inf)
+    covered = cv2.remap(texture.whole[..., 3], x, y, cv2.INTER_LINEAR, borderMode=border)
+    mask = front & (covered > 0.5) & (depth <= far + slack)
+    return Seen(x, y, without_crumbs(mask, least_px))
+
+
+def taken(
+    picture: Shaped[np.ndarray, "height width *channels"], places: Places, mode: int
+) -> Shaped[np.ndarray, "h w *channels"]:
+    """Return a picture's values at places; beyond its edges those of the edge."""
+    return cv2.remap(picture, *places, mode, borderMode=cv2.BORDER_REPLICATE)
+
+
+def filled(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    """Return depth with every gap as deep as the nearest pixel that has one; 0 without any."""
+    seen = np.isfinite(depth)
+    if not seen.any():
+        return np.zeros(depth.shape, dtype=np.float32)
+    return depth[nearest(seen)].astype(np.float32)
+
+
+def crisp_depth(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    """Return depth without gaps and without mixtures of near and far.
+
+    A pixel on a step shows the mean of both sides; it goes to the side that it is nearer to.
+    """
+    whole = filled(depth)
+    low, high = cv2.erode(whole, SQUARE), cv2.dilate(whole, SQUARE)
+    nearer = np.minimum(whole, (whole + low) / 2)
+    farther = np.maximum(whole, (whole + high) / 2)
+    return np.where(whole - low < high - whole, nearer, farther)

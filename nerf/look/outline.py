@@ -1,0 +1,110 @@
+"""A figure's silhouette as a pen draws it: a crisp border, and the line along it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+from skimage.measure import find_contours
+
+from toonset.dataset.silhouettes.mask import mask_of
+from toonset.nerf.lines.nearest import depth_inside, nearest
+from toonset.nerf.lines.strokes import mean_width, outline_width
+
+FINER = 3  # samples per pixel and axis
+SMOOTH_PX = 0.7  # sigma: what is finer in a field's opacity is noise
+CRUMB_PX = 30  # area of parts and holes that are noise, in a figure of CRUMB_AT px
+CRUMB_AT = 260.0
+FEWEST_OUTLINED = 0.5  # of the drawings must have an outline
+DARKEST = 0.2  # of the rim's pixels: the others are mixed with what they surround
+BAND_PX = 2.0  # beyond the outline, in which its soft side lies
+
+Picture = UInt8[np.ndarray, "height width 4"]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The line round a sheet's figures.
+
+    Attributes:
+        rgb: the ink, sRGB.
+        width_px: pixels of the drawings.
+    """
+
+    rgb: tuple[int, int, int]
+    width_px: float
+
+
+def outline_of(drawings: Sequence[Picture]) -> Outline | None:
+    """Return the line round a sheet's figures, None where the artist drew none.
+
+    Its width is how much ink there is over how long the rims are.
+    """
+    drawings = [rgba for rgba in drawings if mask_of(rgba).any()]
+    widths = [outline_width(rgba) for rgba in drawings]
+    outlined = [width for width in widths if width > 0]
+    if not outlined or len(outlined) < FEWEST_OUTLINED * len(widths):
+        return None
+    insides = [depth_inside(mask_of(rgba)) for rgba in drawings]
+    rims = [rgba[(inside > 0) & (inside < 1), :3] for rgba, inside in zip(drawings, insides, strict=True)]
+    colors = np.concatenate(rims).astype(np.float64)
+    light = colors.mean(axis=1)
+    red, green, blue = np.median(colors[light <= np.quantile(light, DARKEST)], axis=0)
+    rgb = (round(float(red)), round(float(green)), round(float(blue)))
+    reach = float(np.median(outlined)) + BAND_PX
+    pictures, regions, length = [], [], 0.0
+    for rgba, inside in zip(drawings, insides, strict=True):
+        if (inside > reach).any():
+            pictures.append((rgba, rgba[nearest(inside > reach)]))
+            regions.append((inside <= reach) & (rgba[..., 3] > 0))
+            length += _rim_px(rgba[..., 3])
+    width = mean_width(pictures, regions, length, rgb) or float(np.median(outlined))
+    return Outline(rgb, width)
+
+
+def _rim_px(alpha: UInt8[np.ndarray, "height width"]) -> float:
+    """Return the length of a silhouette; counting steps between pixels says 4 % too much."""
+    rims = find_contours(np.pad(alpha / 255.0, 1), 0.5)
+    return float(sum(np.linalg.norm(np.diff(rim, axis=0), axis=1).sum() for rim in rims))
+
+
+def crisp_outline(
+    alpha: Float[np.ndarray, "height width"], width_px: float, figure_px: float
+) -> tuple[Float[np.ndarray, "height width"], Float[np.ndarray, "height width"]]:
+    """Return a crisp coverage, and how far a line along its inner side covers every pixel.
+
+    Args:
+        alpha: a soft coverage; its border is where it is one half.
+        width_px: of the line; 0: none.
+        figure_px: height of the figure.
+    """
+    height, width = alpha.shape
+    size = (FINER * width, FINER * height)
+    fine = cv2.resize(alpha.astype(np.float32), size, interpolation=cv2.INTER_CUBIC)
+    inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH_PX * FINER) >= 0.5
+    least = CRUMB_PX * (figure_px / CRUMB_AT) ** 2 * FINER**2
+    inside = without_crumbs(inside, least)
+    ink = np.zeros_like(alpha, dtype=np.float32)
+    if width_px > 0:
+        padded = np.pad(inside, 1).astype(np.uint8)
+        distance = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+        line = np.clip(FINER * width_px + 1 - distance, 0, 1) * inside
+        ink = cv2.resize(line, (width, height), interpolation=cv2.INTER_AREA)
+    cover = cv2.resize(inside.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
+    return cover, np.minimum(ink, cover)
+
+
+def without_crumbs(
+    mask: Bool[np.ndarray, "height width"], least_px: float
+) -> Bool[np.ndarray, "height width"]:
+    """Return a mask without patches and pinholes of fewer pixels."""
+    for value in (True, False):
+        side = (mask == value).astype(np.uint8)
+        _, part, about, _ = cv2.connectedComponentsWithStats(side, connectivity=4)
+        small = about[:, cv2.CC_STAT_AREA] < least_px
+        small[0] = False
+        mask = np.where(small[part], not value, mask)
+    return mask
