@@ -93,9 +93,10 @@ def render(
 
     `drawn` puts views together from the drawings and draws their outline anew; it is the default of
     turntables of sheets with outlines. `rgb`, the default else, is the field's own colour.
-    `palette` (the default else with --recolor or --palette) shows palette colours only; `normal` codes x, y, z of the world as red, green, blue,
-    `normal-camera` right, up and towards the viewer; `depth` has 16 bits, which depth.json turns
-    into world units. Several layers are written as NAME-LAYER.png.
+    `palette` (the default else with --recolor or --palette) shows palette colours only; `normal`
+    codes x, y, z of the world as red, green, blue, `normal-camera` right, up and towards the
+    viewer; `depth` has 16 bits, which depth.json turns into world units. Several layers are written
+    as NAME-LAYER.png.
     """
     printer = Printer(as_json, quiet)
     repaint = bool(recolor or palette)

@@ -125,6 +125,9 @@ def train(
             rich_help_panel=WHILE_PANEL,
         ),
     ] = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit with 3 where the run is weak.")
+    ] = False,
     force: ForceFlag = False,
     seed: SeedOption = 0,
     as_json: JsonFlag = False,
@@ -133,8 +136,8 @@ def train(
 ) -> None:
     """Train a triplane radiance field and a palette classifier on the drawings of a bundle.
 
-    Says at the end whether the run is ok or weak, and why; exit code 3 when it is weak, the files
-    are written then too. Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says
+    Says at the end whether the run is ok or weak, and why; exit code 3 when training went wrong and
+    was cut short, and with --strict when the run is weak: the files are written then too. Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says
     how to go on.
     """
     from toonset.nerf.options import DEVICES, FIELDS, PRESETS
@@ -159,6 +162,7 @@ def train(
         preview_every,
         palette=not no_palette,
         resume=resume,
+        strict=strict,
     )
     code = run(request, Printer(as_json, quiet, verbose))
     if code:

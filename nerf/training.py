@@ -161,9 +161,7 @@ def _with_drawings(training: Training, scene: Scene) -> TrainedField:
     """Return the field with what the drawn look is made of."""
     baked = Baked.of(training.result)
     drawn = [frame.rgba for frame in scene.frames]
-    found = drawings_of(
-        training.prepared.scene, drawn, lambda camera: render(baked, camera).depth
-    )
+    found = drawings_of(training.prepared.scene, drawn, lambda camera: render(baked, camera).depth)
     return replace(training.result, drawings=found)
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from toonset.nerf.run.checkpoint import Checkpoint
     from toonset.nerf.training import Run
 
-DOUBTFUL = 3  # exit code: written, but weak, or training went wrong and was cut short
+DOUBTFUL = 3  # exit code: written, but weak (--strict), or training was cut short
 FINE = ("steps", "budget")  # why a training may end
 RESUMED_AS = {"steps": "--steps", "budget_s": "--budget", "device": "--device", "seed": "--seed"}
 RESUMED_AS |= {
@@ -46,6 +46,7 @@ class Request:
         preview_every: seconds; None: no previews.
         palette: train labels, too.
         resume: go on with an unfinished training.
+        strict: a weak run is doubtful.
     """
 
     bundle: Path
@@ -56,6 +57,7 @@ class Request:
     preview_every: float | None
     palette: bool
     resume: bool
+    strict: bool
 
     @property
     def again(self) -> str:
@@ -99,7 +101,10 @@ def run(request: Request, printer: Printer) -> int:
     metrics = found.save(place.run, force=place.force)
     place.clear()
     printer.result({"run": place.run, **metrics}, summary(place.run, metrics, printer.verbose))
-    doubts = [f"weak: {reason}" for reason in metrics["verdict"]["reasons"]]
+    weak = [f"weak: {reason}" for reason in metrics["verdict"]["reasons"]]
+    doubts = weak if request.strict else []
+    for reason in [] if request.strict else weak:
+        printer.say(f"{place.run}: {reason}")
     if found.training.stopped not in FINE:
         doubts.append(f"training stopped early: {found.training.stopped}")
     for doubt in doubts:

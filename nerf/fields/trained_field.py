@@ -20,9 +20,7 @@ NO_PALETTE = (
     "run: was trained without palette; train again without --no-palette and without --field hull"
 )
 NO_LINES = "run: its drawings have no contour lines; leave --layer ink out"
-NO_DRAWINGS = (
-    "run: holds no drawings, so it has no drawn look; train again, or render --layer rgb"
-)
+NO_DRAWINGS = "run: holds no drawings, so it has no drawn look; train again, or render --layer rgb"
 NO_BENDS = "run: its drawings were not bent; leave --as-drawn out"
 
 

@@ -43,6 +43,7 @@ SIDE_VOTE, OWN_VOTE = 0.5, 0.3  # of a third drawing, of the field: only where n
 STRAY = 4e-4  # of the squared height: smaller patches are no drawing's
 SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
 THIRDS = 2  # further drawings that are asked
+SAME = 1e-9  # radians: seen from one side
 OWN = 0.12  # radians off a drawing's own camera, in which the view becomes the drawing
 
 
@@ -113,26 +114,24 @@ class _Candidate:
 def flanking(cameras: list[Camera], camera: Camera) -> tuple[int, int, float]:
     """Return the two drawings beside a view, and the first one's share.
 
-    The first is the nearest, the second stands on the view's other side; shares are linear in the
-    angle along the arc between them. Where nothing stands on the other side both are the same.
+    The first is the nearest, the second the nearest of those towards which the view lies from it;
+    shares are linear in the angle along the arc between them. Where the view lies towards none,
+    both are the same.
     """
     forward = camera.rotation[2]
     theirs = np.stack([own.rotation[2] for own in cameras])
     angles = np.arccos(np.clip(theirs @ forward, -1, 1))
     first = int(angles.argmin())
-    sideways = theirs - (theirs @ forward)[:, None] * forward
-    near = np.arccos(np.clip(theirs @ theirs[first], -1, 1)) < NEIGHBOURS
-    across = (sideways @ sideways[first] < 0) & near
-    across[first] = False
-    if not across.any():
+    start = theirs[first]
+    turns = theirs - (theirs @ start)[:, None] * start
+    whole = np.arctan2(np.linalg.norm(turns, axis=1), theirs @ start)
+    turns /= np.maximum(np.linalg.norm(turns, axis=1, keepdims=True), 1e-12)
+    along = np.arctan2(turns @ forward, start @ forward)
+    towards = (along > SAME) & (whole > SAME) & (whole < NEIGHBOURS)
+    if not towards.any():
         return first, first, 1.0
-    second = int(np.where(across, angles, np.inf).argmin())
-    start, end = theirs[first], theirs[second]
-    turn = end - (end @ start) * start
-    turn /= max(float(np.linalg.norm(turn)), 1e-12)
-    along = float(np.arctan2(forward @ turn, forward @ start))
-    whole = float(np.arctan2(end @ turn, end @ start))
-    return first, second, 1 - float(np.clip(along / max(whole, 1e-9), 0, 1))
+    second = int(np.where(towards, angles, np.inf).argmin())
+    return first, second, 1 - min(1.0, float(along[second] / whole[second]))
 
 
 def drawn_view(
@@ -276,9 +275,7 @@ def _candidate(
     return _Candidate(color, taken(texture.labels, places, cv2.INTER_NEAREST), weight)
 
 
-def _of_field(
-    view: Geometry, drawings: Drawings, covered: Bool[np.ndarray, "h w"]
-) -> _Candidate:
+def _of_field(view: Geometry, drawings: Drawings, covered: Bool[np.ndarray, "h w"]) -> _Candidate:
     color = (view.rgb / np.maximum(view.alpha, 0.2)[..., None]).clip(0, 1).astype(np.float32)
     if (view.alpha > OPAQUE).any():
         color = color[nearest(view.alpha > OPAQUE)]
@@ -314,10 +311,9 @@ def _voted(
     for one, weight in zip(candidates, weights, strict=True):  # none of the label: all of them
         weight += 1e-4 * one.weight * (total < 1e-4)
     total = np.maximum(np.sum(weights, axis=0), 1e-9)
-    color = sum(
-        ((weight / total)[..., None] * one.color for one, weight in zip(candidates, weights)),
-        np.zeros((1, 1, 3), np.float32),
-    )
+    color = np.zeros((*total.shape, 3), np.float32)
+    for one, weight in zip(candidates, weights, strict=True):
+        color += (weight / total)[..., None] * one.color
     kept = ~_stray(winner, candidates, paints, least_px) & (view.alpha > SOLID)
     if kept.any():
         at = nearest(kept)
@@ -326,10 +322,7 @@ def _voted(
 
 
 def _stray(
-    winner: UInt8[np.ndarray, "h w"],
-    candidates: list[_Candidate],
-    paints: int,
-    least_px: float,
+    winner: UInt8[np.ndarray, "h w"], candidates: list[_Candidate], paints: int, least_px: float
 ) -> Bool[np.ndarray, "h w"]:
     """Return small patches of one label that no single drawing shows as such."""
     drop = np.zeros(winner.shape, dtype=bool)

@@ -56,7 +56,9 @@ class PairFlow:
     camera: Camera
     flow: Float16[np.ndarray, "h w 2"]
 
-    def at(self, points: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, "rows columns 2"]:
+    def at(
+        self, points: Float[np.ndarray, "rows columns 3"]
+    ) -> Float[np.ndarray, "rows columns 2"]:
         """Return F at world points; beyond the picture that of its edge."""
         pixels, _, _ = self.camera.project(points)
         x, y = (np.nan_to_num(pixels[..., k] - 0.5).astype(np.float32) for k in (0, 1))
@@ -200,10 +202,7 @@ def _texture(
 
 
 def look_up(
-    texture: Texture,
-    points: Float[np.ndarray, "h w 3"],
-    slack: float,
-    least_px: float,
+    texture: Texture, points: Float[np.ndarray, "h w 3"], slack: float, least_px: float
 ) -> Seen:
     """Return where places of the surface lie in a drawing, and which of them it shows.
 

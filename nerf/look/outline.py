@@ -49,7 +49,10 @@ def outline_of(drawings: Sequence[Picture]) -> Outline | None:
     if not outlined or len(outlined) < FEWEST_OUTLINED * len(widths):
         return None
     insides = [depth_inside(mask_of(rgba)) for rgba in drawings]
-    rims = [rgba[(inside > 0) & (inside < 1), :3] for rgba, inside in zip(drawings, insides, strict=True)]
+    rims = [
+        rgba[(inside > 0) & (inside < 1), :3]
+        for rgba, inside in zip(drawings, insides, strict=True)
+    ]
     colors = np.concatenate(rims).astype(np.float64)
     light = colors.mean(axis=1)
     red, green, blue = np.median(colors[light <= np.quantile(light, DARKEST)], axis=0)

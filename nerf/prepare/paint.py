@@ -101,7 +101,7 @@ def with_paint_agreed(
     """
     nothing = Repainting(False, 0.0, 0.0, ())
     figures = _figures(drawn, straight, warps, hull)
-    pairs = _pairs(figures)
+    pairs = _pairs(figures) if figures else []
     if not pairs:
         return straight, tuple(warps), nothing
     begin = [figure.warp.numbers for figure in figures]
@@ -198,9 +198,7 @@ class _Pair:
         return [pixels + basis @ numbers[k].reshape(2, -1).T for k, pixels, basis in both]
 
 
-def _figures(
-    drawn: Scene, straight: Scene, warps: Sequence[Warp], hull: Hull
-) -> list[_Figure]:
+def _figures(drawn: Scene, straight: Scene, warps: Sequence[Warp], hull: Hull) -> list[_Figure]:
     outline_px = float(np.median([outline_width(frame.rgba) for frame in drawn.frames]))
     shown = [i for i, frame in enumerate(straight.frames) if not warps[i].is_none]
     frames = [straight.frames[i] for i in shown]
@@ -237,7 +235,7 @@ def _pairs(figures: Sequence[_Figure]) -> list[_Pair]:
         rows, columns = np.nonzero(grid)
         pixels = np.stack([columns, rows], axis=-1) + 0.5
         points = one.camera.unproject(pixels, one.depth[rows, columns])
-        for j in np.flatnonzero(near[i]):
+        for j in np.flatnonzero(near[i]).tolist():
             if j == i:
                 continue
             other = figures[j]
@@ -319,8 +317,7 @@ def _add(
     across, down = (a[1] + b[1]) / 2, (a[2] + b[2]) / 2
     weight = WEIGHT / NOISE**2 / (1 + (apart**2).sum(axis=-1) / NOISE**2) ** 2
     xx, xy, yy = (
-        weight * (p * q).sum(axis=-1)
-        for p, q in ((across, across), (across, down), (down, down))
+        weight * (p * q).sum(axis=-1) for p, q in ((across, across), (across, down), (down, down))
     )
     pull = [weight * (way * apart).sum(axis=-1) for way in (across, down)]
     k = 2 * _HALF

@@ -114,8 +114,12 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         wanted[f"flow.{i}"] = ((high, wide, 2), torch.float16)
     there = {name: (tuple(values.shape), values.dtype) for name, values in found.items()}
     if there != wanted:
-        odd = ", ".join(sorted(name for name in there | wanted if there.get(name) != wanted.get(name)))
-        raise BundleError(f"{file}: tensors missing, unknown or of another shape: {odd}; train again")
+        odd = ", ".join(
+            sorted(name for name in there | wanted if there.get(name) != wanted.get(name))
+        )
+        raise BundleError(
+            f"{file}: tensors missing, unknown or of another shape: {odd}; train again"
+        )
     flows = []
     for i, (pair, camera) in enumerate(zip(record.pairs, places, strict=True)):
         flow = found[f"flow.{i}"]

@@ -99,8 +99,9 @@ def report(
 ) -> dict[str, Any]:
     """Return all figures as plain data.
 
-    `drawn`, `rgb` and `palette` (None without) are means over the held-out views, `views` has each of them;
-    `training` is the same for the views trained on, or None. `absent` says why a metric is null.
+    `drawn`, `rgb` and `palette` (None without) are means over the held-out views, `views` has each
+    of them; `training` is the same for the views trained on, or None. `absent` says why a metric is
+    null.
     """
     settings = {
         "flip_pixels_per_degree": PIXELS_PER_DEGREE,

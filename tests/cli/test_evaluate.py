@@ -63,7 +63,9 @@ def test_held_out_and_training_views_apart(
     assert found["training"]["views"] == found["views"]
     assert found["absent"].keys() <= {"flip", "lpips"}
     assert 0 < found["palette"]["label_accuracy"] <= 1
-    for layer in ("rgb", "palette"):
+    assert 0 < found["drawn"]["label_miou"] <= 1
+    assert found["drawn"]["psnr"] > 30  # drawn cameras return their drawings
+    for layer in ("drawn", "rgb", "palette"):
         each = [view[layer]["psnr"] for view in found["views"]]
         assert found[layer]["psnr"] == pytest.approx(np.mean(each))
     with Image.open(tmp_path / "judged" / "evaluation.png") as picture:
@@ -96,10 +98,12 @@ def test_the_table(bundle: Path, run: Path, toonset) -> None:
     views = len(read_scene(bundle).frames)
     assert lines[0] == "held-out views"
     assert lines[1].split()[:6] == ["view", "layer", "PSNR", "dB", "in", "mask"]
-    assert [line.split()[0] for line in lines[2 + 2 * views : 4 + 2 * views]] == ["mean", "mean"]
-    assert lines[4 + 2 * views : 6 + 2 * views] == ["", "training views"]
-    assert lines[2].split()[1:3] != lines[3].split()[1:3]  # rgb and palette differ
-    widths = {len(line) for line in lines[1 : 4 + 2 * views]}
+    last = 2 + 3 * views
+    assert [line.split()[0] for line in lines[last : last + 3]] == ["mean"] * 3
+    assert [line.split()[1] for line in lines[last : last + 3]] == ["drawn", "rgb", "palette"]
+    assert lines[last + 3 : last + 5] == ["", "training views"]
+    assert lines[3].split()[2:4] != lines[4].split()[2:4]  # rgb and palette differ
+    widths = {len(line) for line in lines[1 : last + 3]}
     assert len(widths) == 1
     assert "LPIPS" not in lines[1] or "lpips: " not in done.out
 

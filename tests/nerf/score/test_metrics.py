@@ -246,7 +246,7 @@ def test_all_figures_of_a_view() -> None:
     blank = np.zeros_like(figure())
     nothing, _ = figures_of(figure(), blank, NO_JUDGES)
     assert [name for name, value in nothing.items() if value is None] == [
-        *("psnr_mask", "ssim_mask", "psnr_shift_mask", "flip", "flip_mask"),
+        *("psnr_mask", "ssim_mask", "psnr_shift_mask", "sharpness", "dirt", "flip", "flip_mask"),
         *("haarpsi_mask", "gmsd_mask", "lpips", "ink_f1"),
     ]
     assert all(math.isfinite(value) for value in nothing.values() if value is not None)

@@ -1,0 +1,104 @@
+"""`toonset render` in the drawn look: its default, its pen, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toonset.dataset.images.picture import load_rgba
+
+QUICK = ("--steps", 20, "--threads", 1, "--device", "cpu", "-q")
+
+
+@pytest.fixture(scope="module")
+def lined(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset) -> Path:
+    """Return a run of eight drawings with outlines."""
+    folder = tmp_path_factory.mktemp("lined")
+    size = ("--cell", 100, "--outline", 2, "--seed", 3, "-q")
+    mesh = drawn / "mannequin.obj"
+    assert toonset("synth", mesh, *size, "-o", folder / "sheet").code == 0
+    run = folder / "run"
+    assert toonset("train", folder / "sheet" / "views", "-o", run, *QUICK).code == 0
+    return run
+
+
+def shown(folder: Path, name: str = "000.png") -> np.ndarray:
+    return load_rgba(folder / name).astype(int)
+
+
+def test_turntables_of_lined_sheets_are_drawn_and_cameras_are_the_fields(
+    lined: Path, toonset, tmp_path: Path
+) -> None:
+    turn = toonset("render", lined, "--turntable", 2, "-o", tmp_path / "turn", "--json")
+    assert turn.json["layer"] == "drawn"
+    cameras = lined.parent / "sheet" / "views" / "transforms.json"
+    asked = ("render", lined, "--cameras", cameras, "--json", "-o")
+    assert toonset(*asked, tmp_path / "field").json["layer"] == "rgb"
+    assert toonset(*asked, tmp_path / "own", "--layer", "drawn").code == 0
+    frames = json.loads(cameras.read_text())["frames"]
+    for frame in frames:
+        drawn = load_rgba(cameras.parent / frame["file_path"]).astype(int)
+        found = shown(tmp_path / "own", Path(frame["file_path"]).name)
+        assert np.abs(found[..., 3] - drawn[..., 3]).max() <= 1
+        assert np.abs(found - drawn)[drawn[..., 3] == 255].max() <= 1
+
+
+def test_turntables_of_sheets_without_lines_are_the_fields(
+    trained, toonset, tmp_path: Path
+) -> None:
+    turn = toonset("render", trained[0], "--turntable", 1, "-o", tmp_path / "turn", "--json")
+    assert turn.json["layer"] == "rgb"
+    asked = ("render", trained[0], "--turntable", 1, "-o", tmp_path / "drawn", "--layer", "drawn")
+    assert toonset(*asked).code == 0
+    pen = toonset(*asked[:-3], tmp_path / "pen", "--ink-width", 2)
+    assert "no contour lines" in pen.reason
+
+
+def test_the_pen_can_be_another_or_none(lined: Path, toonset, tmp_path: Path) -> None:
+    turn = ("render", lined, "--turntable", 1, "-q", "-o")
+    pen = ("--ink-width", 5, "--ink-color", "#e020a0")
+    assert toonset(*turn, tmp_path / "as", "--layer", "ink").code == 0
+    assert toonset(*turn, tmp_path / "wide", "--layer", "ink", *pen).code == 0
+    assert toonset(*turn, tmp_path / "pink", *pen).code == 0
+    assert toonset(*turn, tmp_path / "bare", "--no-lines").code == 0
+    area = [shown(tmp_path / name)[..., 3].sum() for name in ("as", "wide")]
+    assert area[1] > 1.8 * area[0]
+    pink = (np.abs(shown(tmp_path / "pink")[..., :3] - (224, 32, 160)).max(axis=-1) < 4).sum()
+    assert pink > 100
+    assert toonset(*turn, tmp_path / "no", "--layer", "ink", "--no-lines").code == 2
+    assert "--ink-color" in toonset(*turn, tmp_path / "no", "--ink-color", "inky").reason
+    assert not (tmp_path / "no").exists()
+
+
+def test_colours_are_replaced_in_the_drawn_look(lined: Path, toonset, tmp_path: Path) -> None:
+    colors = json.loads((lined / "config.json").read_text())["field"]["palette"]
+    paint = max(colors, key=sum)  # the ink is dark
+    old = "#" + "".join(f"{value:02x}" for value in paint)
+    turn = ("render", lined, "--turntable", 1, "-o")
+    assert toonset(*turn, tmp_path / "as", "-q").code == 0
+    new = toonset(*turn, tmp_path / "new", "--recolor", f"{old}=#00ff00", "--json")
+    assert new.json["layer"] == "drawn"
+    green = np.abs(shown(tmp_path / "new")[..., :3] - (0, 255, 0)).max(axis=-1) < 8
+    was = np.abs(shown(tmp_path / "as")[..., :3] - paint).max(axis=-1) < 8
+    assert green.sum() > 0.8 * was.sum() > 100
+
+
+def test_a_run_made_before_says_how_to_get_the_layer(lined: Path, toonset, tmp_path: Path) -> None:
+    import shutil
+
+    from toonset.nerf.run.manifest import write_manifest
+
+    old = Path(shutil.copytree(lined, tmp_path / "old"))
+    config = json.loads((old / "config.json").read_text())
+    del config["field"]["drawings"]
+    (old / "config.json").write_text(json.dumps(config))
+    for name in ("drawings.png", "drawings.safetensors"):
+        (old / name).unlink()
+    write_manifest(old)
+    turn = ("render", old, "--turntable", 1, "-o", tmp_path / "turn")
+    assert "no drawn look; train again" in toonset(*turn, "--layer", "drawn").reason
+    assert not (tmp_path / "turn").exists()
+    assert toonset(*turn).code == 0  # the field's colour, as before

@@ -1,0 +1,152 @@
+"""Views in the drawn look: crisp, whole, and the drawing itself where it was drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.nerf.look.painted import INK, PALETTE, camera_at, draw, drawings, geometry, ring, unseen
+from toonset.nerf.look.blend import drawn_view, flanking
+from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.outline import Outline
+from toonset.nerf.render.layers import color_picture
+from toonset.nerf.score.metrics import compare
+from toonset.view import over_white
+
+
+@pytest.fixture(scope="module")
+def egg() -> Drawings:
+    return drawings()
+
+
+@pytest.mark.parametrize("degrees", [10.0, 22.5, 100.0])
+def test_a_view_between_drawings_is_what_would_have_been_drawn(
+    egg: Drawings, degrees: float
+) -> None:
+    camera = camera_at(np.radians(degrees))
+    view = drawn_view(egg, geometry(camera))
+    found = compare(color_picture(view.rgb, view.alpha), draw(camera))["psnr"]
+    assert found is not None
+    assert found > 24  # the grey field alone has 12
+    assert view.by_field < 0.01
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_a_drawn_camera_returns_its_own_drawing(egg: Drawings, number: int) -> None:
+    own = egg.views[number]
+    view = drawn_view(egg, geometry(own.camera))
+    apart = over_white(color_picture(view.rgb, view.alpha)) - over_white(own.rgba)
+    assert np.abs(apart).max() <= 1.01 / 255
+
+
+def test_nothing_pops_where_one_pair_of_drawings_follows_another(egg: Drawings) -> None:
+    """A hundredth of a degree beside a drawing the view is nearly the same, from either side."""
+    yaw = egg.views[1].camera.angles[0]
+    at, before, after = (
+        drawn_view(egg, geometry(camera_at(yaw + turn))).rgb for turn in (0, -2e-4, 2e-4)
+    )
+    assert np.abs(before - at).mean() < 2e-4
+    assert np.abs(after - at).mean() < 2e-4
+
+
+def test_both_eyes_stay_whole(egg: Drawings) -> None:
+    import cv2
+
+    view = drawn_view(egg, geometry(camera_at(np.radians(12))))
+    count, _, about, _ = cv2.connectedComponentsWithStats((view.labels == 1).astype(np.uint8))
+    sizes = sorted(about[1:, cv2.CC_STAT_AREA])
+    assert count == 3
+    assert sizes[0] > 80
+
+
+def test_what_no_drawing_shows_is_the_fields(egg: Drawings) -> None:
+    """From above two of eight drawings' egg nothing is missing, grey where nobody looked."""
+    few = drawings([camera_at(0.0), camera_at(0.8)])
+    view = drawn_view(few, geometry(camera_at(np.pi)))
+    assert view.by_field > 0.9
+    assert np.isfinite(view.rgb).all()
+    middle = view.rgb[60, 60]
+    np.testing.assert_allclose(middle, 0.5, atol=0.02)
+
+
+def test_a_view_from_above_has_no_hole(egg: Drawings) -> None:
+    view = drawn_view(egg, geometry(camera_at(0.3, np.radians(60))))
+    assert np.isfinite(view.rgb).all()
+    assert view.alpha[60, 60] == 1
+    assert 0 < view.by_field < 1
+
+
+def test_a_view_of_nothing_is_empty(egg: Drawings) -> None:
+    view = drawn_view(egg, unseen(geometry(camera_at(0.1))))
+    assert not view.alpha.any()
+    assert not view.rgb.any()
+
+
+def test_the_outline_is_as_wide_as_it_was_drawn_and_can_be_another(egg: Drawings) -> None:
+    shown = geometry(camera_at(0.4))
+    area = drawn_view(egg, shown).ink.sum()
+    wide = replace(egg, pen=Outline((90, 0, 120), 4.0))
+    other = drawn_view(wide, shown)
+    assert 1.8 < other.ink.sum() / area < 2.1
+    assert drawn_view(replace(egg, pen=None), shown).ink.sum() == 0
+    line = other.ink > 0.99
+    np.testing.assert_allclose(other.rgb[line].mean(axis=0) * 255, (90, 0, 120), atol=1)
+
+
+def test_another_pen_draws_round_a_drawn_view_too(egg: Drawings) -> None:
+    shown = geometry(egg.views[2].camera)
+    bare = drawn_view(replace(egg, pen=None), shown)
+    dark = bare.rgb.max(axis=-1) < 0.2
+    assert not (dark & (bare.alpha > 0.9)).any()
+
+
+def test_drawings_without_lines_stay_without() -> None:
+    bare = drawings(line_px=0.0)
+    assert bare.outline is None
+    view = drawn_view(bare, geometry(camera_at(0.4)))
+    assert view.ink.sum() == 0
+    assert (view.rgb.max(axis=-1)[view.alpha > 0.9] > 0.3).all()
+
+
+def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> None:
+    shown = geometry(camera_at(0.35))
+    before = drawn_view(egg, shown)
+    palette = PALETTE.copy()
+    palette[2] = (40, 200, 220)
+    after = drawn_view(egg, shown, palette)
+    belt = (before.labels == 2) & (before.ink == 0)
+    inner = belt & np.roll(belt, 2, 0) & np.roll(belt, -2, 0)
+    np.testing.assert_allclose(np.median(after.rgb[inner] * 255, axis=0), palette[2], atol=3)
+    far = (before.labels == 1) & (before.ink == 0)
+    np.testing.assert_array_equal(after.rgb[far][:20], before.rgb[far][:20])
+    assert drawn_view(egg, shown, PALETTE).rgb.tobytes() == before.rgb.tobytes()
+
+
+def test_flanking_shares_are_linear_along_the_arc_and_whatever_the_elevation() -> None:
+    cameras = ring()
+    step = 2 * np.pi / 8
+    for elevation in (0.0, 0.4):
+        first, second, share = flanking(cameras, camera_at(0.25 * step, elevation))
+        assert (first, second) == (0, 1)
+        assert share == pytest.approx(0.75, abs=0.02)
+    assert flanking(cameras, cameras[3])[0] == 3
+    assert flanking(cameras, cameras[3])[2] == pytest.approx(1)
+    assert flanking(cameras[:1], camera_at(1.0)) == (0, 0, 1.0)
+
+
+@pytest.mark.parametrize("color", [(0, 0, 0), (200, 40, 40)])
+def test_a_figure_of_one_colour_has_no_hole(color: tuple[int, int, int]) -> None:
+    whole = drawings()
+    views = tuple(
+        replace(view, rgba=np.dstack([np.full((120, 120, 3), color, np.uint8), view.rgba[..., 3]]))
+        for view in whole.views
+    )
+    view = drawn_view(replace(whole, views=views), geometry(camera_at(0.4)))
+    solid = view.alpha > 0.99
+    assert np.isfinite(view.rgb).all()
+    paint = solid & (view.ink == 0)
+    np.testing.assert_allclose(view.rgb[paint] * 255, np.array([color] * paint.sum()), atol=1)
+    assert whole.outline is not None
+    np.testing.assert_allclose(whole.outline.rgb, INK, atol=6)

@@ -1,0 +1,51 @@
+"""Figures for the eye: each says what it is for, and nothing else."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.nerf.look.painted import camera_at, draw
+from toonset.nerf.score.appearance import block_psnr, dirt, flicker, sharpness
+from toonset.nerf.score.metrics import BEST_PSNR
+from toonset.view import over_white
+
+
+@pytest.fixture
+def picture() -> np.ndarray:
+    return over_white(draw(camera_at(0.2)))
+
+
+@pytest.fixture
+def figure() -> np.ndarray:
+    return draw(camera_at(0.2))[..., 3] >= 128
+
+
+def test_blocks_may_shift_each_by_its_own(picture: np.ndarray) -> None:
+    assert block_psnr(np.roll(picture, (1, 2), (0, 1)), picture) == BEST_PSNR
+    torn = np.concatenate([np.roll(picture[:64], 1, axis=1), np.roll(picture[64:], -2, axis=1)])
+    assert block_psnr(torn, picture) > 40
+    assert block_psnr(np.roll(picture, 5, axis=1), picture) < 25
+
+
+def test_blur_is_not_sharp_and_weave_is_dirt(picture: np.ndarray, figure: np.ndarray) -> None:
+    assert sharpness(picture, picture, figure) == pytest.approx(1)
+    assert sharpness(cv2.GaussianBlur(picture, (0, 0), 2), picture, figure) < 0.7
+    woven = picture + 0.05 * np.random.default_rng(0).normal(size=picture.shape)
+    assert dirt(picture, picture, figure) < 0.2
+    assert dirt(woven, picture, figure) > 3
+
+
+def test_what_cannot_be_said_is_none(picture: np.ndarray, figure: np.ndarray) -> None:
+    nothing = np.zeros_like(figure)
+    assert sharpness(picture, picture, nothing) is None
+    assert dirt(picture, picture, nothing) is None
+    assert sharpness(picture, np.ones_like(picture), figure) is None
+
+
+def test_an_even_turn_does_not_flicker_and_a_pop_does(picture: np.ndarray) -> None:
+    ramp = [np.full((4, 4, 3), value) for value in (0.2, 0.4, 0.2, 0.0)]
+    assert flicker(ramp) == pytest.approx(0.2)
+    assert flicker([picture] * 5) == 0
+    assert flicker([picture, picture, 1 - picture, picture]) > 0.3
