@@ -136,9 +136,9 @@ def train(
 ) -> None:
     """Train a triplane radiance field and a palette classifier on the drawings of a bundle.
 
-    Says at the end whether the run is ok or weak, and why; exit code 3 when training went wrong and
-    was cut short, and with --strict when the run is weak: the files are written then too. Ctrl-C finishes the step, keeps what there is in RUN.unfinished and says
-    how to go on.
+    Says at the end whether the run is ok or weak, and why. Exit code 3 when training went wrong and
+    was cut short, and with --strict when the run is weak; the files are written then too. Ctrl-C
+    finishes the step, keeps what there is in RUN.unfinished and says how to go on.
     """
     from toonset.nerf.options import DEVICES, FIELDS, PRESETS
     from toonset.nerf.options import preset as preset_options

@@ -301,9 +301,9 @@ def _voted(
     votes = np.zeros((*view.alpha.shape, paints), np.float32)
     if view.shares is not None:
         votes[..., : view.shares.shape[-1]] = FIELD_VOTE * view.shares
-    rows, columns = np.indices(view.alpha.shape, sparse=True)
+    rows, columns = (np.arange(size) for size in view.alpha.shape)
     for one in candidates:
-        votes[rows, columns, one.label] += one.weight
+        votes[rows[:, None], columns, one.label] += one.weight
     votes = cv2.GaussianBlur(votes, (0, 0), SOFT_PX).reshape(votes.shape)
     winner = votes.argmax(axis=-1).astype(np.uint8)
     weights = [one.weight * (one.label == winner) for one in candidates]
