@@ -121,7 +121,9 @@ def render(
     trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
     trained = with_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
-    files = rendered_files(trained, named, wanted, together, printer.progress, as_drawn=as_drawn)
+    files = rendered_files(
+        trained, named, wanted, together, printer.progress, printer.say, as_drawn=as_drawn
+    )
     sizes: dict[str, int] = {}
     with new_folder(out, force=force) as folder:
         for name, data in files:

@@ -186,10 +186,8 @@ def _drawn(drawings: Drawings, view: Geometry) -> DrawnView:
     line_px = pen.width_px * scale if pen else 0.0
     turn = float(np.arccos(np.clip(cameras[first].rotation[2] @ camera.rotation[2], -1, 1)))
     part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
-    soft = view.alpha
-    if part > 0:
-        whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
-        soft = soft + part * (whole[..., 3] - soft)
+    whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
+    soft = view.alpha + part * (whole[..., 3] - view.alpha)
     alpha, ink = crisp_outline(soft, line_px, figure_px)
     solid = view.alpha > SOLID
     by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
@@ -198,7 +196,7 @@ def _drawn(drawings: Drawings, view: Geometry) -> DrawnView:
         color, labels = color[at], labels[at]
     drawn_with = np.array(pen.rgb if pen else (0, 0, 0)) / np.float32(255)
     rgb = color * (alpha - ink)[..., None] + ink[..., None] * drawn_with
-    if part > 0 and pen == drawings.outline:  # the drawing's own line, too
+    if pen == drawings.outline:  # the drawing's own line, too
         rgb = rgb + part * (np.minimum(whole[..., :3], whole[..., 3:]) - rgb)
         alpha = alpha + part * (whole[..., 3] - alpha)
     return DrawnView(rgb, alpha, ink, labels, by_field)

@@ -261,10 +261,9 @@ def _agreed(
     k = 2 * _HALF
     prior = np.linalg.inv(_BENDS.covariance) / EXPECTED**2
     priors = [prior + figure.held() for figure in figures]
-    numbers, before = begin, np.inf
+    numbers, gain = begin, 0.0
     for blur in BLURS:
         layers = [_slopes(figure.paint, blur * figure.height_px) for figure in figures]
-        before = _cost(layers, pairs, begin)
         for _ in range(ROUNDS):
             matrix, slope = np.zeros((len(figures) * k,) * 2), np.zeros(len(figures) * k)
             for i, own in enumerate(priors):
@@ -275,9 +274,10 @@ def _agreed(
                 _add(matrix, slope, pair, layers, numbers)
             step = np.linalg.solve(matrix, slope).reshape(len(figures), k)
             numbers = [old - new for old, new in zip(numbers, step, strict=True)]
+        gain = (_cost(layers, pairs, begin) - _cost(layers, pairs, numbers)) / 2
     moved = [after - old for after, old in zip(numbers, begin, strict=True)]
     spent = sum(float(d @ own @ d) for d, own in zip(moved, priors, strict=True))
-    return numbers, (before - _cost(layers, pairs, numbers) - spent) / 2
+    return numbers, gain - spent / 2
 
 
 def _slopes(

@@ -18,6 +18,7 @@ from toonset.nerf.render.views import render
 FORMATS = ("gif", "webp", "mp4", "sprites")
 ANIMATIONS = {"gif": encode_gif, "webp": encode_webp, "mp4": encode_mp4}
 SPRITES = "sprites"
+UNSEEN = 0.05  # of a view in the drawn look: worth a word
 DEPTH_FILE = "depth.json"  # the scale of depth pictures
 
 
@@ -27,6 +28,7 @@ def rendered_files(
     layers: Sequence[str] = ("rgb",),
     formats: Sequence[str] = (),
     progress: Callable[[str], None] = lambda line: None,
+    say: Callable[[str], None] = lambda line: None,
     *,
     as_drawn: bool = False,
 ) -> Iterator[tuple[str, bytes]]:
@@ -38,6 +40,7 @@ def rendered_files(
         layers: names out of LAYERS; several are written as NAME-LAYER.png.
         formats: names out of FORMATS: files of all views of the first layer.
         progress: told which view is rendered.
+        say: told which view shows most that is in no drawing.
         as_drawn: bend pictures as the drawings were.
 
     Raises:
@@ -46,6 +49,7 @@ def rendered_files(
     baked, turning, depths = Baked.of(trained), [], []
     cameras = [camera for _, camera in named]
     levels = DepthLevels.of(trained.hull, cameras)
+    unseen: dict[str, float] = {}
     for number, (stem, camera) in enumerate(named):
         progress(f"rendering {number + 1} of {len(named)}")
         view = render(baked, camera)
@@ -55,6 +59,11 @@ def rendered_files(
             yield name, data
             depths += [name] if layer == "depth" else []
             turning += [picture] if layer == layers[0] else []
+            if layer == "drawn":
+                unseen[stem] = view.drawn.by_field
+    worst = max(unseen, key=unseen.__getitem__, default="")
+    if worst and unseen[worst] > UNSEEN:
+        say(f"{worst}: {unseen[worst]:.0%} of it is in no drawing and has the field's own colour")
     if depths:
         yield DEPTH_FILE, _json(levels.to_json(depths))
     yield from turntable_files(formats, turning, trained, cameras).items()

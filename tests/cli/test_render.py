@@ -102,3 +102,10 @@ def test_a_run_made_before_says_how_to_get_the_layer(lined: Path, toonset, tmp_p
     assert "no drawn look; train again" in toonset(*turn, "--layer", "drawn").reason
     assert not (tmp_path / "turn").exists()
     assert toonset(*turn).code == 0  # the field's colour, as before
+
+
+def test_what_no_drawing_shows_is_said(lined: Path, toonset, tmp_path: Path) -> None:
+    above = ("render", lined, "--turntable", 1, "--elevation", 80, "-o", tmp_path / "above")
+    assert "is in no drawing and has the field's own colour" in toonset(*above).err
+    level = ("render", lined, "--turntable", 1, "-o", tmp_path / "level")
+    assert "in no drawing" not in toonset(*level).err

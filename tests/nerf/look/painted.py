@@ -64,7 +64,7 @@ def draw(
     """Return the RGBA drawing; `bend` says where every pixel's paint comes from, pixels."""
     fine = camera.resized(FINE)
     points, seen = surface(fine)
-    color = PALETTE[paint_of(points)].astype(np.float32) * np.float32(gain)
+    color = PALETTE[paint_of(points)].astype(np.float32) * np.array(gain, dtype=np.float32)
     inside = cv2.distanceTransform(seen.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     color[inside <= line_px * FINE] = INK
     rgba = np.dstack([color * seen[..., None], 255.0 * seen]).astype(np.float32)
@@ -79,13 +79,13 @@ def draw(
     return (mean + 0.5).clip(0, 255).astype(np.uint8)
 
 
-def scene_of(cameras: list[Camera], **how: object) -> Scene:
-    frames = [Frame(f"{i:03d}.png", c, draw(c, **how)) for i, c in enumerate(cameras)]  # type: ignore[arg-type]
+def scene_of(cameras: list[Camera], line_px: float = LINE_PX) -> Scene:
+    frames = [Frame(f"{i:03d}.png", c, draw(c, line_px=line_px)) for i, c in enumerate(cameras)]
     return Scene(tuple(frames), PALETTE, "egg")
 
 
-def drawings(cameras: list[Camera] | None = None, **how: object) -> Drawings:
-    scene = scene_of(cameras or ring(), **how)
+def drawings(cameras: list[Camera] | None = None, line_px: float = LINE_PX) -> Drawings:
+    scene = scene_of(cameras or ring(), line_px)
     found = drawings_of(scene, [frame.rgba for frame in scene.frames], depth_of)
     assert found is not None
     return found

@@ -74,7 +74,7 @@ def config(change: Callable[[dict[str, Any]], None]) -> Callable[[Path], None]:
     return applied
 
 
-def tensors(change: Callable[[dict[str, torch.Tensor]], None]) -> Callable[[Path], None]:
+def tensors(change: Callable[[dict[str, torch.Tensor]], object]) -> Callable[[Path], None]:
     def applied(folder: Path) -> None:
         found = load_file(folder / SURFACES)
         change(found)
