@@ -156,7 +156,7 @@ def drawn_view(
     box = _box(view.alpha > 0)
     if box is None:
         return result
-    part = _drawn(drawings, view.crop(*box))
+    part = _drawn(drawings.fitting(view.camera.scale), view.crop(*box))
     if palette is not None and len(palette) == len(drawings.palette):
         part = _repainted(part, (palette - drawings.palette.astype(np.float32)) / 255)
     for name in ("rgb", "alpha", "ink", "labels"):

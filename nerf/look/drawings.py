@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -19,6 +19,7 @@ from toonset.palette.pixels.labels import nearest_labels
 SOFT_PX = 1.5  # beyond the outline, in which paint and ink are mixed
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
 MOST_ROOM_PX = 50.0
+COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
 CRUMB = 3e-4  # of the squared height of the figure: smaller patches that are seen are noise
 INK_LIKE = 60  # sum of channels: a palette colour so near to the ink is the ink's
 SQUARE = np.ones((3, 3), dtype=np.uint8)
@@ -105,6 +106,21 @@ class Drawings:
             for view in self.views
         )
 
+    @cached_property
+    def half(self) -> Drawings:
+        """Return the same at half the size: small views would miss every other pixel."""
+        flows = (replace(found, flow=found.flow * np.float16(0.5)) for found in self.flows)
+        outline, pen = (
+            line and replace(line, width_px=line.width_px / 2) for line in (self.outline, self.pen)
+        )
+        views = tuple(_half(view) for view in self.views)
+        return replace(self, views=views, flows=tuple(flows), outline=outline, pen=pen)
+
+    def fitting(self, scale: float) -> Drawings:
+        """Return the drawings as large as a view needs them, of `scale` pixels per world unit."""
+        own = min(view.camera.scale for view in self.views)
+        return self if scale > COARSE * own else self.half.fitting(scale)
+
     def flow(self, i: int, j: int) -> tuple[PairFlow, float] | None:
         """Return the flow of two drawings and its sign; None where none was measured."""
         for found in self.flows:
@@ -155,6 +171,19 @@ class Seen:
         return self.x + np.float32(part) * flow[..., 0], self.y + np.float32(part) * flow[..., 1]
 
 
+def _half(view: Drawing) -> Drawing:
+    """Return a drawing averaged over blocks of 2 x 2 pixels."""
+    even = [(0, size % 2) for size in view.levels.shape]
+    levels = np.pad(view.levels, even)
+    rgba = np.pad(view.rgba, [*even, (0, 0)]).astype(np.float32)
+    rgba[..., :3] *= rgba[..., 3:] / 255
+    rows, columns = levels.shape[0] // 2, levels.shape[1] // 2
+    mean = rgba.reshape(rows, 2, columns, 2, 4).mean(axis=(1, 3))
+    mean[..., :3] *= 255 / np.maximum(mean[..., 3:], 1e-6)
+    camera = replace(view.camera, size_wh=(2 * columns, 2 * rows)).resized(0.5)
+    return Drawing(camera, (mean + 0.5).clip(0, 255).astype(np.uint8), levels[::2, ::2].copy())
+
+
 def levels_of(
     depth: Float[np.ndarray, "height width"], depths: tuple[float, float]
 ) -> UInt8[np.ndarray, "height width"]:
@@ -182,7 +211,8 @@ def _texture(
     mask = mask_of(view.rgba)
     inside = depth_inside(mask)
     inner = inside >= outline_px + SOFT_PX
-    at = nearest(inner if inner.any() else mask)
+    inner = inner if inner.any() else mask if mask.any() else np.ones_like(mask)
+    at = nearest(inner)
     opaque = view.rgba.copy()
     opaque[..., 3] = 255
     whole = view.rgba / np.float32(255)

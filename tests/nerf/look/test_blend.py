@@ -150,3 +150,27 @@ def test_a_figure_of_one_colour_has_no_hole(color: tuple[int, int, int]) -> None
     np.testing.assert_allclose(view.rgb[paint] * 255, np.array([color] * paint.sum()), atol=1)
     assert whole.outline is not None
     np.testing.assert_allclose(whole.outline.rgb, INK, atol=6)
+
+
+@pytest.mark.parametrize("side", [60, 30])
+def test_a_small_view_is_a_large_one_seen_from_afar(egg: Drawings, side: int) -> None:
+    """No line is dotted: drawings are averaged before they are looked up."""
+    small = drawn_view(egg, geometry(camera_at(0.4, side=side)))
+    large = drawn_view(egg, geometry(camera_at(0.4)))
+    block = 120 // side
+    mean = large.rgb.reshape(side, block, side, block, 3).mean(axis=(1, 3))
+    assert np.abs(small.rgb - mean).mean() < 0.012
+    assert egg.fitting(60.0) is egg
+    assert egg.fitting(16.0) is egg.half.half
+
+
+def test_half_a_drawing_lies_where_the_whole_one_does() -> None:
+    odd = drawings([camera_at(0.0, side=121), camera_at(0.7, side=121)])
+    for whole, half in zip(odd.views, odd.half.views, strict=True):
+        at, _, _ = whole.camera.project(np.array([0.22, 0.35, 0.2]))
+        there, _, _ = half.camera.project(np.array([0.22, 0.35, 0.2]))
+        np.testing.assert_allclose(there, at / 2)
+        assert half.rgba.shape == (61, 61, 4)
+    assert odd.half.outline is not None
+    assert odd.outline is not None
+    assert odd.half.outline.width_px == odd.outline.width_px / 2
