@@ -56,7 +56,7 @@ class Printer:
             self.say(text)
 
     def doubt(self, text: str) -> None:
-        """Print on stderr why the exit code will not be 0; quiet or not."""
+        """Print on stderr what to look at, quiet or not: why the exit code is 3, or a run weak."""
         self._clear()
         print(text, file=sys.stderr, flush=True)
 

@@ -101,15 +101,14 @@ def run(request: Request, printer: Printer) -> int:
     metrics = found.save(place.run, force=place.force)
     place.clear()
     printer.result({"run": place.run, **metrics}, summary(place.run, metrics, printer.verbose))
-    weak = [f"weak: {reason}" for reason in metrics["verdict"]["reasons"]]
-    doubts = weak if request.strict else []
-    for reason in [] if request.strict else weak:
-        printer.say(f"{place.run}: {reason}")
+    doubts = [f"weak: {reason}" for reason in metrics["verdict"]["reasons"]]
+    doubtful = request.strict and bool(doubts)
     if found.training.stopped not in FINE:
         doubts.append(f"training stopped early: {found.training.stopped}")
+        doubtful = True
     for doubt in doubts:
         printer.doubt(f"{place.run}: {doubt}")
-    return DOUBTFUL if doubts else 0
+    return DOUBTFUL if doubtful else 0
 
 
 def _threads(request: Request, checkpoint: Checkpoint | None) -> int:

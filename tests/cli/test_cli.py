@@ -125,7 +125,8 @@ def test_calibrate_prints_one_json_object_and_nothing_else(calibrated):
 
 def test_train_prints_one_json_object_and_progress_apart(trained):
     run, done = trained
-    assert done.code == 3  # weak: of few steps
+    assert done.code == 0
+    assert done.json["verdict"]["verdict"] == "weak"  # of few steps
     assert done.json["run"] == str(run)
     assert done.json["steps"] == 20
     assert "palette, extracted" in done.err
@@ -140,7 +141,7 @@ def test_a_moved_bundle_goes_through_every_verb(bundle: Path, toonset, tmp_path,
     assert (found.code, found.err) == (0, "")
     assert len(found.json["colors"]) >= 4
     made = toonset("train", "--steps", 2, *FAST, "--quiet")
-    assert made.code == 3
+    assert made.code == 0
     assert "bundle/run: weak: " in made.err
     assert "these were 2 steps: train longer" in made.err
     assert (bundle / "run" / "model.safetensors").is_file()
@@ -265,7 +266,7 @@ def test_no_verb_of_a_user_needs_opengl(drawn: Path, tmp_path):
         ["render", str(run), "--turntable", "1", "--size", "16", "-o", str(tmp_path / "t"), "-q"],
     )
     assert codes[0] in (0, 3)  # two views may be too few to be sure
-    assert codes[1:] == [0, 3, 0]  # one step is too few
+    assert codes[1:] == [0, 0, 0]
     assert {"torch", "cv2"} <= modules  # the probe sees imports
     assert not modules & {"pyrender", "OpenGL"}
 
