@@ -24,9 +24,11 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.lines.explain import Hints, Pairs, depth_hints, lined_pairs, on_borders
 from toonset.nerf.lines.nearest import distance_to, nearest, parts
 from toonset.nerf.lines.strokes import (
+    FEWEST_OUTLINED,
     Lines,
     Strokes,
     drawn_by_pen,
+    ink_color,
     lines_of,
     mean_width,
     outline_width,
@@ -36,10 +38,8 @@ from toonset.nerf.lines.strokes import (
 )
 from toonset.palette.pixels.labels import UNLABELLED
 
-FEWEST_OUTLINED = 0.5  # of the views must have an outline
 EXPLAINED = 0.5  # of a stroke's pixels, for the stroke to be a contour
 INKED = 0.5  # of the hull's depth jumps, for the sheet to draw lines there
-INK_QUANTILE = 0.2  # darkest part of the rim: the rest is mixed with what it surrounds
 OPAQUE = 250
 BREAK_PX = 2  # between a stroke and the outline that it begins at
 
@@ -87,7 +87,8 @@ def without_ink(scene: Scene, as_drawn: Scene | None = None) -> tuple[Scene, Ink
     width = float(np.median(outlined))
     lines = [lines_of(frame.rgba, width) for frame in scene.frames]
     hints, jump = depth_hints(scene, width)
-    ink = _ink_color(scene, lines)
+    pairs = zip(scene.frames, lines, strict=True)
+    ink = ink_color(frame.rgba[line.rim][:, :3] for frame, line in pairs)
     drawings = [_read(*each, ink) for each in zip(scene.frames, lines, hints, strict=True)]
     style = InkStyle(
         rgb=ink,
@@ -185,12 +186,3 @@ def _cleaned(frame: Frame, lines: Lines, contour: Bool[np.ndarray, "height width
     full = covered & (rgba[..., 3] >= OPAQUE)
     labels[full] = frame.labels[rows[full], columns[full]]
     return replace(frame, rgba=rgba, labels=labels)
-
-
-def _ink_color(scene: Scene, lines: list[Lines]) -> tuple[int, int, int]:
-    """Return the median of the darkest pixels of all rims."""
-    rims = [frame.rgba[line.rim][:, :3] for frame, line in zip(scene.frames, lines, strict=True)]
-    colors = np.concatenate(rims).astype(np.float64)
-    light = colors.mean(axis=1)
-    red, green, blue = np.median(colors[light <= np.quantile(light, INK_QUANTILE)], axis=0)
-    return round(float(red)), round(float(green)), round(float(blue))

@@ -14,6 +14,8 @@ from skimage.morphology import skeletonize
 from toonset.nerf.lines.nearest import depth_inside, nearest, parts
 from toonset.palette.pixels.ink_lines import find_contour, rim_line_px
 
+FEWEST_OUTLINED = 0.5  # of a sheet's views must have an outline, for the sheet to have one
+INK_QUANTILE = 0.2  # darkest part of the rim: the rest is mixed with what it surrounds
 INK = 128  # coverage from which a pixel is a line's
 SOFT = 16  # coverage from which a pixel beside a line holds some of it
 FIGURE = 128  # alpha
@@ -65,6 +67,14 @@ def outline_width(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
     over_white = (rgba[..., :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
     light = cv2.cvtColor(over_white, cv2.COLOR_RGB2GRAY)
     return rim_line_px(light, rgba[..., 3] >= FIGURE)
+
+
+def ink_color(rims: Iterable[UInt8[np.ndarray, "n 3"]]) -> tuple[int, int, int]:
+    """Return the median of the darkest pixels of all drawings' rims."""
+    colors = np.concatenate(list(rims)).astype(np.float64)
+    light = colors.mean(axis=1)
+    red, green, blue = np.median(colors[light <= np.quantile(light, INK_QUANTILE)], axis=0)
+    return round(float(red)), round(float(green)), round(float(blue))
 
 
 def lines_of(rgba: UInt8[np.ndarray, "height width 4"], width_px: float) -> Lines:

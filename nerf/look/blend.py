@@ -158,7 +158,7 @@ def drawn_view(
         return result
     part = _drawn(drawings.fitting(view.camera.scale), view.crop(*box))
     if palette is not None and len(palette) == len(drawings.palette):
-        part = _repainted(part, (palette - drawings.palette.astype(np.float32)) / 255)
+        part = _recolored(part, (palette - drawings.palette.astype(np.float32)) / 255)
     for name in ("rgb", "alpha", "ink", "labels"):
         getattr(result, name)[box] = getattr(part, name)
     return replace(result, by_field=part.by_field)
@@ -202,7 +202,7 @@ def _drawn(drawings: Drawings, view: Geometry) -> DrawnView:
     return DrawnView(rgb, alpha, ink, labels, by_field)
 
 
-def _repainted(view: DrawnView, change: Float[np.ndarray, "colors 3"]) -> DrawnView:
+def _recolored(view: DrawnView, change: Float[np.ndarray, "colors 3"]) -> DrawnView:
     """Return the view with every palette colour changed; pixels between two get some of both."""
     if not change.any():
         return view
@@ -242,7 +242,7 @@ def _candidates(
         own = own or seen
         mask = seen.mask & there
         places = seen.moved(flow, part)
-        trust = _trust(taken(texture.room, places, cv2.INTER_LINEAR)) * _feathered(mask)
+        trust = _trust(taken(texture.to_edge, places, cv2.INTER_LINEAR)) * _feathered(mask)
         candidates.append(_candidate(texture, places, np.float32(weight) * trust))
         covered |= mask
     assert own is not None
@@ -282,8 +282,8 @@ def _of_field(view: Geometry, drawings: Drawings, covered: Bool[np.ndarray, "h w
     return _Candidate(color, label, np.where(covered, 0, OWN_VOTE).astype(np.float32))
 
 
-def _trust(room_px: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
-    return 1 - (1 - LEAST_TRUST) * np.exp(-((room_px / FEATHER_PX) ** 2))
+def _trust(edge_px: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
+    return 1 - (1 - LEAST_TRUST) * np.exp(-((edge_px / FEATHER_PX) ** 2))
 
 
 def _feathered(mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:

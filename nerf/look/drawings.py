@@ -18,7 +18,7 @@ from toonset.palette.pixels.labels import nearest_labels
 
 SOFT_PX = 1.5  # beyond the outline, in which paint and ink are mixed
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
-MOST_ROOM_PX = 50.0
+FARTHEST_PX = 50.0  # from an edge: farther is as far
 COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
 CRUMB = 3e-4  # of the squared height of the figure: smaller patches that are seen are noise
 INK_LIKE = 60  # sum of channels: a palette colour so near to the ink is the ink's
@@ -140,7 +140,7 @@ class Texture:
             it, holds the nearest paint inside.
         labels: (height, width) of this paint.
         far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it.
-        room: (height, width) pixels to the outline or the nearest step in depth.
+        to_edge: (height, width) pixels to the outline or the nearest step in depth.
     """
 
     camera: Camera
@@ -148,7 +148,7 @@ class Texture:
     paint: Float[np.ndarray, "height width 3"]
     labels: UInt8[np.ndarray, "height width"]
     far: Float[np.ndarray, "height width"]
-    room: Float[np.ndarray, "height width"]
+    to_edge: Float[np.ndarray, "height width"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,14 +220,14 @@ def _texture(
     seen = np.isfinite(depth)
     far = np.where(seen, cv2.dilate(filled(depth), SQUARE), -np.inf)
     to_step = distance_to(step_edges(depth, STEP * height))
-    room = np.minimum(inside, to_step).clip(0, MOST_ROOM_PX)
+    to_edge = np.minimum(inside, to_step).clip(0, FARTHEST_PX)
     return Texture(
         view.camera,
         whole,
         opaque[at][..., :3] / np.float32(255),
         nearest_labels(opaque, paints)[at],
         far.astype(np.float32),
-        room.astype(np.float32),
+        to_edge.astype(np.float32),
     )
 
 

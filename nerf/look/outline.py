@@ -12,14 +12,12 @@ from skimage.measure import find_contours
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.lines.nearest import depth_inside, nearest
-from toonset.nerf.lines.strokes import mean_width, outline_width
+from toonset.nerf.lines.strokes import FEWEST_OUTLINED, ink_color, mean_width, outline_width
 
 FINER = 3  # samples per pixel and axis
 SMOOTH_PX = 0.7  # sigma: what is finer in a field's opacity is noise
 CRUMB_PX = 30  # area of parts and holes that are noise, in a figure of CRUMB_AT px
 CRUMB_AT = 260.0
-FEWEST_OUTLINED = 0.5  # of the drawings must have an outline
-DARKEST = 0.2  # of the rim's pixels: the others are mixed with what they surround
 BAND_PX = 2.0  # beyond the outline, in which its soft side lies
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -49,17 +47,11 @@ def outline_of(drawings: Sequence[Picture]) -> Outline | None:
     if not outlined or len(outlined) < FEWEST_OUTLINED * len(widths):
         return None
     insides = [depth_inside(mask_of(rgba)) for rgba in drawings]
-    rims = [
-        rgba[(inside > 0) & (inside < 1), :3]
-        for rgba, inside in zip(drawings, insides, strict=True)
-    ]
-    colors = np.concatenate(rims).astype(np.float64)
-    light = colors.mean(axis=1)
-    red, green, blue = np.median(colors[light <= np.quantile(light, DARKEST)], axis=0)
-    rgb = (round(float(red)), round(float(green)), round(float(blue)))
+    pairs = list(zip(drawings, insides, strict=True))
+    rgb = ink_color(rgba[(inside > 0) & (inside < 1), :3] for rgba, inside in pairs)
     reach = float(np.median(outlined)) + BAND_PX
     pictures, regions, length = [], [], 0.0
-    for rgba, inside in zip(drawings, insides, strict=True):
+    for rgba, inside in pairs:
         if (inside > reach).any():
             pictures.append((rgba, rgba[nearest(inside > reach)]))
             regions.append((inside <= reach) & (rgba[..., 3] > 0))

@@ -119,7 +119,6 @@ def paint_flow(
         ]
         both = ((shares[0] > 0.9) & (shares[1] > 0.9)).astype(np.float32)
         f = cv2.resize(flow, size, interpolation=cv2.INTER_LINEAR) / np.float32(shrink)
-        f = np.asarray(f, dtype=np.float32)
         most = MOST * GRID * finest / shrink
         layers = [(picture, *_slopes(picture)) for picture in pictures]
         for _ in range(ROUNDS):

@@ -60,7 +60,7 @@ _HALF = CONTROLS**2
 
 
 @dataclass(frozen=True, eq=False)
-class Repainting:
+class PaintAgreement:
     """How drawings were changed for their paint to agree.
 
     Attributes:
@@ -87,7 +87,7 @@ class Repainting:
 
 def with_paint_agreed(
     drawn: Scene, straight: Scene, warps: Sequence[Warp], hull: Hull
-) -> tuple[Scene, tuple[Warp, ...], Repainting]:
+) -> tuple[Scene, tuple[Warp, ...], PaintAgreement]:
     """Return the scene with drawings bent and tinted so that what they paint agrees.
 
     Args:
@@ -99,7 +99,7 @@ def with_paint_agreed(
     Returns:
         The scene, every drawing's whole bend, and what was found.
     """
-    nothing = Repainting(False, 0.0, 0.0, ())
+    nothing = PaintAgreement(False, 0.0, 0.0, ())
     figures = _figures(drawn, straight, warps, hull)
     pairs = _pairs(figures) if figures else []
     if not pairs:
@@ -125,7 +125,7 @@ def with_paint_agreed(
     return (
         replace(straight, frames=tuple(frames)),
         tuple(whole),
-        Repainting(True, gain_nats, moved_px, rows),
+        PaintAgreement(True, gain_nats, moved_px, rows),
     )
 
 

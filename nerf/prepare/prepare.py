@@ -18,7 +18,7 @@ from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.lines.remove import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.paint import Repainting, with_paint_agreed
+from toonset.nerf.prepare.paint import PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.refine_yaw import Turning, turned
 from toonset.nerf.prepare.registration import Registration, registered
 from toonset.nerf.prepare.unwarp import Unbending, unbent
@@ -37,7 +37,7 @@ class Prepared:
         registration: how cameras moved; None: switched off.
         unbending: how drawings were bent; None: switched off.
         ink: the contour lines that were taken off; None: there are none, or switched off.
-        repainting: what their paint said of bends and colours; None: drawings were not bent.
+        paint: what their paint said of bends and colours; None: drawings were not bent.
     """
 
     scene: Scene
@@ -45,7 +45,7 @@ class Prepared:
     registration: Registration | None
     unbending: Unbending | None
     ink: InkStyle | None
-    repainting: Repainting | None = None
+    paint: PaintAgreement | None = None
 
     @property
     def apart_px(self) -> float:
@@ -91,7 +91,7 @@ class Prepared:
             "turning": None if turning is None else turning.to_json(),
             "registration": None if registration is None else registration.to_json(),
             "unbending": None if unbending is None else unbending.to_json(),
-            "repainting": None if self.repainting is None else self.repainting.to_json(),
+            "paint": None if self.paint is None else self.paint.to_json(),
             "ink": None if self.ink is None else asdict(self.ink),
         }
 
@@ -110,7 +110,7 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
     return Prepared(straight, turning, registration, unbending, ink)
 
 
-def repainted(ready: Prepared, drawn: Scene, hull: Hull) -> Prepared:
+def with_paint(ready: Prepared, drawn: Scene, hull: Hull) -> Prepared:
     """Return bent drawings bent and tinted further, so that their paint agrees over a hull.
 
     Args:
@@ -123,7 +123,7 @@ def repainted(ready: Prepared, drawn: Scene, hull: Hull) -> Prepared:
         return ready
     scene, warps, found = with_paint_agreed(drawn, ready.scene, unbending.warps, hull)
     unbending = replace(unbending, warps=warps)
-    return replace(ready, scene=scene, unbending=unbending, repainting=found)
+    return replace(ready, scene=scene, unbending=unbending, paint=found)
 
 
 def _agreeing(

@@ -29,7 +29,7 @@ from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.prepare import prepared, repainted
+from toonset.nerf.prepare.prepare import prepared, with_paint
 from toonset.nerf.prepare.symmetry import completed, with_mirrored
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
@@ -93,7 +93,7 @@ def fit_field(
     hull, evidence = open_box(whole), NO_EVIDENCE
     if options.carve:
         hull, evidence = hull_of(whole, options, ready.apart_px)
-        ready = repainted(ready, scene, hull)
+        ready = with_paint(ready, scene, hull)
     scene = with_mirrored(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None

@@ -61,8 +61,8 @@ def test_both_eyes_stay_whole(egg: Drawings) -> None:
     assert sizes[0] > 80
 
 
-def test_what_no_drawing_shows_is_the_fields(egg: Drawings) -> None:
-    """From above two of eight drawings' egg nothing is missing, grey where nobody looked."""
+def test_what_no_drawing_shows_is_the_fields() -> None:
+    """Two drawings of the front say nothing of the back: it is grey, as the field is."""
     few = drawings([camera_at(0.0), camera_at(0.8)])
     view = drawn_view(few, geometry(camera_at(np.pi)))
     assert view.by_field > 0.9
@@ -120,7 +120,7 @@ def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> N
     inner = belt & np.roll(belt, 2, 0) & np.roll(belt, -2, 0)
     np.testing.assert_allclose(np.median(after.rgb[inner] * 255, axis=0), palette[2], atol=3)
     far = (before.labels == 1) & (before.ink == 0)
-    np.testing.assert_array_equal(after.rgb[far][:20], before.rgb[far][:20])
+    np.testing.assert_array_equal(after.rgb[far], before.rgb[far])
     assert drawn_view(egg, shown, PALETTE).rgb.tobytes() == before.rgb.tobytes()
 
 

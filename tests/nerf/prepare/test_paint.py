@@ -14,7 +14,7 @@ from toonset.dataset.silhouettes.outlines import Square
 from toonset.nerf.hull.hull import Hull, carve
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import with_paint_agreed
-from toonset.nerf.prepare.prepare import Prepared, prepared, repainted
+from toonset.nerf.prepare.prepare import Prepared, prepared, with_paint
 from toonset.nerf.prepare.unwarp import Warp
 
 WRONG = 0  # the drawing that is wrong: from the front
@@ -81,8 +81,8 @@ def test_paint_that_was_mixed_anew_becomes_one_paint() -> None:
 def test_exact_drawings_are_untouched_to_the_bit() -> None:
     scene = scene_of(ring())
     ready = prepared(scene, TrainOptions())
-    after = repainted(ready, scene, hull_of(scene))
-    assert after.repainting is None
+    after = with_paint(ready, scene, hull_of(scene))
+    assert after.paint is None
     for one, other in zip(after.scene.frames, scene.frames, strict=True):
         assert one.rgba.tobytes() == other.rgba.tobytes()
 
@@ -90,7 +90,7 @@ def test_exact_drawings_are_untouched_to_the_bit() -> None:
 def test_drawings_that_did_not_bend_are_returned_as_they_are() -> None:
     scene = sheet(3.0)
     ready = Prepared(scene, None, None, None, None)
-    assert repainted(ready, scene, hull_of(scene)) is ready
+    assert with_paint(ready, scene, hull_of(scene)) is ready
 
 
 @pytest.mark.parametrize("shown", [0, 1, 2])
