@@ -12,8 +12,8 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float
 
-CONTROLS = 5  # a side of the grid: shapes down to half a figure, 50 numbers a drawing
-REACH = 0.5  # of the square: distance over which a hand's error changes
+CONTROLS = 8  # a side of the grid: shapes down to a fifth of a figure, 128 numbers a drawing
+REACH = 0.2  # of the square: distance over which a hand's error changes
 
 
 class Moves(Protocol):

@@ -18,13 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.displacement import Moves
 from toonset.dataset.silhouettes.outlines import Outlines
 from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
 
-NOISE, NOISE_PX = 0.00175, 0.2  # of the square, but at least so many pixels: a rim's own error
+NOISE, NOISE_PX = 0.003, 0.2  # of the square, but at least so many pixels: a rim's own error
 CORRELATED = 5.0  # rim points in a row that err together
 FOREIGN = 0.02  # of the square: larger disagreements are more and more another shape, no error
 LEAST, MOST = 0.001, 0.02  # of the square: limits of tau; a larger one would bend other shapes
@@ -196,12 +197,16 @@ def _pixel_jacobian(
 
 def _learned(matrix: np.ndarray, precision: np.ndarray, numbers: np.ndarray, tau: float) -> float:
     """Return the size of errors that the numbers and their uncertainty speak for."""
-    spread = np.linalg.inv(matrix + precision / tau**2)
-    energy = float(numbers @ precision @ numbers + np.sum(precision * spread))
+    factor, _ = dpotrf(matrix + precision / tau**2, lower=True)
+    spread, _ = dpotri(factor, lower=True)  # its lower half: half the work of an inverse
+    twice = 2 * float(np.sum(np.tril(precision, -1) * spread))
+    trace = twice + float(np.sum(np.diag(precision) * np.diag(spread)))
+    energy = float(numbers @ precision @ numbers) + trace
     return float(np.clip(np.sqrt(energy / len(numbers)), LEAST, MOST))
 
 
 def _log_volume(matrix: np.ndarray, covariance: np.ndarray, views: int) -> float:
     """Return log det(1 + K H): what the determined numbers cost."""
-    root = np.kron(np.eye(views), np.linalg.cholesky(covariance))
-    return float(np.linalg.slogdet(np.eye(len(matrix)) + root.T @ matrix @ root)[1])
+    prior = np.kron(np.eye(views), np.linalg.inv(covariance))
+    before = views * np.linalg.slogdet(covariance)[1]
+    return float(np.linalg.slogdet(matrix + prior)[1] + before)

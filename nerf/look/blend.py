@@ -34,6 +34,7 @@ from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.palette.pixels.labels import UNLABELLED
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
+BORDER = 0.65  # opacity at an outline between drawn ones, where a hull is a little too large
 OPAQUE = 0.6  # opacity from which a field's colour is its own
 FIELD_VOTE = 0.25  # beside 1 of the drawings together
 SOFT_PX = 0.8  # sigma over which votes are shared
@@ -188,7 +189,7 @@ def _drawn(drawings: Drawings, view: Geometry) -> DrawnView:
     part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
     whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
     soft = view.alpha + part * (whole[..., 3] - view.alpha)
-    alpha, ink = crisp_outline(soft, line_px, figure_px)
+    alpha, ink = crisp_outline(soft, BORDER + part * (0.5 - BORDER), line_px, figure_px)
     solid = view.alpha > SOLID
     by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
     if solid.any():

@@ -67,19 +67,20 @@ def _rim_px(alpha: UInt8[np.ndarray, "height width"]) -> float:
 
 
 def crisp_outline(
-    alpha: Float[np.ndarray, "height width"], width_px: float, figure_px: float
+    alpha: Float[np.ndarray, "height width"], border: float, width_px: float, figure_px: float
 ) -> tuple[Float[np.ndarray, "height width"], Float[np.ndarray, "height width"]]:
     """Return a crisp coverage, and how far a line along its inner side covers every pixel.
 
     Args:
-        alpha: a soft coverage; its border is where it is one half.
+        alpha: a soft coverage.
+        border: the coverage at the border.
         width_px: of the line; 0: none.
         figure_px: height of the figure.
     """
     height, width = alpha.shape
     size = (FINER * width, FINER * height)
     fine = cv2.resize(alpha.astype(np.float32), size, interpolation=cv2.INTER_CUBIC)
-    inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH_PX * FINER) >= 0.5
+    inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH_PX * FINER) >= border
     least = CRUMB_PX * (figure_px / CRUMB_AT) ** 2 * FINER**2
     inside = without_crumbs(inside, least)
     ink = np.zeros_like(alpha, dtype=np.float32)

@@ -21,7 +21,7 @@ from toonset.dataset.silhouettes.outlines import Square
 from toonset.palette.pixels.labels import UNLABELLED
 
 ROUNDS = 8  # of Gauss-Newton
-MOST = 0.03  # of the figure's square: the longest displacement; more is another pose
+MOST = 0.05  # of the figure's square: the longest displacement; more is another pose
 _BENDS = Bends.expected()
 
 

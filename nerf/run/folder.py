@@ -45,7 +45,7 @@ from toonset.nerf.run.tensors import packed, unpack
 from toonset.write import write_bytes
 
 CONFIG, MODEL = "config.json", "model.safetensors"
-FORMAT = 2
+FORMAT = 3
 MOST_CELLS = 512  # along one side, of planes and hull alike
 
 

@@ -23,12 +23,20 @@ def test_the_outlines_width_is_measured() -> None:
 def test_a_soft_border_becomes_crisp_and_stays_where_it_is() -> None:
     y, x = np.mgrid[:100, :100] - 49.5
     away = 30 - np.hypot(x, y)
-    alpha, ink = crisp_outline(1 / (1 + np.exp(-away / 2)), 3.0, 60.0)
+    alpha, ink = crisp_outline(1 / (1 + np.exp(-away / 2)), 0.5, 3.0, 60.0)
     exact = np.pi * 30**2
     assert alpha.sum() == pytest.approx(exact, rel=0.01)
     assert ((alpha > 0.01) & (alpha < 0.99)).sum() < 4 * np.pi * 30
     assert ink.sum() == pytest.approx(exact - np.pi * 27**2, rel=0.03)
     assert (ink <= alpha).all()
+
+
+def test_a_higher_border_is_a_smaller_figure() -> None:
+    y, x = np.mgrid[:100, :100] - 49.5
+    soft = 1 / (1 + np.exp(-(30 - np.hypot(x, y)) / 2))
+    inner, _ = crisp_outline(soft, 0.65, 0.0, 60.0)
+    radius = 30 - 2 * np.log(0.65 / 0.35)  # where the coverage is 0.65
+    assert inner.sum() == pytest.approx(np.pi * radius**2, rel=0.01)
 
 
 def test_crumbs_and_pinholes_go() -> None:
