@@ -27,7 +27,7 @@ def hull_of(scene: Scene) -> Hull:
 
 def nearly_none() -> Warp:
     """Return a warp that says the drawing bends, but by nothing that matters."""
-    return Warp(Square(np.array([5.0, 5.0]), 110.0), np.full(50, 1e-9))
+    return Warp(Square(np.array([5.0, 5.0]), 110.0), np.full(len(Warp.none().numbers), 1e-9))
 
 
 def swollen(pixels: float) -> np.ndarray:
