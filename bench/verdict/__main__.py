@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from bench.verdict.curve import draw_curve, table
 from bench.verdict.measure import FULL, QUICK, Judged, judge
@@ -61,12 +62,7 @@ def _arguments() -> argparse.Namespace:
 def _synthetic(seeds: int) -> Iterator[tuple[str, Drawer]]:
     for seed in range(seeds):
         for fault in FAULTS:
-
-            def draw(fault=fault, seed=seed) -> tuple[Scene, Scene]:
-                sheet = draw_sheet(fault, seed)
-                return sheet.train, sheet.test
-
-            yield f"{fault.name} s{seed}", draw
+            yield f"{fault.name} s{seed}", partial(draw_sheet, fault, seed)
 
 
 def _cases(folder: Path) -> Iterator[tuple[str, Drawer]]:
@@ -80,7 +76,7 @@ def _case(folder: Path) -> tuple[Scene, Scene]:
     return train, replace(test, frames=test.frames[::EVERY])
 
 
-def _judged(row: dict) -> Judged:
+def _judged(row: dict[str, Any]) -> Judged:
     lists = {name: tuple(row[name]) for name in ("reasons", "flip", "look")}
     return Judged(**{**row, **lists})
 

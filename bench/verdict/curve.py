@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from bench.verdict.measure import Judged
 from toonset.nerf.score.verdict import MOST_OFF, OK
 
 FINE, BAD = 0.014, 0.017  # worst held-out view: a person is content below, unhappy above
+FEWEST = 3  # sheets of which a rank correlation is said
 HEAD = ("sheet", "off, %", "look, %", "worst look, %", "FLIP", "verdict")
 
 
@@ -46,14 +47,12 @@ def count(sheets: Sequence[Judged]) -> Count:
 
 def rank_correlation(sheets: Sequence[Judged]) -> float:
     """Return Spearman's, of what the verdict rests on and the worst held-out view's look."""
-    values = np.array([(sheet.statistic, sheet.worst_look) for sheet in sheets if sheet.off])
+    from scipy.stats import spearmanr
+
+    values = [(sheet.statistic, sheet.worst_look) for sheet in sheets if sheet.off]
     if len(values) < FEWEST:
         return float("nan")
-    ranks = values.argsort(axis=0).argsort(axis=0)
-    return float(np.corrcoef(ranks.T)[0, 1])
-
-
-FEWEST = 3
+    return float(spearmanr(*zip(*values, strict=True)).statistic)
 
 
 def table(sheets: Sequence[Judged]) -> str:
@@ -80,7 +79,7 @@ def table(sheets: Sequence[Judged]) -> str:
     )
 
 
-def draw_curve(groups: dict[str, Sequence[Judged]]) -> bytes:
+def draw_curve(groups: Mapping[str, Sequence[Judged]]) -> bytes:
     """Return a PNG: a point per sheet, hollow where it is called weak for too few drawings."""
     import matplotlib as mpl
 

@@ -55,22 +55,14 @@ class Fault:
     change: Callable[[Scene, int], Scene] = lambda scene, _: scene
 
 
-@dataclass(frozen=True, eq=False)
-class Sheet:
-    """Drawings to train on, and held-out views as they should look."""
-
-    train: Scene
-    test: Scene
-
-
-def draw_sheet(fault: Fault, seed: int) -> Sheet:
-    """Return the seed's body, drawn with a fault."""
+def draw_sheet(fault: Fault, seed: int) -> tuple[Scene, Scene]:
+    """Return the seed's body, drawn with a fault, and held-out views as they should look."""
     body = _body(seed)
     options = _options(fault.kind, SHEET.views)
     truth = _scene(body, replace(options, views=HELD_OUT), seed, fault.kind)
     bent = _with_room(replace(options, views=fault.views), fault.warp)
     drawn = fault.change(_scene(body, bent, seed, fault.kind), seed)
-    return Sheet(drawn, replace(truth, frames=truth.frames[::2] + truth.frames[1::4]))
+    return drawn, replace(truth, frames=truth.frames[::2] + truth.frames[1::4])
 
 
 def _body(seed: int) -> Mesh:
