@@ -99,7 +99,10 @@ def test_a_run_is_as_weak_as_its_worst_drawing() -> None:
     assert judged(views, done) == ""
     assert judged([], done) == ""
     said = judged([*views, view("odd", 1.1 * MOST_OFF)], done)
-    assert said.startswith("odd is not what its side looks like by a.png and b.png: off by 2.1 %")
+    assert said.startswith("odd is not what its side looks like by a.png and b.png: off by ")
+    assert (
+        f"off by {110 * MOST_OFF:.1f} % of the height, where up to {100 * MOST_OFF:.1f} %" in said
+    )
     assert "12 % of the figure differs, most at the upper left, in the dark red; " in said
     assert "toonset consistency" in said
 
