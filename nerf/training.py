@@ -153,11 +153,11 @@ def train(
         training = fit_field(scene, options, told.progress, onlooker)
         if training.stopped != INTERRUPTED:
             told.progress("laying the drawings over the field")
-            training = replace(training, result=_with_drawings(training, scene))
+            training = replace(training, result=with_drawings(training, scene))
     return Run(training.result, training, scene, test, onlooker.held_out, count)
 
 
-def _with_drawings(training: Training, scene: Scene) -> TrainedField:
+def with_drawings(training: Training, scene: Scene) -> TrainedField:
     """Return the field with what the drawn look is made of."""
     baked = Baked.of(training.result)
     drawn = [frame.rgba for frame in scene.frames]

@@ -49,9 +49,10 @@ KEYS = {
 RULES = {
     "calibration": "A view is fine within 5 degrees of the truth and has failed beyond 15; it is "
     "announced if its verdict is not ok.",
-    "training": "A training is fine if held-out views lose less than 1 dB against the same body's "
-    "clean scene, and has failed beyond 3 dB, twice the error's power; it is announced if train "
-    "refused or called the run weak. What it set right it says, too, but that is no alarm.",
+    "training": "A training is fine if its worst held-out view looks as if moved by less than "
+    "0.8 % of the height more than with the same body's clean scene (FLIP over that of a move by "
+    "a pixel), and has failed beyond 1.1 %; it is announced if train refused or called the run "
+    "weak. What it set right it says, too, but that is no alarm.",
     "palette": "A palette has failed that lacks one of the colours; it is announced if that colour "
     "is listed as left out, the number of colours is called a close call, or there is a warning.",
 }

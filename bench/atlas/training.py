@@ -1,4 +1,7 @@
-"""Trying a training: how near held-out views come, and what `toonset train` says of the run.
+"""Trying a training: how held-out views look, and what `toonset train` says of the run.
+
+What people are shown is looked at, the drawn look or the field's colours: FLIP of the worst view,
+as of a move by percent of the height (see `bench.verdict.measure`).
 
 It refuses, or calls the run weak; or it warns of the palette that it extracts; or it says what it
 did to drawings that disagreed: cameras turned, drawings moved, sized or bent back. That a repair
@@ -10,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -19,20 +22,24 @@ from jaxtyping import Bool, UInt8
 from bench.atlas.scenes import DrawnScene, draw_scene
 from bench.stability.page import Page
 from bench.stability.sheet import Step
+from bench.verdict.measure import by_pixel, needed_flip
 from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.images.picture import encode_png
+from toonset.dataset.silhouettes.mask import figure_px
 from toonset.errors import ToonsetError
 from toonset.nerf.kernels.threads import use_threads
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.consistency import consistency_of
+from toonset.nerf.render.layers import default_layer
+from toonset.nerf.render.views import render
 from toonset.nerf.run.report import figures_of, pictures_of
 from toonset.nerf.score.evaluation_picture import tile_of
-from toonset.nerf.score.metrics import psnr_of
-from toonset.nerf.score.verdict import WEAK, Picture, Verdict, verdict_of
+from toonset.nerf.score.verdict import WEAK, Verdict, verdict_of
 from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.result import Training
 from toonset.nerf.train.train import fit_field
+from toonset.nerf.training import with_drawings
 from toonset.palette.palette import Palette
 from toonset.view import over_white
 
@@ -63,7 +70,8 @@ class Tried:
 
     Attributes:
         seed: of the body.
-        figure: the larger the better: dB of the held-out views, or percent of what was to be found.
+        figure: the larger the better: minus the worst held-out view's look in % of the
+            height, or percent of what was to be found.
         voice: the loudest of what was said.
         words: what was said, most important first.
         evidence: further numbers that training writes into its report.
@@ -99,11 +107,13 @@ def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
         scene = draw()
         ready, palette = labelled(scene.train)
         training = fit_field(ready, TrainOptions(steps=STEPS, seed=seed))
-        views = pictures_of(training.result, scene.test)
-        fitted = pictures_of(training.result, training.prepared.scene)
-        verdict = verdict_of(training, fitted)
+        training = replace(training, result=with_drawings(training, ready))
+        field, layer = training.result, default_layer(training.result)
+        views = [render(field, frame.camera).picture(layer) for frame in scene.test.frames]
+        fitted = pictures_of(field, training.prepared.scene)
+        verdict = verdict_of(training, ready)
         voice, words = _said(training, verdict, palette)
-        evidence = _evidence(scene.train, training, fitted) | _shares(verdict)
+        evidence = _evidence(scene.train, training, fitted) | {"off": verdict.off}
     except ToonsetError as error:
         views, voice, words, evidence = [], REFUSED, str(error), {}
     except Exception as error:
@@ -111,21 +121,25 @@ def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
     if scene is None:
         return Tried(seed, 0.0, voice, words), b""
     views = views or [np.zeros_like(frame.rgba) for frame in scene.test.frames]  # nothing is shown
-    figures = [_psnr(scene, i, view) for i, view in enumerate(views)]
+    figures = [_look(scene, i, view) for i, view in enumerate(views)]
     worst = int(np.nanargmin(figures))
     picture = _side_by_side(scene.test.frames[worst], views[worst])
     seconds = time.perf_counter() - began
-    return Tried(seed, float(np.nanmean(figures)), voice, words, evidence, seconds), picture
+    return Tried(seed, float(np.nanmin(figures)), voice, words, evidence, seconds), picture
 
 
-def _psnr(scene: DrawnScene, index: int, view: UInt8[np.ndarray, "height width 4"]) -> float:
-    """Return a view's PSNR in dB; nan where no pixel counts."""
-    drawn = scene.test.frames[index].rgba
-    error = ((over_white(view) - over_white(drawn)) ** 2).mean(axis=-1)
-    counted: Bool[np.ndarray, "height width"] = np.ones(error.shape, dtype=bool)
+def _look(scene: DrawnScene, index: int, view: UInt8[np.ndarray, "height width 4"]) -> float:
+    """Return minus a view's look in percent of the height; nan where no pixel counts."""
+    frame, flip = scene.test.frames[index], needed_flip()
+    truth = over_white(frame.rgba)
+    counted: Bool[np.ndarray, "height width"] = np.ones(truth.shape[:2], dtype=bool)
     if scene.where is not None:
         counted = scene.where[index]
-    return psnr_of(float(error[counted].mean())) if counted.any() else math.nan
+    per_px = float(by_pixel(flip, truth)[counted].sum())
+    if not per_px:
+        return math.nan
+    error = float(flip(truth, over_white(view))[counted].sum())
+    return -100 * error / per_px / figure_px(frame)
 
 
 def _said(training: Training, verdict: Verdict, palette: Palette) -> tuple[str, str]:
@@ -146,13 +160,9 @@ def _said(training: Training, verdict: Verdict, palette: Palette) -> tuple[str, 
     return WEAK if verdict.verdict == WEAK else loud, words
 
 
-def _shares(verdict: Verdict) -> dict[str, float]:
-    """Return what the verdict rests on."""
-    off = verdict.off
-    return {"off": off.both, "off_outlines": off.outlines, "off_pictures": off.pictures}
-
-
-def _evidence(scene: Scene, training: Training, fitted: Sequence[Picture]) -> dict[str, float]:
+def _evidence(
+    scene: Scene, training: Training, fitted: Sequence[UInt8[np.ndarray, "height width 4"]]
+) -> dict[str, float]:
     """Return what the report holds besides, and what `toonset consistency` finds."""
     ready, ious = training.prepared, training.evidence.left_out_iou
     fit = figures_of(fitted, ready.scene)

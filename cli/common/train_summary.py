@@ -38,9 +38,11 @@ def _verdict(found: dict[str, Any], *, verbose: bool) -> str:
     if not verbose:
         return f"verdict: {found['verdict']}"
     off = found["off_height"]
-    parts = f"outlines {_percent(off['outlines'])}, pictures {_percent(off['pictures'])}"
-    bound = f"together up to {_percent(off['bound'])} is ok"
-    return f"verdict: {found['verdict']}; {parts} of the height apart from the drawings ({bound})"
+    worst = max(off["views"], key=off["views"].__getitem__, default=None)
+    if worst is None:
+        return f"verdict: {found['verdict']}; too few drawings to predict one from the others"
+    found_off = f"{worst} is off by {_percent(off['worst'])} of the height from what the others"
+    return f"verdict: {found['verdict']}; {found_off} make of it ({_percent(off['bound'])} is ok)"
 
 
 def _percent(share: float) -> str:

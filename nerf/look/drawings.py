@@ -121,6 +121,13 @@ class Drawings:
         own = min(view.camera.scale for view in self.views)
         return self if scale > COARSE * own else self.half.fitting(scale)
 
+    def without(self, number: int) -> Drawings:
+        """Return the others, without flows: what they make of the one left out predicts it."""
+        others = [i for i in range(len(self.views)) if i != number]
+        left = replace(self, views=tuple(self.views[i] for i in others), flows=())
+        left.__dict__["textures"] = tuple(self.textures[i] for i in others)  # not made again
+        return left
+
     def flow(self, i: int, j: int) -> tuple[PairFlow, float] | None:
         """Return the flow of two drawings and its sign; None where none was measured."""
         for found in self.flows:

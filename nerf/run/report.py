@@ -59,7 +59,7 @@ def write_run(
         **_course(training, held_out),
         "train": figures_of(shown, drawn),
         "test": None if test is None else compared(baked, test),
-        "verdict": verdict_of(training, shown).to_json(),
+        "verdict": verdict_of(training, scene, baked).to_json(),
     }
     write_bytes(folder / "preview.png", encode_png(preview(baked)))
     _write_files(folder, training, scene, metrics)

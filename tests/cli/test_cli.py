@@ -126,7 +126,7 @@ def test_calibrate_prints_one_json_object_and_nothing_else(calibrated):
 def test_train_prints_one_json_object_and_progress_apart(trained):
     run, done = trained
     assert done.code == 0
-    assert done.json["verdict"]["verdict"] == "weak"  # of few steps
+    assert done.json["verdict"]["verdict"] == "ok"  # the drawn look needs few steps
     assert done.json["run"] == str(run)
     assert done.json["steps"] == 20
     assert "palette, extracted" in done.err

@@ -21,7 +21,11 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
         "planes": None,
         "verdict": {
             "verdict": "weak",
-            "off_height": {"both": 0.0027, "bound": 0.0012, "outlines": 0.0012, "pictures": 0.0015},
+            "off_height": {
+                "worst": 0.027,
+                "bound": 0.019,
+                "views": {"a.png": 0.01, "b.png": 0.027},
+            },
         },
         "drawings": dict.fromkeys(("turning", "registration", "unbending", "ink")) | drawings,
     }
@@ -53,8 +57,8 @@ def test_the_verdict_is_there_with_what_it_rests_on() -> None:
     (line,) = (
         x for x in summary(Path("run"), metrics(), True).splitlines() if x.startswith("verdict")
     )
-    assert line.startswith("verdict: weak; outlines 0.12 %, pictures 0.15 % of the height apart")
-    assert "up to 0.12 % is ok" in line
+    assert line.startswith("verdict: weak; b.png is off by 2.70 % of the height")
+    assert "1.90 % is ok" in line
 
 
 def test_drawings_that_agree_are_fitted_as_they_are() -> None:

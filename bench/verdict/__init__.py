@@ -1,0 +1,1 @@
+"""What a run's verdict says beside how its new views look."""
