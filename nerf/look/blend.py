@@ -157,7 +157,9 @@ def drawn_view(
     box = _box(view.alpha > 0)
     if box is None:
         return result
-    part = _drawn(drawings.fitting(view.camera.scale), view.crop(*box))
+    finer = min(1.0, view.camera.scale / min(one.camera.scale for one in drawings.views))
+    border = 0.5 + finer * (BORDER - 0.5)  # what small views show of it is their own pixels
+    part = _drawn(drawings.fitting(view.camera.scale), view.crop(*box), border)
     if palette is not None and len(palette) == len(drawings.palette):
         part = _recolored(part, (palette - drawings.palette.astype(np.float32)) / 255)
     for name in ("rgb", "alpha", "ink", "labels"):
@@ -175,7 +177,7 @@ def _box(mask: Bool[np.ndarray, "height width"], room: int = 4) -> tuple[slice, 
     return sides[0], sides[1]
 
 
-def _drawn(drawings: Drawings, view: Geometry) -> DrawnView:
+def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     camera, pen = view.camera, drawings.pen
     points = camera.unproject(camera.pixel_grid(), crisp_depth(view.depth))
     figure_px = drawings.height * camera.scale
@@ -189,7 +191,7 @@ def _drawn(drawings: Drawings, view: Geometry) -> DrawnView:
     part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
     whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
     soft = view.alpha + part * (whole[..., 3] - view.alpha)
-    alpha, ink = crisp_outline(soft, BORDER + part * (0.5 - BORDER), line_px, figure_px)
+    alpha, ink = crisp_outline(soft, border + part * (0.5 - border), line_px, figure_px)
     solid = view.alpha > SOLID
     by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
     if solid.any():
