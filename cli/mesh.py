@@ -85,15 +85,13 @@ def mesh(
     sizes = {name: len(data) for name, data in files.items()}
     count = len(surface.faces)
     fewest = " (fewer would open it)" if faces is not None and count > faces else ""
-    painted = (
-        " a texture of {0} x {1} px, {2:.0%} of the faces in no drawing;".format(
-            *values["texture"], values["by_field"]
-        )
-        if texture
-        else ""
-    )
+    drawn = ""
+    if texture:
+        width, height = values["texture"]
+        unseen = f"{values['by_field']:.0%} of the faces in no drawing"
+        drawn = f" texture of {width} x {height} px, {unseen};"
     printer.result(
         {"out": out, "faces": count, "vertices": len(surface.vertices), "bytes": sizes, **values},
-        f"{out}: {count} faces{fewest};{painted} "
+        f"{out}: {count} faces{fewest};{drawn} "
         + ", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes.items()),
     )

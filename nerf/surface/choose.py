@@ -83,8 +83,8 @@ def merits(
             depth_map(vertices, faces, camera.resized(FINER)).astype(np.float32), SQUARE
         )
         (x, y), depth = _places(camera, points)
-        fine = [np.float32(FINER) * (at + np.float32(0.5)) - np.float32(0.5) for at in (x, y)]
-        limit = cv2.remap(deepest, *fine, cv2.INTER_NEAREST, borderValue=-np.inf)
+        across, down = (np.float32(FINER) * (at + 0.5) - np.float32(0.5) for at in (x, y))
+        limit = cv2.remap(deepest, across, down, cv2.INTER_NEAREST, borderValue=-np.inf)
         cover = cv2.remap(paint.texture.whole[..., 3], x, y, cv2.INTER_LINEAR)
         seen = (depth <= limit + BEHIND * height) & (cover > 0.5)
         ways = camera.rotation[2] + camera.k * (points[:, 0] - camera.target)

@@ -26,7 +26,7 @@ INK_LIKE = 40.0  # levels from the outline's colour, Euclidean
 ROUND = 3.0  # times the largest circle in it: a dark spot of so little area is no line
 BESIDE_PX = 1.5  # a pixel and those that touch it
 FEATHER_PX, LEAST_TRUST = 4.0, 0.1  # beside an edge a drawing shows what the next one may not
-SMALL = 4e-3  # of the figure's squared height: smaller patches are features, eyes and buttons
+SMALL = 0.012  # of the figure's squared height: smaller patches are features, eyes and buttons
 
 
 @dataclass(frozen=True, eq=False)

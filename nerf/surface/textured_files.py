@@ -1,9 +1,9 @@
 """A surface with a picture as GLB or OBJ, and the inverted hull that draws its outline.
 
 GLB   one unlit material with the picture. With an outline the surface is moved in by half the
-      line's width, and a second mesh lies as far outside of it, inside out, in the ink's
-      colour. Viewers that leave out back faces, as its material asks, show of it only what
-      sticks out behind the figure.
+      line's width, and a second mesh, without its small bumps, lies as far outside of it, inside
+      out, in the ink's colour. Viewers that leave out back faces, as its material asks, show of it
+      only what sticks out behind the figure.
 OBJ   the same without outline, with NAME.mtl and NAME.png beside it
 """
 
@@ -18,7 +18,7 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.errors import OutputError
-from toonset.nerf.surface.color import vertex_normals
+from toonset.nerf.surface.color import neighbour_mean, vertex_normals
 from toonset.nerf.surface.files import (
     NAME,
     Surface,
@@ -33,6 +33,8 @@ from toonset.palette.names import hex_of
 
 TEXTURED = (".glb", ".obj")
 OUTLINED = (".glb",)
+SMOOTHINGS = 5  # of the hull
+INWARDS, OUTWARDS = 0.5, -0.53
 
 
 @dataclass(frozen=True)
@@ -113,15 +115,34 @@ def encode_textured_glb(textured: TexturedSurface) -> bytes:
     texture = file.add_texture(encode_png(textured.picture), "drawn")
     drawn = _add_material(file, "drawn", baseColorTexture={"index": texture})
     half = 0.0 if textured.pen is None else textured.pen.width / 2
-    normals = vertex_normals(surface.vertices, surface.faces)
-    body = (surface.vertices - half * normals)[atlas.vertex]
+    body = _moved(surface.vertices, surface.faces, -half)[atlas.vertex]
     _add_mesh(file, NAME, drawn, body, atlas.faces, TEXCOORD_0=atlas.uv / atlas.size_wh)
     if textured.pen is not None:
         ink = linear_from_srgb(np.array(textured.pen.rgb) / 255).tolist()
         outline = _add_material(file, "outline", baseColorFactor=[*ink, 1.0])
-        hull = surface.vertices + half * normals
+        hull = _moved(_smooth(surface.vertices, surface.faces), surface.faces, half)
         _add_mesh(file, "outline", outline, hull, surface.faces[:, ::-1])
     return file.encode({"palette": [hex_of((r, g, b)) for r, g, b in surface.palette.tolist()]})
+
+
+def _moved(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"], outwards: float
+) -> Float[np.ndarray, "v 3"]:
+    return vertices + outwards * vertex_normals(vertices, faces)
+
+
+def _smooth(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"]
+) -> Float[np.ndarray, "v 3"]:
+    """Return vertices without bumps as small as faces, which would draw lines of their own.
+
+    Source: Taubin, "A signal processing approach to fair surface design", 1995.
+    """
+    mean = neighbour_mean(faces, len(vertices))
+    for _ in range(SMOOTHINGS):
+        for share in (INWARDS, OUTWARDS):
+            vertices = vertices + share * (mean @ vertices - vertices)
+    return vertices
 
 
 def _add_material(file: Gltf, name: str, **color: object) -> int:

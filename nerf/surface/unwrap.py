@@ -26,8 +26,8 @@ MOST_SIDE = 4096  # texels: what every graphics card takes
 FILLED = 0.7  # of a picture that charts cover, usually
 LEAST_PART = 0.01  # of the surface: a smaller group (an eye, a button) stays in the chart around it
 NO_XATLAS = (
-    "xatlas: is not installed, and --texture needs it; pip install xatlas (where it has no build for "
-    "the platform, that takes a C++ compiler), or leave --texture out"
+    "xatlas: is not installed, and --texture needs it; pip install xatlas (it takes a C++ compiler "
+    "where there is no build for the platform), or leave --texture out"
 )
 
 
