@@ -34,6 +34,7 @@ BEHIND = 0.01  # of the figure's height, that a face may lie behind what is seen
 FINER = 2.0  # pixels of the depth picture per pixel of the drawing
 FAR = 9.0  # of the rasteriser
 APART, SEAM, FEATURE = 12.0, 0.5, 12.0  # per pixel of a seam; colours in [0, 1]
+TALL = 270.0  # pixels of a figure, in costs
 UNIT = 64  # of costs, which are whole numbers: a graph's capacities
 NEVER = 1 << 24
 SWEEPS = 3
@@ -100,7 +101,7 @@ def chosen(
     faces: Int[np.ndarray, "f 3"],
     merit: Float[np.ndarray, "f drawings"],
     paints: Sequence[Paint],
-    px_per_unit: float,
+    height: float,
 ) -> Int[np.ndarray, " f"]:
     """Return the drawing of every face; the number behind the last one for the field.
 
@@ -109,8 +110,9 @@ def chosen(
         faces: of a closed surface.
         merit: see `merits`.
         paints: of the drawings.
-        px_per_unit: of the drawings.
+        height: of the figure, world units.
     """
+    px_per_unit = TALL / height
     area = areas(vertices[faces]) * px_per_unit**2
     unseen = ~(merit > 0).any(axis=1)
     own = np.where(merit > 0, np.rint(UNIT * area[:, None] * (1 - merit)), NEVER)

@@ -77,7 +77,7 @@ def painted(surface: Surface, drawings: Drawings, *, outline: bool = False) -> T
         seen = np.where(np.isfinite(depth), depth, np.nan)
         paints.append(paint_of(texture, seen, drawings, surface.palette))
     merit = merits(vertices, faces, paints, drawings.height)
-    source = chosen(vertices, faces, merit, paints, scale)
+    source = chosen(vertices, faces, merit, paints, drawings.height)
     atlas = unwrap(vertices, faces, parts_of(vertices, faces, surface.labels), FINE * scale)
     picture = _picture(surface, atlas, paints, source, merit > 0)
     pen = drawings.pen if outline else None

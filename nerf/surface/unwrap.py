@@ -22,7 +22,7 @@ from toonset.errors import SetupError
 from toonset.nerf.lines.nearest import distance_to, nearest
 
 GUTTER = 4  # texels round every chart
-MOST_SIDE = 4096  # texels: what every graphics card takes
+MOST_SIDE = 2048  # texels, about: half a GiB of memory while it is painted
 FILLED = 0.7  # of a picture that charts cover, usually
 LEAST_PART = 0.01  # of the surface: a smaller group (an eye, a button) stays in the chart around it
 NO_XATLAS = (
