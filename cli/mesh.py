@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -23,9 +23,16 @@ def mesh(
         typer.Option(
             "--faces",
             min=100,
-            help="Triangles at most, if they can close it (default: as fine as the run).",
+            help="Triangles at most, if they can close it (default: as fine as the run; "
+            "8000 with --texture).",
         ),
     ] = None,
+    texture: Annotated[
+        bool, typer.Option("--texture", help="Paint it as the drawings are: .glb, .obj.")
+    ] = False,
+    outline: Annotated[
+        bool, typer.Option("--outline", help="With --texture: the sheet's outline as a hull: .glb.")
+    ] = False,
     recolor: Annotated[
         list[str] | None,
         typer.Option("--recolor", help="OLD=NEW, e.g. '#aa0000=#00aa00'; repeatable."),
@@ -41,26 +48,50 @@ def mesh(
 
     It lies in the mannequin's frame: +Y up, the character faces +Z. An OBJ comes with a material
     and the palette as a picture, NAME.mtl and NAME.png.
+
+    With --texture the picture holds the drawn look: every patch is painted by the one drawing that
+    shows it best, without contour lines. --outline puts an inverted hull round it, in the sheet's
+    ink and as wide as its line.
     """
     printer = Printer(as_json, quiet)
+    if outline and not texture:
+        raise typer.BadParameter("--outline belongs to --texture")
     from toonset.nerf.kernels.threads import use_threads
     from toonset.nerf.render.recolor import recolored
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
+    from toonset.nerf.surface.texture import FACES, textured_surface_of
+    from toonset.nerf.surface.textured_files import check_textured_files, textured_files
 
-    check_mesh_files(out, force=force)
+    if texture:
+        check_textured_files(out, outline=outline, force=force)
+    else:
+        check_mesh_files(out, force=force)
     use_threads(threads)
     trained = recolored(read_field(run), recolor or [])
     printer.progress("finding the surface")
-    surface = surface_of(trained, faces)
-    files = mesh_files(surface, out)
+    values: dict[str, Any] = {}
+    if texture:
+        faces = faces or FACES
+        textured = textured_surface_of(trained, faces, outline=outline)
+        surface, files = textured.surface, textured_files(textured, out)
+        by_field = float((textured.source < 0).mean())
+        values = {"texture": list(textured.atlas.size_wh), "by_field": by_field}
+    else:
+        surface = surface_of(trained, faces)
+        files = mesh_files(surface, out)
     write_mesh_files(files, out)
     sizes = {name: len(data) for name, data in files.items()}
     count = len(surface.faces)
     fewest = " (fewer would open it)" if faces is not None and count > faces else ""
+    drawn = ""
+    if texture:
+        width, height = values["texture"]
+        unseen = f"{values['by_field']:.0%} of the faces in no drawing"
+        drawn = f" texture of {width} x {height} px, {unseen};"
     printer.result(
-        {"out": out, "faces": count, "vertices": len(surface.vertices), "bytes": sizes},
-        f"{out}: {count} faces{fewest}; "
+        {"out": out, "faces": count, "vertices": len(surface.vertices), "bytes": sizes, **values},
+        f"{out}: {count} faces{fewest};{drawn} "
         + ", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes.items()),
     )

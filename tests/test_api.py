@@ -11,6 +11,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -184,6 +185,11 @@ def test_evaluate_and_surface_give_what_the_commands_write(
     ts.surface_of(field, 500).save(tmp_path / "mine.glb")
     assert (tmp_path / "mine.glb").read_bytes() == (tmp_path / "body.glb").read_bytes()
 
+    line = ("mesh", run, "-o", tmp_path / "drawn.glb", "--faces", 500, "--texture")
+    assert toonset(*line).code == 0
+    ts.textured_surface_of(field, 500).save(tmp_path / "painted.glb")
+    assert (tmp_path / "painted.glb").read_bytes() == (tmp_path / "drawn.glb").read_bytes()
+
 
 @pytest.fixture
 def small_scene(bundle: Path) -> Path:
@@ -316,6 +322,10 @@ def test_arguments_that_contradict_each_other(drawn: Path, toonset: Any) -> None
         ts.Hints(lock=("hat",)).check()
 
 
+def without_pen(field: Any) -> Any:
+    return replace(field, drawings=replace(field.drawings, pen=None))
+
+
 A_NAME: Any = "sheet.png"  # of another type than is asked for
 NO_MEANING = [
     (lambda s, f: ts.split_sheet([]), "no sheet"),
@@ -329,6 +339,15 @@ NO_MEANING = [
     ),
     (lambda s, f: ts.turntable(f, 0), "0 views"),
     (lambda s, f: ts.surface_of(f, -5), "faces: -5; 100 or more"),
+    (lambda s, f: ts.textured_surface_of(f, -5), "faces: -5; 100 or more"),
+    (
+        lambda s, f: ts.textured_surface_of(replace(f, drawings=None)),
+        "holds no drawings to paint the mesh with; train again",
+    ),
+    (
+        lambda s, f: ts.textured_surface_of(without_pen(f), outline=True),
+        "no outline; leave --outline out",
+    ),
     (lambda s, f: ts.render(f, ts.turntable(f, 1)[0]).picture("ink"), "no contour lines"),
 ]
 NO_OPTIONS = [

@@ -48,7 +48,7 @@ def label_probabilities(
         color = _seen(trained, vertices[part], directions[part])
         parts.append(torch.softmax(trained.classifier(color), dim=1))
     chances = torch.cat(parts).double().numpy()
-    mean = _neighbour_mean(faces, len(vertices))
+    mean = neighbour_mean(faces, len(vertices))
     for _ in range(rounds):
         chances = mean @ chances
     return chances
@@ -96,7 +96,7 @@ def _seen(
     return straight((weights[..., None] * table[..., 1:]).sum(dim=1), weights.sum(dim=1))
 
 
-def _neighbour_mean(faces: Int[np.ndarray, "f 3"], count: int) -> sparse.csr_array:
+def neighbour_mean(faces: Int[np.ndarray, "f 3"], count: int) -> sparse.csr_array:
     """Return the matrix that averages every vertex with its neighbours."""
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     rows, columns = np.concatenate([ends, ends[:, ::-1]]).T

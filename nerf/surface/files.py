@@ -67,10 +67,10 @@ def mesh_files(surface: Surface, path: Path) -> dict[str, bytes]:
         return {path.name: encode_glb(surface)}
     if kind == ".ply":
         return {path.name: encode_ply(surface)}
-    material, texture = _companions(path)
+    material, texture = companions(path)
     return {
         path.name: _obj(surface, material),
-        material: _mtl(texture),
+        material: material_text("palette", texture),
         texture: encode_png(palette_texture(surface.palette)),
     }
 
@@ -87,7 +87,7 @@ def check_mesh_files(path: Path, *, force: bool) -> None:
         raise OutputError(f"{path}: is no mesh file's name; end -o in {', '.join(KINDS)}")
     if path.parent.is_file():
         raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
-    beside = _companions(path) if kind == ".obj" else ()
+    beside = companions(path) if kind == ".obj" else ()
     for file in (path, *(path.with_name(name) for name in beside)):
         if file.is_dir():
             raise OutputError(f"{file}: is a folder, a file is needed; choose another -o")
@@ -162,7 +162,12 @@ def split_by_label(
     return surface.vertices[unique // 256], unique % 256, index.reshape(-1, 3)
 
 
-def _companions(path: Path) -> tuple[str, str]:
+def material_text(name: str, texture: str) -> bytes:
+    """Return the MTL file of one unlit material with a picture."""
+    return f"# toonset\nnewmtl {name}\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd {texture}\n".encode()
+
+
+def companions(path: Path) -> tuple[str, str]:
     """Return the names of an OBJ's material and texture; OBJ ends a name at a space."""
     word = "_".join(path.stem.split())
     return f"{word}.mtl", f"{word}.png"
@@ -177,10 +182,6 @@ def _obj(surface: Surface, material: str) -> bytes:
     corners = np.column_stack([surface.faces, surface.labels]) + 1
     lines += [f"f {a}/{t} {b}/{t} {c}/{t}" for a, b, c, t in corners.tolist()]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _mtl(texture: str) -> bytes:
-    return f"# toonset\nnewmtl palette\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd {texture}\n".encode()
 
 
 def _uv(labels: Int[np.ndarray, " n"], colors: int) -> Float[np.ndarray, "n 2"]:

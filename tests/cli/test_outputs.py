@@ -19,6 +19,20 @@ def test_mesh_and_planes_of_a_run(toonset: Callable[..., Any], run: Path, tmp_pa
     assert "exists already" in toonset("mesh", run, "-o", out).reason
     assert "end -o in .glb, .obj, .ply" in toonset("mesh", run, "-o", tmp_path / "a.stl").reason
 
+    drawn = tmp_path / "drawn.obj"
+    done = toonset("mesh", run, "-o", drawn, "--faces", 800, "--texture", "--json")
+    assert done.code == 0, done
+    assert done.json["faces"] == len(load_mesh(drawn).faces) <= 800
+    assert set(done.json["bytes"]) == {"drawn.obj", "drawn.mtl", "drawn.png"}
+    assert 0 <= done.json["by_field"] < 0.5
+    for arguments, reason in (
+        (("a.ply", "--texture"), "holds no texture; end -o in .glb, .obj"),
+        (("a.obj", "--texture", "--outline"), "end -o in .glb for --outline"),
+        (("a.glb", "--outline"), "--outline belongs to --texture"),
+    ):
+        assert reason in toonset("mesh", run, "-o", tmp_path / arguments[0], *arguments[1:]).reason
+    assert not list(tmp_path.glob("a.*"))
+
     folder = tmp_path / "planes"
     assert toonset("planes", run, "-o", folder).code == 0
     about = json.loads((folder / "planes.json").read_text())
