@@ -97,6 +97,12 @@ PLOTS: dict[str, Plot] = {
     ),
     "train": TRAINING,
     "paper": TRAINING,
+    "look": Plot(
+        ("FLIP",),
+        *(CPU_SECONDS, "CPU seconds of training, laying out and 16 views", "CPU s"),
+        *("", "characters"),
+        mean=True,
+    ),
     "palette": Plot(
         (COLORS_FOUND,),
         *(CPU_SECONDS, "CPU seconds per sheet", "CPU s"),

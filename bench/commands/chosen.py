@@ -16,6 +16,7 @@ class Subject(StrEnum):
 
     calib = "calib"
     train = "train"
+    look = "look"
     paper = "paper"
     stability = "stability"
     splitting = "split"  # a string has a method `split`

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import UInt8
 
+from toonset.nerf.score.metrics import MOST_SHIFT_PX
 from toonset.palette.pixels.labels import UNLABELLED
+
+Labels = UInt8[np.ndarray, "height width"]
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,7 @@ class LabelScore:
     pixels: int
 
 
-def score_labels(
-    rendered: UInt8[np.ndarray, "height width"], true: UInt8[np.ndarray, "height width"]
-) -> LabelScore | None:
+def score_labels(rendered: Labels, true: Labels) -> LabelScore | None:
     """Return the score over pixels that are labelled in both; None where there is none.
 
     In the truth these are the pixels that are no blends, in the rendering those of the figure.
@@ -42,3 +43,18 @@ def score_labels(
     present = sizes > 0
     miou = float((hits[present] / union[present]).mean())
     return LabelScore(float((found == wanted).mean()), miou, len(wanted))
+
+
+def shifted_miou(rendered: Labels, true: Labels) -> float | None:
+    """Return the best mIoU over all shifts of the rendering by up to 2 whole pixels a side.
+
+    One shift for the whole picture, as of `shifted_psnr`; None where no shift has a pixel that is
+    labelled in both.
+    """
+    m, (height, width) = MOST_SHIFT_PX, true.shape
+    padded = np.pad(rendered, m, constant_values=UNLABELLED)
+    shifts = (
+        padded[y : y + height, x : x + width] for y in range(2 * m + 1) for x in range(2 * m + 1)
+    )
+    scores = [score.miou for score in (score_labels(each, true) for each in shifts) if score]
+    return max(scores, default=None)
