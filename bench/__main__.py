@@ -74,6 +74,16 @@ def bench(
         Baseline | None,
         typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
     ] = None,
+    peer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--peer",
+            metavar="NAME=COMMAND",
+            help="Train: run another program, too, its CPU seconds counted from outside as "
+            "toonset's own beside it; {data}: folder with transforms.json and pictures, {test}: "
+            "held-out cameras, {out}: where to write their pictures. May be given several times.",
+        ),
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer settings or cases.")] = False,
     against_committed: Annotated[
         bool,
@@ -107,14 +117,15 @@ def bench(
 
     printer = Printer(as_json, quiet)
     if against_committed or renew:
-        others = (subject, cases, sprites, only, count, half, baseline, quick, force)
+        others = (subject, cases, sprites, only, count, half, baseline, quick, force, peer)
         if any(others) or (against_committed and renew):
             raise typer.BadParameter("--check and --renew stand alone, without a subject")
         check(seed, printer, renew=renew)
         return
     if subject is None:
         raise typer.BadParameter(f"say what to measure: {', '.join(Subject)}; or --check")
-    chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed)
+    peers = tuple(peer or ())
+    chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed, peers)
     chosen.check()
     if subject in (Subject.stability, Subject.train, Subject.paper):
         with resumable(printer):

@@ -128,7 +128,9 @@ def eye_look(eyes: Sequence[Eye], truth: Scene) -> EyeLook | None:
         clear = np.argsort([-np.linalg.norm(own - around) for own, around in pairs])
         best = clear[: -(-len(front) // 2)]  # elsewhere it is hidden, or seen from its side
         pair = np.median([pairs[i] for i in best], axis=0)
-        sizes = [_in_reach(_eye_mask(front[i].rgba, pair), front[i].camera, eye).sum() for i in best]
+        sizes = [
+            _in_reach(_eye_mask(front[i].rgba, pair), front[i].camera, eye).sum() for i in best
+        ]
         px = [eye.radius * front[i].camera.scale for i in best]
         colors.append(pair)
         areas.append(float(np.median(np.array(sizes) / np.square(px))))
