@@ -46,15 +46,17 @@ def score_labels(rendered: Labels, true: Labels) -> LabelScore | None:
 
 
 def shifted_miou(rendered: Labels, true: Labels) -> float | None:
-    """Return the best mIoU over all shifts of the rendering by up to 2 whole pixels a side.
+    """Return the mIoU after that shift by up to 2 whole pixels a side that sets most labels right.
 
-    One shift for the whole picture, as of `shifted_psnr`; None where no shift has a pixel that is
-    labelled in both.
+    One shift for the whole picture, as of `shifted_psnr`; None where no pixel is labelled in both.
     """
     m, (height, width) = MOST_SHIFT_PX, true.shape
     padded = np.pad(rendered, m, constant_values=UNLABELLED)
-    shifts = (
-        padded[y : y + height, x : x + width] for y in range(2 * m + 1) for x in range(2 * m + 1)
-    )
-    scores = [score.miou for score in (score_labels(each, true) for each in shifts) if score]
-    return max(scores, default=None)
+    scores = [
+        score_labels(padded[y : y + height, x : x + width], true)
+        for y in range(2 * m + 1)
+        for x in range(2 * m + 1)
+    ]
+    known = [score for score in scores if score is not None]
+    best = max(known, key=lambda score: (score.accuracy * score.pixels, score.miou), default=None)
+    return None if best is None else best.miou
