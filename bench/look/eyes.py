@@ -33,7 +33,7 @@ CORE, RING = 0.75, (1.5, 2.2)  # of the radius: where an eye's colour is measure
 NEAR = 0.35  # of the distance of both colours: as near to an eye's is the eye's
 REACH = 1.4  # of the radius: as far as an eye reaches
 OFF = 0.02  # of the figure's height: hands are off by so much
-WHOLE, SLIVER = 0.5, 0.15  # of an eye's area at the front: it counts; it is as good as hidden
+WHOLE, SLIVER = 0.5, 0.15  # of its area at the front, an eye counts; less of it is none
 CLOSED = 0.6  # of a patch lies within reach, or the eye runs into what is dark beside it
 ALIKE = (0.5, 2.0)  # area over the truth's
 ONE = 0.75  # of an eye is its largest patch
@@ -154,10 +154,10 @@ def check_eyes(look: EyeLook, truth: Frame, rendered: Picture) -> EyeCheck:
         known |= blobs
         seen |= _opened(found, THIN * radius)
         least = min(least, area * radius**2)
-        if not _is_whole(blobs, _in_reach(blobs, camera, eye), area * radius**2):
+        patch, whole = _in_reach(own, camera, eye), _in_reach(blobs, camera, eye)
+        if not (_is_whole(blobs, whole, area * radius**2) and _is_one(patch)):
             continue
         expected += 1
-        patch = _in_reach(own, camera, eye)
         window = _best_window(patch, found, camera, eye, off)
         known |= window
         fault = _fault(patch, found & window)
@@ -173,8 +173,13 @@ def _fault(wanted: Mask, found: Mask) -> str:
         return "small" if ratio > SLIVER else "missing"
     if ratio > ALIKE[1]:
         return "large"
-    _, _, about, _ = cv2.connectedComponentsWithStats(found.astype(np.uint8), connectivity=8)
-    return "" if about[1:, cv2.CC_STAT_AREA].max() >= ONE * found.sum() else "split"
+    return "" if _is_one(found) else "split"
+
+
+def _is_one(mask: Mask) -> bool:
+    """Return whether nearly all of a mask is one patch."""
+    _, _, about, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    return bool(about[1:, cv2.CC_STAT_AREA].max(initial=0) >= max(ONE * mask.sum(), 1))
 
 
 def _is_whole(own: Mask, patch: Mask, full: float) -> bool:
