@@ -1,4 +1,8 @@
-"""How well a rendering's dark lines lie on the drawing's: F1, 2 px of a figure of 260 tolerated."""
+"""How well a rendering's ink lies on the drawing's: F1 of dark pixels, some pixels off tolerated.
+
+Hair and boots as dark as ink count, too: where they end is a line to the eye. But only drawings
+with dark lines round their figures are asked.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +14,12 @@ from toonset.dataset.silhouettes.mask import mask_of
 from toonset.view import over_white
 
 TOLERANCE_PX, OF_PX = 2.0, 260.0  # that a line may be off; of a figure so tall
-LEAST_TOLERANCE_PX = 1.0  # of small figures: next to a line is on it
-DARK = 110 / 255  # luma of ink, over white
-CONTRAST = 64 / 255  # luma that ink is below what lies on both sides
+INK = 0.2  # luma over white below which a pixel is dark
+SEEN = 0.3  # opacity from which a pixel shows
+DARK = 110 / 255  # luma of a line
+CONTRAST = 0.2  # luma that a line is below what lies on both sides
 WIDEST, LEAST_WIDE_PX = 0.04, 6  # a line's widest, of the figure's height
-# share of the rim beside a line: 0.4 and more in drawings with lines of 1 px, else 0.27 at most
+# share of the rim beside a line: 0.4 and more in drawings with lines, else 0.27 at most
 OUTLINED = 1 / 3
 LUMA = np.array([0.299, 0.587, 0.114])
 
@@ -22,13 +27,13 @@ LUMA = np.array([0.299, 0.587, 0.114])
 def line_f1(
     rendered: UInt8[np.ndarray, "height width 4"], drawn: UInt8[np.ndarray, "height width 4"]
 ) -> float | None:
-    """Return the harmonic mean of precision and recall of the line pixels.
+    """Return the harmonic mean of precision and recall of the dark pixels.
 
     What is off by no more than `tolerance_px` is right. None where the drawing has no dark outline:
-    what is dark and thin there is no line, or the figure is as dark as its lines.
+    what is dark there is no line, or the figure is as dark as its lines.
     """
-    wanted, found = line_pixels(drawn), line_pixels(rendered)
-    if not _is_outlined(drawn, wanted):
+    wanted, found = _dark(drawn), _dark(rendered)
+    if not wanted.any() or not _is_outlined(drawn, line_pixels(drawn)):
         return None
     if not found.any():
         return 0.0
@@ -38,9 +43,9 @@ def line_f1(
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
-def tolerance_px(drawn: UInt8[np.ndarray, "height width 4"]) -> float:
-    """Return how far a line may be off: 2 px of a figure of 260 px, 1 px at least."""
-    return max(LEAST_TOLERANCE_PX, TOLERANCE_PX * _height(drawn) / OF_PX)
+def tolerance_px(drawn: UInt8[np.ndarray, "height width 4"]) -> int:
+    """Return how far ink may be off: 2 px of a figure of 260 px, whole pixels, at least 1."""
+    return max(1, round(TOLERANCE_PX * _height(drawn) / OF_PX))
 
 
 def line_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
@@ -54,6 +59,11 @@ def line_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "
     depth = cv2.morphologyEx(luma, cv2.MORPH_CLOSE, disc) - luma
     lines: Bool[np.ndarray, "height width"] = (depth >= CONTRAST) & (luma < DARK)
     return lines[reach:-reach, reach:-reach]
+
+
+def _dark(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
+    dark: Bool[np.ndarray, "height width"] = over_white(rgba) @ LUMA < INK
+    return dark & (rgba[..., 3] > SEEN * 255)
 
 
 def _height(rgba: UInt8[np.ndarray, "height width 4"]) -> int:
