@@ -217,54 +217,53 @@ COLUMNS = (
     Column(FLICKER, "flicker", "1", "lower", "flicker", "{:.2f}"),
     Column(VIEW_S, "seconds per view, CPU", "s", "lower", "s a view"),
 )
+COST = Column("", CPU_SECONDS, "s", "lower", "")
+RIGHT_EYES = Column("", "views with the right eyes", "1", "higher", "")
 
 
 def records_of(results: Sequence[LookResult], seed: int) -> list[Record]:
     """Return the records of all groups and looks."""
     records = []
     for (group, name), found in _grouped(results):
-        for column in COLUMNS:
-            by_case = {
-                one.case.name: value
-                for one in found
-                if (value := one.figures[column.name]) is not None
-            }
-            records += _record(
-                by_case, column.metric, column.unit, column.direction, group, name, seed
-            )
-        spent = {one.case.name: one.cpu_seconds for one in found}
-        records += _record(spent, CPU_SECONDS, "s", "lower", group, name, seed)
-        kept = {
-            one.case.name: (one.figures[EYES] or 0.0) / seeing
-            for one in found
-            if (seeing := one.figures[SEEING])
-        }
-        records += _record(kept, "views with the right eyes", "1", "higher", group, name, seed)
+        columns: list[tuple[Column, Callable[[LookResult], float | None]]] = [
+            *((column, partial(_figure, column.name)) for column in COLUMNS),
+            (COST, lambda one: one.cpu_seconds),
+            (RIGHT_EYES, _right_eyes),
+        ]
+        for column, value in columns:
+            figures = {one.case.name: value(one) for one in found}
+            by_case = {case: figure for case, figure in figures.items() if figure is not None}
+            if by_case:
+                records.append(
+                    summarise(
+                        list(by_case.values()),
+                        method=name,
+                        metric=column.metric,
+                        unit=column.unit,
+                        direction=column.direction,
+                        seed=seed,
+                        group=group,
+                        by_case=by_case,
+                    )
+                )
     return records
 
 
-def _record(
-    by_case: dict[str, float],
-    metric: str,
-    unit: str,
-    direction: Direction,
-    group: str,
-    method: str,
-    seed: int,
-) -> list[Record]:
-    if not by_case:
-        return []
-    about = {"method": method, "metric": metric, "unit": unit, "direction": direction}
-    values = list(by_case.values())
-    return [summarise(values, **about, seed=seed, group=group, by_case=by_case)]  # type: ignore[arg-type]
+def _figure(name: str, one: LookResult) -> float | None:
+    return one.figures[name]
+
+
+def _right_eyes(one: LookResult) -> float | None:
+    seeing = one.figures[SEEING]
+    return (one.figures[EYES] or 0.0) / seeing if seeing else None
 
 
 def table_of(results: Sequence[LookResult]) -> str:
     """Return means over the cases, medians of seconds and counts of eyes, a text per group."""
     lines: list[str] = []
     for group, listed in groupby(_grouped(results), key=lambda entry: entry[0][0]):
-        head = ("look", "n", "CPU s", *(column.heading for column in COLUMNS), "eyes")
-        rows = [head]
+        headings = [column.heading for column in COLUMNS]
+        rows: list[tuple[str, ...]] = [("look", "n", "CPU s", *headings, "eyes")]
         for (_, name), found in listed:
             spent = f"{np.median([one.cpu_seconds for one in found]):.1f}"
             cells = [_cell(column, found) for column in COLUMNS]
