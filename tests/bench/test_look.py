@@ -17,16 +17,18 @@ from bench.atlas.run import TriedStepResult
 from bench.cases.bodies import random_body
 from bench.charts.chart import DEFAULT
 from bench.charts.points import charts_of
-from bench.look import cases as look_cases_module
 from bench.look.cases import DRAWN, LookCase, drawn_case, look_cases
 from bench.look.eyes import Eye, check_eyes, eye_look, eyes_of_body, read_eyes
 from bench.look.measure import LookResult, bench_look, eyes_text, records_of, table_of
 from bench.look.picture import draw_looks, face_sheet, look_sheet
 from bench.look.plan import FIELD, LOOKS, Recipe, Variant
 from bench.stability.bodies import with_eyes
+from bench.train.peers import write_scene
 from tests.nerf.look.painted import drawings
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.load import save_obj
 from toonset.errors import BundleError
 from toonset.nerf.options import TrainOptions
 
@@ -119,14 +121,30 @@ def test_a_folder_without_cases_and_a_name_that_fits_none(tmp_path: Path, bench)
     assert "no case's name contains 'nobody'" in bench("look", "--only", "nobody").reason
 
 
-def test_sheets_come_with_found_cameras_too() -> None:
+def test_a_case_folder_comes_with_its_own_and_with_found_cameras(tmp_path: Path) -> None:
     case, made = drawn_case(3, replace(DRAWN, cell_px=100, views=4, outline_px=1))
-    assert len(case.test.frames) == 8
-    assert len(case.eyes) == 2
-    found = look_cases_module._calibrated(made.views, made.mesh)
-    pairs = zip(found.frames, case.train.frames, strict=True)
+    folder = tmp_path / "figure-drawn"
+    write_scene(folder / "views", case.train)
+    write_scene(folder / "test", case.test)
+    (folder / "sheet.png").write_bytes(encode_png(made.sheet))
+    (folder / "mannequin.obj").write_bytes(save_obj(made.mesh))
+    places = [{"center": eye.center.tolist(), "radius": eye.radius} for eye in case.eyes]
+    (folder / "eyes.json").write_text(json.dumps({"eyes": places}))
+    (true,) = look_cases(tmp_path, 0, 1, quick=True)
+    own, found = look_cases(tmp_path, 0, 1, "figure")
+    assert (own.name, own.group) == (true.name, true.group) == ("figure", "drawn")
+    assert (found.name, found.group) == ("figure", "drawn, calibrated")
+    assert own.turn is None
+    assert len(own.eyes) == 2
+    assert [f.rgba.tobytes() for f in own.train.frames] == [
+        f.rgba.tobytes() for f in case.train.frames
+    ]
+    pairs = zip(found.train.frames, own.train.frames, strict=True)
     off = [np.abs(a.camera.rotation - b.camera.rotation).max() for a, b in pairs]
     assert 0 < np.median(off) < 0.2
+    (folder / "sheet.png").unlink()
+    with pytest.raises(BundleError, match=r"holds no sheet\.png"):
+        list(look_cases(tmp_path, 0, 1, "calibrated"))
 
 
 @pytest.fixture(scope="module")
@@ -137,8 +155,7 @@ def short() -> Iterator[list[LookResult]]:
     for name, look in known.items():
         options = replace(quick, ink=look.recipe.options.ink)
         LOOKS[name] = replace(look, recipe=Recipe(options, look.recipe.paint))
-    options = replace(DRAWN, cell_px=80, outline_px=1.2, views=6)
-    case, _ = drawn_case(0, options)
+    case, _ = drawn_case(0, replace(DRAWN, cell_px=80, outline_px=1.2, views=6))
     turn = replace(case.test, frames=case.test.frames[:3])
     case = replace(case, turn=turn, test=replace(case.test, frames=case.test.frames[:3]))
     yield bench_look([case], 5)
