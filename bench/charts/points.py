@@ -154,7 +154,7 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
         points=tuple(p for p in points if p.method not in same),
         same=same,
         merit=first.metric,
-        unit=first.unit,
+        unit=first.unit if first.unit != "1" else "",
         cost=plot.cost_name,
         cost_unit=plot.cost_unit,
         statistic="mean" if plot.mean else "median",

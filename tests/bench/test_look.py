@@ -193,6 +193,7 @@ def test_looks_are_records_a_table_a_chart_and_pictures(short: list[LookResult])
     assert f"body 0, drawn, default: {seeing - 1}" in eyes_text(_one_wrong(short))
     (chart,) = charts_of("look", records, "seed 5")
     assert chart.lower_is_better
+    assert chart.headline.startswith(f"default: FLIP {short[0].figures['flip']:#.3g} in ")
     assert {point.method for point in chart.points} == set(LOOKS)
     svg = draw_looks(short, "seed 5", "svg").decode()
     assert all(name in svg for name in LOOKS if name != DEFAULT)
