@@ -13,7 +13,7 @@ import numpy as np
 from bench.charts.chart import DEFAULT
 from bench.look.cases import LookCase
 from bench.look.eyes import EyeCheck, check_eyes, eye_look
-from bench.look.plan import LOOKS, Look, Recipe, Variant
+from bench.look.plan import FIELD, LOOKS, Look, Recipe, Variant
 from bench.records.record import CPU_SECONDS, Direction, Record, aligned, summarise
 from toonset.camera import Camera
 from toonset.cli.common.host import keep_freed_memory
@@ -277,7 +277,7 @@ def eyes_text(results: Sequence[LookResult]) -> str:
     lines = []
     for one in results:
         seeing = [check for check in one.checks if check.expected]
-        if seeing and one.look in (DEFAULT, "field only"):
+        if seeing and one.look in (DEFAULT, FIELD):
             names = (frame.name for frame in one.case.test.frames)
             wrong = [
                 f"{name} {'+'.join(check.faults)}"
@@ -285,9 +285,8 @@ def eyes_text(results: Sequence[LookResult]) -> str:
                 if check.faults
             ]
             kept = f"{len(seeing) - len(wrong)} of {len(seeing)}"
-            lines.append(
-                f"{one.case.name}, {one.case.group}, {one.look}: {kept}; {', '.join(wrong)}"
-            )
+            words = f"; {', '.join(wrong)}" if wrong else ""
+            lines.append(f"{one.case.name}, {one.case.group}, {one.look}: {kept}{words}")
     return "\n".join(["eyes", *lines]) if lines else ""
 
 
