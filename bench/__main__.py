@@ -17,7 +17,7 @@ from bench.commands.charts import REPORT, result_files
 from bench.commands.charts import WRITTEN as RESULTS
 from bench.commands.check import check
 from bench.commands.chosen import Baseline, Chosen, Subject
-from bench.commands.measure import WRONG_SPLITS, measure
+from bench.commands.measure import FACES, LOOK_VIEWS, LOOKS, WRONG_SPLITS, measure
 from toonset.cli.common.help import Verb
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
@@ -30,7 +30,8 @@ from toonset.cli.common.output import (
 from toonset.cli.main import run
 from toonset.write import check_output
 
-WRITTEN = (*RESULTS, WRONG_SPLITS)
+LOOK = (f"{LOOKS}.png", f"{LOOKS}.svg", f"{LOOK_VIEWS}-*.png", f"{FACES}-*.png")
+WRITTEN = (*RESULTS, WRONG_SPLITS, *LOOK)
 
 app = typer.Typer(
     pretty_exceptions_enable=False,
@@ -73,6 +74,16 @@ def bench(
         Baseline | None,
         typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
     ] = None,
+    peer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--peer",
+            metavar="NAME=COMMAND",
+            help="Train: run another program, too, its CPU seconds counted from outside as "
+            "toonset's own beside it; {data}: folder with transforms.json and pictures, {test}: "
+            "held-out cameras, {out}: where to write their pictures. May be given several times.",
+        ),
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer settings or cases.")] = False,
     against_committed: Annotated[
         bool,
@@ -91,10 +102,12 @@ def bench(
 ) -> None:
     """Measure one stage: seconds against accuracy, per setting, beside a baseline.
 
-    Prints a table and writes records.json, report.html and, for `calib`, `train` and `palette`, a
-    chart of seconds against accuracy per condition (PNG, SVG, CSV). `split` draws the wrongly
-    split sheets. `stability` sweeps what a sheet may have wrong, to where it fails; `train` draws
-    held-out PSNR against seconds; `paper` makes the plain method's table and figure, for hours, and
+    Prints a table and writes records.json, report.html and, for `calib`, `train`, `look` and
+    `palette`, a chart of seconds against accuracy per condition (PNG, SVG, CSV). `split` draws the
+    wrongly split sheets. `look` says how new views of drawn sheets look, leaving out every part of
+    the drawn look in turn, and counts whole eyes. `stability` sweeps what a sheet may have wrong,
+    to where it fails; `train` draws held-out PSNR against seconds; `paper` makes the plain method's
+    table and figure, for hours, and
     says whether palettes help it. Of these three, the same command again continues a stopped run,
     or draws all that is there.
     `--check` runs a quick bench of every stage and ends with 3 where one has got worse.
@@ -104,14 +117,15 @@ def bench(
 
     printer = Printer(as_json, quiet)
     if against_committed or renew:
-        others = (subject, cases, sprites, only, count, half, baseline, quick, force)
+        others = (subject, cases, sprites, only, count, half, baseline, quick, force, peer)
         if any(others) or (against_committed and renew):
             raise typer.BadParameter("--check and --renew stand alone, without a subject")
         check(seed, printer, renew=renew)
         return
     if subject is None:
         raise typer.BadParameter(f"say what to measure: {', '.join(Subject)}; or --check")
-    chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed)
+    peers = tuple(peer or ())
+    chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed, peers)
     chosen.check()
     if subject in (Subject.stability, Subject.train, Subject.paper):
         with resumable(printer):
@@ -122,7 +136,7 @@ def bench(
         return
     check_output(out, [cases, sprites], WRITTEN, force=force)
     measured = measure(chosen, printer)
-    files = result_files(subject.value, measured.records, f"seed {seed}")
+    files = result_files(subject.value, measured.records, f"seed {seed}", measured.shown)
     with new_folder(out, force=force) as folder:
         for name, content in (files | measured.pictures).items():
             write_bytes(folder / name, content)

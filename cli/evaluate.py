@@ -29,6 +29,7 @@ COLUMNS = {  # of the table: heading, number format
     "silhouette_iou": ("outline", "{:.1%}"),
     "label_accuracy": ("labels", "{:.1%}"),
     "label_miou": ("mIoU", "{:.1%}"),
+    "label_miou_shift": ("mIoU+-2", "{:.1%}"),
     "ink_f1": ("lines", "{:.2f}"),
 }
 
@@ -62,10 +63,11 @@ def evaluate(
     Everything over white; "in mask" counts the pixels that the drawing covers. "+-2 px" is the best
     PSNR over shifts of the whole picture by up to 2 px, "blocks" the same with a shift for every
     block of 16 px, "sharp" the mean gradient over the truth's, "dirt" the gradient where the truth
-    is flat (levels per px), "outline" the overlap of the silhouettes,
-    "labels" the share of unmixed pixels with the right palette colour, "lines" the F1 of dark lines
-    within 2 px. "-": the run or the picture has no such thing, or a package is missing; the JSON
-    says why.
+    is flat (levels per px), "outline" the overlap of the silhouettes, "labels" the share of unmixed
+    pixels with the right palette colour, "mIoU" the same as mean intersection over union, "mIoU+-2"
+    with the best shift of the whole picture, "lines" the F1 of dark lines that may be off by 2 px
+    of a figure of 260. "-": the run or the picture has no such thing, or a package is missing; the
+    JSON says why.
     """
     from toonset.dataset.bundle.read_scene import read_scene
     from toonset.nerf.run.folder import read_field

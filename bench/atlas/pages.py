@@ -1,8 +1,9 @@
-"""The pages of the atlas beside calibration's: what training and the palette can stand."""
+"""The pages of the atlas beside calibration's: what training, look and palette can stand."""
 
 from __future__ import annotations
 
-from bench.atlas import scenes
+from bench.atlas import look, scenes
+from bench.atlas.look import LookPage
 from bench.atlas.palette import PalettePage, near_equal, tiny_feature
 from bench.atlas.training import TrainPage
 from bench.stability.draws import HARD, LOSSLESS
@@ -162,5 +163,43 @@ TRAIN_PAGES = (
         "Small drawings; the held-out views stay at 80 px.",
         80,
         scenes.sized,
+    ),
+)
+LOOK_PAGES = (
+    LookPage(
+        "look warp",
+        "drawing error, % of the picture",
+        (0, 0.5, 1, 1.5, 2),
+        (0, 1, 2),
+        "Drawing error: every view smoothly bent; careful hands are within 0.5 to 1.5 %.",
+        1,
+        look.warped,
+    ),
+    LookPage(
+        "look line",
+        "line width, px of 150",
+        (0, 0.5, 1.25, 2, 3),
+        (0, 1.25, 3),
+        "From no contour lines to thick ones; the held-out views have them, too.",
+        1.25,
+        look.outlined,
+    ),
+    LookPage(
+        "look views",
+        "views",
+        (12, 8, 6, 5, 4, 3),
+        (8, 4, 3),
+        "Fewer drawings, evenly round the character.",
+        8,
+        look.numbered,
+    ),
+    LookPage(
+        "look yaw",
+        "cameras' error in yaw, ± degrees",
+        (0, 2, 5, 10, 15),
+        (0, 5, 15),
+        "Cameras turned wrongly, each with a sigma as large as its error.",
+        0,
+        look.misturned,
     ),
 )

@@ -44,6 +44,8 @@ KEYS = {
     "as it was found in vermilion.",
     "training": "Pictures: the worst held-out view of a step: as it should be, as it was rendered, "
     "and where these differ.",
+    "look": "Pictures: the held-out view of a step where the drawn layer is worst beside the "
+    "field: as it should be, from the drawings, from the field.",
     "palette": "Pictures: a drawing, the colours that were to be found, the palette that was.",
 }
 RULES = {
@@ -53,6 +55,8 @@ RULES = {
     "0.8 % of the height more than with the same body's clean scene (FLIP over that of a move by "
     "a pixel), and has failed beyond 1.1 %; it is announced if train refused or called the run "
     "weak. What it set right it says, too, but that is no alarm.",
+    "look": "The drawn layer has failed where its FLIP over all held-out views is above the "
+    "field's, and is fine where it is at least 5 % below; it gives no verdict of itself.",
     "palette": "A palette has failed that lacks one of the colours; it is announced if that colour "
     "is listed as left out, the number of colours is called a close call, or there is a warning.",
 }

@@ -2,7 +2,8 @@
 
 A calibrated view is fine within 5 degrees of the truth and has failed beyond 15. A training has
 failed where the worst held-out view looks as if moved by 1.1 % of the height more than that of the
-same body's clean scene; below 0.8 % it is fine. A palette has failed that lacks a colour.
+same body's clean scene; below 0.8 % it is fine. The drawn look has failed where its FLIP is above the field's, and is fine
+where it is 5 % below. A palette has failed that lacks a colour.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from collections.abc import Sequence
 
 from bench.atlas.figures import Kind, Trial, TriedPage, TriedStep
+from bench.atlas.look import LookPage
 from bench.atlas.palette import CLOSE, LISTED, PalettePage
 from bench.atlas.palette import WARNED as PALETTE_WARNED
 from bench.atlas.run import AnyPage, Result, TriedStepResult, all_pages
@@ -23,6 +25,7 @@ from toonset.nerf.score.verdict import WEAK
 
 BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, BLACK, GREY = COLORS
 LOST_FINE, LOST_FAILED = 0.8, 1.1  # % of the height; a person is unhappy from there on
+LOOK_FINE, LOOK_FAILED = 95.0, 100.0  # % of the field's FLIP
 NONE_MISSED = 0.1  # %
 HUNDRED = 100.0
 CALIBRATION = Kind(
@@ -41,6 +44,10 @@ TRAINING = Kind(
         CRASHED: BLACK,
     },
     informs=(REPAIRED,),
+)
+LOOK = Kind(
+    *("look", "sheets", "FLIP of the drawn layer", "% of the field's", LOOK_FINE, LOOK_FAILED),
+    {SILENT: GREEN, REFUSED: VERMILION, CRASHED: BLACK},
 )
 PALETTE = Kind(
     *("palette", "palettes", "colours missed", "%", NONE_MISSED, NONE_MISSED),
@@ -69,6 +76,8 @@ def _page_of(result: Result) -> str:
 def _kind(page: AnyPage) -> Kind:
     if isinstance(page, TrainPage):
         return TRAINING
+    if isinstance(page, LookPage):
+        return LOOK
     return PALETTE if isinstance(page, PalettePage) else CALIBRATION
 
 

@@ -121,7 +121,7 @@ def calib_cases(folder: Path | None, seed: int, count: int, only: str = "") -> I
                 if only in f"{group} {i}":
                     yield _synthetic_calib(f"{group} {i}", group, condition, seed + i)
         return
-    for case in (place for place in _folders(folder, "gt.json") if only in place.name):
+    for case in (place for place in case_folders(folder, "gt.json") if only in place.name):
         truth = read_json(case / "gt.json")
         views = split_picture(load_rgba(case / "sheet.png")).views
         poses = [frames.opencv_pose_from_opengl(np.array(m)) for m in truth["world_from_camera"]]
@@ -157,7 +157,7 @@ def train_cases(
             other = _as_tall(_stranger(seed + i), body)
             yield TrainCase(f"body {seed + i}", "clean", train, odd, other)
         return
-    for case in _folders(folder, "views/transforms.json"):
+    for case in case_folders(folder, "views/transforms.json"):
         train, test = read_scene(case / "views"), read_scene(case / "test")
         if half:
             train, test = _halved(train), _halved(test)
@@ -212,7 +212,12 @@ def _as_tall(mannequin: Mesh, drawn: Mesh) -> Mesh:
     return replace(mannequin, vertices=vertices)
 
 
-def _folders(folder: Path, needed: str) -> list[Path]:
+def case_folders(folder: Path, needed: str) -> list[Path]:
+    """Return the case folders that hold a file.
+
+    Raises:
+        BundleError: there is none.
+    """
     found = sorted(path.parent for path in folder.glob(f"*/{needed.split('/')[0]}"))
     found = [case for case in found if (case / needed).is_file()]
     if not found:

@@ -97,6 +97,12 @@ PLOTS: dict[str, Plot] = {
     ),
     "train": TRAINING,
     "paper": TRAINING,
+    "look": Plot(
+        ("FLIP",),
+        *(CPU_SECONDS, "CPU seconds of training, laying out and 16 views", "CPU s"),
+        *("", "characters"),
+        mean=True,
+    ),
     "palette": Plot(
         (COLORS_FOUND,),
         *(CPU_SECONDS, "CPU seconds per sheet", "CPU s"),
@@ -148,7 +154,7 @@ def _chart(subject: str, group: str, own: Sequence[Record], plot: Plot, seeds: s
         points=tuple(p for p in points if p.method not in same),
         same=same,
         merit=first.metric,
-        unit=first.unit,
+        unit=first.unit if first.unit != "1" else "",
         cost=plot.cost_name,
         cost_unit=plot.cost_unit,
         statistic="mean" if plot.mean else "median",

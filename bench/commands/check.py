@@ -22,7 +22,9 @@ SUBJECTS = {  # synthetic cases of each: what fits five minutes
     Subject.labels: None,
     Subject.splitting: 1,
     Subject.train: 1,
+    Subject.look: 1,
 }
+LOOK_METRICS = ("FLIP", "dirt", "ink F1")  # of looks: the others follow from these
 WORSE = 3
 
 
@@ -77,12 +79,28 @@ def _chosen(subject: Subject, count: int | None, seed: int) -> Chosen:
 
 def _records(chosen: Chosen, printer: Printer) -> list[Record]:
     if chosen.subject is Subject.train:
-        from bench.charts.chart import DEFAULT
-        from bench.commands.train import jobs_of
-        from bench.train.measure import records_of, run_jobs
-
-        jobs = [job for job in jobs_of(chosen) if job.method == DEFAULT]
-        return records_of([found for _, found in run_jobs(jobs, printer.progress)], chosen.seed)
+        return _training(chosen, printer)
+    if chosen.subject is Subject.look:
+        return _look(chosen, printer)
     from bench.commands.measure import measure
 
     return measure(chosen, printer).records
+
+
+def _training(chosen: Chosen, printer: Printer) -> list[Record]:
+    from bench.charts.chart import DEFAULT
+    from bench.commands.train import jobs_of
+    from bench.train.measure import records_of, run_jobs
+
+    jobs = [job for job in jobs_of(chosen) if job.method == DEFAULT]
+    return records_of([found for _, found in run_jobs(jobs, printer.progress)], chosen.seed)
+
+
+def _look(chosen: Chosen, printer: Printer) -> list[Record]:
+    from bench.charts.chart import DEFAULT
+    from bench.look.cases import look_cases
+    from bench.look.measure import bench_look, records_of
+
+    cases = look_cases(None, chosen.seed, chosen.count or 1, quick=True)
+    results = bench_look(cases, chosen.seed, (DEFAULT,), printer.progress)
+    return [r for r in records_of(results, chosen.seed) if r.metric in LOOK_METRICS]

@@ -16,6 +16,7 @@ class Subject(StrEnum):
 
     calib = "calib"
     train = "train"
+    look = "look"
     paper = "paper"
     stability = "stability"
     splitting = "split"  # a string has a method `split`
@@ -42,6 +43,7 @@ class Chosen:
     baseline: Baseline | None
     quick: bool
     seed: int
+    peers: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Refuse options of another subject.
@@ -54,6 +56,8 @@ class Chosen:
             raise typer.BadParameter("--half belongs to `train --cases` and `paper --cases`")
         if self.baseline is not None and self.subject is not Subject.calib:
             raise typer.BadParameter("--baseline belongs to `calib`")
+        if self.peers and self.subject is not Subject.train:
+            raise typer.BadParameter("--peer belongs to `train`")
         if self.sprites is not None and self.subject not in (Subject.calib, Subject.splitting):
             raise typer.BadParameter("--sprites belongs to `calib` and `split`")
         alone = self.subject is Subject.calib and self.sprites is not None

@@ -11,19 +11,24 @@ from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:
+    from bench.look.measure import LookResult
     from bench.records.record import Record
+    from bench.records.report import Picture
     from bench.split.cases import SplitCase
 
 WRONG_SPLITS = "wrong.png"
+LOOKS, LOOK_VIEWS, FACES = "look", "views", "faces"
+QUICK_LOOKS = 1
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Records, their table, and PNG pictures by file name."""
+    """Records, their table, pictures by file name, and those that the page shows."""
 
     records: list[Record]
     text: str
     pictures: dict[str, bytes] = field(default_factory=dict)
+    shown: tuple[Picture, ...] = ()
 
 
 def measure(chosen: Chosen, printer: Printer) -> Measured:
@@ -34,6 +39,8 @@ def measure(chosen: Chosen, printer: Printer) -> Measured:
     """
     if chosen.subject is Subject.splitting:
         return _splitting(chosen, printer)
+    if chosen.subject is Subject.look:
+        return _look(chosen, printer)
     if chosen.subject is Subject.palette:
         return _palettes(chosen, printer)
     if chosen.subject is Subject.labels:
@@ -92,6 +99,46 @@ def _split_cases(chosen: Chosen) -> Iterator[SplitCase]:
     if chosen.cases is None and chosen.sprites is None:
         count = chosen.count or (1 if chosen.quick else DEFAULT_COUNT)
         yield from messy_cases(chosen.seed, count, chosen.only)
+
+
+def _look(chosen: Chosen, printer: Printer) -> Measured:
+    from bench.look.cases import look_cases
+    from bench.look.measure import bench_look, eyes_text, records_of, table_of
+    from bench.look.plan import LOOKS as NAMES
+
+    count = chosen.count or (QUICK_LOOKS if chosen.quick else DEFAULT_COUNT)
+    cases = look_cases(chosen.cases, chosen.seed, count, chosen.only, quick=chosen.quick)
+    results = bench_look(cases, chosen.seed, tuple(NAMES), printer.progress)
+    if not results:
+        raise _none_of(chosen)
+    text = "\n\n".join(part for part in (table_of(results), eyes_text(results)) if part)
+    pictures, shown = _look_pictures(results, chosen.seed)
+    return Measured(records_of(results, chosen.seed), text, pictures, shown)
+
+
+def _look_pictures(
+    results: list[LookResult], seed: int
+) -> tuple[dict[str, bytes], tuple[Picture, ...]]:
+    from bench.charts.figure import FORMS
+    from bench.commands.charts import file_name
+    from bench.look.picture import draw_looks, face_sheet, look_sheet
+    from bench.records.record import machine
+    from bench.records.report import Picture
+    from toonset.dataset.images.picture import encode_png
+
+    sheets: dict[tuple[str, str], list[LookResult]] = {}
+    for one in results:
+        sheets.setdefault((one.case.name, one.case.group), []).append(one)
+    caption = f"Mean of {len(sheets)} sheets; seed {seed}; {machine()}."
+    files = {f"{LOOKS}.{form}": draw_looks(results, caption, form) for form in FORMS}
+    for (name, group), own in sheets.items():
+        files[f"{LOOK_VIEWS}-{file_name(f'{name} {group}')}.png"] = encode_png(look_sheet(own))
+    for name in dict.fromkeys(one.look for one in results):
+        faces = face_sheet([one for one in results if one.look == name])
+        if faces is not None:
+            files[f"{FACES}-{file_name(name)}.png"] = encode_png(faces)
+    shows = "What eyes see, against CPU seconds: the default look, and without each of its parts"
+    return files, (Picture(files[f"{LOOKS}.svg"], shows),)
 
 
 def _palettes(chosen: Chosen, printer: Printer) -> Measured:

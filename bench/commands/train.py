@@ -63,11 +63,13 @@ def jobs_of(chosen: Chosen) -> list[Job]:
     Raises:
         BundleError: there is no training of that name.
     """
+    from bench.train.peers import parse_peers
     from bench.train.plan import SCOPES, plan
 
+    peers = parse_peers(chosen.peers)  # refused before anything is drawn
     count = QUICK_COUNT if chosen.quick else DEFAULT_COUNT
     scope = SCOPES[chosen.subject.value, chosen.quick]
-    return some(plan(cases_of(chosen, count), chosen.seed, chosen.only, scope), chosen)
+    return some(plan(cases_of(chosen, count), chosen.seed, chosen.only, scope, peers), chosen)
 
 
 def some(jobs: list[Job], chosen: Chosen) -> list[Job]:

@@ -21,7 +21,7 @@ from toonset.errors import BundleError
 
 FORMAT = 1
 SECONDS, CPU, YARDS = ("s", "s/MP"), "CPU", "yardsticks"
-LOSS = {"dB": 0.3, "1": 0.02, "%": 2.0, "deg": 0.1, "views": 0.0, "px": 0.1}
+LOSS = {"dB": 0.3, "1": 0.02, "%": 2.0, "deg": 0.1, "views": 0.0, "px": 0.1, "levels/px": 0.1}
 SHARE = {"deg": 0.2, YARDS: 0.5}  # of the value, on top of it
 ANY_SHARE = 0.05  # of figures in other units
 ROUNDING = 1e-9  # of any figure: errors of 1e-16 are none

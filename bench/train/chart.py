@@ -7,6 +7,7 @@ is in the charts of cost against merit.
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -46,7 +47,8 @@ def draw_curves(runs: Sequence[RunResult], caption: str, form: Form = "png") -> 
         _draw_panel(place, panel)
     for place in places[len(panels) :]:
         place.set_axis_off()
-    cases = {m: {r.case for p in panels for r in p if r.method == m} for m in (*FOLLOWED, NEAREST)}
+    names = (*FOLLOWED, *_peers(runs), NEAREST)
+    cases = {m: {r.case for p in panels for r in p if r.method == m} for m in names}
     figure.legend(
         handles=[_handle(method, len(own)) for method, own in cases.items() if own],
         loc="outside right upper",
@@ -60,6 +62,11 @@ def draw_curves(runs: Sequence[RunResult], caption: str, form: Form = "png") -> 
     )
     figure.supylabel("held-out PSNR, dB (higher is better)", fontsize=9.5)
     return figure_bytes(figure, form)
+
+
+def _peers(runs: Sequence[RunResult]) -> list[str]:
+    """Return the other programs' names."""
+    return list(dict.fromkeys(run.method for run in runs if run.method not in METHODS))
 
 
 def _panels(runs: Sequence[RunResult]) -> list[list[RunResult]]:
@@ -86,7 +93,7 @@ def mean_curve(curves: Sequence[Sequence[Seen]]) -> list[tuple[float, float]]:
 
 def _draw_panel(axes: Axes, runs: Sequence[RunResult]) -> None:
     ends = [LEAST_S]
-    for method in (*FOLLOWED, NEAREST):
+    for method in (*FOLLOWED, *_peers(runs), NEAREST):
         found = [run for run in runs if run.method == method]
         if not found:
             continue
@@ -119,7 +126,10 @@ def _handle(method: str, cases: int) -> Line2D:
     color, marker, width = _look(method)
     if method == NEAREST:
         return Line2D([], [], color=color, lw=1.2, ls=":", label=f"{method}, at no cost")
-    line, name = "none" if method in BASELINES else "-", f"{method} (n = {cases})"
+    line, name = (
+        "none" if method in BASELINES or method not in METHODS else "-",
+        f"{method} (n = {cases})",
+    )
     return Line2D([], [], color=color, marker=marker, lw=width, ls=line, label=name)
 
 
@@ -129,6 +139,8 @@ def _look(method: str) -> tuple[str, str, float]:
         return VERMILION, STAR, 2.6
     if method == NEAREST or method in BASELINES:
         return GREY, BASELINES.get(method, ""), 1.2
+    if method not in METHODS:
+        return COLORS[6], DISCS[zlib.crc32(method.encode()) % len(DISCS)], 1.2
     number = FOLLOWED.index(method) - 1
     others = [color for color in COLORS if color != VERMILION]
     return others[number % len(others)], DISCS[(number + number // len(others)) % len(DISCS)], 1.3

@@ -58,7 +58,7 @@ def run_jobs(
     defaults = {_character(found): found for found in done if found.method == DEFAULT}
     for number, job in enumerate(jobs, 1):
         known = defaults.get((job.group, job.case.name, job.seed))
-        if known and not known.note and METHODS[job.method].leaves_out not in (None, *known.acted):
+        if known and not known.note and job.way.leaves_out not in (None, *known.acted):
             yield job, replace(known, method=job.method)
             continue
         progress(f"{number} of {len(jobs)}: {job.name}, seed {job.seed}")
@@ -122,7 +122,7 @@ def in_order(runs: Sequence[RunResult]) -> list[RunResult]:
     """Return the runs that succeeded, group by group as they came, methods as they are listed."""
     runs = [run for run in runs if not run.note]
     groups = list(dict.fromkeys(run.group for run in runs))
-    methods = list(METHODS)
+    methods = list(dict.fromkeys([*METHODS, *(run.method for run in runs)]))  # peers last
     return sorted(runs, key=lambda run: (groups.index(run.group), methods.index(run.method)))
 
 

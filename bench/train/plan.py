@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 from bench.cases.cases import TrainCase
 from bench.charts.chart import DEFAULT
+from bench.train.peers import Peer
 from toonset.nerf.options import TrainOptions, paper
 
 NEAREST = "nearest drawing"
@@ -93,6 +94,7 @@ METHODS: dict[str, Method] = {
         replace(paper(2000), field="mlp"), first_seed_only=True, most_views_only=True
     ),
 }
+OF_PEERS = Method(None, first_seed_only=True, most_views_only=True)
 FOR_THE_TABLE_ALONE = [name for name in PAPER if PAPER[name].palette != "automatic palette"]
 SLOW = ("without hull", "mlp", "paper, mlp", *PAPER)
 
@@ -137,10 +139,11 @@ class Job:
     Attributes:
         case: all views; held-out ones are for the figures alone.
         views: how many of the case's views are trained on.
-        method: name in `METHODS`.
+        method: name in `METHODS`, or the peer's.
         seed: of everything random.
         followed: held-out PSNR may be followed while it trains; what is found does not depend on
             it.
+        peer: the other program that is run; None: none is.
     """
 
     case: TrainCase
@@ -148,12 +151,18 @@ class Job:
     method: str
     seed: int
     followed: bool = True
+    peer: Peer | None = None
+
+    @property
+    def way(self) -> Method:
+        """Return how views are predicted."""
+        return METHODS[self.method] if self.peer is None else OF_PEERS
 
     @property
     def curve(self) -> bool:
         """Return whether held-out PSNR is followed while it trains."""
         most_views = self.views == len(self.case.train.frames)
-        return self.followed and METHODS[self.method].curve and most_views
+        return self.followed and self.way.curve and most_views
 
     @property
     def group(self) -> str:
@@ -169,7 +178,7 @@ class Job:
     @property
     def identity(self) -> dict[str, Any]:
         """Return all that a result depends on, as plain data; the code aside."""
-        method = METHODS[self.method]
+        method = self.way
         options = None if method.options is None else asdict(method.options)
         found = {
             "name": self.name,
@@ -177,10 +186,13 @@ class Job:
             "options": options,
             "palette": method.palette,
         }
-        return found if method.share is None else found | {"share": method.share}
+        found |= {} if method.share is None else {"share": method.share}
+        return found if self.peer is None else found | {"peer": self.peer.command}
 
 
-def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list[Job]:
+def plan(
+    cases: Iterable[TrainCase], seed: int, only: str, scope: Scope, peers: Sequence[Peer] = ()
+) -> list[Job]:
     """Return the jobs, what tells most first: a stopped run has filled the most of its tables.
 
     Every seed begins when all cases have the one before; small pictures and many views go first.
@@ -190,6 +202,7 @@ def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list
         seed: the first.
         only: keep jobs whose name contains this.
         scope: which of all possible jobs.
+        peers: run with the most views of every case, after the methods.
     """
     cases = list(cases)
     first = _first_of_groups(cases)
@@ -208,7 +221,12 @@ def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list
         if (case in first or method not in scope.first_case)
         and _wanted(METHODS[method], case, number, fewer)
     ]
-    order = list(METHODS)
+    jobs += [
+        Job(case, view_counts(case, scope.views)[0], peer.name, seed, peer=peer)
+        for case in cases
+        for peer in peers
+    ]
+    order = [*METHODS, *(peer.name for peer in peers)]
     jobs.sort(key=lambda j: (j.seed, side_px(j.case), -j.views, order.index(j.method)))
     return [job for job in jobs if only in job.name]
 

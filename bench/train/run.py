@@ -15,7 +15,8 @@ from torch import Tensor
 from bench.cases.cases import TrainCase
 from bench.train.mannequin_fit import fitted_mannequin
 from bench.train.mannequin_views import mannequin_view, paint_mannequin
-from bench.train.plan import METHODS, Job, PaletteChoice, Preparation, subset
+from bench.train.peers import run_peer
+from bench.train.plan import Job, PaletteChoice, Preparation, subset
 from toonset.camera import rotation_distance
 from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Frame, Scene
@@ -92,10 +93,13 @@ class RunResult:
 
 def run_job(job: Job, judges: Judges, look: Look = lambda *_: None) -> RunResult:
     """Return what training and rendering of one job gives; a refusal is a result, too."""
-    case, method = subset(job.case, job.views), METHODS[job.method]
+    case, method = subset(job.case, job.views), job.way
     keep_freed_memory()  # as the command does: seconds count
     use_threads(1)  # neither figures nor CPU seconds may depend on the machine's cores
     try:
+        if job.peer is not None:
+            done = run_peer(job.peer, case.train, case.test)
+            return _untrained(job, case, judges, done.pictures, (done.seconds, done.cpu_seconds, 0))
         if method.mannequin:
             return _colored_mannequin(job, case, judges)
         if method.options is None:
@@ -112,8 +116,8 @@ def _trained(
     watch = Snapshots(
         time.perf_counter(), time.process_time(), first_look_s=first_look_s, carved=options.carve
     )
-    scene = _with_palette(case.train, METHODS[job.method].palette)
-    share = METHODS[job.method].share
+    scene = _with_palette(case.train, job.way.palette)
+    share = job.way.share
     if share is not None:
         options = replace(options, resolution=round(share * finest_cells(scene)))
     training = fit_field(scene, options, watch=watch)

@@ -15,8 +15,8 @@ from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import color_picture, palette_picture
 from toonset.nerf.render.views import render
 from toonset.nerf.score.flip import PIXELS_PER_DEGREE
-from toonset.nerf.score.labels import score_labels
-from toonset.nerf.score.lines import TOLERANCE_PX
+from toonset.nerf.score.labels import score_labels, shifted_miou
+from toonset.nerf.score.lines import OF_PX, TOLERANCE_PX
 from toonset.nerf.score.metrics import MOST_SHIFT_PX, Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
 from toonset.palette.pixels.labels import label_pixels
@@ -34,8 +34,8 @@ class ScoredView:
         drawn: (height, width, 4) the truth.
         pictures: per layer, the rendering; no "palette" without palette, no "drawn" of a run that
             holds no drawings.
-        figures: per layer, as `toonset.nerf.score.metrics_view` names them, with label_accuracy and
-            label_miou.
+        figures: per layer, as `toonset.nerf.score.metrics_view` names them, with label_accuracy,
+            label_miou and label_miou_shift.
         errors: per layer, (height, width) error in [0, 1].
     """
 
@@ -106,7 +106,7 @@ def report(
     settings = {
         "flip_pixels_per_degree": PIXELS_PER_DEGREE,
         "psnr_shift_px": MOST_SHIFT_PX,
-        "ink_tolerance_px": TOLERANCE_PX,
+        "ink_tolerance_height": TOLERANCE_PX / OF_PX,
     }
     training_part = _section(training) if training else None
     return {**_section(held_out), "training": training_part, "absent": absent, "settings": settings}
@@ -136,23 +136,32 @@ def _scored(baked: Baked, scene: Scene, frame: Frame, judges: Judges) -> ScoredV
     figures, errors = {}, {}
     for layer, picture in pictures.items():
         found, errors[layer] = figures_of(picture, frame.rgba, judges)
-        figures[layer] = found | _label_figures(trained, scene, frame, labels[layer])
+        figures[layer] = found | label_figures(trained, scene, frame, labels[layer])
     return ScoredView(frame.name, frame.rgba, pictures, figures, errors)
 
 
-def _label_figures(
+def label_figures(
     trained: TrainedField,
     scene: Scene,
     frame: Frame,
     labels: UInt8[np.ndarray, "height width"] | None,
 ) -> Figures:
-    score = None
+    """Return how right a view's labels are; None where the run, or the view, has none.
+
+    Args:
+        trained: its palette is that of the labels.
+        scene: of the frame; its labels are the truth's if its palette is the run's.
+        frame: the truth.
+        labels: of the rendering.
+    """
+    score, shifted = None, None
     if trained.palette is not None and labels is not None:
         own = scene.palette is not None and np.array_equal(scene.palette, trained.palette)
         true = frame.labels if own else None
         true = label_pixels(frame.rgba, trained.palette) if true is None else true
-        score = score_labels(labels, true)
+        score, shifted = score_labels(labels, true), shifted_miou(labels, true)
     return {
         "label_accuracy": None if score is None else score.accuracy,
         "label_miou": None if score is None else score.miou,
+        "label_miou_shift": shifted,
     }

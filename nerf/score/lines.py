@@ -1,19 +1,25 @@
-"""How well a rendering's dark lines lie on the drawing's: F1 with a tolerance of 2 px."""
+"""How well a rendering's ink lies on the drawing's: F1 of dark pixels, some pixels off tolerated.
+
+Hair and boots as dark as ink count, too: where they end is a line to the eye. But only drawings
+with dark lines round their figures are asked.
+"""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.view import over_white
 
-TOLERANCE_PX = 2
-DARK = 110 / 255  # luma of ink, over white
-CONTRAST = 64 / 255  # luma that ink is below what lies on both sides
+TOLERANCE_PX, OF_PX = 2.0, 260.0  # that a line may be off; of a figure so tall
+INK = 0.2  # luma over white below which a pixel is dark
+SEEN = 0.3  # opacity from which a pixel shows
+DARK = 110 / 255  # luma of a line
+CONTRAST = 0.2  # luma that a line is below what lies on both sides
 WIDEST, LEAST_WIDE_PX = 0.04, 6  # a line's widest, of the figure's height
-# share of the rim beside a line: 0.4 and more in drawings with lines of 1 px, else 0.27 at most
+# share of the rim beside a line: 0.4 and more in drawings with lines, else 0.27 at most
 OUTLINED = 1 / 3
 LUMA = np.array([0.299, 0.587, 0.114])
 
@@ -21,19 +27,25 @@ LUMA = np.array([0.299, 0.587, 0.114])
 def line_f1(
     rendered: UInt8[np.ndarray, "height width 4"], drawn: UInt8[np.ndarray, "height width 4"]
 ) -> float | None:
-    """Return the harmonic mean of precision and recall of the line pixels, 2 px off is right.
+    """Return the harmonic mean of precision and recall of the dark pixels.
 
-    None where the drawing has no dark outline: what is dark and thin there is no line, or the
-    figure is as dark as its lines.
+    What is off by no more than `tolerance_px` is right. None where the drawing has no dark outline:
+    what is dark there is no line, or the figure is as dark as its lines.
     """
-    wanted, found = line_pixels(drawn), line_pixels(rendered)
-    if not _is_outlined(drawn, wanted):
+    wanted, found = _dark(drawn), _dark(rendered)
+    if not wanted.any() or not _is_outlined(drawn, line_pixels(drawn)):
         return None
     if not found.any():
         return 0.0
-    precision = float(_grown(wanted, TOLERANCE_PX)[found].mean())
-    recall = float(_grown(found, TOLERANCE_PX)[wanted].mean())
+    near = tolerance_px(drawn)
+    precision = float((_distance(wanted)[found] <= near).mean())
+    recall = float((_distance(found)[wanted] <= near).mean())
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
+
+
+def tolerance_px(drawn: UInt8[np.ndarray, "height width 4"]) -> int:
+    """Return how far ink may be off: 2 px of a figure of 260 px, whole pixels, at least 1."""
+    return max(1, round(TOLERANCE_PX * _height(drawn) / OF_PX))
 
 
 def line_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
@@ -41,14 +53,28 @@ def line_pixels(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "
 
     Thin is what a morphological closing fills (the black-hat transform).
     """
-    rows = np.flatnonzero(mask_of(rgba).any(axis=1))
-    height = rows[-1] - rows[0] + 1 if len(rows) else 0
-    reach = max(LEAST_WIDE_PX, round(WIDEST * height)) // 2
+    reach = max(LEAST_WIDE_PX, round(WIDEST * _height(rgba))) // 2
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     luma = np.pad(over_white(rgba) @ LUMA, reach, constant_values=1.0)
     depth = cv2.morphologyEx(luma, cv2.MORPH_CLOSE, disc) - luma
     lines: Bool[np.ndarray, "height width"] = (depth >= CONTRAST) & (luma < DARK)
     return lines[reach:-reach, reach:-reach]
+
+
+def _dark(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:
+    dark: Bool[np.ndarray, "height width"] = over_white(rgba) @ LUMA < INK
+    return dark & (rgba[..., 3] > SEEN * 255)
+
+
+def _height(rgba: UInt8[np.ndarray, "height width 4"]) -> int:
+    rows = np.flatnonzero(mask_of(rgba).any(axis=1))
+    return int(rows[-1] - rows[0] + 1) if len(rows) else 0
+
+
+def _distance(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    """Return the pixels to the nearest one of a mask that has any."""
+    apart = (~mask).astype(np.uint8)
+    return cv2.distanceTransform(apart, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
 
 
 def _is_outlined(

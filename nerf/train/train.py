@@ -62,6 +62,8 @@ def fit_field(
     options: TrainOptions,
     progress: Progress | None = None,
     watch: Watch | None = None,
+    *,
+    agree: bool = True,
 ) -> Training:
     """Return the field that explains the drawings, and how it came about.
 
@@ -73,6 +75,7 @@ def fit_field(
         options: see there.
         progress: called with a line that says what is prepared.
         watch: looks on while the field is fitted.
+        agree: bend drawings that were bent further until their paint agrees (off: to compare).
 
     Raises:
         BundleError: fewer than two usable views, a picture that is opaque all over, or cameras that
@@ -93,7 +96,7 @@ def fit_field(
     hull, evidence = open_box(whole), NO_EVIDENCE
     if options.carve:
         hull, evidence = hull_of(whole, options, ready.apart_px)
-        ready = with_paint(ready, scene, hull)
+        ready = with_paint(ready, scene, hull) if agree else ready
     scene = with_mirrored(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None

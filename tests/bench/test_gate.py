@@ -117,12 +117,12 @@ def test_check_ends_with_3_where_something_is_worse(
     printer = Printer(as_json=False, quiet=True)
     bench_check.check(0, printer, renew=True)
     bench_check.check(0, printer, renew=False)
-    assert "5 figures: 0 worse" in capsys.readouterr().out
+    assert "6 figures: 0 worse" in capsys.readouterr().out
     found[0] = record(value=20.0)
     with pytest.raises(bench_check.typer.Exit) as stop:
         bench_check.check(0, printer, renew=False)
     assert stop.value.exit_code == bench_check.WORSE
-    assert "5 worse" in capsys.readouterr().out
+    assert "6 worse" in capsys.readouterr().out
     with pytest.raises(BundleError, match="figures of seed 0, not 7"):
         bench_check.check(7, printer, renew=False)
 

@@ -64,6 +64,7 @@ def test_held_out_and_training_views_apart(
     assert found["absent"].keys() <= {"flip", "lpips"}
     assert 0 < found["palette"]["label_accuracy"] <= 1
     assert 0 < found["drawn"]["label_miou"] <= 1
+    assert 0 < found["drawn"]["label_miou_shift"] <= 1
     assert found["drawn"]["psnr"] > 30  # drawn cameras return their drawings
     for layer in ("drawn", "rgb", "palette"):
         each = [view[layer]["psnr"] for view in found["views"]]
@@ -98,6 +99,7 @@ def test_the_table(bundle: Path, run: Path, toonset) -> None:
     views = len(read_scene(bundle).frames)
     assert lines[0] == "held-out views"
     assert lines[1].split()[:6] == ["view", "layer", "PSNR", "dB", "in", "mask"]
+    assert lines[1].split()[-2:] == ["mIoU", "mIoU+-2"]  # a drawing without lines has no F1
     last = 2 + 3 * views
     assert [line.split()[0] for line in lines[last : last + 3]] == ["mean"] * 3
     assert [line.split()[1] for line in lines[last : last + 3]] == ["drawn", "rgb", "palette"]

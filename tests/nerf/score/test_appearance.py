@@ -51,5 +51,7 @@ def test_what_cannot_be_said_is_none(picture: np.ndarray, figure: np.ndarray) ->
 def test_an_even_turn_does_not_flicker_and_a_pop_does(picture: np.ndarray) -> None:
     ramp = [np.full((4, 4, 3), value) for value in (0.2, 0.4, 0.2, 0.0)]
     assert flicker(ramp) == pytest.approx(0.2)
+    assert flicker(ramp[:3], whole=False) == pytest.approx(0.4)  # up, down
+    assert flicker(ramp[1:], whole=False) == pytest.approx(0)
     assert flicker([picture] * 5) == 0
     assert flicker([picture, picture, 1 - picture, picture]) > 0.3

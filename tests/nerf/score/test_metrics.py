@@ -14,8 +14,8 @@ from skimage.metrics import structural_similarity
 
 from toonset.nerf.score import lpips as lpips_metric
 from toonset.nerf.score.flip import load_flip
-from toonset.nerf.score.labels import score_labels
-from toonset.nerf.score.lines import line_f1, line_pixels
+from toonset.nerf.score.labels import score_labels, shifted_miou
+from toonset.nerf.score.lines import line_f1, line_pixels, tolerance_px
 from toonset.nerf.score.metrics import (
     BEST_PSNR,
     compare,
@@ -214,9 +214,31 @@ def test_labels_by_hand() -> None:
     assert (strange.accuracy, strange.miou) == (0, 0)
 
 
-def test_lines_may_lie_two_pixels_off() -> None:
+def test_labels_of_a_shifted_picture_are_right() -> None:
+    true = np.full((12, 12), 255, dtype=np.uint8)
+    true[3:9, 3:9] = 0
+    true[5:7, 5:7] = 1
+    assert shifted_miou(true, true) == 1
+    assert shifted_miou(np.roll(true, (2, -1), (0, 1)), true) == 1
+    apart = shifted_miou(np.roll(true, 4, axis=1), true)
+    assert apart is not None
+    assert apart < 0.8
+    assert shifted_miou(np.full_like(true, 255), true) is None
+
+
+def test_lines_may_lie_a_hundredth_of_the_height_off() -> None:
     assert line_f1(figure(), figure()) == 1
-    assert line_f1(figure(at=22), figure()) == 1
+    assert line_f1(figure(at=21), figure()) == 1  # 1 px of any figure
+    off = line_f1(figure(at=22), figure())
+    assert off is not None
+    assert off < 1
+    large = np.zeros((300, 300, 4), dtype=np.uint8)
+    large[20:280, 20:280] = (0, 0, 0, 255)
+    large[23:277, 23:277] = (200, 60, 40, 255)
+    moved = [line_f1(np.roll(large, by, axis=1), large) for by in (2, 3, 4)]
+    assert moved[0] == 1
+    assert moved == sorted(moved, reverse=True)  # type: ignore[type-var]
+    assert tolerance_px(large) == 2
     far = line_f1(figure(at=28), figure())
     assert far is not None
     assert 0.3 < far < 0.75  # the horizontal lines lie right, those at the sides do not
