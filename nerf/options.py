@@ -52,7 +52,7 @@ class TrainOptions:
             cleaner, but small eyes and mouths may go with the lines.
     """
 
-    steps: int = 400
+    steps: int = 600
     budget_s: float | None = None
     seed: int = 0
     device: str = "auto"

@@ -87,7 +87,7 @@ def step_parts(scene: Scene, options: TrainOptions) -> list[Part]:
     assert model.classifier is not None
     along = float(hull.box.size.max()) / STEPS_ALONG
     generator = torch.Generator().manual_seed(options.seed)
-    rays = FixedRays(make_batches(scene, hull, field, along, MOST_SAMPLES, generator))
+    rays = FixedRays(make_batches(scene, hull, along, MOST_SAMPLES, generator), field)
     weights = Weights(options.palette_weight, options.smoothness)
     others = [*field.hidden.parameters(), *field.out.parameters(), *model.classifier.parameters()]
     groups = [Group([field.planes], TABLES_RATE), Group(others, field.decoder_rate)]
