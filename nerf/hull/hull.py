@@ -31,6 +31,9 @@ from toonset.nerf.hull.support import agreement, agreement_within
 from toonset.nerf.kernels.threads import side_by_side
 
 LEVEL = 0.5
+# Support from which all of a point's density counts; at LEVEL, rays that graze a border would make
+# figures too wide (docs/decisions.md)
+FULL = 1.0
 EDGE = 0.02  # support from which a point can be part of the figure's soft border
 BLOCK = 4  # voxels along a block's edge
 COARSE = 48  # voxels along the cube in the first carving, which only finds the tight box
@@ -108,10 +111,9 @@ class Hull:
 def occupancy(support: Float[Tensor, " n"]) -> Float[Tensor, " n"]:
     """Return how much of a point's density counts: 1 inside, falling to 0 across the border.
 
-    A hard border would be as coarse as the samples; a soft one lets outlines fall between pixels,
-    and where no drawing shows an outline, its place is not known better (docs/decisions.md).
+    A hard border would be as coarse as the samples; a soft one lets outlines fall between pixels.
     """
-    return support.clamp(0, 1)
+    return (support / FULL).clamp(0, 1)
 
 
 def grown(volume: Shaped[Tensor, "x y z"], by: int) -> Shaped[Tensor, "x y z"]:
