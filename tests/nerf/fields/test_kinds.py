@@ -47,7 +47,7 @@ def places(count: int, seed: int = 0) -> Tensor:
 def batch_of(
     field: Field, counts: list[int], dtype: torch.dtype = torch.float32, *, placed: bool = False
 ) -> Batch:
-    """Return a batch of rays with so many samples each, at random places; `placed`: not laid out."""
+    """Return a batch of rays with so many samples each, laid out or just at random places."""
     ray = torch.arange(len(counts)).repeat_interleave(torch.tensor(counts))
     rng = np.random.default_rng(5)
     numbers = [rng.random((len(ray),)) * 0.4, rng.random((len(counts), 3)), rng.random(len(counts))]
