@@ -37,7 +37,7 @@ def train(
         ),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option("--steps", min=1, help="Optimiser steps (default: 400).")
+        int | None, typer.Option("--steps", min=1, help="Optimiser steps (default: 600).")
     ] = None,
     budget: Annotated[
         float | None,

@@ -2,8 +2,8 @@
 
 A calibrated view is fine within 5 degrees of the truth and has failed beyond 15. A training has
 failed where the worst held-out view looks as if moved by 1.1 % of the height more than that of the
-same body's clean scene; below 0.8 % it is fine. The drawn look has failed where its FLIP is above the field's, and is fine
-where it is 5 % below. A palette has failed that lacks a colour.
+same body's clean scene; below 0.8 % it is fine. The drawn look has failed where its FLIP is above
+the field's, and is fine where it is 5 % below. A palette has failed that lacks a colour.
 """
 
 from __future__ import annotations

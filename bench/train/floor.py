@@ -37,7 +37,7 @@ from toonset.nerf.train.batches import Batch, make_batches
 from toonset.nerf.train.carved_rays import PRUNE_AFTER, FixedRays
 from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.loop import BETAS, TABLES_RATE
-from toonset.nerf.train.loss import Model, Weights, loss_terms
+from toonset.nerf.train.loss import CLASSIFIED, Model, Weights, loss_terms
 from toonset.nerf.train.train import (
     CELLS,
     CELLS_PER_PX,
@@ -87,7 +87,7 @@ def step_parts(scene: Scene, options: TrainOptions) -> list[Part]:
     assert model.classifier is not None
     along = float(hull.box.size.max()) / STEPS_ALONG
     generator = torch.Generator().manual_seed(options.seed)
-    rays = FixedRays(make_batches(scene, hull, field, along, MOST_SAMPLES, generator))
+    rays = FixedRays(make_batches(scene, hull, along, MOST_SAMPLES, generator), field)
     weights = Weights(options.palette_weight, options.smoothness)
     others = [*field.hidden.parameters(), *field.out.parameters(), *model.classifier.parameters()]
     groups = [Group([field.planes], TABLES_RATE), Group(others, field.decoder_rate)]
@@ -111,13 +111,14 @@ def _parts_of(model: Model, batch: Batch) -> list[Part]:
     assert classifier is not None
     assert isinstance(field, TriplaneField)
     assert isinstance(operator, Operator)
-    n, rays, table = len(batch.ray), len(batch.rgb), field.planes.numel()
+    n, rays, table = len(batch.ray), batch.rays, field.planes.numel()
+    pixels = len(batch.rgb) // CLASSIFIED
     features = operator(field.planes).detach().requires_grad_()
     depth, rgb = (part.detach().requires_grad_() for part in field.decode(features))
     depth = (depth.detach() * batch.length).requires_grad_()
     decoder = CHANNELS * HIDDEN + HIDDEN * 4
     labels = 3 * CLASSIFIER_WIDTH + CLASSIFIER_WIDTH * len(classifier.out.bias)
-    seen = torch.rand(rays, 3, requires_grad=True)
+    seen = torch.rand(pixels, 3, requires_grad=True)
     jobs: list[tuple[str, Callable[[], Tensor], list[Tensor], float, float]] = [
         (
             "interpolation",
@@ -144,8 +145,8 @@ def _parts_of(model: Model, batch: Batch) -> list[Part]:
             "classifier",
             lambda: classifier(seen),
             [seen, *classifier.parameters()],
-            2 * rays * labels,
-            FLOAT * rays * (3 + CLASSIFIER_WIDTH),
+            2 * pixels * labels,
+            FLOAT * pixels * (3 + CLASSIFIER_WIDTH),
         ),
         ("total variation", field.roughness, [field.planes], 6 * table, FLOAT * 2 * table),
     ]

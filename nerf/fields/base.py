@@ -14,7 +14,7 @@ from typing import Literal, Protocol, Self
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from toonset.dataset.silhouettes.bounds import Box
@@ -48,10 +48,6 @@ class Constants(Protocol):
         """Return them on a device."""
         ...
 
-    def kept(self, samples: Bool[Tensor, " n"]) -> Self:
-        """Return those of some of the points."""
-        ...
-
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -62,10 +58,6 @@ class Places:
     def to(self, device: torch.device) -> Places:
         """Return them on a device."""
         return Places(self.points.to(device))
-
-    def kept(self, samples: Bool[Tensor, " n"]) -> Places:
-        """Return some of them."""
-        return Places(self.points[samples])
 
 
 class Field(nn.Module, ABC):

@@ -33,7 +33,7 @@ from toonset.nerf.kernels.threads import side_by_side
 LEVEL = 0.5
 # Support from which all of a point's density counts; at LEVEL, rays that graze a border would make
 # figures too wide (docs/decisions.md)
-FULL = 0.7
+FULL = 1.0
 EDGE = 0.02  # support from which a point can be part of the figure's soft border
 BLOCK = 4  # voxels along a block's edge
 COARSE = 48  # voxels along the cube in the first carving, which only finds the tight box

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 
 
@@ -57,20 +57,6 @@ class Operator:
     def to(self, device: torch.device) -> Operator:
         """Return the operator on a device."""
         return Operator(*(getattr(self, field.name).to(device) for field in fields(self)))
-
-    def kept(self, samples: Bool[Tensor, " samples"]) -> Operator:
-        """Return the operator of some of its samples; nothing is sorted again."""
-        number = samples.cumsum(0, dtype=torch.int32) - 1
-        by_row = samples.index_select(0, self.samples_by_row)
-        before = torch.cat([number.new_zeros(1), by_row.cumsum(0, dtype=torch.int32)])
-        here, there = samples.nonzero()[:, 0], by_row.nonzero()[:, 0]
-        return Operator(
-            self.rows.index_select(0, here),
-            self.weights.index_select(0, here),
-            number.index_select(0, self.samples_by_row.index_select(0, there)),
-            self.weights_by_row.index_select(0, there),
-            before.index_select(0, self.offsets),
-        )
 
     def __call__(
         self, table: Float[Tensor, "entries channels"]

@@ -6,12 +6,14 @@ can put away and take back what changes on the way, so that an interrupted train
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Protocol
 
 import torch
 from torch import Tensor
 
+from toonset.nerf.fields.base import Field
 from toonset.nerf.kernels.compositing import transmittance_packed
 from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.train.batches import Batch
@@ -44,11 +46,20 @@ class TrainingRays(Protocol):
 
 
 class FixedRays:
-    """Rays whose samples never move; once surfaces have formed, samples behind them are dropped."""
+    """Rays whose samples never move; once surfaces have formed, samples behind them are dropped.
 
-    def __init__(self, steps: list[tuple[Batch, ...]]) -> None:
-        """Take the batches of `make_batches`."""
-        self._steps = list(steps)
+    What a field knows of the samples' places is laid out then: for all of them it would take
+    most of a training's memory, and longer than the few steps with them gain by it.
+    """
+
+    def __init__(self, steps: Sequence[tuple[Batch, ...]], field: Field | None = None) -> None:
+        """Take the batches of `make_batches`, and the field for which they are laid out.
+
+        Args:
+            steps: of each its batches.
+            field: None: nothing is dropped nor laid out.
+        """
+        self._steps, self._field = list(steps), field
         self._kept: list[Tensor] = []
 
     def __len__(self) -> int:
@@ -62,7 +73,7 @@ class FixedRays:
 
     def after(self, step: int, model: Model) -> None:
         """Drop the samples that hardly any light reaches, once."""
-        if step + 1 == PRUNE_AFTER:
+        if step + 1 == PRUNE_AFTER and self._field is not None:
             self._keep(side_by_side([partial(seen_samples, model, b) for b in self._all()]))
 
     def state(self) -> dict[str, Tensor]:
@@ -74,10 +85,14 @@ class FixedRays:
         if state:
             self._keep([state[f"kept.{i}"].bool() for i in range(len(self._all()))])
 
+    @torch.no_grad()
     def _keep(self, kept: list[Tensor]) -> None:
-        self._kept = [samples.cpu() for samples in kept]
+        assert self._field is not None
+        self._kept, field = [samples.cpu() for samples in kept], self._field
         pairs = zip(self._all(), kept, strict=True)
-        tasks = [partial(batch.kept, samples.to(batch.ray.device)) for batch, samples in pairs]
+        tasks = [
+            partial(batch.kept, samples.to(batch.ray.device), field) for batch, samples in pairs
+        ]
         left = iter(side_by_side(tasks))
         self._steps = [tuple(next(left) for _ in batches) for batches in self._steps]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
@@ -12,6 +13,8 @@ from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.compositing import composite_even, composite_packed
 from toonset.nerf.train.batches import Batch
+
+CLASSIFIED = 4  # of so many pixels of a batch one teaches the classifier, which learns in no time
 
 
 class Model(nn.Module):
@@ -51,8 +54,9 @@ def loss_terms(
     )
     entropy = photometric.new_zeros(())
     if model.classifier is not None:
-        logits = model.classifier(losses.straight(color, opacity))
-        entropy = weights.palette * losses.cross_entropy(logits, batch.labels)
+        few = slice(0, None, CLASSIFIED)
+        logits = model.classifier(losses.straight(color[few], opacity[few]))
+        entropy = weights.palette * losses.cross_entropy(logits, batch.labels[few])
     smooth = photometric.new_zeros(())
     if weights.smoothness:
         smooth = weights.smoothness * model.field.roughness()
@@ -61,10 +65,15 @@ def loss_terms(
 
 def render_batch(
     field: Field, batch: Batch
-) -> tuple[Float[Tensor, "rays 3"], Float[Tensor, " rays"]]:
-    """Return premultiplied colour and opacity of a batch's rays."""
+) -> tuple[Float[Tensor, "pixels 3"], Float[Tensor, " pixels"]]:
+    """Return premultiplied colour and opacity of a batch's pixels."""
     density, rgb = field.shade(batch.constants)
-    depth, rays = density * batch.length, len(batch.rgb)
+    depth, rays = density * batch.length, batch.rays
     if batch.even:
         return composite_even(depth.view(rays, -1), rgb.T.reshape(3, rays, -1))
-    return composite_packed(depth, rgb, batch.ray, rays)
+    color, opacity = composite_packed(depth, rgb, batch.ray, rays)
+    if batch.pixel is None or batch.share is None:
+        return color, opacity
+    seen = torch.cat([color, opacity[:, None]], dim=1) * batch.share[:, None]
+    mean = seen.new_zeros(len(batch.rgb), 4).index_add(0, batch.pixel, seen)
+    return mean[:, :3], mean[:, 3]

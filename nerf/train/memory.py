@@ -21,7 +21,7 @@ from toonset.nerf.train.train import MOST_SAMPLES
 # Measured by `python -m bench.train.floor`: peak resident memory over that before.
 CARVED_BYTES = 40  # of a voxel of the hull's grid, while it is carved and faired
 VOXEL_BYTES = 12  # and later
-SAMPLE_BYTES = 265  # interpolation both ways, and its pruned copy
+SAMPLE_BYTES = 140  # its place; interpolation both ways of the half that is left
 FIXED_BYTES = 60 * 2**20  # activations of a batch, parameters, allocator
 PIXEL_BYTES = 100  # of a whole ray through the box, while rays are laid out
 BOX_SAMPLE_BYTES = 650  # of a step along whole rays: points, features, hidden values, gradients

@@ -38,6 +38,7 @@ STEPS = 60  # by then the order of the candidates shows
 TWO_FROM = 6  # views from which two drawings are left out, half a turn apart
 
 Build = Callable[[int], Field]
+Batches = Sequence[tuple[Batch, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +63,11 @@ class Ground:
     options: TrainOptions
     device: torch.device
 
-    def batches(
-        self, frames: Sequence[Frame], field: Field, generator: torch.Generator, most: int
-    ) -> list[tuple[Batch, ...]]:
+    def batches(self, frames: Sequence[Frame], most: int) -> Batches:
         """Return the rays of some drawings, `most` at most."""
         part = replace(self.scene, frames=tuple(frames))
-        sampling = (self.step, self.samples)
-        found = make_batches(part, self.hull, field, *sampling, generator, most)
+        generator = torch.Generator().manual_seed(self.options.seed)
+        found = make_batches(part, self.hull, self.step, self.samples, generator, most)
         return [tuple(batch.to(self.device) for batch in batches) for batches in found]
 
 
@@ -91,7 +90,8 @@ def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> F
     kept = [frame for frame in frames if frame not in left]
     torch.default_generator.manual_seed(ground.options.seed)
     fields = [build(count) for count in cells]
-    tasks = [partial(_tried, ground, kept, left, field) for field in fields]
+    seen, unseen = ground.batches(kept, SEEN_RAYS), ground.batches(left, UNSEEN_RAYS)
+    tasks = [partial(_tried, ground, seen, unseen, field) for field in fields]
     candidates = tuple(side_by_side(tasks))
     names = tuple(frame.name for frame in left)
     return FieldChoice(chosen(candidates), "", candidates, names)
@@ -111,10 +111,8 @@ def left_out(frames: Sequence[Frame]) -> list[Frame]:
     return [frames[number] for number in numbers]
 
 
-def _tried(ground: Ground, kept: Sequence[Frame], left: Sequence[Frame], field: Field) -> Candidate:
+def _tried(ground: Ground, seen: Batches, unseen: Batches, field: Field) -> Candidate:
     generator = torch.Generator().manual_seed(ground.options.seed)
-    seen = ground.batches(kept, field, generator, SEEN_RAYS)
-    unseen = ground.batches(left, field, generator, UNSEEN_RAYS)
     model = Model(field, None).to(ground.device)
     few = replace(ground.options, steps=STEPS, budget_s=None)
     fit(model, FixedRays(seen), ground.weights, few, generator)
@@ -123,7 +121,7 @@ def _tried(ground: Ground, kept: Sequence[Frame], left: Sequence[Frame], field: 
 
 
 @torch.no_grad()
-def _psnr(field: Field, batches: Sequence[tuple[Batch, ...]]) -> float:
+def _psnr(field: Field, batches: Batches) -> float:
     error, rays = 0.0, 0
     for batch in (batch for parts in batches for batch in parts):
         color, opacity = render_batch(field, batch)

@@ -2,8 +2,8 @@
 
     loss = photometric + palette_weight * cross-entropy + smoothness * total variation
 
-Everything that does not change is computed before the first step: the hull, the samples on every
-ray and their interpolation weights. A step is two sparse products, a small decoder and sums.
+Hull and samples on every ray are found before the first step, interpolation weights once it shows
+which samples count. A step is two sparse products, a small decoder and sums.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def _rays(
         box_rays = BoxRays(scene, start.hull, options.seed, generator, parts)
         return box_rays.to(device), {"rays": box_rays.rays, "samples": box_rays.rays * BINS}
     sampling = (start.step, start.samples)
-    steps = make_batches(scene, start.hull, start.field, *sampling, generator, parts=parts)
+    steps = make_batches(scene, start.hull, *sampling, generator, parts=parts)
     batches = [batch for step in steps for batch in step]
     if not batches:
         raise BundleError(f"{scene.name}: no drawn pixel meets the hull; the cameras are wrong")
@@ -175,7 +175,7 @@ def _rays(
         "samples": sum(len(batch.ray) for batch in batches),
     }
     there = [tuple(batch.to(device) for batch in step) for step in steps]
-    return FixedRays(there), counts
+    return FixedRays(there, start.field), counts
 
 
 def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:

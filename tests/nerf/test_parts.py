@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -122,18 +121,6 @@ def test_taps_equal_grid_sample() -> None:
         image = plane.permute(2, 0, 1)[None]
         slow = slow + F.grid_sample(image, grid, align_corners=True)[0, :, 0].T
     torch.testing.assert_close(fast, slow, atol=1e-5, rtol=1e-4)
-
-
-def test_an_operator_of_some_samples_is_that_of_their_rows() -> None:
-    torch.manual_seed(4)
-    rows, weights = torch.randint(0, 30, (50, 12)), torch.rand(50, 12)
-    kept = torch.rand(50) < 0.6
-    some, fresh = (
-        Operator.of(rows, weights, 30).kept(kept),
-        Operator.of(rows[kept], weights[kept], 30),
-    )
-    for field in fields(Operator):
-        torch.testing.assert_close(getattr(some, field.name), getattr(fresh, field.name))
 
 
 def test_operator_backward_is_the_transpose() -> None:

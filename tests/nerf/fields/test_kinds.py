@@ -44,15 +44,18 @@ def places(count: int, seed: int = 0) -> Tensor:
     return torch.as_tensor(BOX.low + unit * BOX.size, dtype=torch.float32)
 
 
-def batch_of(field: Field, counts: list[int], dtype: torch.dtype = torch.float32) -> Batch:
-    """Return a batch of rays with so many samples each, at random places."""
+def batch_of(
+    field: Field, counts: list[int], dtype: torch.dtype = torch.float32, *, placed: bool = False
+) -> Batch:
+    """Return a batch of rays with so many samples each, laid out or just at random places."""
     ray = torch.arange(len(counts)).repeat_interleave(torch.tensor(counts))
     rng = np.random.default_rng(5)
     numbers = [rng.random((len(ray),)) * 0.4, rng.random((len(counts), 3)), rng.random(len(counts))]
     length, rgb, alpha = (torch.as_tensor(n).to(dtype) for n in numbers)
     labels = torch.arange(len(counts)) % 3
     labels[0] = 255
-    constants = field.constants(places(len(ray)).to(dtype))
+    points = places(len(ray)).to(dtype)
+    constants = Places(points) if placed else field.constants(points)
     return Batch(constants, ray, length, rgb, alpha, labels)
 
 
@@ -68,12 +71,10 @@ def test_what_is_precomputed_changes_nothing(spec: FieldSpec) -> None:
 
 
 @pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.kind)
-def test_constants_of_some_points(spec: FieldSpec) -> None:
+def test_what_is_precomputed_changes_no_gradient(spec: FieldSpec) -> None:
     field, points = made(spec), places(200)
-    kept = torch.as_tensor(np.random.default_rng(1).random(200) < 0.4)
-    some, anew = field.constants(points).kept(kept), field.constants(points[kept])
     grads = []
-    for constants in (some, anew):
+    for constants in (field.constants(points), Places(points)):
         field.zero_grad()
         density, rgb = field.shade(constants)
         torch.autograd.backward(density.sum() + (rgb * torch.arange(3.0)).sum())
@@ -196,8 +197,8 @@ def test_only_hidden_samples_are_dropped_and_the_choice_comes_back() -> None:
     field = made(SPECS[1])
     with torch.no_grad():
         field.tables()[0][:, 0] = 40.0  # opaque
-    model, batch = Model(field, None), batch_of(field, [6, 8, 1, 7])
-    rays = FixedRays([(batch,)])
+    model, batch = Model(field, None), batch_of(field, [6, 8, 1, 7], placed=True)
+    rays = FixedRays([(batch,)], field)
     for step in range(PRUNE_AFTER):
         assert rays.batches(0, step)[0] is batch
         rays.after(step, model)
@@ -208,6 +209,6 @@ def test_only_hidden_samples_are_dropped_and_the_choice_comes_back() -> None:
         render_batch(field, pruned), render_batch(field, batch), strict=True
     ):
         assert (few - all_samples).abs().max() < 0.011
-    again = FixedRays([(batch,)])
+    again = FixedRays([(batch,)], field)
     again.restore(rays.state())
     assert torch.equal(again.batches(0, 0)[0].length, pruned.length)
