@@ -34,7 +34,7 @@ from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.palette.pixels.labels import UNLABELLED
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
-BORDER = 0.65  # opacity at an outline between drawn ones, where a hull is a little too large
+BORDER = 0.7  # opacity at an outline between drawn ones, where a hull is a little too large
 OPAQUE = 0.6  # opacity from which a field's colour is its own
 FIELD_VOTE = 0.25  # beside 1 of the drawings together
 SOFT_PX = 0.8  # sigma over which votes are shared
