@@ -8,9 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 import torch
+from jaxtyping import Float
 from threadpoolctl import threadpool_limits
 
+from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import check_cut_out, has_figure
 from toonset.errors import UsageError
@@ -159,9 +162,13 @@ def train(
 
 def with_drawings(training: Training, scene: Scene) -> TrainedField:
     """Return the field with what the drawn look is made of."""
-    baked = Baked.of(training.result)
+    baked, ready = Baked.of(training.result), training.prepared
     drawn = [frame.rgba for frame in scene.frames]
-    found = drawings_of(training.prepared.scene, drawn, lambda camera: render(baked, camera).depth)
+
+    def depth_of(camera: Camera) -> Float[np.ndarray, "height width"]:
+        return render(baked, camera).depth
+
+    found = drawings_of(ready.scene, drawn, depth_of, bent=ready.bent)
     return replace(training.result, drawings=found)
 
 

@@ -107,7 +107,8 @@ def _laid(scene: Scene, recipe: Recipe, seed: int) -> _Laid:
         return render(baked, camera).depth
 
     drawn = [frame.rgba for frame in ready.frames]
-    drawings = drawings_of(training.prepared.scene, drawn, depth_of)
+    prepared = training.prepared
+    drawings = drawings_of(prepared.scene, drawn, depth_of, bent=prepared.bent)
     laid, again = time.process_time(), 0.0
     if drawings is not None:
         assert drawings.textures  # made here, not while flows are timed

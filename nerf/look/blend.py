@@ -34,7 +34,7 @@ from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.palette.pixels.labels import UNLABELLED
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
-BORDER = 0.7  # opacity at an outline between drawn ones, where a hull is a little too large
+BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
 OPAQUE = 0.6  # opacity from which a field's colour is its own
 FIELD_VOTE = 0.25  # beside 1 of the drawings together
 SOFT_PX = 0.8  # sigma over which votes are shared
@@ -157,9 +157,7 @@ def drawn_view(
     box = _box(view.alpha > 0)
     if box is None:
         return result
-    finer = min(1.0, view.camera.scale / min(one.camera.scale for one in drawings.views))
-    border = 0.5 + finer * (BORDER - 0.5)  # what small views show of it is their own pixels
-    part = _drawn(drawings.fitting(view.camera.scale), view.crop(*box), border)
+    part = _drawn(drawings.fitting(view.camera.scale), view.crop(*box), _border(drawings, view))
     if palette is not None and len(palette) == len(drawings.palette):
         part = _recolored(part, (palette - drawings.palette.astype(np.float32)) / 255)
     for name in ("rgb", "alpha", "ink", "labels"):
@@ -214,6 +212,14 @@ def _recolored(view: DrawnView, change: Float[np.ndarray, "colors 3"]) -> DrawnV
     body = view.alpha - view.ink
     rgb = (view.rgb + own * body[..., None]).clip(0, 1)
     return replace(view, rgb=np.minimum(rgb, view.alpha[..., None]))
+
+
+def _border(drawings: Drawings, view: Geometry) -> float:
+    """Return the opacity at an outline; in small views opacity is soft by their own pixels."""
+    if not drawings.bent:
+        return SOLID
+    finer = view.camera.scale / min(one.camera.scale for one in drawings.views)
+    return SOLID + min(1.0, finer) * (BORDER - SOLID)
 
 
 def _eased(part: float) -> float:

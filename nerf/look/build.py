@@ -20,7 +20,11 @@ COARSE, MOST_COLORS = 32, 12  # levels of a channel that count as one; colours
 
 
 def drawings_of(
-    ready: Scene, drawn: Sequence[UInt8[np.ndarray, "height width 4"]], depth_of: Depths
+    ready: Scene,
+    drawn: Sequence[UInt8[np.ndarray, "height width 4"]],
+    depth_of: Depths,
+    *,
+    bent: bool,
 ) -> Drawings | None:
     """Return what the drawn look needs; None where no drawing, or no field, shows a figure.
 
@@ -28,6 +32,7 @@ def drawings_of(
         ready: the drawings as they were trained on.
         drawn: the same before they were bent, which blurs lines: the outline is measured there.
         depth_of: the field's surface as a camera sees it, nan where there is none.
+        bent: whether they were bent.
     """
     frames = [frame for frame in ready.frames if has_figure(frame)]
     if not frames:
@@ -43,7 +48,7 @@ def drawings_of(
     palette = ready.palette if ready.palette is not None else _common_colors(views)
     height = float(np.median(heights))
     line = outline_of(drawn)
-    found = Drawings(views, (), line, line, palette, height, extent)
+    found = Drawings(views, (), line, line, palette, height, extent, bent)
     return replace(found, flows=pair_flows(found, depth_of))
 
 

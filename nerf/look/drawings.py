@@ -78,6 +78,7 @@ class Drawings:
         palette: (colors, 3) of the drawings' labels.
         height: of the figure, world units.
         depths: the nearest and the farthest, past the cameras' targets, world units.
+        bent: whether the drawings had to be bent to agree: their hull is a little too large then.
     """
 
     views: tuple[Drawing, ...]
@@ -87,6 +88,7 @@ class Drawings:
     palette: UInt8[np.ndarray, "colors 3"]
     height: float
     depths: tuple[float, float]
+    bent: bool
 
     @cached_property
     def paints(self) -> UInt8[np.ndarray, "paints 3"]:

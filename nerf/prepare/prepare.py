@@ -65,13 +65,17 @@ class Prepared:
         return self.apart_px or compared.apart_px[0]
 
     @property
+    def bent(self) -> bool:
+        """Return whether drawings were bent."""
+        return self.unbending is not None and self.unbending.applied
+
+    @property
     def agree(self) -> bool:
         """Return whether outlines agree, as they are or once cameras follow them.
 
         Bent drawings never do: their faces and seams are drawn as wrongly as their outlines.
         """
-        bent = self.unbending is not None and self.unbending.applied
-        return not bent and self.apart_px < AGREE_PX
+        return not self.bent and self.apart_px < AGREE_PX
 
     @property
     def keys(self) -> KeyWarps | None:

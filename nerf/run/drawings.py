@@ -61,6 +61,7 @@ class DrawingsRecord(BaseModel):
     palette: list[Color] = Field(min_length=1, max_length=254)
     height: float = Field(gt=0, le=1e9)
     depths: tuple[Number, Number]
+    bent: bool
 
     @classmethod
     def of(cls, drawings: Drawings) -> DrawingsRecord:
@@ -75,6 +76,7 @@ class DrawingsRecord(BaseModel):
                 "palette": drawings.palette.tolist(),
                 "height": drawings.height,
                 "depths": drawings.depths,
+                "bent": drawings.bent,
             }
         )
 
@@ -142,6 +144,7 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         np.array(record.palette, dtype=np.uint8),
         record.height,
         record.depths,
+        record.bent,
     )
 
 

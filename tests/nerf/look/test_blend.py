@@ -174,3 +174,12 @@ def test_half_a_drawing_lies_where_the_whole_one_does() -> None:
     assert odd.half.outline is not None
     assert odd.outline is not None
     assert odd.half.outline.width_px == odd.outline.width_px / 2
+
+
+def test_bent_drawings_have_a_narrower_figure_between_them_and_their_own_where_drawn() -> None:
+    straight = drawings()
+    bent = replace(straight, bent=True)
+    between, drawn = geometry(camera_at(0.4)), geometry(camera_at(0.0))
+    assert drawn_view(bent, between).alpha.sum() < drawn_view(straight, between).alpha.sum() - 20
+    own = (drawn_view(each, drawn).alpha for each in (bent, straight))
+    np.testing.assert_allclose(next(own), next(own), atol=1e-6)

@@ -27,7 +27,7 @@ from toonset.view import over_white
 def left_out(scene: Scene, drawn: Sequence[np.ndarray] | None = None) -> list[LeftOut]:
     """Return every drawing of a perfect field as the others predict it."""
     shown = [frame.rgba for frame in scene.frames] if drawn is None else drawn
-    drawings = drawings_of(scene, shown, depth_of)
+    drawings = drawings_of(scene, shown, depth_of, bent=False)
     assert drawings is not None
     drawings = drawings.fitting(TALL_PX / drawings.height)
     frames = [replace(f, rgba=rgba) for f, rgba in zip(scene.frames, shown, strict=True)]

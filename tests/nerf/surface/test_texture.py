@@ -204,7 +204,7 @@ def lined(step: float) -> tuple[Drawings, np.ndarray]:
     camera = replace(camera_at(0.0, side=SIDE), scale=float(SIDE))
     view = Drawing(camera, rgba, levels_of(depth, (-1.0, 1.0)))
     line = Outline(INK, 3.0)
-    return Drawings((view,), (), line, line, PALETTE, 0.8, (-1.0, 1.0)), depth
+    return Drawings((view,), (), line, line, PALETTE, 0.8, (-1.0, 1.0), False), depth
 
 
 @pytest.mark.parametrize("step", [0.0, 0.3])
