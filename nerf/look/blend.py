@@ -189,7 +189,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
     whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
     soft = view.alpha + part * (whole[..., 3] - view.alpha)
-    alpha, ink = crisp_outline(soft, border + part * (0.5 - border), line_px, figure_px)
+    alpha, ink = crisp_outline(soft, border + float(part) * (SOLID - border), line_px, figure_px)
     solid = view.alpha > SOLID
     by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
     if solid.any():
