@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg import get_lapack_funcs
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.displacement import Moves
@@ -197,8 +197,9 @@ def _pixel_jacobian(
 
 def _learned(matrix: np.ndarray, precision: np.ndarray, numbers: np.ndarray, tau: float) -> float:
     """Return the size of errors that the numbers and their uncertainty speak for."""
-    factor, _ = dpotrf(matrix + precision / tau**2, lower=True)
-    spread, _ = dpotri(factor, lower=True)  # its lower half: half the work of an inverse
+    potrf, potri = get_lapack_funcs(("potrf", "potri"), (matrix,))
+    factor, _ = potrf(matrix + precision / tau**2, lower=True)
+    spread, _ = potri(factor, lower=True)  # its lower half: half the work of an inverse
     twice = 2 * float(np.sum(np.tril(precision, -1) * spread))
     trace = twice + float(np.sum(np.diag(precision) * np.diag(spread)))
     energy = float(numbers @ precision @ numbers) + trace
