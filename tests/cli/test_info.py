@@ -72,7 +72,7 @@ def test_info_and_check_of_a_run(run: Path, toonset):
     done = toonset("info", run)
     assert done.code == 0
     assert done.out.startswith(f"{run}: 20 steps, psnr ")
-    assert "colours, weak\n" in done.out
+    assert "colours, ok\n" in done.out
     assert "these were 20 steps: train longer" in done.out
     assert toonset("check", run).out == f"{run}: no problem\n"
     (run / "model.safetensors").write_bytes(b"\0" * 64)
