@@ -11,7 +11,7 @@ for i, camera in enumerate(ts.turntable(run.field, 36)):
     ts.render(run.field, camera).save(f"{i:03d}.png")
 
 This is the whole public interface: the road of a sheet from drawings to new views, with the bytes
-that the commands write. Exports, films and new colours are the commands' own. Importing it loads
+that the commands write. Exports, films, textures and new colours are the commands' own. Importing it loads
 nothing heavy: a name's module is imported when the name is used.
 """
 
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.score.evaluate import evaluate as evaluate
     from toonset.nerf.surface.surface import surface_of as surface_of
-    from toonset.nerf.surface.texture import textured_surface_of as textured_surface_of
     from toonset.nerf.training import Run as Run
     from toonset.nerf.training import train as train
     from toonset.palette.extract import extract_palette as extract_palette
@@ -77,7 +76,6 @@ _PLACES = {  # module -> its public names; "name=there" where it is called other
     "nerf.run.folder": "read_run=read_field",
     "nerf.score.evaluate": "evaluate",
     "nerf.surface.surface": "surface_of",
-    "nerf.surface.texture": "textured_surface_of",
     "nerf.training": "Run train",
     "palette.extract": "extract_palette label_image",
     "palette.palette": "Palette",
