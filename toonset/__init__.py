@@ -11,8 +11,8 @@ for i, camera in enumerate(ts.turntable(run.field, 36)):
     ts.render(run.field, camera).save(f"{i:03d}.png")
 
 This is the whole public interface: the road of a sheet from drawings to new views, with the bytes
-that the commands write. Exports, films, textures and new colours are the commands' own. Importing it loads
-nothing heavy: a name's module is imported when the name is used.
+that the commands write. Exports, films, textures and new colours are the commands' own. Importing
+it loads nothing heavy: a name's module is imported when the name is used.
 """
 
 from __future__ import annotations
