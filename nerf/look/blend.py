@@ -29,12 +29,13 @@ from toonset.nerf.look.drawings import (
     look_up,
     taken,
 )
-from toonset.nerf.look.outline import crisp_outline
+from toonset.nerf.look.outline import CRUMB_PX, crisp_outline
 from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.palette.pixels.labels import UNLABELLED
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
+HOLE_PX = 80  # of bent drawings: hulls of capes are torn where outlines disagree
 OPAQUE = 0.6  # opacity from which a field's colour is its own
 FIELD_VOTE = 0.25  # beside 1 of the drawings together
 SOFT_PX = 0.8  # sigma over which votes are shared
@@ -189,7 +190,9 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
     whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
     soft = view.alpha + part * (whole[..., 3] - view.alpha)
-    alpha, ink = crisp_outline(soft, border + float(part) * (SOLID - border), line_px, figure_px)
+    border += float(part) * (SOLID - border)
+    hole_px = HOLE_PX if drawings.bent else CRUMB_PX
+    alpha, ink = crisp_outline(soft, border, line_px, figure_px, hole_px)
     solid = view.alpha > SOLID
     by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
     if solid.any():

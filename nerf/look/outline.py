@@ -67,7 +67,11 @@ def _rim_px(alpha: UInt8[np.ndarray, "height width"]) -> float:
 
 
 def crisp_outline(
-    alpha: Float[np.ndarray, "height width"], border: float, width_px: float, figure_px: float
+    alpha: Float[np.ndarray, "height width"],
+    border: float,
+    width_px: float,
+    figure_px: float,
+    hole_px: float = CRUMB_PX,
 ) -> tuple[Float[np.ndarray, "height width"], Float[np.ndarray, "height width"]]:
     """Return a crisp coverage, and how far a line along its inner side covers every pixel.
 
@@ -76,13 +80,14 @@ def crisp_outline(
         border: the coverage at the border.
         width_px: of the line; 0: none.
         figure_px: height of the figure.
+        hole_px: smaller holes are noise: area in a figure of CRUMB_AT px.
     """
     height, width = alpha.shape
     size = (FINER * width, FINER * height)
     fine = cv2.resize(alpha.astype(np.float32), size, interpolation=cv2.INTER_CUBIC)
     inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH_PX * FINER) >= border
-    least = CRUMB_PX * (figure_px / CRUMB_AT) ** 2 * FINER**2
-    inside = without_crumbs(inside, least)
+    samples = (figure_px / CRUMB_AT) ** 2 * FINER**2
+    inside = without_crumbs(inside, CRUMB_PX * samples, hole_px * samples)
     ink = np.zeros_like(alpha, dtype=np.float32)
     if width_px > 0:
         padded = np.pad(inside, 1).astype(np.uint8)
@@ -94,13 +99,13 @@ def crisp_outline(
 
 
 def without_crumbs(
-    mask: Bool[np.ndarray, "height width"], least_px: float
+    mask: Bool[np.ndarray, "height width"], least_px: float, hole_px: float | None = None
 ) -> Bool[np.ndarray, "height width"]:
-    """Return a mask without patches and pinholes of fewer pixels."""
-    for value in (True, False):
+    """Return a mask without patches of fewer pixels, and holes of fewer than `hole_px`."""
+    for value, least in ((True, least_px), (False, least_px if hole_px is None else hole_px)):
         side = (mask == value).astype(np.uint8)
         _, part, about, _ = cv2.connectedComponentsWithStats(side, connectivity=4)
-        small = about[:, cv2.CC_STAT_AREA] < least_px
+        small = about[:, cv2.CC_STAT_AREA] < least
         small[0] = False
         mask = np.where(small[part], not value, mask)
     return mask

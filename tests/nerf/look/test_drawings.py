@@ -127,3 +127,12 @@ def test_colours_stand_in_for_a_missing_palette() -> None:
     assert near <= 16
     empty = replace(scene.frames[0], rgba=np.zeros_like(scene.frames[0].rgba))
     assert drawings_of(replace(scene, frames=(empty,)), [empty.rgba], depth_of, bent=False) is None
+
+
+def test_holes_are_closed_up_to_their_own_size() -> None:
+    mask = np.zeros((20, 20), dtype=bool)
+    mask[2:18, 2:18] = True
+    torn = mask.copy()
+    torn[8:11, 8:11] = False
+    np.testing.assert_array_equal(without_crumbs(torn, 4, 10), mask)
+    np.testing.assert_array_equal(without_crumbs(torn, 4), torn)
