@@ -73,8 +73,13 @@ def test_info_and_check_of_a_run(run: Path, toonset):
     assert done.code == 0
     assert done.out.startswith(f"{run}: 20 steps, psnr ")
     assert "colours, ok\n" in done.out
-    assert "these were 20 steps: train longer" in done.out
     assert toonset("check", run).out == f"{run}: no problem\n"
+    metrics = json.loads((run / "metrics.json").read_text())
+    metrics["verdict"] |= {"verdict": "weak", "reasons": ["a drawing is off: mend it"]}
+    (run / "metrics.json").write_text(json.dumps(metrics))
+    weak = toonset("info", run).out
+    assert "colours, weak\n" in weak
+    assert "a drawing is off: mend it" in weak
     (run / "model.safetensors").write_bytes(b"\0" * 64)
     (run / "metrics.json").write_text('{"steps": NaN}')
     broken = toonset("check", run)
