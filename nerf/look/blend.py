@@ -35,7 +35,7 @@ from toonset.palette.pixels.labels import UNLABELLED
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
-HOLE_PX = 80  # of bent drawings: hulls of capes are torn where outlines disagree
+HOLE_PX = 80  # area, as CRUMB_PX: where bent drawings disagree, hulls of capes are torn
 OPAQUE = 0.6  # opacity from which a field's colour is its own
 FIELD_VOTE = 0.25  # beside 1 of the drawings together
 SOFT_PX = 0.8  # sigma over which votes are shared
