@@ -73,6 +73,12 @@ def train(
             "again in renderings, which may cost small eyes and mouths.",
         ),
     ] = "paint",
+    no_mannequin: Annotated[
+        bool,
+        typer.Option(
+            "--no-mannequin", help="Learn the shape from the drawings alone, not the mannequin's."
+        ),
+    ] = False,
     as_placed: Annotated[
         bool, typer.Option("--as-placed", help="Trust the cameras: do not register drawings.")
     ] = False,
@@ -149,7 +155,7 @@ def train(
     _check_choice(ink, INKS, "--ink")
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
     switches = {"fair": as_carved, "register": as_placed, "turn": as_turned}
-    switches |= {"unbend": as_bent, "symmetric": one_sided}
+    switches |= {"unbend": as_bent, "symmetric": one_sided, "mannequin": no_mannequin}
     given |= {name: False for name, off in switches.items() if off}
     given |= {"ink": True} if ink == "redraw" else {}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle

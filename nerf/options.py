@@ -38,6 +38,8 @@ class TrainOptions:
             drawings well (`resolution_search`); "triplane", one cell per pixel; or, to compare
             with, a network alone, a grid of voxels, or the hull with the drawings' colours (nothing
             is fitted then).
+        mannequin: take the mannequin's shape where it predicts drawings better than they predict
+            each other (off: --no-mannequin).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over any backdrop.
         fair: take the fairest surface inside the hull instead of the hull with its corners
@@ -61,6 +63,7 @@ class TrainOptions:
     palette_weight: float = 0.003
     missing_views: int | None = None
     field: FieldName = "auto"
+    mannequin: bool = True
     carve: bool = True
     fair: bool = True
     register: bool = True
@@ -111,6 +114,7 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
         steps=steps,
         palette_weight=0.01,
         field="triplane",
+        mannequin=False,
         carve=False,
         smoothness=0.0,
         register=False,

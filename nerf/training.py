@@ -168,7 +168,7 @@ def with_drawings(training: Training, scene: Scene) -> TrainedField:
     def depth_of(camera: Camera) -> Float[np.ndarray, "height width"]:
         return render(baked, camera).depth
 
-    found = drawings_of(ready.scene, drawn, depth_of, bent=ready.bent)
+    found = drawings_of(ready.scene, drawn, depth_of, ready.shape, bent=ready.bent)
     return replace(training.result, drawings=found)
 
 

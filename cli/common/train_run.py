@@ -28,6 +28,7 @@ RESUMED_AS |= {
     "turn": "--as-turned",
     "unbend": "--as-bent",
     "symmetric": "--one-sided",
+    "mannequin": "--no-mannequin",
     "ink": "--ink",
 }
 RESUMED_AS |= {"field": "--field", "carve": "--preset", "smoothness": "--preset"}

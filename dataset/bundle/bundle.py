@@ -29,7 +29,7 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.calibration_file import calibration_content
-from toonset.dataset.bundle.read_scene import member, read_scene
+from toonset.dataset.bundle.read_scene import MANNEQUIN, member, read_scene
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.bundle.transforms_read import transforms_file
@@ -42,7 +42,7 @@ from toonset.palette.palette import Palette
 from toonset.view import View
 from toonset.write import new_folder, write_bytes, write_json
 
-MANNEQUIN, OVERLAY, CALIBRATION = "mannequin.obj", "overlay.png", "calibration.json"
+OVERLAY, CALIBRATION = "overlay.png", "calibration.json"
 LABELS, CONTOURS, IMAGES = "labels", "contours", "images"
 WRITTEN = (
     *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
@@ -88,7 +88,7 @@ def read_bundle(folder: str | Path) -> Bundle:
     scene = read_scene(folder)
     file = member(transforms_file(folder).parent, "palette.json")
     palette = None if file is None else read_palette_json(file)
-    return Bundle(folder, scene, palette, mannequin_of(folder))
+    return Bundle(folder, scene, palette, scene.mannequin)
 
 
 @contextmanager

@@ -14,12 +14,13 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, IMAGES, LABELS, MANNEQUIN, OVERLAY
+from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, IMAGES, LABELS, OVERLAY
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile
 from toonset.dataset.bundle.palette_files import COPIES, PALETTE_JSON, SWATCHES
 from toonset.dataset.bundle.problem_log import Problem, ProblemLog
 from toonset.dataset.bundle.read_scene import (
+    MANNEQUIN,
     check_label_names,
     label_name,
     member,

@@ -20,10 +20,12 @@ from toonset.dataset.bundle.transforms_read import (
     transforms_file,
 )
 from toonset.dataset.images.picture import load_indexed_png, load_rgba
+from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError
 from toonset.palette.formats.schema import read_palette_json
 from toonset.palette.pixels.labels import UNLABELLED
 
+MANNEQUIN = "mannequin.obj"
 Labels = UInt8[np.ndarray, "height width"]
 
 
@@ -31,11 +33,12 @@ def read_scene(path: Path) -> Scene:
     """Return the posed pictures of a bundle, a transforms.json, or a folder that holds one.
 
     Labels and palette are read where the folder has `palette.json` and `labels/`, sigmas where it
-    has the `calibration.json` of these cameras.
+    has the `calibration.json` of these cameras, the mannequin where it has one.
 
     Raises:
         BundleError: a file is missing, broken, of another size than its camera says, or outside
             of the folder.
+        MeshError: mannequin.obj is broken.
         PaletteError: palette.json is broken.
         PictureError: a picture cannot be read.
     """
@@ -51,7 +54,9 @@ def read_scene(path: Path) -> Scene:
         rgba = read_picture(frame, file)
         labels = None if palette is None else read_labels(root, frame, len(palette))
         frames.append(Frame(Path(frame.file_path).name, frame.camera, rgba, labels, sigma))
-    return Scene(tuple(frames), palette, str(path))
+    mannequin = member(root, MANNEQUIN)
+    mesh = None if mannequin is None else load_mesh(mannequin)
+    return Scene(tuple(frames), palette, str(path), mesh)
 
 
 def read_palette_of(root: Path) -> UInt8[np.ndarray, "colors 3"] | None:

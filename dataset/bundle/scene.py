@@ -1,4 +1,4 @@
-"""A scene to train on: posed RGBA pictures, with or without palette labels."""
+"""A scene to train on: posed RGBA pictures, with or without palette labels and mannequin."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
+from toonset.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +38,10 @@ class Scene:
         frames: in file order.
         palette: (colors, 3) sRGB that `Frame.labels` index; None without palette.
         name: where it came from, for messages.
+        mannequin: as calibration fitted it, in the cameras' world; None: there is none.
     """
 
     frames: tuple[Frame, ...]
     palette: UInt8[np.ndarray, "colors 3"] | None
     name: str
+    mannequin: Mesh | None = None

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, LABELS, MANNEQUIN
+from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, LABELS
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecord
 from toonset.dataset.bundle.problem_log import ProblemLog
-from toonset.dataset.bundle.read_scene import label_name, member
+from toonset.dataset.bundle.read_scene import MANNEQUIN, label_name, member
 from toonset.dataset.bundle.transforms_read import PosedPicture, read_frames, transforms_file
 from toonset.dataset.mesh.load import load_mesh
 from toonset.palette.formats.json import to_json

@@ -22,9 +22,8 @@ from jaxtyping import UInt8
 
 from toonset import frames as conventions
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import MANNEQUIN
 from toonset.dataset.bundle.camera_record import NativeCamera
-from toonset.dataset.bundle.read_scene import read_scene
+from toonset.dataset.bundle.read_scene import MANNEQUIN, read_scene
 from toonset.dataset.bundle.scene import Frame
 from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.images.picture import encode_png

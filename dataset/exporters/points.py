@@ -7,7 +7,6 @@ drawing, farthest from ink and from outlines that do not match.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +18,7 @@ from scipy.ndimage import distance_transform_edt
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame
+from toonset.dataset.mesh.rasterize import depth_map
 from toonset.mesh import Mesh
 
 OUTSIDE = 0.03  # of the body height: drawn outlines differ from the mannequin's by so much
@@ -92,28 +92,6 @@ def track_points(
     return TrackedPoints(candidates[kept], rgb[kept], seen[:, kept], pixels[:, kept])
 
 
-def depth_map(mesh: Mesh, pinhole: Camera) -> Float[np.ndarray, "height width"]:
-    """Return the distance along the optical axis of the nearest surface; infinite where none is.
-
-    OpenCV's rasteriser puts the optical axis into the middle of the image: a shear moves it.
-    """
-    (width, height), K = pinhole.size_wh, pinhole.K
-    pose = pinhole.camera_from_world
-    x, y, z = (mesh.vertices @ pose[:3, :3].T + pose[:3, 3]).T
-    x = (K[0, 0] * x + (K[0, 2] - width / 2) * z) / K[1, 1]
-    y = y + (K[1, 2] - height / 2) / K[1, 1] * z
-    opengl = np.ascontiguousarray(np.stack([x, -y, -z], axis=1), dtype=np.float32)
-    near, far = 0.9 * max(float(z.min()), 0.1 / pinhole.k), 1.1 * float(z.max())
-    depth = np.full((height, width), far, dtype=np.float32)
-    settings = cv2.TriangleRasterizeSettings()
-    settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
-    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-    angle = 2 * math.atan(height / 2 / K[1, 1])
-    axes = np.eye(4, dtype=np.float32)
-    cv2.triangleRasterizeDepth(opengl, faces, depth, axes, angle, near, far, settings)
-    return np.where(depth < 0.999 * far, depth, np.inf)
-
-
 def _visible(
     points: Float[np.ndarray, "n 3"], mesh: Mesh, pinhole: Camera
 ) -> Bool[np.ndarray, " n"]:
@@ -121,11 +99,10 @@ def _visible(
 
     The farthest depth of a pixel's neighbours counts: on the rim, half of them see past the body.
     """
-    behind = cv2.dilate(depth_map(mesh, pinhole), np.ones((3, 3), np.uint8))
-    pixels, past_target, in_front = pinhole.project(points)
+    deepest = cv2.dilate(depth_map(mesh.vertices, mesh.faces, pinhole), np.ones((3, 3), np.uint8))
+    pixels, depth, in_front = pinhole.project(points)
     column, row, within = _cells(pixels, pinhole.size_wh)
-    depth = past_target + 1 / pinhole.k
-    return within & in_front & (depth <= behind[row, column] + BEHIND * mesh.height)
+    return within & in_front & (depth <= deepest[row, column] + BEHIND * mesh.height)
 
 
 def _look_up(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.bundle.bundle import MANNEQUIN
+from toonset.dataset.bundle.read_scene import MANNEQUIN
 from toonset.dataset.bundle.transforms import FAR_HEIGHTS, transforms_dict
 from toonset.dataset.bundle.transforms_read import check_total
 from toonset.dataset.exporters.common import NATIVE

@@ -14,7 +14,7 @@ import numpy as np
 
 from toonset.dataset.mesh.color import Material, face_colors_from_texture, read_materials
 from toonset.dataset.mesh.validate import Soup, check_counts
-from toonset.errors import MeshError
+from toonset.errors import MeshError, printable
 
 
 @dataclass
@@ -49,7 +49,7 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> Soup:
         try:
             _read_line(words, lists)
         except (ValueError, IndexError) as error:
-            shown = " ".join(words)[:40]
+            shown = printable(" ".join(words)[:40])
             raise MeshError(
                 f"{path}: line {number}: '{shown}': {error}; the file is damaged, export it again"
             ) from error

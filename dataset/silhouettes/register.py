@@ -75,7 +75,7 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
     precision = np.kron(np.eye(views), np.linalg.inv(moves.covariance))
     numbers = np.zeros((views, count))
     first, near = _linearised(outlines, moves, numbers, None)
-    idle = first.cost - _log_volume(first.matrix, moves.covariance * tau**2, views)
+    idle = first.cost - log_volume(first.matrix, moves.covariance * tau**2, views)
     if idle <= 0:  # even a perfect fit would not be worth its numbers
         return Fit(numbers, 0.0, float(idle / 2), (first.apart, first.apart))
     normal, flat = first, numbers.reshape(-1)
@@ -87,9 +87,9 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
         numbers = flat.reshape(views, count)
         normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
         if round_ >= SETTLED:
-            tau = _learned(normal.matrix, precision, flat, tau)
+            tau = learned(energy(normal.matrix, precision, flat, tau), len(flat))
     spent = normal.cost + flat @ precision @ flat / tau**2
-    volume = _log_volume(normal.matrix, moves.covariance * tau**2, views)
+    volume = log_volume(normal.matrix, moves.covariance * tau**2, views)
     gain = (first.cost - spent - volume) / 2
     return Fit(numbers, tau, float(gain), (first.apart, normal.apart))
 
@@ -195,18 +195,29 @@ def _pixel_jacobian(
     return np.stack(columns, axis=-1)
 
 
-def _learned(matrix: np.ndarray, precision: np.ndarray, numbers: np.ndarray, tau: float) -> float:
-    """Return the size of errors that the numbers and their uncertainty speak for."""
+def energy(
+    matrix: Float[np.ndarray, "k k"],
+    precision: Float[np.ndarray, "k k"],
+    numbers: Float[np.ndarray, " k"],
+    tau: float,
+) -> float:
+    """Return what numbers and their uncertainty amount to, in variances of the prior."""
     potrf, potri = get_lapack_funcs(("potrf", "potri"), (matrix,))
     factor, _ = potrf(matrix + precision / tau**2, lower=True)
     spread, _ = potri(factor, lower=True)  # its lower half: half the work of an inverse
     twice = 2 * float(np.sum(np.tril(precision, -1) * spread))
     trace = twice + float(np.sum(np.diag(precision) * np.diag(spread)))
-    energy = float(numbers @ precision @ numbers) + trace
-    return float(np.clip(np.sqrt(energy / len(numbers)), LEAST, MOST))
+    return float(numbers @ precision @ numbers) + trace
 
 
-def _log_volume(matrix: np.ndarray, covariance: np.ndarray, views: int) -> float:
+def learned(whole: float, count: int) -> float:
+    """Return the size of errors that the energy of `count` numbers speaks for."""
+    return float(np.clip(np.sqrt(whole / count), LEAST, MOST))
+
+
+def log_volume(
+    matrix: Float[np.ndarray, "m m"], covariance: Float[np.ndarray, "k k"], views: int
+) -> float:
     """Return log det(1 + K H): what the determined numbers cost."""
     prior = np.kron(np.eye(views), np.linalg.inv(covariance))
     before = views * np.linalg.slogdet(covariance)[1]

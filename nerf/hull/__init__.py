@@ -1,1 +1,1 @@
-"""The visual hull: carve it, march through it, smooth it."""
+"""The body that drawings show: their visual hull, or the mannequin where that is it."""

@@ -49,9 +49,12 @@ def hull_of(
     hull = carve(cameras, wide if len(frames) >= WIDE_FROM else alphas, voxels, evidence.missing)
     slack = SLACK * apart_px / (hull.voxel * max(camera.scale for camera in cameras))
     hull = faired(hull, cameras, alphas, slack) if options.fair else hull
-    # Run folders hold bytes, deflated: train on exactly what will be loaded.
-    stored = (hull.support * LEVELS).round() * (255 // LEVELS)
-    return replace(hull, support=stored / 255), evidence
+    return as_stored(hull), evidence
+
+
+def as_stored(hull: Hull) -> Hull:
+    """Return the hull as run folders hold it: in bytes. It is trained on as it will be loaded."""
+    return replace(hull, support=(hull.support * LEVELS).round() * (255 // LEVELS) / 255)
 
 
 def per_px(scene: Scene, factor: float, limits: tuple[int, int]) -> int:

@@ -18,7 +18,9 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.camera import Camera
+from toonset.nerf.hull.mannequin_shape import FINER, Sight
 from toonset.nerf.lines.nearest import nearest
+from toonset.nerf.lines.step_lines import drawn_steps
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
@@ -31,6 +33,7 @@ from toonset.nerf.look.drawings import (
 )
 from toonset.nerf.look.outline import CRUMB_PX, crisp_outline
 from toonset.nerf.look.paint_flow import NEIGHBOURS
+from toonset.nerf.look.shade import smoothed
 from toonset.palette.pixels.labels import UNLABELLED
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
@@ -155,12 +158,15 @@ def drawn_view(
         np.zeros((height, width), np.uint8),
         0.0,
     )
-    box = _box(view.alpha > 0)
+    shape = drawings.shape
+    box = _box(view.alpha > 0) if shape is None else shape.box(view.camera)
     if box is None:
         return result
-    part = _drawn(drawings.fitting(view.camera.scale), view.crop(*box), _border(drawings, view))
+    change: Float[np.ndarray, "colors 3"] = np.zeros((len(drawings.palette), 3), np.float32)
     if palette is not None and len(palette) == len(drawings.palette):
-        part = _recolored(part, (palette - drawings.palette.astype(np.float32)) / 255)
+        change = (palette - drawings.palette.astype(np.float32)) / 255
+    fitting, border = drawings.fitting(view.camera.scale), _border(drawings, view)
+    part = _drawn(fitting, view.crop(*box), border, change)
     for name in ("rgb", "alpha", "ink", "labels"):
         getattr(result, name)[box] = getattr(part, name)
     return replace(result, by_field=part.by_field)
@@ -176,13 +182,21 @@ def _box(mask: Bool[np.ndarray, "height width"], room: int = 4) -> tuple[slice, 
     return sides[0], sides[1]
 
 
-def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
-    camera, pen = view.camera, drawings.pen
+def _drawn(
+    drawings: Drawings, view: Geometry, border: float, change: Float[np.ndarray, "colors 3"]
+) -> DrawnView:
+    camera, pen, own_color = view.camera, drawings.pen, _straight(view)
+    sight = None
+    if drawings.shape is not None:
+        sight = drawings.shape.seen(camera, normals=drawings.shade is not None)
+        view = replace(view, alpha=sight.alpha, depth=sight.depth)
     points = camera.unproject(camera.pixel_grid(), crisp_depth(view.depth))
     figure_px = drawings.height * camera.scale
     cameras = [texture.camera for texture in drawings.textures]
     first, second, share = flanking(cameras, camera)
-    candidates, covered, own = _candidates(drawings, view, points, (first, second, share))
+    candidates, covered, own = _candidates(
+        drawings, view, points, own_color, (first, second, share)
+    )
     color, labels = _voted(candidates, view, len(drawings.paints), STRAY * figure_px**2)
     scale = camera.scale / cameras[first].scale
     line_px = pen.width_px * scale if pen else 0.0
@@ -191,27 +205,43 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
     soft = view.alpha + part * (whole[..., 3] - view.alpha)
     border += float(part) * (SOLID - border)
-    hole_px = HOLE_PX if drawings.bent else CRUMB_PX
+    hole_px = HOLE_PX if drawings.bent and sight is None else CRUMB_PX
     alpha, ink = crisp_outline(soft, border, line_px, figure_px, hole_px)
+    if sight is not None:
+        ink = np.maximum(ink, np.minimum(_inner_lines(drawings, sight, scale), alpha))
     solid = view.alpha > SOLID
     by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
     if solid.any():
         at = nearest(solid)
         color, labels = color[at], labels[at]
+    tone: Float[np.ndarray, "h w 3"] = np.ones((1, 1, 3), np.float32)
+    if sight is not None and drawings.shade is not None:
+        tone = drawings.shade.tone(smoothed(sight.normal, figure_px), FINER)
     drawn_with = np.array(pen.rgb if pen else (0, 0, 0)) / np.float32(255)
-    rgb = color * (alpha - ink)[..., None] + ink[..., None] * drawn_with
+    rgb = color * tone * (alpha - ink)[..., None] + ink[..., None] * drawn_with
     if pen == drawings.outline:  # the drawing's own line, too
         rgb = rgb + part * (np.minimum(whole[..., :3], whole[..., 3:]) - rgb)
         alpha = alpha + part * (whole[..., 3] - alpha)
-    return DrawnView(rgb, alpha, ink, labels, by_field)
+    return _recolored(DrawnView(rgb, alpha, ink, labels, by_field), change, tone)
 
 
-def _recolored(view: DrawnView, change: Float[np.ndarray, "colors 3"]) -> DrawnView:
+def _inner_lines(drawings: Drawings, sight: Sight, scale: float) -> Float[np.ndarray, "h w"]:
+    """Return how far lines cover every pixel where one part of the figure hides another."""
+    pen, outline, style = drawings.pen, drawings.outline, drawings.steps
+    if pen is None or outline is None or style is None:
+        return np.zeros(sight.alpha.shape, np.float32)
+    wider = pen.width_px / max(outline.width_px, 1e-6)
+    return drawn_steps(sight.fine, style, drawings.height, FINER, scale * wider)
+
+
+def _recolored(
+    view: DrawnView, change: Float[np.ndarray, "colors 3"], tone: Float[np.ndarray, "h w 3"]
+) -> DrawnView:
     """Return the view with every palette colour changed; pixels between two get some of both."""
     if not change.any():
         return view
     own = np.concatenate([change, np.zeros((256 - len(change), 3), np.float32)])[view.labels]
-    own = cv2.blur(own, (3, 3))
+    own = cv2.blur(own, (3, 3)) * tone
     body = view.alpha - view.ink
     rgb = (view.rgb + own * body[..., None]).clip(0, 1)
     return replace(view, rgb=np.minimum(rgb, view.alpha[..., None]))
@@ -219,7 +249,7 @@ def _recolored(view: DrawnView, change: Float[np.ndarray, "colors 3"]) -> DrawnV
 
 def _border(drawings: Drawings, view: Geometry) -> float:
     """Return the opacity at an outline; in small views opacity is soft by their own pixels."""
-    if not drawings.bent:
+    if not drawings.bent or drawings.shape is not None:
         return SOLID
     finer = view.camera.scale / min(one.camera.scale for one in drawings.views)
     return SOLID + min(1.0, finer) * (BORDER - SOLID)
@@ -233,6 +263,7 @@ def _candidates(
     drawings: Drawings,
     view: Geometry,
     points: Float[np.ndarray, "h w 3"],
+    own_color: Float[np.ndarray, "h w 3"],
     between: tuple[int, int, float],
 ) -> tuple[list[_Candidate], Bool[np.ndarray, "h w"], Seen]:
     """Return what drawings and field say, the pixels that drawings show, and the first's places."""
@@ -267,7 +298,7 @@ def _candidates(
             weight = SIDE_VOTE * gap.astype(np.float32)
             candidates.append(_candidate(textures[number], (seen.x, seen.y), weight))
             covered |= gap
-    candidates.append(_of_field(view, drawings, covered))
+    candidates.append(_of_field(own_color, drawings, covered))
     return candidates, covered, own
 
 
@@ -285,10 +316,15 @@ def _candidate(
     return _Candidate(color, taken(texture.labels, places, cv2.INTER_NEAREST), weight)
 
 
-def _of_field(view: Geometry, drawings: Drawings, covered: Bool[np.ndarray, "h w"]) -> _Candidate:
+def _straight(view: Geometry) -> Float[np.ndarray, "h w 3"]:
+    """Return the field's colours, beside what it shows those of the nearest that is opaque."""
     color = (view.rgb / np.maximum(view.alpha, 0.2)[..., None]).clip(0, 1).astype(np.float32)
-    if (view.alpha > OPAQUE).any():
-        color = color[nearest(view.alpha > OPAQUE)]
+    return color[nearest(view.alpha > OPAQUE)] if (view.alpha > OPAQUE).any() else color
+
+
+def _of_field(
+    color: Float[np.ndarray, "h w 3"], drawings: Drawings, covered: Bool[np.ndarray, "h w"]
+) -> _Candidate:
     paints = drawings.paints / np.float32(255)
     label = ((color[..., None, :] - paints) ** 2).sum(axis=-1).argmin(axis=-1).astype(np.uint8)
     return _Candidate(color, label, np.where(covered, 0, OWN_VOTE).astype(np.float32))

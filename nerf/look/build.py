@@ -11,8 +11,10 @@ from jaxtyping import UInt8
 
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import has_figure, mask_of
+from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.look.drawings import Drawing, Drawings, levels_of
+from toonset.nerf.look.flat_paint import flat_paint
 from toonset.nerf.look.outline import outline_of
 from toonset.nerf.look.paint_flow import Depths, pair_flows
 
@@ -23,6 +25,7 @@ def drawings_of(
     ready: Scene,
     drawn: Sequence[UInt8[np.ndarray, "height width 4"]],
     depth_of: Depths,
+    shape: Shape | None = None,
     *,
     bent: bool,
 ) -> Drawings | None:
@@ -32,23 +35,34 @@ def drawings_of(
         ready: the drawings as they were trained on.
         drawn: the same before they were bent, which blurs lines: the outline is measured there.
         depth_of: the field's surface as a camera sees it, nan where there is none.
+        shape: the mannequin's, where it is the character's: the surface is its own then.
         bent: whether they were bent.
     """
     frames = [frame for frame in ready.frames if has_figure(frame)]
     if not frames:
         return None
-    depths = side_by_side([partial(depth_of, frame.camera) for frame in frames])
+    sights = None
+    if shape is not None:
+        sights = [shape.seen(frame.camera, normals=True) for frame in frames]
+        depths = [sight.depth for sight in sights]
+    else:
+        depths = side_by_side([partial(depth_of, frame.camera) for frame in frames])
     seen = np.concatenate([depth[np.isfinite(depth)] for depth in depths])
     if not len(seen):
         return None
     extent = (float(seen.min()), float(seen.max()))
-    pairs = zip(frames, depths, strict=True)
-    views = tuple(Drawing(f.camera, f.rgba, levels_of(depth, extent)) for f, depth in pairs)
-    heights = [_tall(frame.rgba) / frame.camera.scale for frame in frames]
-    palette = ready.palette if ready.palette is not None else _common_colors(views)
-    height = float(np.median(heights))
+    height = float(np.median([_tall(frame.rgba) / frame.camera.scale for frame in frames]))
     line = outline_of(drawn)
-    found = Drawings(views, (), line, line, palette, height, extent, bent)
+    flat = flat_paint([frame.rgba for frame in frames], line, sights, height)
+    views = tuple(
+        Drawing(
+            frame.camera, frame.rgba, paint, levels_of(depth, extent) if shape is None else None
+        )
+        for frame, paint, depth in zip(frames, flat.paints, depths, strict=True)
+    )
+    palette = ready.palette if ready.palette is not None else _common_colors(views)
+    found = Drawings(views, (), line, line, palette, height, extent, bent, shape)
+    found = replace(found, steps=flat.steps, shade=flat.shade)
     return replace(found, flows=pair_flows(found, depth_of))
 
 

@@ -11,12 +11,14 @@ from jaxtyping import Bool, Float, Float16, Shaped, UInt8
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
+from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.lines.explain import step_edges
 from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
+from toonset.nerf.lines.step_lines import StepLines
 from toonset.nerf.look.outline import Outline, without_crumbs
+from toonset.nerf.look.shade import Shade
 from toonset.palette.pixels.labels import nearest_labels
 
-SOFT_PX = 1.5  # beyond the outline, in which paint and ink are mixed
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
 FARTHEST_PX = 50.0  # from an edge: farther is as far
 COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
@@ -34,13 +36,15 @@ class Drawing:
     Attributes:
         camera: that saw it.
         rgba: (height, width, 4) sRGB with straight alpha.
+        paint: (height, width, 3) of `toonset.nerf.look.flat_paint`.
         levels: (height, width) depth of the field's surface, 1 to 255 over `Drawings.depths`; 0
-            where there is none.
+            where there is none; None: the surface is the mannequin's.
     """
 
     camera: Camera
     rgba: UInt8[np.ndarray, "height width 4"]
-    levels: UInt8[np.ndarray, "height width"]
+    paint: UInt8[np.ndarray, "height width 3"]
+    levels: UInt8[np.ndarray, "height width"] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,9 @@ class Drawings:
         height: of the figure, world units.
         depths: the nearest and the farthest, past the cameras' targets, world units.
         bent: whether the drawings had to be bent to agree: their hull is a little too large then.
+        shape: the mannequin's, where it is the character's; None: the surface is the field's.
+        steps: lines at steps in depth; None: there are none, or the paint has them.
+        shade: a shadow that the paint lacks; None: there is none, or the paint has it.
     """
 
     views: tuple[Drawing, ...]
@@ -89,6 +96,9 @@ class Drawings:
     height: float
     depths: tuple[float, float]
     bent: bool
+    shape: Shape | None = None
+    steps: StepLines | None = None
+    shade: Shade | None = None
 
     @cached_property
     def paints(self) -> UInt8[np.ndarray, "paints 3"]:
@@ -102,11 +112,16 @@ class Drawings:
     @cached_property
     def textures(self) -> tuple[Texture, ...]:
         """Return the drawings, ready to be looked up."""
-        width = self.outline.width_px if self.outline else 0.0
         return tuple(
-            _texture(view, depth_of(view.levels, self.depths), self.paints, width, self.height)
-            for view in self.views
+            _texture(view, self._depth(view), self.paints, self.height) for view in self.views
         )
+
+    def _depth(self, view: Drawing) -> Float[np.ndarray, "height width"]:
+        """Return the depth of the surface that a drawing shows, nan where there is none."""
+        if view.levels is not None:
+            return depth_of(view.levels, self.depths)
+        assert self.shape is not None
+        return self.shape.seen(view.camera).depth
 
     @cached_property
     def half(self) -> Drawings:
@@ -116,7 +131,11 @@ class Drawings:
             line and replace(line, width_px=line.width_px / 2) for line in (self.outline, self.pen)
         )
         views = tuple(_half(view) for view in self.views)
-        return replace(self, views=views, flows=tuple(flows), outline=outline, pen=pen)
+        steps = self.steps and replace(
+            self.steps, near_px=self.steps.near_px / 2, far_px=self.steps.far_px / 2
+        )
+        changed = replace(self, views=views, flows=tuple(flows), steps=steps)
+        return replace(changed, outline=outline, pen=pen)
 
     def fitting(self, scale: float) -> Drawings:
         """Return the drawings as large as a view needs them, of `scale` pixels per world unit."""
@@ -145,8 +164,7 @@ class Texture:
     Attributes:
         camera: that saw it.
         whole: (height, width, 4) premultiplied, in [0, 1].
-        paint: (height, width, 3) straight colour in [0, 1]; the band of the outline, and all beyond
-            it, holds the nearest paint inside.
+        paint: (height, width, 3) straight colour in [0, 1]: see `Drawing`.
         labels: (height, width) of this paint.
         far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it.
         to_edge: (height, width) pixels to the outline or the nearest step in depth.
@@ -182,15 +200,24 @@ class Seen:
 
 def _half(view: Drawing) -> Drawing:
     """Return a drawing averaged over blocks of 2 x 2 pixels."""
-    even = [(0, size % 2) for size in view.levels.shape]
-    levels = np.pad(view.levels, even)
+    even = [(0, size % 2) for size in view.rgba.shape[:2]]
     rgba = np.pad(view.rgba, [*even, (0, 0)]).astype(np.float32)
+    paint = np.pad(view.paint, [*even, (0, 0)], mode="edge").astype(np.float32)
     rgba[..., :3] *= rgba[..., 3:] / 255
-    rows, columns = levels.shape[0] // 2, levels.shape[1] // 2
-    mean = rgba.reshape(rows, 2, columns, 2, 4).mean(axis=(1, 3))
+    mean = _in_blocks(rgba)
     mean[..., :3] *= 255 / np.maximum(mean[..., 3:], 1e-6)
-    camera = replace(view.camera, size_wh=(2 * columns, 2 * rows)).resized(0.5)
-    return Drawing(camera, (mean + 0.5).clip(0, 255).astype(np.uint8), levels[::2, ::2].copy())
+    levels = None if view.levels is None else np.pad(view.levels, even)[::2, ::2].copy()
+    camera = replace(view.camera, size_wh=(rgba.shape[1], rgba.shape[0])).resized(0.5)
+    return Drawing(camera, _rounded(mean), _rounded(_in_blocks(paint)), levels)
+
+
+def _in_blocks(picture: Float[np.ndarray, "height width c"]) -> Float[np.ndarray, "rows columns c"]:
+    height, width, channels = picture.shape
+    return picture.reshape(height // 2, 2, width // 2, 2, channels).mean(axis=(1, 3))
+
+
+def _rounded(picture: Float[np.ndarray, "rows columns c"]) -> UInt8[np.ndarray, "rows columns c"]:
+    return (picture + 0.5).clip(0, 255).astype(np.uint8)
 
 
 def levels_of(
@@ -214,18 +241,12 @@ def _texture(
     view: Drawing,
     depth: Float[np.ndarray, "height width"],
     paints: UInt8[np.ndarray, "paints 3"],
-    outline_px: float,
     height: float,
 ) -> Texture:
-    mask = mask_of(view.rgba)
-    inside = depth_inside(mask)
-    inner = inside >= outline_px + SOFT_PX
-    inner = inner if inner.any() else mask if mask.any() else np.ones_like(mask)
-    at = nearest(inner)
-    opaque = view.rgba.copy()
-    opaque[..., 3] = 255
+    inside = depth_inside(mask_of(view.rgba))
     whole = view.rgba / np.float32(255)
     whole[..., :3] *= whole[..., 3:]
+    opaque = np.dstack([view.paint, np.full(inside.shape, 255, np.uint8)])
     seen = np.isfinite(depth)
     far = np.where(seen, cv2.dilate(filled(depth), SQUARE), -np.inf)
     to_step = distance_to(step_edges(depth, STEP * height))
@@ -233,8 +254,8 @@ def _texture(
     return Texture(
         view.camera,
         whole,
-        opaque[at][..., :3] / np.float32(255),
-        nearest_labels(opaque, paints)[at],
+        view.paint / np.float32(255),
+        nearest_labels(opaque, paints),
         far.astype(np.float32),
         to_edge.astype(np.float32),
     )

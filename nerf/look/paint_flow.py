@@ -83,7 +83,7 @@ def between(first: Camera, second: Camera, figure_px: float, height: float) -> C
 def _pair_flow(drawings: Drawings, pair: tuple[int, int], depth_of: Depths) -> PairFlow:
     first, second = (drawings.textures[i] for i in pair)
     camera = between(first.camera, second.camera, GRID, drawings.height)
-    depth = depth_of(camera)
+    depth = drawings.shape.seen(camera).depth if drawings.shape else depth_of(camera)
     points = camera.unproject(camera.pixel_grid(), crisp_depth(depth))
     slack, least = STEP * drawings.height, CRUMB * GRID**2
     there = np.isfinite(depth)

@@ -21,7 +21,7 @@ adjustment; Geman and McClure's robust weights.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -34,8 +34,6 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.hull.hull import Hull
-from toonset.nerf.hull.march import surface_depth
 from toonset.nerf.lines.nearest import depth_inside, nearest
 from toonset.nerf.lines.strokes import outline_width
 from toonset.nerf.prepare.unwarp import Warp, warped
@@ -55,6 +53,7 @@ HOLD = 4.0  # of a pixel of the rim, per squared pixel that it moves across itse
 EVERY = 3  # of a rim's pixels is held
 GAIN, GAIN_NOISE = 0.03, 0.3  # standard deviations: of a drawing's gain; of one place's colour
 SAME_PAINT, DARK = 0.12, 0.15  # logarithms apart; below, a channel says nothing of its gain
+Depths = Callable[[Camera], Float[np.ndarray, "height width"]]
 _BENDS = Bends.expected()
 _HALF = CONTROLS**2
 
@@ -86,7 +85,7 @@ class PaintAgreement:
 
 
 def with_paint_agreed(
-    drawn: Scene, straight: Scene, warps: Sequence[Warp], hull: Hull
+    drawn: Scene, straight: Scene, warps: Sequence[Warp], depth_of: Depths, height: float
 ) -> tuple[Scene, tuple[Warp, ...], PaintAgreement]:
     """Return the scene with drawings bent and tinted so that what they paint agrees.
 
@@ -94,13 +93,14 @@ def with_paint_agreed(
         drawn: the drawings as they are.
         straight: the same, cameras set right, and bent so that outlines agree.
         warps: these bends.
-        hull: of the outlines.
+        depth_of: the body's surface as a camera sees it, nan where there is none.
+        height: of the figure, world units.
 
     Returns:
         The scene, every drawing's whole bend, and what was found.
     """
     nothing = PaintAgreement(False, 0.0, 0.0, ())
-    figures = _figures(drawn, straight, warps, hull)
+    figures = _figures(drawn, straight, warps, depth_of, height)
     pairs = _pairs(figures) if figures else []
     if not pairs:
         return straight, tuple(warps), nothing
@@ -138,7 +138,7 @@ class _Figure:
         camera: of the drawing.
         paint: (height, width, 3) as drawn, in [0, 1], the nearest paint under its outline.
         mask: (height, width) the figure, outlines agreeing.
-        depth: (height, width) of the hull past the camera's target, nan beside it.
+        depth: (height, width) of the body past the camera's target, nan beside it.
         warp: under which outlines agree.
         height_px: of the figure.
     """
@@ -153,7 +153,7 @@ class _Figure:
 
     @cached_property
     def inside(self) -> Bool[np.ndarray, "height width"]:
-        """Return the pixels that show the hull, away from the outline."""
+        """Return the pixels that show the body, away from the outline."""
         inner = depth_inside(self.mask) > RIM * self.height_px
         return inner & np.isfinite(self.depth)
 
@@ -198,18 +198,19 @@ class _Pair:
         return [pixels + basis @ numbers[k].reshape(2, -1).T for k, pixels, basis in both]
 
 
-def _figures(drawn: Scene, straight: Scene, warps: Sequence[Warp], hull: Hull) -> list[_Figure]:
+def _figures(
+    drawn: Scene, straight: Scene, warps: Sequence[Warp], depth_of: Depths, height: float
+) -> list[_Figure]:
     outline_px = float(np.median([outline_width(frame.rgba) for frame in drawn.frames]))
     shown = [i for i, frame in enumerate(straight.frames) if not warps[i].is_none]
     frames = [straight.frames[i] for i in shown]
-    height = float(hull.inside.any(dim=2).any(dim=0).sum()) * hull.voxel
     return [
         _Figure(
             i,
             frame.camera,
             _paint(drawn.frames[i], outline_px),
             mask_of(frame.rgba),
-            surface_depth(hull, frame.camera),
+            depth_of(frame.camera),
             warps[i],
             height * frame.camera.scale,
         )

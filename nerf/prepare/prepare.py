@@ -1,10 +1,10 @@
 """What happens to drawings before a field is fitted to them.
 
-Each only where the drawings ask for it: cameras that were estimated turn (`refine_yaw`), they
-    follow
-drawings that were placed or sized off (`registration`), drawings that bend are unbent (`unwarp`),
-contour lines are taken off (`toonset.nerf.lines.remove`). What was taken away is kept, to be given
-back to renderings.
+Where the mannequin is the body that was drawn, drawings are bent to show it (`to_mannequin`). Else
+each only where the drawings ask for it: cameras that were estimated turn (`refine_yaw`), they
+follow drawings that were placed or sized off (`registration`), drawings that bend are unbent
+(`unwarp`). Contour lines are taken off (`toonset.nerf.lines.remove`). What was taken away is kept,
+to be given back to renderings.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ from typing import Any
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.hull.hull import Hull
+from toonset.nerf.hull.mannequin_fit import MannequinFit
+from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.lines.remove import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.paint import PaintAgreement, with_paint_agreed
+from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.refine_yaw import Turning, turned
 from toonset.nerf.prepare.registration import Registration, registered
+from toonset.nerf.prepare.to_mannequin import Posed, bent_to, posed
 from toonset.nerf.prepare.unwarp import Unbending, unbent
 from toonset.nerf.prepare.warp_back import KeyWarps
 
@@ -38,6 +40,8 @@ class Prepared:
         unbending: how drawings were bent; None: switched off.
         ink: the contour lines that were taken off; None: there are none, or switched off.
         paint: what their paint said of bends and colours; None: drawings were not bent.
+        mannequin: what speaks for the mannequin's shape; None: there is none, or switched off.
+        shape: the mannequin's, where it is the character's; None: it is not.
     """
 
     scene: Scene
@@ -46,6 +50,8 @@ class Prepared:
     unbending: Unbending | None
     ink: InkStyle | None
     paint: PaintAgreement | None = None
+    mannequin: MannequinFit | None = None
+    shape: Shape | None = None
 
     @property
     def apart_px(self) -> float:
@@ -92,6 +98,7 @@ class Prepared:
         """Return what was found and done, for a report."""
         turning, registration, unbending = self.turning, self.registration, self.unbending
         return {
+            "mannequin": None if self.mannequin is None else self.mannequin.to_json(),
             "turning": None if turning is None else turning.to_json(),
             "registration": None if registration is None else registration.to_json(),
             "unbending": None if unbending is None else unbending.to_json(),
@@ -105,27 +112,37 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
 
     Args:
         scene: posed drawings; without labels the contour lines stay.
-        options: its `turn`, `register`, `unbend` and `ink` switch the steps.
+        options: its `mannequin`, `turn`, `register`, `unbend` and `ink` switch the steps.
+
+    Raises:
+        MeshError: the mannequin lies in none of the pictures.
     """
-    straight, turning, registration, unbending = _agreeing(scene, options)
+    given = posed(scene) if options.mannequin else Posed(None, None)
+    turning = registration = unbending = None
+    straight = scene
+    if given.shape is None:
+        straight, turning, registration, unbending = _agreeing(scene, options)
+    elif options.unbend:
+        straight, unbending = bent_to(scene, given.shape)
     ink = None
     if options.ink and scene.palette is not None:
         straight, ink = without_ink(straight, scene)
-    return Prepared(straight, turning, registration, unbending, ink)
+    return Prepared(straight, turning, registration, unbending, ink, None, given.fit, given.shape)
 
 
-def with_paint(ready: Prepared, drawn: Scene, hull: Hull) -> Prepared:
+def with_paint(ready: Prepared, drawn: Scene, depth_of: Depths, height: float) -> Prepared:
     """Return bent drawings bent and tinted further, so that their paint agrees over a hull.
 
     Args:
         ready: where its drawings did not bend, it is returned as it is.
         drawn: what it was prepared from.
-        hull: of its drawings.
+        depth_of: the body's surface as a camera sees it, nan where there is none.
+        height: of the figure, world units.
     """
     unbending = ready.unbending
     if unbending is None or not unbending.applied:
         return ready
-    scene, warps, found = with_paint_agreed(drawn, ready.scene, unbending.warps, hull)
+    scene, warps, found = with_paint_agreed(drawn, ready.scene, unbending.warps, depth_of, height)
     unbending = replace(unbending, warps=warps)
     return replace(ready, scene=scene, unbending=unbending, paint=found)
 

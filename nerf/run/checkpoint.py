@@ -151,12 +151,12 @@ def check_scene(checkpoint: Checkpoint, scene: Scene, file: Path) -> None:
     """Refuse to go on with a training on another scene than it began with.
 
     Raises:
-        BundleError: pictures, cameras, labels or palette have changed.
+        BundleError: pictures, cameras, labels, palette or mannequin have changed.
     """
     if scene_digest(scene) != checkpoint.record.scene:
         raise BundleError(
-            f"{file}: was trained on other pictures, cameras or labels than {scene.name} holds "
-            "now; restore them, or train again without --resume"
+            f"{file}: was trained on other pictures, cameras, labels or mannequin than "
+            f"{scene.name} holds now; restore them, or train again without --resume"
         )
 
 
@@ -172,6 +172,9 @@ def scene_digest(scene: Scene) -> str:
         digest.update(np.ascontiguousarray(frame.rgba).tobytes())
         digest.update(b"" if frame.labels is None else np.ascontiguousarray(frame.labels).tobytes())
     digest.update(b"" if scene.palette is None else np.ascontiguousarray(scene.palette).tobytes())
+    if scene.mannequin is not None:
+        for values in (scene.mannequin.vertices, scene.mannequin.faces):
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
     return digest.hexdigest()
 
 

@@ -1,37 +1,47 @@
 """What the drawn look is made of, on disk.
 
     drawings.png            the drawings as they were trained on, side by side, tops aligned
-    drawings.safetensors    depth    (height, all widths) levels of the field's surface in each
-                            flow.0   (h, w, 2) how far paint lies apart, of the first pair, and on
+    paint.png               the same without outlines and what else new views have drawn anew
+    drawings.safetensors    flow.0   (h, w, 2) how far paint lies apart, of the first pair, and on
+                            depth    (height, all widths) levels of the field's surface in each; or
+                            places   (v, 3) the mannequin's vertices, in steps of a grid, and
+                            faces    (f, 3) its triangles, where it is the surface
 
-Their cameras, the pairs and the outline are in config.json under `field.drawings`.
+Their cameras, the pairs, outline, lines and shadow are in config.json under `field.drawings`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import torch
-from jaxtyping import Shaped
+from jaxtyping import Shaped, UInt8
 from pydantic import BaseModel, ConfigDict, Field
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
+from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
 from toonset.errors import BundleError
+from toonset.nerf.hull.mannequin_shape import Shape
+from toonset.nerf.lines.step_lines import StepLines
 from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
 from toonset.nerf.look.outline import Outline
+from toonset.nerf.look.shade import Shade
 from toonset.nerf.run.records import MOST_VIEWS, Byte, Number, Width
 from toonset.write import write_bytes
 
-PICTURES, SURFACES = "drawings.png", "drawings.safetensors"
+PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
 MAX_BYTES = 512 * 2**20
 LONGEST_PX = 4096.0  # a displacement
 Color = tuple[Byte, Byte, Byte]
+Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0, lt=MOST_VIEWS)]
 
 
@@ -51,6 +61,32 @@ class PairRecord(BaseModel):
     camera: NativeCamera
 
 
+class StepsRecord(BaseModel):
+    """Lines at steps in depth; fields as in `StepLines`."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    least: float = Field(gt=0, le=1)
+    near_px: Width
+    far_px: Width
+
+
+class ShadeRecord(BaseModel):
+    """A shadow; fields as in `Shade`."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    slope: tuple[Number, Number, Number]
+    level: Number
+    factor: tuple[Share, Share, Share]
+
+
+class ShapeRecord(BaseModel):
+    """Where the grid of a `Shape` lies."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    low: tuple[Number, Number, Number]
+    step: float = Field(gt=0, le=1e9)
+
+
 class DrawingsRecord(BaseModel):
     """What config.json holds of `Drawings`."""
 
@@ -62,11 +98,14 @@ class DrawingsRecord(BaseModel):
     height: float = Field(gt=0, le=1e9)
     depths: tuple[Number, Number]
     bent: bool
+    shape: ShapeRecord | None
+    steps: StepsRecord | None
+    shade: ShadeRecord | None
 
     @classmethod
     def of(cls, drawings: Drawings) -> DrawingsRecord:
         """Return the record of drawings."""
-        line = drawings.outline
+        line, shape = drawings.outline, drawings.shape
         pairs = [{"pair": f.pair, "camera": NativeCamera.of(f.camera)} for f in drawings.flows]
         return cls.model_validate(
             {
@@ -77,16 +116,26 @@ class DrawingsRecord(BaseModel):
                 "height": drawings.height,
                 "depths": drawings.depths,
                 "bent": drawings.bent,
+                "shape": shape and {"low": shape.low.tolist(), "step": shape.step},
+                "steps": drawings.steps and asdict(drawings.steps),
+                "shade": drawings.shade and asdict(drawings.shade),
             }
         )
 
 
 def write_drawings(folder: Path, drawings: Drawings) -> None:
-    """Write drawings.png and drawings.safetensors."""
-    write_bytes(folder / PICTURES, encode_png(_side_by_side([v.rgba for v in drawings.views])))
-    depth = torch.from_numpy(_side_by_side([view.levels for view in drawings.views]))
-    flows = {f"flow.{i}": torch.from_numpy(f.flow) for i, f in enumerate(drawings.flows)}
-    write_bytes(folder / SURFACES, save({"depth": depth, **flows}))
+    """Write drawings.png, paint.png and drawings.safetensors."""
+    views = drawings.views
+    write_bytes(folder / PICTURES, encode_png(_side_by_side([view.rgba for view in views])))
+    write_bytes(folder / PAINT, encode_png(_side_by_side([view.paint for view in views])))
+    tensors = {f"flow.{i}": flow.flow for i, flow in enumerate(drawings.flows)}
+    if drawings.shape is None:
+        levels = [view.levels for view in views if view.levels is not None]
+        tensors["depth"] = _side_by_side(levels)
+    else:
+        tensors["places"] = drawings.shape.places
+        tensors["faces"] = drawings.shape.faces.astype(np.uint16)
+    write_bytes(folder / SURFACES, save({k: torch.from_numpy(v) for k, v in tensors.items()}))
 
 
 def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
@@ -95,33 +144,14 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
     Raises:
         BundleError: a file is missing or damaged, or does not belong to the record.
         CameraError: a camera's record is none.
-        PictureError: drawings.png is no picture.
+        PictureError: a picture is none.
     """
     cameras = [camera.camera() for camera in record.cameras]
-    sizes = [camera.size_wh for camera in cameras]
-    whole = (max(high for _, high in sizes), sum(wide for wide, _ in sizes))
-    where = folder / PICTURES
-    rgba = load_rgba(where, MAX_PIXELS)
-    if rgba.shape[:2] != whole:
-        raise BundleError(
-            f"{where}: is {rgba.shape[1]} x {rgba.shape[0]} px, config.json asks for "
-            f"{whole[1]} x {whole[0]}; train again"
-        )
+    rgba, paint = (_apart(_picture(folder / name, cameras), cameras) for name in (PICTURES, PAINT))
     file = folder / SURFACES
     found = load_tensors(file)
-    wanted: dict[str, tuple[tuple[int, ...], torch.dtype]] = {"depth": (whole, torch.uint8)}
     places = [pair.camera.camera() for pair in record.pairs]
-    for i, camera in enumerate(places):
-        wide, high = camera.size_wh
-        wanted[f"flow.{i}"] = ((high, wide, 2), torch.float16)
-    there = {name: (tuple(values.shape), values.dtype) for name, values in found.items()}
-    if there != wanted:
-        odd = ", ".join(
-            sorted(name for name in there | wanted if there.get(name) != wanted.get(name))
-        )
-        raise BundleError(
-            f"{file}: tensors missing, unknown or of another shape: {odd}; train again"
-        )
+    _check_tensors(found, record, cameras, places, file)
     flows = []
     for i, (pair, camera) in enumerate(zip(record.pairs, places, strict=True)):
         flow = found[f"flow.{i}"]
@@ -130,14 +160,15 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         if max(pair.pair) >= len(cameras) or pair.pair[0] == pair.pair[1]:
             raise BundleError(f"{file}: pair {pair.pair} is none of {len(cameras)} drawings")
         flows.append(PairFlow(pair.pair, camera, flow.numpy()))
-    depth, left, views = found["depth"].numpy(), 0, []
-    for camera, (wide, high) in zip(cameras, sizes, strict=True):
-        at = (slice(0, high), slice(left, left + wide))
-        views.append(Drawing(camera, rgba[at], depth[at]))
-        left += wide
+    shape = None if record.shape is None else _shape(record.shape, found, file)
+    levels: list[np.ndarray | None] = [None] * len(cameras)
+    if shape is None:
+        levels = [*_apart(found["depth"].numpy(), cameras)]
+    parts = zip(cameras, rgba, paint, levels, strict=True)
+    views = tuple(Drawing(c, own, flat[..., :3], level) for c, own, flat, level in parts)
     line = None if record.outline is None else Outline(**record.outline.model_dump())
     return Drawings(
-        tuple(views),
+        views,
         tuple(flows),
         line,
         line,
@@ -145,7 +176,72 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         record.height,
         record.depths,
         record.bent,
+        shape,
+        None if record.steps is None else StepLines(**record.steps.model_dump()),
+        None if record.shade is None else Shade(**record.shade.model_dump()),
     )
+
+
+def _whole(cameras: Sequence[Camera]) -> tuple[int, int]:
+    """Return height and width of the drawings' pictures side by side."""
+    sizes = [camera.size_wh for camera in cameras]
+    return max(high for _, high in sizes), sum(wide for wide, _ in sizes)
+
+
+def _picture(file: Path, cameras: Sequence[Camera]) -> UInt8[np.ndarray, "height width 4"]:
+    rgba = load_rgba(file, MAX_PIXELS)
+    high, wide = _whole(cameras)
+    if rgba.shape[:2] != (high, wide):
+        raise BundleError(
+            f"{file}: is {rgba.shape[1]} x {rgba.shape[0]} px, config.json asks for "
+            f"{wide} x {high}; train again"
+        )
+    return rgba
+
+
+def _check_tensors(
+    found: Mapping[str, Tensor],
+    record: DrawingsRecord,
+    cameras: Sequence[Camera],
+    places: Sequence[Camera],
+    file: Path,
+) -> None:
+    """Refuse tensors that are missing, unknown, or of another shape or type."""
+    wanted: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
+        f"flow.{i}": ((camera.size_wh[1], camera.size_wh[0], 2), torch.float16)
+        for i, camera in enumerate(places)
+    }
+    there = {name: (tuple(values.shape), values.dtype) for name, values in found.items()}
+    if record.shape is None:
+        wanted["depth"] = (_whole(cameras), torch.uint8)
+    else:
+        for name in ("places", "faces"):
+            rows = found[name].shape[0] if name in found and found[name].dim() else 0
+            wanted[name] = ((max(1, rows), 3), torch.uint16)
+    if there != wanted:
+        odd = ", ".join(
+            sorted(name for name in there | wanted if there.get(name) != wanted.get(name))
+        )
+        raise BundleError(
+            f"{file}: tensors missing, unknown or of another shape: {odd}; train again"
+        )
+
+
+def _shape(record: ShapeRecord, found: Mapping[str, Tensor], file: Path) -> Shape:
+    places, faces = found["places"].numpy(), found["faces"].numpy().astype(np.int64)
+    if faces.max() >= len(places):
+        raise BundleError(f"{file}: faces name vertices that are not there; train again")
+    return Shape(np.array(record.low), record.step, places, faces)
+
+
+def _apart(picture: np.ndarray, cameras: Sequence[Camera]) -> list[np.ndarray]:
+    """Return the pictures that lie side by side."""
+    found, left = [], 0
+    for camera in cameras:
+        wide, high = camera.size_wh
+        found.append(picture[:high, left : left + wide])
+        left += wide
+    return found
 
 
 def load_tensors(file: Path) -> dict[str, Tensor]:

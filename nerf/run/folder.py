@@ -4,7 +4,8 @@
     config.json         what is needed to build them, and the resolved options
     metrics.json        how training went
     drawings.png        the drawings as they were trained on, side by side
-    drawings.safetensors  the surface's depth in each, and how far their paint lies apart
+    paint.png           the same without the lines and shadows that new views have drawn anew
+    drawings.safetensors  their surface, and how far their paint lies apart
     history.csv         every step's losses
     preview.png         four views of the result
     manifest.json       the SHA-256 of them all
@@ -32,6 +33,7 @@ from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.run.drawings import (
+    PAINT,
     PICTURES,
     SURFACES,
     DrawingsRecord,
@@ -45,7 +47,7 @@ from toonset.nerf.run.tensors import packed, unpack
 from toonset.write import write_bytes
 
 CONFIG, MODEL = "config.json", "model.safetensors"
-FORMAT = 3
+FORMAT = 4
 MOST_CELLS = 512  # along one side, of planes and hull alike
 
 
@@ -95,9 +97,12 @@ class FieldRecord(BaseModel):
         )
 
 
-class _Config(BaseModel):
+class _Format(BaseModel):
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     format: int
+
+
+class _Config(_Format):
     field: FieldRecord
 
 
@@ -139,20 +144,19 @@ def read_field(folder: str | Path) -> TrainedField:
         check_manifest(folder, (CONFIG, MODEL))
         return trained
     drawings = read_drawings(folder, record.drawings)
-    check_manifest(folder, (CONFIG, MODEL, PICTURES, SURFACES))
+    check_manifest(folder, (CONFIG, MODEL, PICTURES, PAINT, SURFACES))
     return replace(trained, drawings=drawings)
 
 
 def _record(file: Path) -> FieldRecord:
+    content = read_json(file)
     try:
-        config = _Config.model_validate(read_json(file))
+        written = _Format.model_validate(content).format
+        if written != FORMAT:
+            raise BundleError(f"{file}: format {written}, this toonset reads {FORMAT}; train again")
+        record = _Config.model_validate(content).field
     except ValidationError as error:
         raise BundleError(f"{file}: {validation_reason(error)}") from error
-    if config.format != FORMAT:
-        raise BundleError(
-            f"{file}: format {config.format}, this toonset reads {FORMAT}; train again"
-        )
-    record = config.field
     if not all(1 <= n <= MOST_CELLS for n in record.hull_shape):
         raise BundleError(f"{file}: hull_shape {record.hull_shape}, 1 to {MOST_CELLS} is needed")
     if record.palette is not None and not all(0 <= v <= 255 for c in record.palette for v in c):

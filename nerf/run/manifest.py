@@ -22,7 +22,7 @@ FILE = "manifest.json"
 SCHEMA, VERSION = "toonset-run", 1
 WRITTEN = (
     *("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png"),
-    *("drawings.png", "drawings.safetensors", FILE),
+    *("drawings.png", "paint.png", "drawings.safetensors", FILE),
 )
 
 

@@ -22,6 +22,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from toonset.camera import Camera
+from toonset.dataset.mesh.rasterize import depth_map
 from toonset.nerf.look.drawings import SQUARE, Places, taken
 from toonset.nerf.surface.paint import Paint
 from toonset.nerf.surface.unwrap import areas, neighbours
@@ -32,31 +33,11 @@ SHOWN = 0.6  # of a face's points must be in sight
 GRAZING = 0.15  # cosine: a face seen more askew is not seen
 BEHIND = 0.01  # of the figure's height, that a face may lie behind what is seen
 FINER = 2.0  # pixels of the depth picture per pixel of the drawing
-FAR = 9.0  # of the rasteriser
 APART, SEAM, FEATURE = 12.0, 2.0, 40.0  # per pixel of a seam; colours in [0, 1]
 TALL = 270.0  # pixels of a figure, in costs
 UNIT = 64  # of costs, which are whole numbers: a graph's capacities
 NEVER = 1 << 24
 SWEEPS = 3
-
-
-def depth_map(
-    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"], camera: Camera
-) -> Float[np.ndarray, "height width"]:
-    """Return how deep the nearest surface lies past the camera's target; inf where none is."""
-    width, height = camera.size_wh
-    pixels, depth, _ = camera.project(vertices)
-    low, extent = float(depth.min()), float(np.ptp(depth)) or 1.0
-    away = 1 + (depth - low) / extent
-    place = np.stack([pixels[:, 0] * 2 - width, height - pixels[:, 1] * 2], axis=1) / height
-    eye = np.column_stack([place * away[:, None], -away]).astype(np.float32)
-    shown = np.full((height, width), FAR, dtype=np.float32)
-    settings = cv2.TriangleRasterizeSettings()
-    settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
-    corners = np.ascontiguousarray(faces, dtype=np.int32)
-    axes = np.eye(4, dtype=np.float32)
-    cv2.triangleRasterizeDepth(eye, corners, shown, axes, np.pi / 2, 0.5, FAR, settings)
-    return np.where(shown < FAR - 1, (shown - 1) * extent + low, np.inf)
 
 
 def merits(

@@ -12,10 +12,11 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
+from toonset.dataset.mesh.rasterize import depth_map
 from toonset.errors import BundleError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.look.drawings import Drawings, Places, taken
-from toonset.nerf.surface.choose import chosen, depth_map, merits
+from toonset.nerf.surface.choose import chosen, merits
 from toonset.nerf.surface.files import Surface
 from toonset.nerf.surface.paint import Paint, paint_of
 from toonset.nerf.surface.surface import surface_of

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -24,12 +25,15 @@ from toonset.nerf.fields.painted_hull import paint
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.voxel import VoxelField
 from toonset.nerf.hull.hull import Hull
-from toonset.nerf.hull.scene_hull import hull_of, per_px
+from toonset.nerf.hull.mannequin_volume import hull_of_shape
+from toonset.nerf.hull.march import surface_depth
+from toonset.nerf.hull.scene_hull import VOXELS, VOXELS_PER_PX, as_stored, hull_of, per_px
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.prepare import prepared, with_paint
+from toonset.nerf.prepare.paint import Depths
+from toonset.nerf.prepare.prepare import Prepared, prepared, with_paint
 from toonset.nerf.prepare.symmetry import completed, with_mirrored
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
@@ -93,10 +97,9 @@ def fit_field(
     whole, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
-    hull, evidence = open_box(whole), NO_EVIDENCE
-    if options.carve:
-        hull, evidence = hull_of(whole, options, ready.apart_px)
-        ready = with_paint(ready, scene, hull) if agree else ready
+    hull, evidence = _hull(whole, options, ready)
+    if options.carve and agree:
+        ready = with_paint(ready, scene, _depths(ready, hull), _height(hull))
     scene = with_mirrored(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
@@ -122,6 +125,29 @@ def fit_field(
     return Training(
         result, options, tuple(history), stopped, ready, evidence, seconds, counts, symmetry, choice
     )
+
+
+def _hull(scene: Scene, options: TrainOptions, ready: Prepared) -> tuple[Hull, HullEvidence]:
+    """Return where the field is, and what speaks for how drawings carve it."""
+    if not options.carve:
+        return open_box(scene), NO_EVIDENCE
+    if ready.shape is None:
+        return hull_of(scene, options, ready.apart_px)
+    extent = float(np.ptp(ready.shape.vertices, axis=0).max())
+    hull = hull_of_shape(ready.shape, extent / per_px(scene, VOXELS_PER_PX, VOXELS))
+    return as_stored(hull), NO_EVIDENCE
+
+
+def _depths(ready: Prepared, hull: Hull) -> Depths:
+    """Return how deep the body is that drawings show."""
+    shape = ready.shape
+    if shape is None:
+        return partial(surface_depth, hull)
+    return lambda camera: shape.seen(camera).depth
+
+
+def _height(hull: Hull) -> float:
+    return float(hull.inside.any(dim=2).any(dim=0).sum()) * hull.voxel
 
 
 def _resolved(options: TrainOptions) -> TrainOptions:

@@ -22,7 +22,7 @@ from toonset.nerf.kernels.threads import use_threads
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
 RUN_FILES = {
     *("model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png"),
-    *("drawings.png", "drawings.safetensors", "manifest.json"),
+    *("drawings.png", "paint.png", "drawings.safetensors", "manifest.json"),
 }
 
 
@@ -149,10 +149,10 @@ def test_too_little_memory_is_said_before_anything_is_done(
     assert "GB of memory, 0.0 GB are free; end other programs" in reason
     assert snapshot(bundle) == before
 
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 9")
 
-    monkeypatch.setattr("toonset.nerf.train.train.hull_of", full)
+    monkeypatch.setattr("toonset.nerf.train.train.make_batches", full)
     done = toonset("train", bundle, *FAST, "-q")
     assert done.reason.startswith("out of memory (training asked for more than this machine has)")
     assert snapshot(bundle) == before

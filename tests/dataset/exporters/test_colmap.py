@@ -19,7 +19,7 @@ from toonset.dataset.bundle.scene import Frame
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.exporters.colmap import write_colmap
 from toonset.dataset.exporters.common import ExportView, read_views
-from toonset.dataset.exporters.points import depth_map, sample_surface, track_points
+from toonset.dataset.exporters.points import sample_surface, track_points
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.importers.colmap import read_colmap
 from toonset.dataset.mesh.load import load_mesh, save_obj
@@ -156,17 +156,6 @@ def front(scale: float = 40.0, yaw: float = 0.0) -> Camera:
     return Camera.looking_at(
         np.zeros(3), yaw, 0.0, scale, (70, 60), center=center, k=0.01 / scale * 40
     )
-
-
-def test_depth_of_a_tilted_square_is_exact() -> None:
-    mesh, camera = quad(0.0, 0.2, 0.6), front(yaw=0.5)
-    depth = depth_map(mesh, camera)
-    row, column = np.nonzero(np.isfinite(depth))
-    pixels = np.stack([column, row], axis=1) + 0.5
-    points = camera.unproject(pixels, depth[row, column] - 1 / camera.k)
-    np.testing.assert_allclose(points[:, 2], 0.2, atol=1e-3)
-    assert np.abs(points[:, :2]).max() == pytest.approx(0.6, abs=0.03)
-    assert len(row) == pytest.approx((1.2 * 40) ** 2 * math.cos(0.5), rel=0.05)
 
 
 def test_a_point_is_seen_where_nothing_lies_before_it() -> None:

@@ -139,9 +139,9 @@ def test_flanking_shares_are_linear_along_the_arc_and_whatever_the_elevation() -
 @pytest.mark.parametrize("color", [(0, 0, 0), (200, 40, 40)])
 def test_a_figure_of_one_colour_has_no_hole(color: tuple[int, int, int]) -> None:
     whole = drawings()
+    flat = np.full((120, 120, 3), color, np.uint8)
     views = tuple(
-        replace(view, rgba=np.dstack([np.full((120, 120, 3), color, np.uint8), view.rgba[..., 3]]))
-        for view in whole.views
+        replace(view, rgba=np.dstack([flat, view.rgba[..., 3]]), paint=flat) for view in whole.views
     )
     view = drawn_view(replace(whole, views=views), geometry(camera_at(0.4)))
     solid = view.alpha > 0.99

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,18 +12,22 @@ import torch
 from tests.nerf.look.painted import SIDE, draw, ring, scene_of
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.outlines import Square
-from toonset.nerf.hull.hull import Hull, carve
+from toonset.nerf.hull.hull import carve
+from toonset.nerf.hull.march import surface_depth
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.paint import with_paint_agreed
+from toonset.nerf.prepare.paint import Depths, with_paint_agreed
 from toonset.nerf.prepare.prepare import Prepared, prepared, with_paint
 from toonset.nerf.prepare.unwarp import Warp
 
 WRONG = 0  # the drawing that is wrong: from the front
 
 
-def hull_of(scene: Scene) -> Hull:
+def body_of(scene: Scene) -> tuple[Depths, float]:
+    """Return how deep the hull of a scene lies, and its height."""
     alphas = [torch.as_tensor(f.rgba[..., 3] / np.float32(255)) for f in scene.frames]
-    return carve([frame.camera for frame in scene.frames], alphas, 96, 0)
+    hull = carve([frame.camera for frame in scene.frames], alphas, 96, 0)
+    height = float(hull.inside.any(dim=2).any(dim=0).sum()) * hull.voxel
+    return partial(surface_depth, hull), height
 
 
 def nearly_none() -> Warp:
@@ -49,7 +54,7 @@ def sheet(pixels: float = 0.0, gain: tuple[float, float, float] = (1, 1, 1)) -> 
 def test_paint_that_one_drawing_has_elsewhere_goes_back() -> None:
     drawn, exact = sheet(3.0), sheet()
     warps = [nearly_none()] * 8
-    found, _, report = with_paint_agreed(drawn, drawn, warps, hull_of(exact))
+    found, _, report = with_paint_agreed(drawn, drawn, warps, *body_of(exact))
     assert report.applied
     assert report.gain_nats > 0
 
@@ -62,7 +67,7 @@ def test_paint_that_one_drawing_has_elsewhere_goes_back() -> None:
 
 def test_outlines_stay_where_they_are() -> None:
     drawn = sheet(3.0)
-    found, _, _ = with_paint_agreed(drawn, drawn, [nearly_none()] * 8, hull_of(sheet()))
+    found, _, _ = with_paint_agreed(drawn, drawn, [nearly_none()] * 8, *body_of(sheet()))
     for one, other in zip(found.frames, drawn.frames, strict=True):
         a, b = (frame.rgba[..., 3] >= 128 for frame in (one, other))
         assert (a ^ b).sum() < 0.6 * 2 * np.pi * 45  # less than 0.6 px all round
@@ -71,7 +76,7 @@ def test_outlines_stay_where_they_are() -> None:
 def test_paint_that_was_mixed_anew_becomes_one_paint() -> None:
     gain = (0.96, 1.03, 1.0)
     drawn = sheet(0.0, gain)
-    _, _, report = with_paint_agreed(drawn, drawn, [nearly_none()] * 8, hull_of(drawn))
+    _, _, report = with_paint_agreed(drawn, drawn, [nearly_none()] * 8, *body_of(drawn))
     assert report.applied
     np.testing.assert_allclose(report.gains[WRONG], 1 / np.array(gain), atol=0.012)
     others = [row for i, row in enumerate(report.gains) if i != WRONG]
@@ -81,7 +86,7 @@ def test_paint_that_was_mixed_anew_becomes_one_paint() -> None:
 def test_exact_drawings_are_untouched_to_the_bit() -> None:
     scene = scene_of(ring())
     ready = prepared(scene, TrainOptions())
-    after = with_paint(ready, scene, hull_of(scene))
+    after = with_paint(ready, scene, *body_of(scene))
     assert after.paint is None
     for one, other in zip(after.scene.frames, scene.frames, strict=True):
         assert one.rgba.tobytes() == other.rgba.tobytes()
@@ -90,7 +95,7 @@ def test_exact_drawings_are_untouched_to_the_bit() -> None:
 def test_drawings_that_did_not_bend_are_returned_as_they_are() -> None:
     scene = sheet(3.0)
     ready = Prepared(scene, None, None, None, None)
-    assert with_paint(ready, scene, hull_of(scene)) is ready
+    assert with_paint(ready, scene, *body_of(scene)) is ready
 
 
 @pytest.mark.parametrize("shown", [0, 1, 2])
@@ -103,7 +108,7 @@ def test_too_few_drawings_say_nothing(shown: int) -> None:
     ]
     few = replace(scene, frames=tuple(frames))
     warps = [nearly_none() if i < shown else Warp.none() for i in range(2)]
-    found, kept, report = with_paint_agreed(few, few, warps, hull_of(sheet()))
+    found, kept, report = with_paint_agreed(few, few, warps, *body_of(sheet()))
     assert found is few
     assert kept == tuple(warps)
     assert not report.applied

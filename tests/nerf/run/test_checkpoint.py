@@ -15,6 +15,7 @@ import torch
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
+from toonset.mesh import Mesh
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.checkpoint import check_scene, read_checkpoint, scene_digest, write_checkpoint
 from toonset.nerf.run.monitor import INTERRUPTED, Looking, Onlooker, held_out_psnr, sample_of
@@ -232,8 +233,11 @@ def test_a_checkpoint_goes_on_with_its_own_scene_only(
         replace(first, yaw_sigma=0.01),
     ):
         changed = replace(SCENE, frames=(frame, *others))
-        with pytest.raises(BundleError, match="other pictures, cameras or labels"):
+        with pytest.raises(BundleError, match="other pictures, cameras, labels or mannequin"):
             check_scene(checkpoint, changed, tmp_path)
+    body = Mesh(np.eye(3), np.array([[0, 1, 2]]))
+    with pytest.raises(BundleError, match="other pictures, cameras, labels or mannequin"):
+        check_scene(checkpoint, replace(SCENE, mannequin=body), tmp_path)
     assert scene_digest(replace(SCENE, name="elsewhere")) == scene_digest(SCENE)
     watch = onlooker(tmp_path)
     watch.start = replace(checkpoint.state, parameters={})

@@ -13,8 +13,11 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
+from tests.nerf.bodies import Hand
+from tests.nerf.bodies import camera_at as body_camera
 from tests.nerf.ellipsoids import train_scene
 from tests.nerf.look.painted import camera_at, drawings, geometry
+from tests.nerf.look.test_shaped import drawn, misty
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.errors import BundleError, ToonsetError
 from toonset.nerf.look.blend import drawn_view
@@ -25,7 +28,8 @@ from toonset.nerf.run.report import write_run
 from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.result import Training
 
-CONFIG, PICTURES, SURFACES = "config.json", "drawings.png", "drawings.safetensors"
+CONFIG, PICTURES, PAINT = "config.json", "drawings.png", "paint.png"
+SURFACES = "drawings.safetensors"
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +54,39 @@ def test_views_are_the_same_after_loading(folder: Path, egg: Drawings) -> None:
     assert loaded.outline == egg.outline
 
 
+@pytest.fixture(scope="module")
+def shaped() -> Drawings:
+    return drawn(Hand(shadow=0.7))
+
+
+@pytest.fixture
+def shaped_folder(tmp_path: Path, training: Training, shaped: Drawings) -> Path:
+    result = replace(training.result, drawings=shaped)
+    write_run(tmp_path, replace(training, result=result), labelled(train_scene())[0])
+    return tmp_path
+
+
+def test_a_mannequins_shape_lines_and_shadow_are_the_same_after_loading(
+    shaped_folder: Path, shaped: Drawings
+) -> None:
+    loaded = read_field(shaped_folder).drawings
+    assert loaded is not None
+    assert loaded.steps == shaped.steps
+    assert loaded.shade == shaped.shade
+    a, b = (drawn_view(one, misty(body_camera(0.4))) for one in (shaped, loaded))
+    np.testing.assert_array_equal(a.rgb, b.rgb)
+    assert loaded.shape is not None
+
+
 def test_the_files_are_small(folder: Path) -> None:
     pixels = 8 * 120 * 120
-    for name, most in ((PICTURES, 0.5), (SURFACES, 1.6)):
+    for name, most in ((PICTURES, 0.5), (PAINT, 0.5), (SURFACES, 1.6)):
         assert (folder / name).stat().st_size < most * pixels
+
+
+def test_a_shape_takes_the_place_of_depth(shaped_folder: Path) -> None:
+    assert "depth" not in load_file(shaped_folder / SURFACES)
+    assert (shaped_folder / SURFACES).stat().st_size < 80_000
 
 
 def test_a_run_without_drawings_says_how_to_get_them(training: Training, tmp_path: Path) -> None:
@@ -99,6 +132,8 @@ def repainted(folder: Path) -> None:
     [
         (lambda folder: (folder / PICTURES).unlink(), PICTURES),
         (lambda folder: (folder / SURFACES).unlink(), SURFACES),
+        (lambda folder: (folder / PAINT).unlink(), PAINT),
+        (lambda folder: (folder / PAINT).write_bytes(b"no picture"), PAINT),
         (lambda folder: (folder / PICTURES).write_bytes(b"no picture"), PICTURES),
         (lambda folder: (folder / SURFACES).write_bytes(b"no tensors"), "is damaged"),
         (smaller, "config.json asks for 960 x 120"),
@@ -125,3 +160,25 @@ def test_damage_gets_one_clear_line(
         read_field(folder)
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("harm", "said"),
+    [
+        (tensors(lambda t: t.pop("places")), "places"),
+        (tensors(lambda t: t.pop("faces")), "faces"),
+        (tensors(lambda t: t.update(faces=t["faces"].int())), "faces"),
+        (tensors(lambda t: t.update(faces=t["faces"][:0])), "faces"),
+        (tensors(lambda t: t.update(faces=t["faces"][:, :2].contiguous())), "faces"),
+        (tensors(lambda t: t.update(places=t["places"][:9])), "vertices that are not there"),
+        (config(lambda d: d["shape"].update(step=0)), "step"),
+        (config(lambda d: d.update(shape=None)), "depth"),
+        (config(lambda d: d["steps"].update(near_px=-1)), "near_px"),
+        (config(lambda d: d["shade"].update(factor=[1, 2, 3])), "factor"),
+        (config(lambda d: d["shade"].update(slope=[1, 2])), "slope"),
+    ],
+)
+def test_damage_to_a_shape_gets_one_clear_line(
+    shaped_folder: Path, harm: Callable[[Path], object], said: str
+) -> None:
+    test_damage_gets_one_clear_line(shaped_folder, harm, said)

@@ -202,7 +202,7 @@ def lined(step: float) -> tuple[Drawings, np.ndarray]:
     inside = rgba[..., 3] > 0
     depth = np.where(inside, np.where(columns < 40, 0.0, step), np.nan)
     camera = replace(camera_at(0.0, side=SIDE), scale=float(SIDE))
-    view = Drawing(camera, rgba, levels_of(depth, (-1.0, 1.0)))
+    view = Drawing(camera, rgba, rgba[..., :3], levels_of(depth, (-1.0, 1.0)))
     line = Outline(INK, 3.0)
     return Drawings((view,), (), line, line, PALETTE, 0.8, (-1.0, 1.0), False), depth
 

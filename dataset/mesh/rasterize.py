@@ -1,0 +1,104 @@
+"""A mesh as a camera sees it, by OpenCV's rasteriser: depth and face normal at every pixel centre.
+
+The rasteriser is a pinhole that looks into the middle of the picture. Points are handed to it as
+
+    (u, v) away, away       away = the distance to a pinhole's centre; for an orthographic camera
+                            FAR_OFF times the mesh's depth, past its nearest point
+
+so that depth is interpolated as the camera does it: as 1 / distance or, so far off, linearly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int
+
+from toonset.camera import Camera
+
+FAR_OFF = 1000.0  # depth is then linear within 3e-4 of the mesh's, single precision included
+ROOM = 0.02  # of the mesh's depth: clipping planes lie so much nearer and farther
+NEAREST = 1e-3  # of the far plane's distance: the near one's, where the mesh is round the pinhole
+
+Depth = Float[np.ndarray, "height width"]
+
+
+def depth_map(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"], camera: Camera
+) -> Depth:
+    """Return how deep the nearest surface lies past the camera's target; inf where none is."""
+    placed = _Placed.of(vertices, camera)
+    corners = np.ascontiguousarray(faces, dtype=np.int32)
+    cv2.triangleRasterizeDepth(placed.eye, corners, placed.shown, *placed.lens, _settings())
+    return placed.past_target()
+
+
+def depth_and_normals(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"], camera: Camera
+) -> tuple[Depth, Float[np.ndarray, "height width 3"]]:
+    """Return `depth_map`, and the unit normals of the faces seen; 0 where none is.
+
+    Normals are in camera axes and point towards the viewer, however faces are wound.
+    """
+    placed = _Placed.of(vertices, camera)
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    ways = camera.rotation[2] + camera.k * ((a + b + c) / 3 - camera.target)
+    normal = np.where((normal * ways).sum(axis=1, keepdims=True) > 0, -normal, normal)
+    tint = np.repeat((normal @ camera.rotation.T + 1) / 2, 3, axis=0).astype(np.float32)
+    each = np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3)
+    color = np.zeros((*placed.shown.shape, 3), dtype=np.float32)
+    settings = _settings()
+    settings.setShadingType(cv2.RASTERIZE_SHADING_FLAT)
+    corners = placed.eye[faces.reshape(-1)]
+    cv2.triangleRasterize(corners, each, tint, color, placed.shown, *placed.lens, settings)
+    depth = placed.past_target()
+    return depth, np.where(np.isfinite(depth)[..., None], 2 * color - 1, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """A mesh before the rasteriser.
+
+    Attributes:
+        eye: (v, 3) its points.
+        shown: (height, width) the empty depth buffer.
+        start: where the buffer's depth begins, past the camera's target.
+        lens: the rasteriser's pose, field of view, near and far plane.
+    """
+
+    eye: Float[np.ndarray, "v 3"]
+    shown: Depth
+    start: float
+    lens: tuple[Float[np.ndarray, "4 4"], float, float, float]
+
+    @classmethod
+    def of(cls, vertices: Float[np.ndarray, "v 3"], camera: Camera) -> _Placed:
+        width, height = camera.size_wh
+        pixels, depth, _ = camera.project(vertices)
+        low, high = float(depth.min()), float(depth.max())
+        extent = max(high - low, 1e-6 * height / camera.scale)
+        start = -1 / camera.k if camera.k else low - FAR_OFF * extent
+        away = depth - start
+        place = np.stack([pixels[:, 0] * 2 - width, height - pixels[:, 1] * 2], axis=1) / height
+        eye = np.column_stack([place * away[:, None], -away]).astype(np.float32)
+        far = high - start + ROOM * extent
+        near = max(low - start - ROOM * extent, NEAREST * far)
+        shown = np.full((height, width), far, dtype=np.float32)
+        return cls(eye, shown, start, (np.eye(4, dtype=np.float32), np.pi / 2, near, far))
+
+    def past_target(self) -> Depth:
+        """Return what the filled buffer says, past the camera's target; inf where it is empty."""
+        near, far = self.lens[2:]
+        empty = self.shown >= far - ROOM / 4 * (far - near)
+        return np.where(empty, np.inf, self.shown.astype(np.float64) + self.start)
+
+
+def _settings() -> Any:
+    settings = cv2.TriangleRasterizeSettings()
+    settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
+    return settings

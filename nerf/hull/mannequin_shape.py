@@ -1,0 +1,139 @@
+"""A mannequin's surface, small enough for a run folder, and what a camera sees of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt16
+
+from toonset.camera import Camera
+from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map
+from toonset.errors import MeshError
+from toonset.mesh import Mesh
+
+FINER = 3  # samples per pixel and axis: outlines and steps in depth lie between pixels
+GRID_PX = 0.25  # of the drawings: what is nearer is one vertex
+MOST_FACES = 40_000  # finer meshes get a coarser grid
+MOST_STEPS = 65_000  # of the grid, along an axis
+BESIDE_PX = 2  # pixels of room round what is seen
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What a camera sees of a shape.
+
+    Attributes:
+        camera: that looks.
+        alpha: (height, width) share of every pixel that is covered.
+        depth: (height, width) past the camera's target at the pixels' centres, nan beside it.
+        fine: (FINER height, FINER width) the same at FINER x FINER places of every pixel.
+        normal: (height, width, 3) of the faces seen, in camera axes, towards the viewer; 0 beside
+            the shape, and everywhere unless asked for.
+    """
+
+    camera: Camera
+    alpha: Float[np.ndarray, "height width"]
+    depth: Float[np.ndarray, "height width"]
+    fine: Float[np.ndarray, "rows columns"]
+    normal: Float[np.ndarray, "height width 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A triangle surface whose vertices lie on a grid.
+
+    Attributes:
+        low: (3,) world place of the grid's first corner.
+        step: of the grid, world units.
+        places: (v, 3) of the vertices, in steps.
+        faces: (f, 3) vertices of every triangle.
+    """
+
+    low: Float[np.ndarray, " 3"]
+    step: float
+    places: UInt16[np.ndarray, "v 3"]
+    faces: Int[np.ndarray, "f 3"]
+
+    @cached_property
+    def vertices(self) -> Float[np.ndarray, "v 3"]:
+        """Return the vertices in the world."""
+        return self.low + self.step * self.places.astype(np.float64)
+
+    def box(self, camera: Camera) -> tuple[slice, slice] | None:
+        """Return the rows and columns of a picture in which the shape may be; None: nowhere."""
+        pixels, _, front = camera.project(self.vertices)
+        if not front.any():
+            return None
+        sides = []
+        for axis, size in ((1, camera.size_wh[1]), (0, camera.size_wh[0])):
+            along = pixels[front, axis]
+            first = max(0, int(np.floor(along.min())) - BESIDE_PX)
+            last = min(size, int(np.ceil(along.max())) + BESIDE_PX)
+            if last <= first:
+                return None
+            sides.append(slice(first, last))
+        return sides[0], sides[1]
+
+    def seen(self, camera: Camera, *, normals: bool = False) -> Sight:
+        """Return what a camera sees of the shape; with `normals`, which way its faces look."""
+        width, height = camera.size_wh
+        depth = depth_map(self.vertices, self.faces, camera.resized(FINER))
+        hit = np.isfinite(depth)
+        cover = cv2.resize(hit.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
+        fine = np.where(hit, depth, np.nan)
+        middle = slice(FINER // 2, None, FINER)
+        normal = np.zeros((height, width, 3), dtype=np.float32)
+        if normals:
+            _, normal = depth_and_normals(self.vertices, self.faces, camera)
+        return Sight(camera, cover, fine[middle, middle], fine, normal)
+
+
+def shape_of(mesh: Mesh, cameras: Sequence[Camera]) -> Shape:
+    """Return the part of a mannequin that lies in some drawing's picture.
+
+    What lies beyond all of them was never drawn.
+
+    Raises:
+        MeshError: nothing of it lies in any picture.
+    """
+    faces = mesh.faces[_within(mesh.vertices[mesh.faces].mean(axis=1), cameras)]
+    if not len(faces):
+        raise MeshError(
+            f"{mesh.name}: lies in none of the pictures; it belongs to other cameras, train with "
+            "--no-mannequin or put the right one there"
+        )
+    corners = mesh.vertices[faces]
+    low = corners.min(axis=(0, 1))
+    extent = float(np.ptp(corners, axis=(0, 1)).max())
+    step = max(GRID_PX / max(camera.scale for camera in cameras), extent / MOST_STEPS)
+    while True:
+        places, number = np.unique(
+            np.rint((corners - low) / step).astype(np.int64).reshape(-1, 3),
+            axis=0,
+            return_inverse=True,
+        )
+        found = _distinct(number.reshape(-1, 3))
+        if len(found) <= MOST_FACES and len(places) <= MOST_STEPS:
+            return Shape(low, step, places.astype(np.uint16), found)
+        step *= 1.4
+
+
+def _within(points: Float[np.ndarray, "n 3"], cameras: Sequence[Camera]) -> Bool[np.ndarray, " n"]:
+    inside = np.zeros(len(points), dtype=bool)
+    for camera in cameras:
+        pixels, _, front = camera.project(points)
+        with np.errstate(invalid="ignore"):
+            inside |= front & ((pixels >= 0) & (pixels <= np.array(camera.size_wh))).all(axis=1)
+    return inside
+
+
+def _distinct(faces: Int[np.ndarray, "f 3"]) -> Int[np.ndarray, "g 3"]:
+    """Return the triangles with three corners, each once."""
+    ordered = np.sort(faces, axis=1)
+    whole = (np.diff(ordered, axis=1) > 0).all(axis=1)
+    _, first = np.unique(ordered[whole], axis=0, return_index=True)
+    return faces[whole][np.sort(first)]

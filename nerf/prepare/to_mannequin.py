@@ -1,0 +1,157 @@
+"""Drawings of the mannequin's own body: bent until they show it.
+
+Only where the mannequin predicts drawings better than they predict each other (`mannequin_fit`).
+What every drawing gets wrong is then known from one common shape, and the shape between the drawn
+views is known, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.mask import alpha_of, has_figure
+from toonset.dataset.silhouettes.outlines import RIM_POINTS, ROOM, Square
+from toonset.dataset.silhouettes.register import Fit
+from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired
+from toonset.nerf.hull.mannequin_shape import FINER, Shape, Sight, shape_of
+from toonset.nerf.lines.step_lines import learned_steps, step_places
+from toonset.nerf.lines.strokes import outline_width
+from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
+from toonset.nerf.prepare.unwarp import Unbending, Warp, warped
+from toonset.palette.pixels.ink_lines import find_contour
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A scene whose mannequin was looked at.
+
+    Attributes:
+        shape: the mannequin, where it is taken for the character's shape; None: it is not.
+        fit: what speaks for it; None: it could not be asked.
+    """
+
+    shape: Shape | None
+    fit: MannequinFit | None
+
+
+def posed(scene: Scene) -> Posed:
+    """Return whether a scene's mannequin is the body that was drawn.
+
+    Raises:
+        MeshError: it lies in none of the pictures.
+    """
+    if scene.mannequin is None:
+        return Posed(None, None)
+    shape = shape_of(scene.mannequin, [frame.camera for frame in scene.frames])
+    fit = mannequin_fit(scene, shape)
+    return Posed(shape if fit and fit.chosen else None, fit)
+
+
+def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
+    """Return the scene with its drawings bent to show the mannequin, and how.
+
+    Drawings that show it within an outline's own error are returned as they are, to the bit.
+
+    Args:
+        scene: posed drawings.
+        shape: the mannequin in their world.
+    """
+    shown = [i for i, frame in enumerate(scene.frames) if has_figure(frame)]
+    frames = [scene.frames[i] for i in shown]
+    sights = [shape.seen(frame.camera) for frame in frames]
+    cameras = [frame.camera for frame in frames]
+    alphas = [alpha_of(frame) for frame in frames]
+    outlines = paired(cameras, alphas, [sight.alpha for sight in sights])
+    drawn, shapes = outlines.views[: len(frames)], outlines.views[len(frames) :]
+    ratio = outlines.ratio(cameras[0])
+    squares = [Square(one.square.low / ratio, one.square.size / ratio) for one in drawn]
+    fit = fit_bends(drawn, shapes)
+    warps = [Warp.none() for _ in scene.frames]
+    if fit.gain_nats > 0:
+        lines = _inner_lines(frames, sights, squares, fit)
+        fit = (
+            replace(fit_bends(drawn, shapes, lines, fit), gain_nats=fit.gain_nats) if lines else fit
+        )
+        for i, square, own in zip(shown, squares, fit.numbers, strict=True):
+            warps[i] = Warp(square, own)
+    found = Unbending(
+        fit.gain_nats > 0,
+        fit.gain_nats,
+        fit.tau * squares[0].size,
+        (fit.apart_px[0] / ratio, fit.apart_px[1] / ratio),
+        tuple(warps),
+    )
+    if not found.applied:
+        return scene, found
+    bent = [warped(*pair) for pair in zip(scene.frames, warps, strict=True)]
+    return replace(scene, frames=tuple(bent)), found
+
+
+def _inner_lines(
+    frames: list[Frame], sights: list[Sight], squares: list[Square], fit: Fit
+) -> list[InnerLines] | None:
+    """Return where drawings should have lines at steps in depth; None: their artist draws none.
+
+    Args:
+        frames: as drawn.
+        sights: of the mannequin, as each camera sees it.
+        squares: in which figures may move.
+        fit: of the outlines.
+    """
+    width = float(np.median([outline_width(frame.rgba) for frame in frames]))
+    if width <= 0:
+        return None
+    covers = [find_contour(frame.rgba, width) / np.float32(255) for frame in frames]
+    moved = [
+        _moved(cover, Warp(square, own), frame)
+        for cover, frame, square, own in zip(covers, frames, squares, fit.numbers, strict=True)
+    ]
+    height = _height(sights)
+    style = learned_steps(moved, [sight.depth for sight in sights], height, width)
+    if style is None:
+        return None
+    found = []
+    for cover, sight, square in zip(covers, sights, squares, strict=True):
+        gap = square.size / ROOM / RIM_POINTS
+        places, across = step_places(sight.fine, style.least * height, FINER, gap)
+        inside = _depth_inside(sight)
+        clear = inside[tuple(np.floor(places).astype(int).T[::-1])] > width + style.width_px
+        found.append(
+            InnerLines(
+                square.unit(places[clear]),
+                across[clear],
+                style.beyond_px / square.size,
+                cover,
+                square.low,
+                square.size,
+            )
+        )
+    return found
+
+
+def _moved(
+    cover: Float[np.ndarray, "height width"], warp: Warp, frame: Frame
+) -> Float[np.ndarray, "height width"]:
+    places = frame.camera.pixel_grid() + warp.on_grid(frame.camera.size_wh)
+    x, y = np.moveaxis(places - 0.5, -1, 0).astype(np.float32)
+    return cv2.remap(cover, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+
+
+def _height(sights: list[Sight]) -> float:
+    """Return the figure's height, world units."""
+    tall = [np.flatnonzero((sight.alpha > 0).any(axis=1)) for sight in sights]
+    heights = [
+        (rows[-1] + 1 - rows[0]) / sight.camera.scale
+        for rows, sight in zip(tall, sights, strict=True)
+    ]
+    return float(np.median(heights))
+
+
+def _depth_inside(sight: Sight) -> Float[np.ndarray, "height width"]:
+    inside = np.pad(sight.alpha >= 0.5, 1).astype(np.uint8)
+    return cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]

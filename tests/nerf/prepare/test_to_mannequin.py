@@ -1,0 +1,116 @@
+"""Drawings of the mannequin's own body are bent until they show it; others are left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.nerf.bodies import Hand, body, camera_at, drawing, ring, sheet
+from toonset.dataset.bundle.scene import Scene
+from toonset.nerf.hull.mannequin_shape import shape_of
+from toonset.nerf.options import TrainOptions
+from toonset.nerf.prepare.prepare import prepared
+from toonset.nerf.prepare.to_mannequin import bent_to
+
+BEND = Hand(bend=0.012)
+
+
+def outlines_apart(scene: Scene) -> float:
+    """Return the share of pixels that differ from exact drawings."""
+    exact = sheet(body())
+    wrong = [
+        ((a.rgba[..., 3] > 127) != (b.rgba[..., 3] > 127)).mean()
+        for a, b in zip(scene.frames, exact.frames, strict=True)
+    ]
+    return float(np.mean(wrong))
+
+
+def test_outlines_become_the_mannequins() -> None:
+    drawn = sheet(body(), BEND, body())
+    bent, found = bent_to(drawn, shape_of(body(), ring()))
+    assert found.applied
+    assert found.gain_nats > 0
+    assert found.apart_px[1] < 0.4 * found.apart_px[0]
+    assert outlines_apart(bent) < 0.35 * outlines_apart(drawn)
+
+
+def test_exact_drawings_are_untouched_to_the_bit() -> None:
+    drawn = sheet(body(), Hand(), body())
+    bent, found = bent_to(drawn, shape_of(body(), ring()))
+    assert not found.applied
+    assert bent is drawn
+
+
+def test_lines_at_steps_pull_where_outlines_say_nothing() -> None:
+    """The arm is drawn aside, within the figure: no outline tells."""
+    aside = body()
+    arm = aside.vertices[:, 2] > 0.5
+    vertices = np.where(arm[:, None], aside.vertices + np.array([0.05, 0, 0]), aside.vertices)
+    cameras = [camera_at(yaw) for yaw in (-0.3, 0.0, 0.3)]
+    shape = shape_of(body(), cameras)
+    wrong = replace(aside, vertices=vertices)
+
+    def apart(lines: bool) -> float:
+        """Return how far the arm lies from its place in the front view, pixels, after bending."""
+        hand = Hand(lines=lines, bend=0.004)
+        base = sheet(body(), hand)
+        frames = tuple(
+            replace(base.frames[0], camera=c, rgba=drawing(wrong, c, hand, i))
+            for i, c in enumerate(cameras)
+        )
+        bent, found = bent_to(replace(base, frames=frames), shape)
+        assert found.applied
+        green = [
+            frame.rgba[..., 1].astype(float) - frame.rgba[..., 0] > 20
+            for frame in (bent.frames[1], sheet_frame(body(), cameras[1]))
+        ]
+        middles = [np.argwhere(mask).mean(axis=0) for mask in green]
+        return float(np.abs(middles[0] - middles[1])[1])
+
+    assert apart(lines=True) < 0.5 * apart(lines=False)
+
+
+def sheet_frame(mesh, camera):
+    base = sheet(mesh, views=1).frames[0]
+    return replace(base, camera=camera, rgba=drawing(mesh, camera))
+
+
+def test_preparation_takes_the_mannequin_where_it_is_the_body() -> None:
+    ready = prepared(sheet(body(), BEND, body()), TrainOptions())
+    assert ready.shape is not None
+    assert ready.bent
+    assert ready.mannequin is not None
+    assert ready.mannequin.chosen
+    assert ready.registration is None
+    report = ready.to_json()["mannequin"]
+    assert report["chosen"] is True
+    assert report["mannequin_off_height"] < report["drawings_off_height"]
+
+
+def test_preparation_leaves_another_body_alone() -> None:
+    other = body(scale=1.3)
+    with_it, without = (
+        prepared(sheet(body(), BEND, mannequin), TrainOptions()) for mannequin in (other, None)
+    )
+    assert with_it.shape is None
+    assert with_it.mannequin is not None
+    for one, two in zip(with_it.scene.frames, without.scene.frames, strict=True):
+        assert one.rgba.tobytes() == two.rgba.tobytes()
+
+
+@pytest.mark.parametrize("views", [2, 3])
+def test_switched_off_or_too_few_it_is_not_asked(views: int) -> None:
+    scene = sheet(body(), BEND, body(), views=views)
+    options = TrainOptions() if views == 2 else TrainOptions(mannequin=False)
+    ready = prepared(scene, options)
+    assert ready.shape is None
+    assert ready.mannequin is None
+
+
+def test_unbend_off_keeps_drawings_but_takes_the_shape() -> None:
+    scene = sheet(body(), BEND, body())
+    ready = prepared(scene, TrainOptions(unbend=False))
+    assert ready.shape is not None
+    assert ready.scene is scene
