@@ -34,7 +34,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     kept = folder / SHEETS
     done = [_judged(row) for row in read_json(kept)] if kept.is_file() else []
-    for name, draw in _cases(asked.cases) if asked.cases else _synthetic(asked.seeds):
+    for name, draw in _cases(asked.cases) if asked.cases else _synthetic(asked):
         if asked.only not in name or name in {sheet.name for sheet in done}:
             continue
         scene, test = draw()
@@ -54,15 +54,17 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("-o", "--out", type=Path, default=Path("bench-results/verdict"))
     parser.add_argument("--seeds", type=int, default=4, help="bodies, from seed 0 on")
     parser.add_argument("--only", default="", help="sheets whose name contains this")
+    parser.add_argument("--mannequin", action="store_true", help="drawings come with their body")
     parser.add_argument("--cases", type=Path, help="folders with views/ and test/, at half size")
     parser.add_argument("--full", action="store_true", help="train as users do: three times longer")
     return parser.parse_args()
 
 
-def _synthetic(seeds: int) -> Iterator[tuple[str, Drawer]]:
-    for seed in range(seeds):
+def _synthetic(asked: argparse.Namespace) -> Iterator[tuple[str, Drawer]]:
+    for seed in range(asked.seeds):
         for fault in FAULTS:
-            yield f"{fault.name} s{seed}", partial(draw_sheet, fault, seed)
+            draw = partial(draw_sheet, fault, seed, mannequin=asked.mannequin)
+            yield f"{fault.name} s{seed}", draw
 
 
 def _cases(folder: Path) -> Iterator[tuple[str, Drawer]]:

@@ -55,13 +55,20 @@ class Fault:
     change: Callable[[Scene, int], Scene] = lambda scene, _: scene
 
 
-def draw_sheet(fault: Fault, seed: int) -> tuple[Scene, Scene]:
-    """Return the seed's body, drawn with a fault, and held-out views as they should look."""
+def draw_sheet(fault: Fault, seed: int, *, mannequin: bool = False) -> tuple[Scene, Scene]:
+    """Return the seed's body, drawn with a fault, and held-out views as they should look.
+
+    Args:
+        fault: of the drawings.
+        seed: of the body and the hand.
+        mannequin: the body itself comes with the drawings.
+    """
     body = _body(seed)
     options = _options(fault.kind, SHEET.views)
     truth = _scene(body, replace(options, views=HELD_OUT), seed, fault.kind)
     bent = _with_room(replace(options, views=fault.views), fault.warp)
     drawn = fault.change(_scene(body, bent, seed, fault.kind), seed)
+    drawn = replace(drawn, mannequin=body if mannequin else None)
     return drawn, replace(truth, frames=truth.frames[::2] + truth.frames[1::4])
 
 

@@ -2,7 +2,8 @@
 
 Every drawing's outline is compared with the mannequin's, and with that of the visual hull of the
 other drawings. Where the mannequin's lies nearer, it knows more of the body than the drawings tell
-of each other, between the drawn views most of all.
+of each other, between the drawn views most of all. What no bend of the drawings explains is a part
+that one of both lacks: a body without the drawn hat is another body.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from toonset.nerf.kernels.threads import side_by_side
 FEWEST_VIEWS = 3  # two drawings leave no hull to compare with
 MOST_OFF = 0.016  # of the figure's height: another body, whatever else is known
 FARTHEST = 0.06  # of the figure's height: what is farther apart counts no more
+PART, MOST_LEFT = 0.02, 0.006  # of the height: no bend is off by so much; of the outlines are
 VOXELS = 96  # of the other drawings' hull, along its longest side
 RAYS = 2  # per pixel and axis, of that hull's outline
 
@@ -45,15 +47,19 @@ class MannequinFit:
         mannequin: root mean square distance of the mannequin's, in heights of the figure; mean of
             the drawings.
         drawings: the same of the hulls of all drawings but the one that is predicted.
+        left: share of the outlines that lie more than PART apart once drawings are bent to show the
+            mannequin; 0 until they are.
     """
 
     mannequin: float
     drawings: float
+    left: float = 0.0
 
     @property
     def chosen(self) -> bool:
         """Return whether the mannequin is taken for the character's shape."""
-        return self.mannequin <= MOST_OFF and self.mannequin < self.drawings
+        near = self.mannequin <= MOST_OFF and self.mannequin < self.drawings
+        return near and self.left <= MOST_LEFT
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers for a report."""
@@ -61,6 +67,7 @@ class MannequinFit:
             "chosen": self.chosen,
             "mannequin_off_height": round(self.mannequin, 6),
             "drawings_off_height": round(self.drawings, 6),
+            "parts_left": round(self.left, 6),
         }
 
 
@@ -105,6 +112,24 @@ def apart(outlines: Outlines) -> float:
     views = outlines.views
     half = len(views) // 2
     return float(np.mean([_apart(*pair) for pair in zip(views[:half], views[half:], strict=True)]))
+
+
+def parts_left(outlines: Outlines) -> float:
+    """Return the share of `paired` outlines that lie more than PART from the other, by drawings.
+
+    What is drawn beside the second ones, or lies within them and is not drawn: the larger share.
+    """
+    views = outlines.views
+    half = len(views) // 2
+    pairs = list(zip(views[:half], views[half:], strict=True))
+    beyond = [_beyond(one, other) for one, other in pairs]
+    within = [_beyond(other, one) for one, other in pairs]
+    return float(max(np.mean(beyond), np.mean(within)))
+
+
+def _beyond(one: Outline, other: Outline) -> float:
+    """Return the share of an outline that lies more than PART outside of the other."""
+    return float(np.mean(other.at(one.rim)[0] < -PART * one.square.size))
 
 
 def _apart(one: Outline, other: Outline) -> float:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt16
+from scipy import ndimage
 
 from toonset.camera import Camera
 from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map
@@ -32,7 +34,7 @@ class Sight:
         depth: (height, width) past the camera's target at the pixels' centres, nan beside it.
         fine: (FINER height, FINER width) the same at FINER x FINER places of every pixel.
         normal: (height, width, 3) of the faces seen, in camera axes, towards the viewer; 0 beside
-            the shape, and everywhere unless asked for.
+            them, and everywhere unless asked for.
     """
 
     camera: Camera
@@ -51,12 +53,14 @@ class Shape:
         step: of the grid, world units.
         places: (v, 3) of the vertices, in steps.
         faces: (f, 3) vertices of every triangle.
+        beyond: world units by which outlines are drawn outside of it.
     """
 
     low: Float[np.ndarray, " 3"]
     step: float
     places: UInt16[np.ndarray, "v 3"]
     faces: Int[np.ndarray, "f 3"]
+    beyond: float = 0.0
 
     @cached_property
     def vertices(self) -> Float[np.ndarray, "v 3"]:
@@ -68,11 +72,12 @@ class Shape:
         pixels, _, front = camera.project(self.vertices)
         if not front.any():
             return None
+        room = BESIDE_PX + self.beyond * camera.scale
         sides = []
         for axis, size in ((1, camera.size_wh[1]), (0, camera.size_wh[0])):
             along = pixels[front, axis]
-            first = max(0, int(np.floor(along.min())) - BESIDE_PX)
-            last = min(size, int(np.ceil(along.max())) + BESIDE_PX)
+            first = max(0, int(np.floor(along.min() - room)))
+            last = min(size, int(np.ceil(along.max() + room)))
             if last <= first:
                 return None
             sides.append(slice(first, last))
@@ -82,9 +87,11 @@ class Shape:
         """Return what a camera sees of the shape; with `normals`, which way its faces look."""
         width, height = camera.size_wh
         depth = depth_map(self.vertices, self.faces, camera.resized(FINER))
-        hit = np.isfinite(depth)
-        cover = cv2.resize(hit.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
-        fine = np.where(hit, depth, np.nan)
+        fine = _grown(
+            np.where(np.isfinite(depth), depth, np.nan), self.beyond * camera.scale * FINER
+        )
+        hit = np.isfinite(fine).astype(np.float32)
+        cover = cv2.resize(hit, (width, height), interpolation=cv2.INTER_AREA)
         middle = slice(FINER // 2, None, FINER)
         normal = np.zeros((height, width, 3), dtype=np.float32)
         if normals:
@@ -120,6 +127,17 @@ def shape_of(mesh: Mesh, cameras: Sequence[Camera]) -> Shape:
         if len(found) <= MOST_FACES and len(places) <= MOST_STEPS:
             return Shape(low, step, places.astype(np.uint16), found)
         step *= 1.4
+
+
+def _grown(
+    depth: Float[np.ndarray, "rows columns"], by_px: float
+) -> Float[np.ndarray, "rows columns"]:
+    """Return depth continued over so many pixels beside the figure."""
+    if by_px <= 0 or not np.isfinite(depth).any():
+        return depth
+    found = ndimage.distance_transform_edt(np.isnan(depth), return_indices=True)
+    away, at = cast("tuple[np.ndarray, np.ndarray]", found)
+    return np.where(away <= by_px, depth[tuple(at)], np.nan)
 
 
 def _within(points: Float[np.ndarray, "n 3"], cameras: Sequence[Camera]) -> Bool[np.ndarray, " n"]:

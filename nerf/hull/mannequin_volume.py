@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import cast
 
 import numpy as np
@@ -29,17 +30,19 @@ def hull_of_shape(shape: Shape, voxel: float) -> Hull:
         shape: the surface.
         voxel: edge, world units.
     """
-    low = shape.vertices.min(axis=0) - ROOM * voxel
+    beyond = shape.beyond / voxel
+    reach = math.ceil(REACH + beyond)
+    low = shape.vertices.min(axis=0) - (ROOM + beyond) * voxel
     extent = shape.vertices.max(axis=0) - low
-    counts = np.ceil(extent / voxel).astype(int) + ROOM
+    counts = np.ceil(extent / voxel + beyond).astype(int) + ROOM
     touched = np.zeros(counts, dtype=bool)
     touched[tuple(((_points(shape, DENSE * voxel) - low) / voxel).astype(np.int32).T)] = True
     inside = torch.from_numpy(_enclosed(touched))
     outer, inner = (
-        squared_distance(part, REACH).float().sqrt_().clamp_(max=REACH + 1)
+        squared_distance(part, reach).float().sqrt_().clamp_(max=reach + 1)
         for part in (inside, ~inside)
     )
-    distance = torch.where(inside, 0.5 - inner, outer - 0.5) + PROTRUDES
+    distance = torch.where(inside, 0.5 - inner, outer - 0.5) + PROTRUDES - beyond
     return Hull(low, voxel, (LEVEL - SLOPE * distance).clamp_(0, 1))
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, Sight
@@ -28,6 +28,7 @@ from toonset.nerf.look.drawings import (
     Seen,
     Texture,
     crisp_depth,
+    filled,
     look_up,
     taken,
 )
@@ -45,6 +46,7 @@ SOFT_PX = 0.8  # sigma over which votes are shared
 FEATHER_PX = 4.0  # beside an outline or a step, a drawing shows what the next one may not
 LEAST_TRUST = 0.1
 SIDE_VOTE, OWN_VOTE = 0.5, 0.3  # of a third drawing, of the field: only where nothing better is
+SLIVER = 0.03  # of the height: places so near to paint have it, too
 STRAY = 4e-4  # of the squared height: smaller patches are no drawing's
 SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
 THIRDS = 2  # further drawings that are asked
@@ -198,6 +200,11 @@ def _drawn(
         drawings, view, points, own_color, (first, second, share)
     )
     color, labels = _voted(candidates, view, len(drawings.paints), STRAY * figure_px**2)
+    if sight is not None:
+        source, covered = _continued(
+            covered, view.depth, STEP * drawings.height, SLIVER * figure_px
+        )
+        color, labels = color[tuple(source)], labels[tuple(source)]
     scale = camera.scale / cameras[first].scale
     line_px = pen.width_px * scale if pen else 0.0
     turn = float(np.arccos(np.clip(cameras[first].rotation[2] @ camera.rotation[2], -1, 1)))
@@ -365,6 +372,22 @@ def _voted(
         at = nearest(kept)
         return color[at], winner[at]
     return color, winner
+
+
+def _continued(
+    covered: Bool[np.ndarray, "h w"], depth: Float[np.ndarray, "h w"], apart: float, reach_px: float
+) -> tuple[Int[np.ndarray, "2 h w"], Bool[np.ndarray, "h w"]]:
+    """Return from where every pixel takes its paint, and which have that of a drawing then.
+
+    Slivers that no drawing shows go on with the paint beside them, if it is of the same surface.
+    """
+    here = np.indices(covered.shape)
+    if covered.all() or not covered.any():
+        return here, covered
+    there, deep = np.stack(nearest(covered)), filled(depth)
+    near = np.hypot(*(there - here)) <= reach_px
+    near &= np.abs(deep[tuple(there)] - deep) <= apart
+    return np.where(near, there, here), near
 
 
 def _stray(

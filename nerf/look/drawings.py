@@ -20,11 +20,13 @@ from toonset.nerf.look.shade import Shade
 from toonset.palette.pixels.labels import nearest_labels
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
+BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
 FARTHEST_PX = 50.0  # from an edge: farther is as far
 COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
 CRUMB = 3e-4  # of the squared height of the figure: smaller patches that are seen are noise
 INK_LIKE = 60  # sum of channels: a palette colour so near to the ink is the ink's
 SQUARE = np.ones((3, 3), dtype=np.uint8)
+AROUND = np.ones((2 * BESIDE_PX + 1, 2 * BESIDE_PX + 1), dtype=np.uint8)
 
 Places = tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]
 
@@ -166,7 +168,8 @@ class Texture:
         whole: (height, width, 4) premultiplied, in [0, 1].
         paint: (height, width, 3) straight colour in [0, 1]: see `Drawing`.
         labels: (height, width) of this paint.
-        far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it.
+        far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it, and
+            just behind the steps of a known shape.
         to_edge: (height, width) pixels to the outline or the nearest step in depth.
     """
 
@@ -247,8 +250,10 @@ def _texture(
     whole = view.rgba / np.float32(255)
     whole[..., :3] *= whole[..., 3:]
     opaque = np.dstack([view.paint, np.full(inside.shape, 255, np.uint8)])
-    seen = np.isfinite(depth)
-    far = np.where(seen, cv2.dilate(filled(depth), SQUARE), -np.inf)
+    seen, deep = np.isfinite(depth), filled(depth)
+    if view.levels is None:
+        seen &= deep - cv2.erode(deep, AROUND) <= STEP * height
+    far = np.where(seen, cv2.dilate(deep, SQUARE), -np.inf)
     to_step = distance_to(step_edges(depth, STEP * height))
     to_edge = np.minimum(inside, to_step).clip(0, FARTHEST_PX)
     return Texture(

@@ -22,7 +22,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.refine_yaw import Turning, turned
 from toonset.nerf.prepare.registration import Registration, registered
-from toonset.nerf.prepare.to_mannequin import Posed, bent_to, posed
+from toonset.nerf.prepare.to_mannequin import Posed, posed
 from toonset.nerf.prepare.unwarp import Unbending, unbent
 from toonset.nerf.prepare.warp_back import KeyWarps
 
@@ -117,13 +117,11 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
     Raises:
         MeshError: the mannequin lies in none of the pictures.
     """
-    given = posed(scene) if options.mannequin else Posed(None, None)
-    turning = registration = unbending = None
-    straight = scene
+    given = posed(scene, unbend=options.unbend) if options.mannequin else Posed(scene, None, None)
+    straight, unbending = given.scene, given.unbending
+    turning = registration = None
     if given.shape is None:
         straight, turning, registration, unbending = _agreeing(scene, options)
-    elif options.unbend:
-        straight, unbending = bent_to(scene, given.shape)
     ink = None
     if options.ink and scene.palette is not None:
         straight, ink = without_ink(straight, scene)

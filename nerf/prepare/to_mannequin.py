@@ -15,9 +15,10 @@ from jaxtyping import Float
 
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import alpha_of, has_figure
-from toonset.dataset.silhouettes.outlines import RIM_POINTS, ROOM, Square
+from toonset.dataset.silhouettes.outlines import RIM_POINTS, ROOM, Outlines, Square
 from toonset.dataset.silhouettes.register import Fit
-from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired
+from toonset.nerf.hull.hull import LEVEL
+from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired, parts_left
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, Sight, shape_of
 from toonset.nerf.lines.step_lines import learned_steps, step_places
 from toonset.nerf.lines.strokes import outline_width
@@ -31,25 +32,68 @@ class Posed:
     """A scene whose mannequin was looked at.
 
     Attributes:
+        scene: its drawings, bent to show the mannequin where that is taken for the shape.
         shape: the mannequin, where it is taken for the character's shape; None: it is not.
         fit: what speaks for it; None: it could not be asked.
+        unbending: how drawings were bent; None: they were not asked.
     """
 
+    scene: Scene
     shape: Shape | None
     fit: MannequinFit | None
+    unbending: Unbending | None = None
 
 
-def posed(scene: Scene) -> Posed:
+def posed(scene: Scene, *, unbend: bool = True) -> Posed:
     """Return whether a scene's mannequin is the body that was drawn.
+
+    Args:
+        scene: posed drawings.
+        unbend: whether drawings may be bent.
 
     Raises:
         MeshError: it lies in none of the pictures.
     """
     if scene.mannequin is None:
-        return Posed(None, None)
+        return Posed(scene, None, None)
     shape = shape_of(scene.mannequin, [frame.camera for frame in scene.frames])
+    shape = replace(shape, beyond=_outside(scene, shape))
     fit = mannequin_fit(scene, shape)
-    return Posed(shape if fit and fit.chosen else None, fit)
+    if fit is None or not fit.chosen:
+        return Posed(scene, None, fit)
+    bent, unbending = bent_to(scene, shape)
+    frames = [frame for frame in bent.frames if has_figure(frame)]
+    fit = replace(fit, left=parts_left(_beside(frames, shape)))
+    if not fit.chosen:
+        return Posed(scene, None, fit)
+    return Posed(bent, shape, fit, unbending) if unbend else Posed(scene, shape, fit)
+
+
+def _beside(frames: list[Frame], shape: Shape) -> Outlines:
+    """Return the outlines of drawings, and the mannequin's behind them."""
+    cameras = [frame.camera for frame in frames]
+    seen = [shape.seen(camera).alpha for camera in cameras]
+    return paired(cameras, [alpha_of(frame) for frame in frames], seen)
+
+
+def _outside(scene: Scene, shape: Shape) -> float:
+    """Return by how much outlines are drawn outside of the mannequin, world units.
+
+    0 where they are drawn inside, or there are none. The middle of a line that lies about the
+    silhouette is half its width nearer than that of one outside of it.
+    """
+    frames = [frame for frame in scene.frames if has_figure(frame)]
+    width = float(np.median([outline_width(frame.rgba) for frame in frames])) if frames else 0.0
+    if width <= 0 or not all((shape.seen(f.camera).alpha >= LEVEL).any() for f in frames):
+        return 0.0
+    outlines = _beside(frames, shape).views
+    drawn, shapes = outlines[: len(frames)], outlines[len(frames) :]
+    off = [
+        -float(np.median(own.at(line.rim)[0])) / own.camera.scale
+        for line, own in zip(drawn, shapes, strict=True)
+    ]
+    found = float(np.mean(off))
+    return found if found * frames[0].camera.scale > width / 4 else 0.0
 
 
 def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -85,6 +85,7 @@ class ShapeRecord(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     low: tuple[Number, Number, Number]
     step: float = Field(gt=0, le=1e9)
+    beyond: float = Field(ge=0, le=1e9)
 
 
 class DrawingsRecord(BaseModel):
@@ -116,11 +117,16 @@ class DrawingsRecord(BaseModel):
                 "height": drawings.height,
                 "depths": drawings.depths,
                 "bent": drawings.bent,
-                "shape": shape and {"low": shape.low.tolist(), "step": shape.step},
+                "shape": shape
+                and {"low": shape.low.tolist(), "step": shape.step, "beyond": shape.beyond},
                 "steps": drawings.steps and asdict(drawings.steps),
                 "shade": drawings.shade and asdict(drawings.shade),
             }
         )
+
+
+def _where(shape: Shape) -> dict[str, Any]:
+    return {"low": shape.low.tolist(), "step": shape.step, "beyond": shape.beyond}
 
 
 def write_drawings(folder: Path, drawings: Drawings) -> None:
@@ -231,7 +237,7 @@ def _shape(record: ShapeRecord, found: Mapping[str, Tensor], file: Path) -> Shap
     places, faces = found["places"].numpy(), found["faces"].numpy().astype(np.int64)
     if faces.max() >= len(places):
         raise BundleError(f"{file}: faces name vertices that are not there; train again")
-    return Shape(np.array(record.low), record.step, places, faces)
+    return Shape(np.array(record.low), record.step, places, faces, record.beyond)
 
 
 def _apart(picture: np.ndarray, cameras: Sequence[Camera]) -> list[np.ndarray]:

@@ -8,6 +8,8 @@ drawing as it was drawn, D, both at one size and a little blurred, in CIELAB:
 so that a drawing error of a hundredth of the height is off by about that, whatever is drawn. The
 drawings beside it are twice as far apart as beside any other view: of few drawings it says too
 much. Cameras that are wrong count, and poses, colours and sides that only one drawing has.
+Where the mannequin gives the shape, D is the drawing as it was bent to show it: how it was drawn
+does not reach new views then.
 
 Source: Geisser 1975, "The predictive sample reuse method" (leave one out).
 """
@@ -77,9 +79,12 @@ def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
         drawn: the same as they were drawn.
     """
     drawings = baked.trained.drawings
-    pairs = zip(prepared.frames, drawn.frames, strict=True)
+    if drawings is None:
+        return []
+    compared = prepared if drawings.shape is not None else drawn
+    pairs = zip(prepared.frames, compared.frames, strict=True)
     frames = [own for ready, own in pairs if has_figure(ready)]
-    if drawings is None or len(frames) < FEWEST:
+    if len(frames) < FEWEST:
         return []
     drawings = drawings.fitting(TALL_PX / drawings.height)
     assert drawings.textures  # made here: two threads must not make them twice
@@ -109,7 +114,7 @@ def predicted(
         drawings: of about the size of the view.
         number: of the drawing.
         view: of the field, by `small_camera`.
-        frames: the drawings as they were drawn, in the same order.
+        frames: what it is compared with, in the same order.
         field: people are shown the field's own colours.
     """
     frame, others = frames[number], drawings.without(number)

@@ -31,12 +31,14 @@ class Hand:
         shadow: colours in shadow over those in light; 1: there is none.
         grain: levels, of noise.
         bend: of the picture's side: a smooth error of every drawing's own.
+        beyond_px: as far outlines are drawn outside of the silhouette.
     """
 
     lines: bool = True
     shadow: float = 1.0
     grain: float = 0.0
     bend: float = 0.0
+    beyond_px: float = 0.0
 
 
 LIGHT = np.array([-0.5, -0.6, -0.6])  # in camera axes, from the surface to it
@@ -51,6 +53,13 @@ def body(scale: float = 1.0, arm: bool = True) -> Mesh:
         vertices = np.concatenate([vertices, ball.vertices * 0.2 + [0.2, 0.1, 0.75]])
         faces = np.concatenate([faces, ball.faces + len(torso.vertices)])
     return Mesh(np.array(vertices), np.array(faces))
+
+
+def with_bobble(mesh: Mesh) -> Mesh:
+    """Return a body with a small ball on its head."""
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    vertices = np.concatenate([mesh.vertices, ball.vertices * 0.09 + [0, 0.93, 0]])
+    return Mesh(vertices, np.concatenate([mesh.faces, ball.faces + len(mesh.vertices)]))
 
 
 def camera_at(yaw: float, side: int = SIDE) -> Camera:
@@ -71,12 +80,17 @@ def drawing(mesh: Mesh, camera: Camera, hand: Hand = Hand(), seed: int = 0) -> n
     color[np.abs(points[..., 1] + 0.3) < 0.15] = BELT
     color[points[..., 2] > 0.5] = ARM
     color[normal @ LIGHT < 0.3] *= hand.shadow
+    if hand.beyond_px:
+        outside = cv2.distanceTransform((~there).astype(np.uint8), cv2.DIST_L2, 5)
+        there = outside <= hand.beyond_px * FINE
     alpha = _smaller(there.astype(np.float32))
     rgb = _smaller(color * there[..., None]) / np.maximum(alpha, 1e-6)[..., None]
     if hand.lines:
         inside = cv2.distanceTransform(there.astype(np.uint8), cv2.DIST_L2, 5)
         ink = _smaller((inside <= LINE_PX * FINE).astype(np.float32))
-        at_steps = drawn_steps(np.where(there, depth, np.nan), STEPS, HEIGHT, FINE, 1.0)
+        at_steps = drawn_steps(
+            np.where(np.isfinite(depth), depth, np.nan), STEPS, HEIGHT, FINE, 1.0
+        )
         ink = np.maximum(ink, at_steps)[..., None]
         rgb = rgb * (1 - ink) + INK * ink
     rng = np.random.default_rng(seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -111,6 +112,22 @@ def test_a_hull_that_predicts_better_wins() -> None:
     assert MannequinFit(0.010, 0.012).chosen
     assert not MannequinFit(0.012, 0.010).chosen
     assert not MannequinFit(0.03, 0.05).chosen  # both are far off
+    assert not MannequinFit(0.010, 0.012, left=0.02).chosen  # a part is missing
+
+
+def test_outlines_outside_of_the_shape_are_seen_there() -> None:
+    shape, camera = shape_of(body(), ring()), camera_at(0.4)
+    beyond = replace(shape, beyond=2 / camera.scale)
+    inner, outer = shape.seen(camera), beyond.seen(camera)
+    away = cv2.distanceTransform((inner.alpha < 0.5).astype(np.uint8), cv2.DIST_L2, 5)
+    assert np.all(outer.alpha[away <= 1.5] > 0.5)
+    assert np.all(outer.alpha[away >= 3.5] == 0)
+    both = np.isfinite(inner.depth)
+    np.testing.assert_array_equal(outer.depth[both], inner.depth[both])
+    rows, columns = beyond.box(camera) or (slice(0), slice(0))
+    assert outer.alpha[rows, columns].sum() == pytest.approx(outer.alpha.sum(), rel=1e-6)
+    wider = hull_of_shape(beyond, 0.02).inside.sum() / hull_of_shape(shape, 0.02).inside.sum()
+    assert 1.05 < float(wider) < 1.25
 
 
 def test_two_drawings_and_unseen_mannequins_say_nothing() -> None:

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.nerf.bodies import Hand, body, camera_at, drawing, ring, sheet
+from tests.nerf.bodies import Hand, body, camera_at, drawing, ring, sheet, with_bobble
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.hull.mannequin_shape import shape_of
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import prepared
-from toonset.nerf.prepare.to_mannequin import bent_to
+from toonset.nerf.prepare.to_mannequin import bent_to, posed
 
 BEND = Hand(bend=0.012)
 
@@ -114,3 +114,25 @@ def test_unbend_off_keeps_drawings_but_takes_the_shape() -> None:
     ready = prepared(scene, TrainOptions(unbend=False))
     assert ready.shape is not None
     assert ready.scene is scene
+
+
+@pytest.mark.parametrize("beyond_px", [0.0, 1.0, 2.0])
+def test_lines_outside_of_the_silhouette_are_no_part_of_the_body(beyond_px: float) -> None:
+    hand = Hand(bend=0.004, beyond_px=beyond_px)
+    found = posed(sheet(body(), hand, body()))
+    assert found.shape is not None
+    assert found.shape.beyond * ring()[0].scale == pytest.approx(beyond_px, abs=0.3)
+    assert found.fit is not None
+    assert found.fit.mannequin < 0.006
+
+
+def test_a_mannequin_that_lacks_a_small_part_is_another_body() -> None:
+    """It predicts drawings better than they do each other, but the part would be lost."""
+    scene = sheet(with_bobble(body()), BEND, body())
+    assert posed(replace(scene, mannequin=with_bobble(body()))).shape is not None
+    found = posed(scene)
+    assert found.shape is None
+    assert found.scene is scene
+    assert found.fit is not None
+    assert found.fit.left > 0.006
+    assert found.fit.mannequin < found.fit.drawings
