@@ -1,8 +1,8 @@
 """Drawn sheets with held-out views that are true: what the look bench is measured on.
 
-Synthetic bodies with eyes, outlines and the errors of a hand, or case folders as in
-`bench.cases.cases`, where an `eyes.json` may say where the character's eyes are. Every sheet comes
-twice: with its true cameras, and with those that calibration finds on it.
+Synthetic bodies with eyes, outlines, the errors of a hand and their own mesh as mannequin, or case
+folders as in `bench.cases.cases`, where an `eyes.json` may say where the character's eyes are.
+Every sheet comes twice: with its true cameras, and with those that calibration finds on it.
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ def _synthetic(seed: int, *, calibrated: bool, px: int) -> LookCase:
     options = replace(DRAWN, cell_px=px, outline_px=DRAWN.outline_px * px / DRAWN.cell_px)
     case, made = drawn_case(seed, options)
     turn = _scene(make_turnaround(made.mesh, _true(options, TURN), seed))
-    case = replace(case, turn=replace(turn, frames=turn.frames[:SHOWN]))
+    train = replace(case.train, mannequin=made.mesh)
+    case = replace(case, train=train, turn=replace(turn, frames=turn.frames[:SHOWN]))
     if not calibrated:
         return case
     views = split_picture(made.sheet).views

@@ -108,7 +108,7 @@ def _laid(scene: Scene, recipe: Recipe, seed: int) -> _Laid:
 
     drawn = [frame.rgba for frame in ready.frames]
     prepared = training.prepared
-    drawings = drawings_of(prepared.scene, drawn, depth_of, bent=prepared.bent)
+    drawings = drawings_of(prepared.scene, drawn, depth_of, prepared.shape, bent=prepared.bent)
     laid, again = time.process_time(), 0.0
     if drawings is not None:
         assert drawings.textures  # made here, not while flows are timed

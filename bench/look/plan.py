@@ -44,13 +44,16 @@ class Look:
     without: Part = ""
 
 
+NO_MANNEQUIN = Recipe(TrainOptions(mannequin=False))
 FIELD, REDRAWN = "field only", "field, lines redrawn"
 LOOKS: dict[str, Look] = {
     DEFAULT: Look(),
+    "without the mannequin": Look(recipe=NO_MANNEQUIN),
     "without paint agreement": Look(recipe=Recipe(paint=False)),
     "without flow": Look(without="flow"),
     "nearest drawing": Look(without="vote"),
     FIELD: Look("rgb"),
+    "field only, no mannequin": Look("rgb", NO_MANNEQUIN),
     "palette layer": Look("palette"),
     REDRAWN: Look("rgb", Recipe(TrainOptions(ink=True))),
 }

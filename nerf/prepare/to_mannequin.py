@@ -26,6 +26,9 @@ from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
 from toonset.nerf.prepare.unwarp import Unbending, Warp, warped
 from toonset.palette.pixels.ink_lines import find_contour
 
+OUTSIDE = 0.25  # of an outline's width: lines that reach farther beyond the silhouette lie about it
+SURE = 2.5  # standard errors, from drawing to drawing
+
 
 @dataclass(frozen=True, eq=False)
 class Posed:
@@ -79,12 +82,16 @@ def _beside(frames: list[Frame], shape: Shape) -> Outlines:
 def _outside(scene: Scene, shape: Shape) -> float:
     """Return by how much outlines are drawn outside of the mannequin, world units.
 
-    0 where they are drawn inside, or there are none. The middle of a line that lies about the
-    silhouette is half its width nearer than that of one outside of it.
+    0 where they are drawn inside, or there are none. A line that lies about the silhouette reaches
+    half its width beyond it.
     """
     frames = [frame for frame in scene.frames if has_figure(frame)]
     width = float(np.median([outline_width(frame.rgba) for frame in frames])) if frames else 0.0
-    if width <= 0 or not all((shape.seen(f.camera).alpha >= LEVEL).any() for f in frames):
+    if (
+        len(frames) < 2
+        or width <= 0
+        or not all((shape.seen(f.camera).alpha >= LEVEL).any() for f in frames)
+    ):
         return 0.0
     outlines = _beside(frames, shape).views
     drawn, shapes = outlines[: len(frames)], outlines[len(frames) :]
@@ -92,8 +99,8 @@ def _outside(scene: Scene, shape: Shape) -> float:
         -float(np.median(own.at(line.rim)[0])) / own.camera.scale
         for line, own in zip(drawn, shapes, strict=True)
     ]
-    found = float(np.mean(off))
-    return found if found * frames[0].camera.scale > width / 4 else 0.0
+    found, sure = float(np.mean(off)), SURE * float(np.std(off, ddof=1)) / len(off) ** 0.5
+    return found if found > max(sure, OUTSIDE * width / frames[0].camera.scale) else 0.0
 
 
 def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
