@@ -187,7 +187,7 @@ class Camera:
         relative = 1 + self.k * depth
         in_front = relative > MIN_RELATIVE_DEPTH
         divisor = np.where(in_front, relative, np.nan)
-        pixels = self.center + self._scale_uv * local[..., :2] / divisor[..., None]
+        pixels = self.center + self.scale_uv * local[..., :2] / divisor[..., None]
         return pixels, depth, in_front
 
     def unproject(
@@ -195,7 +195,7 @@ class Camera:
     ) -> Float[np.ndarray, "*n 3"]:
         """Return the world points seen at `pixels` with `depth` past the target's plane."""
         depth = np.asarray(depth, dtype=np.float64)
-        plane = (np.asarray(pixels, dtype=np.float64) - self.center) / self._scale_uv
+        plane = (np.asarray(pixels, dtype=np.float64) - self.center) / self.scale_uv
         local = np.concatenate([plane * (1 + self.k * depth)[..., None], depth[..., None]], axis=-1)
         return local @ self.rotation + self.target
 
@@ -208,7 +208,7 @@ class Camera:
         t < 0 along a ray are valid down to there.
         """
         origins = self.unproject(pixels, np.zeros(np.shape(pixels)[:-1]))
-        plane = (np.asarray(pixels, dtype=np.float64) - self.center) / self._scale_uv
+        plane = (np.asarray(pixels, dtype=np.float64) - self.center) / self.scale_uv
         local = np.concatenate([self.k * plane, np.ones((*plane.shape[:-1], 1))], axis=-1)
         local /= np.linalg.norm(local, axis=-1, keepdims=True)
         return origins, local @ self.rotation
@@ -252,7 +252,8 @@ class Camera:
         return replace(self, rotation=rotation, target=self.target * [-1.0, 1.0, 1.0])
 
     @property
-    def _scale_uv(self) -> Float[np.ndarray, " 2"]:
+    def scale_uv(self) -> Float[np.ndarray, " 2"]:
+        """Return pixels per world unit along u and v, at the target's depth."""
         return np.array([self.scale, self.scale * self.pixel_aspect])
 
 

@@ -15,9 +15,10 @@ def summary(run: Path, metrics: dict[str, Any], verbose: bool = False) -> str:
     return "\n".join(
         [
             f"{counts['views']} views{size}; {metrics['steps']} steps in {seconds:.1f} s",
+            *_mannequin(metrics["drawings"]["mannequin"], verbose=verbose),
             *_drawings(metrics["drawings"], verbose=verbose),
             *_symmetry(metrics["symmetry"], verbose=verbose),
-            *(_hull(metrics["hull"]) + _planes(metrics["planes"]) if verbose else []),
+            *(_hull(metrics) + _planes(metrics["planes"]) if verbose else []),
             f"fit to the drawings{_set_right(metrics['drawings'])}: {_figures(fit)}",
             *held_out,
             _verdict(metrics["verdict"], verbose=verbose),
@@ -26,8 +27,33 @@ def summary(run: Path, metrics: dict[str, Any], verbose: bool = False) -> str:
     )
 
 
-def _hull(hull: dict[str, Any]) -> list[str]:
+def _chosen(found: dict[str, Any] | None) -> bool:
+    return found is not None and bool(found["chosen"])
+
+
+def _mannequin(found: dict[str, Any] | None, *, verbose: bool) -> list[str]:
+    """Return whether the mannequin gives the shape; if verbose, on what evidence."""
+    if found is None or not (verbose or found["chosen"]):
+        return []
+    what = (
+        "the mannequin's"
+        if found["chosen"]
+        else "the drawings' hull, the mannequin is another body"
+    )
+    if not verbose:
+        return [f"shape: {what}"]
+    others, left = found["drawings_off"], found["parts_left"]
+    hull = "" if others is None else f", by the other drawings {_percent(others)}"
+    parts = f", {_percent(left)} unexplained by bends" if left else ""
+    off = f"outlines predicted {_percent(found['mannequin_off'])} off{hull}{parts}"
+    return [f"shape: {what} ({off})"]
+
+
+def _hull(metrics: dict[str, Any]) -> list[str]:
     """Return how many drawings may contradict the hull, and why so many."""
+    if _chosen(metrics["drawings"]["mannequin"]):
+        return []
+    hull = metrics["hull"]
     tried = ", ".join(f"{100 * iou:.1f} %" for iou in hull["left_out_iou"])
     evidence = f" (left-out views' outlines met with 0, 1 against: {tried})" if tried else ""
     return [f"hull: filled where at most {hull['missing']} views say background{evidence}"]
@@ -61,6 +87,8 @@ def _drawings(found: dict[str, Any], *, verbose: bool) -> list[str]:
         if step is None or not (verbose or step["applied"]):
             continue
         before, after = step["apart_px"]
+        if name == "unbending" and _chosen(found["mannequin"]):
+            done = "bent to the mannequin"
         moved = f"{what} {done}: outlines {before:.2f} px apart, {after:.2f} px after"
         kept = f"{what} not {done}: outlines {before:.2f} px apart"
         more = "" if step["applied"] or step["gain_nats"] <= 0 else ", not the best explanation"

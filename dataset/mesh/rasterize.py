@@ -2,10 +2,12 @@
 
 The rasteriser is a pinhole that looks into the middle of the picture. Points are handed to it as
 
-    (u, v) away, away       away = the distance to a pinhole's centre; for an orthographic camera
-                            FAR_OFF times the mesh's depth, past its nearest point
+    (u, v) away, away       away = the distance to a pinhole's centre; for an orthographic camera,
+                            and for pinholes still farther off, FAR_OFF times the mesh's depth, past
+                            its nearest point
 
 so that depth is interpolated as the camera does it: as 1 / distance or, so far off, linearly.
+Triangles that reach behind a pinhole are not seen: the rasteriser does not cut them.
 """
 
 from __future__ import annotations
@@ -79,14 +81,19 @@ class _Placed:
     @classmethod
     def of(cls, vertices: Float[np.ndarray, "v 3"], camera: Camera) -> _Placed:
         width, height = camera.size_wh
-        pixels, depth, _ = camera.project(vertices)
+        local = (np.asarray(vertices, dtype=np.float64) - camera.target) @ camera.rotation.T
+        depth = local[:, 2]
         low, high = float(depth.min()), float(depth.max())
         extent = max(high - low, 1e-6 * height / camera.scale)
-        start = -1 / camera.k if camera.k else low - FAR_OFF * extent
-        away = depth - start
-        place = np.stack([pixels[:, 0] * 2 - width, height - pixels[:, 1] * 2], axis=1) / height
-        eye = np.column_stack([place * away[:, None], -away]).astype(np.float32)
-        far = high - start + ROOM * extent
+        pinhole = -1 / camera.k > low - FAR_OFF * extent if camera.k else False
+        start = -1 / camera.k if pinhole else low - FAR_OFF * extent
+        away = (depth - start)[:, None]
+        # of a pinhole, away / (1 + k z) is 1 / k: corners beside it divide nothing by 0
+        shrunk = 1 / camera.k if pinhole else away / (1 + camera.k * depth[:, None])
+        place = camera.center * away + camera.scale_uv * local[:, :2] * shrunk
+        place = (2 * place - np.array(camera.size_wh) * away) * [1, -1] / height
+        eye = np.column_stack([place, -away]).astype(np.float32)
+        far = max(high - start, 0.0) + ROOM * extent
         near = max(low - start - ROOM * extent, NEAREST * far)
         shown = np.full((height, width), far, dtype=np.float32)
         return cls(eye, shown, start, (np.eye(4, dtype=np.float32), np.pi / 2, near, far))

@@ -30,9 +30,9 @@ from toonset.nerf.hull.support import alpha_at
 from toonset.nerf.kernels.threads import side_by_side
 
 FEWEST_VIEWS = 3  # two drawings leave no hull to compare with
-MOST_OFF = 0.016  # of the figure's height: another body, whatever else is known
-FARTHEST = 0.06  # of the figure's height: what is farther apart counts no more
-PART, MOST_LEFT = 0.02, 0.006  # of the height: no bend is off by so much; of the outlines are
+MOST_OFF = 0.016  # of the square: another body, whatever else is known
+FARTHEST = 0.06  # of the square: what is farther apart counts no more
+PART, MOST_LEFT = 0.02, 0.006  # of the square, that bent outlines are never off; of the outlines
 VOXELS = 96  # of the other drawings' hull, along its longest side
 RAYS = 2  # per pixel and axis, of that hull's outline
 
@@ -41,32 +41,33 @@ Alpha = Float[np.ndarray, "height width"]
 
 @dataclass(frozen=True)
 class MannequinFit:
-    """How far predicted outlines lie from drawn ones.
+    """How far predicted outlines lie from drawn ones, in shares of the figure's `Square`.
 
     Attributes:
-        mannequin: root mean square distance of the mannequin's, in heights of the figure; mean of
-            the drawings.
-        drawings: the same of the hulls of all drawings but the one that is predicted.
+        mannequin: root mean square distance of the mannequin's; mean of the drawings.
+        drawings: the same of the hulls of all drawings but the one that is predicted, as carved;
+            None: they were not asked, the mannequin is too far off.
         left: share of the outlines that lie more than PART apart once drawings are bent to show the
             mannequin; 0 until they are.
     """
 
     mannequin: float
-    drawings: float
+    drawings: float | None
     left: float = 0.0
 
     @property
     def chosen(self) -> bool:
         """Return whether the mannequin is taken for the character's shape."""
-        near = self.mannequin <= MOST_OFF and self.mannequin < self.drawings
-        return near and self.left <= MOST_LEFT
+        if self.drawings is None or self.mannequin > MOST_OFF:
+            return False
+        return self.mannequin < self.drawings and self.left <= MOST_LEFT
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers for a report."""
         return {
             "chosen": self.chosen,
-            "mannequin_off_height": round(self.mannequin, 6),
-            "drawings_off_height": round(self.drawings, 6),
+            "mannequin_off": round(self.mannequin, 6),
+            "drawings_off": None if self.drawings is None else round(self.drawings, 6),
             "parts_left": round(self.left, 6),
         }
 
@@ -91,8 +92,8 @@ def mannequin_fit(scene: Scene, shape: Shape) -> MannequinFit | None:
     if not all((alpha >= LEVEL).any() for alpha in seen):
         return None
     own = apart(paired(cameras, drawn, seen))
-    if own > MOST_OFF:  # the hull need not be asked
-        return MannequinFit(own, 0.0)
+    if own > MOST_OFF:
+        return MannequinFit(own, None)
     small = min(1.0, FIGURE_PX / max(figure_px(frame) for frame in frames))
     cameras = [camera.resized(small) for camera in cameras]
     drawn = [
@@ -108,7 +109,7 @@ def paired(cameras: Sequence[Camera], first: Sequence[Alpha], second: Sequence[A
 
 
 def apart(outlines: Outlines) -> float:
-    """Return the mean distance of `paired` outlines, in heights of the figure."""
+    """Return the mean distance of `paired` outlines, in shares of the square."""
     views = outlines.views
     half = len(views) // 2
     return float(np.mean([_apart(*pair) for pair in zip(views[:half], views[half:], strict=True)]))
@@ -129,16 +130,25 @@ def parts_left(outlines: Outlines) -> float:
 
 def _beyond(one: Outline, other: Outline) -> float:
     """Return the share of an outline that lies more than PART outside of the other."""
-    return float(np.mean(other.at(one.rim)[0] < -PART * one.square.size))
+    return (
+        float(np.mean(other.at(one.rim)[0] < -PART * one.square.size)) if _both(one, other) else 1
+    )
 
 
 def _apart(one: Outline, other: Outline) -> float:
+    if not _both(one, other):
+        return FARTHEST
     farthest = FARTHEST * one.square.size
     squares = [
         np.square(np.minimum(np.abs(to.at(rim.rim)[0]), farthest)).mean()
         for to, rim in ((one, other), (other, one))
     ]
     return float(np.sqrt(np.mean(squares))) / one.square.size
+
+
+def _both(one: Outline, other: Outline) -> bool:
+    """Return whether both have an outline: specks, and a picture that is all figure, have none."""
+    return len(one.rim) > 0 and len(other.rim) > 0
 
 
 def _by_others(cameras: Sequence[Camera], alphas: Sequence[Alpha]) -> list[Alpha]:

@@ -19,7 +19,8 @@ from toonset.mesh import Mesh
 
 FINER = 3  # samples per pixel and axis: outlines and steps in depth lie between pixels
 GRID_PX = 0.25  # of the drawings: what is nearer is one vertex
-MOST_FACES = 40_000  # finer meshes get a coarser grid
+MOST_FACES = 40_000  # of finer meshes, vertices in one cell become one, in cells COARSER each time
+COARSER = 1.3
 MOST_STEPS = 65_000  # of the grid, along an axis
 BESIDE_PX = 2  # pixels of room round what is seen
 
@@ -34,7 +35,7 @@ class Sight:
         depth: (height, width) past the camera's target at the pixels' centres, nan beside it.
         fine: (FINER height, FINER width) the same at FINER x FINER places of every pixel.
         normal: (height, width, 3) of the faces seen, in camera axes, towards the viewer; 0 beside
-            them, and everywhere unless asked for.
+            the shape, and everywhere unless asked for.
     """
 
     camera: Camera
@@ -96,6 +97,12 @@ class Shape:
         normal = np.zeros((height, width, 3), dtype=np.float32)
         if normals:
             _, normal = depth_and_normals(self.vertices, self.faces, camera)
+            there = (normal != 0).any(axis=-1)
+            if self.beyond and there.any():
+                at = ndimage.distance_transform_edt(
+                    ~there, return_distances=False, return_indices=True
+                )
+                normal = np.where((cover > 0)[..., None], normal[tuple(np.asarray(at))], 0)
         return Sight(camera, cover, fine[middle, middle], fine, normal)
 
 
@@ -107,26 +114,45 @@ def shape_of(mesh: Mesh, cameras: Sequence[Camera]) -> Shape:
     Raises:
         MeshError: nothing of it lies in any picture.
     """
-    faces = mesh.faces[_within(mesh.vertices[mesh.faces].mean(axis=1), cameras)]
+    faces = mesh.faces[_within(mesh, cameras)]
     if not len(faces):
         raise MeshError(
             f"{mesh.name}: lies in none of the pictures; it belongs to other cameras, train with "
             "--no-mannequin or put the right one there"
         )
-    corners = mesh.vertices[faces]
-    low = corners.min(axis=(0, 1))
-    extent = float(np.ptp(corners, axis=(0, 1)).max())
+    used, index = np.unique(faces, return_inverse=True)
+    vertices, faces = mesh.vertices[used], index.reshape(-1, 3)
+    low, extent = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
     step = max(GRID_PX / max(camera.scale for camera in cameras), extent / MOST_STEPS)
+    cell = step
     while True:
-        places, number = np.unique(
-            np.rint((corners - low) / step).astype(np.int64).reshape(-1, 3),
-            axis=0,
-            return_inverse=True,
-        )
-        found = _distinct(number.reshape(-1, 3))
+        group = _numbers(np.rint((vertices - low) / cell))
+        places, number = _means((vertices - low) / step, group)
+        found = _distinct(number[faces])
+        if not len(found):
+            raise MeshError(
+                f"{mesh.name}: is smaller than a pixel in every picture; give one in the cameras' "
+                "units, or train with --no-mannequin"
+            )
         if len(found) <= MOST_FACES and len(places) <= MOST_STEPS:
-            return Shape(low, step, places.astype(np.uint16), found)
-        step *= 1.4
+            return Shape(low, step, places, found)
+        cell *= COARSER
+
+
+def _numbers(cells: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+    """Return one number for every cell, the same for points in one."""
+    x, y, z = cells.astype(np.int64).T
+    side = int(cells.max()) + 1
+    return (x * side + y) * side + z
+
+
+def _means(
+    points: Float[np.ndarray, "n 3"], group: Int[np.ndarray, " n"]
+) -> tuple[UInt16[np.ndarray, "m 3"], Int[np.ndarray, " n"]]:
+    """Return the middle of every group of points, in whole numbers, and each point's group."""
+    _, number, count = np.unique(group, return_inverse=True, return_counts=True)
+    sums = np.stack([np.bincount(number, axis) for axis in points.T], axis=1)
+    return np.rint(sums / count[:, None]).astype(np.uint16), number
 
 
 def _grown(
@@ -140,12 +166,15 @@ def _grown(
     return np.where(away <= by_px, depth[tuple(at)], np.nan)
 
 
-def _within(points: Float[np.ndarray, "n 3"], cameras: Sequence[Camera]) -> Bool[np.ndarray, " n"]:
-    inside = np.zeros(len(points), dtype=bool)
+def _within(mesh: Mesh, cameras: Sequence[Camera]) -> Bool[np.ndarray, " faces"]:
+    """Return the faces whose box in some picture meets it."""
+    inside = np.zeros(len(mesh.faces), dtype=bool)
     for camera in cameras:
-        pixels, _, front = camera.project(points)
-        with np.errstate(invalid="ignore"):
-            inside |= front & ((pixels >= 0) & (pixels <= np.array(camera.size_wh))).all(axis=1)
+        pixels, _, front = camera.project(mesh.vertices)
+        there = front[mesh.faces, None]
+        least = np.where(there, pixels[mesh.faces], np.inf).min(axis=1)
+        most = np.where(there, pixels[mesh.faces], -np.inf).max(axis=1)
+        inside |= ((most >= 0) & (least <= np.array(camera.size_wh))).all(axis=1)
     return inside
 
 

@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
 from toonset.nerf.hull.fairing import SLOPE, squared_distance
@@ -17,6 +17,7 @@ from toonset.nerf.hull.mannequin_shape import Shape
 ROOM = 6  # voxels round the shape
 REACH = 3  # voxels from its surface to where the support is 0 or 1
 DENSE = 0.45  # voxels between points of the surface: none is missed
+AT_ONCE = 1 << 20  # points; bounds memory
 PROTRUDES = 0.4  # voxels that are taken off: a voxel that the surface only touches counts whole
 
 
@@ -35,9 +36,7 @@ def hull_of_shape(shape: Shape, voxel: float) -> Hull:
     low = shape.vertices.min(axis=0) - (ROOM + beyond) * voxel
     extent = shape.vertices.max(axis=0) - low
     counts = np.ceil(extent / voxel + beyond).astype(int) + ROOM
-    touched = np.zeros(counts, dtype=bool)
-    touched[tuple(((_points(shape, DENSE * voxel) - low) / voxel).astype(np.int32).T)] = True
-    inside = torch.from_numpy(_enclosed(touched))
+    inside = torch.from_numpy(_enclosed(_touched(shape, low, voxel, counts)))
     outer, inner = (
         squared_distance(part, reach).float().sqrt_().clamp_(max=reach + 1)
         for part in (inside, ~inside)
@@ -57,16 +56,29 @@ def _enclosed(touched: Bool[np.ndarray, "x y z"]) -> Bool[np.ndarray, "x y z"]:
     return touched | hidden | (free != free[0, 0, 0])
 
 
-def _points(shape: Shape, gap: float) -> Float[np.ndarray, "n 3"]:
-    """Return points of the surface, no two neighbours farther apart than `gap`."""
-    a, b, c = (shape.vertices[shape.faces[:, i]].astype(np.float32) for i in range(3))
-    sides = [np.linalg.norm(one - other, axis=1) for one, other in ((a, b), (b, c), (c, a))]
-    count = np.ceil(np.max(sides, axis=0) / gap).astype(int) + 1
-    found = []
-    for parts in np.unique(count):
-        at = count == parts
-        i, j = (grid.reshape(-1) for grid in np.indices((parts + 1, parts + 1)))
-        u, v = (k[i + j <= parts, None].astype(np.float32) / parts for k in (i, j))
-        one, two = b[at] - a[at], c[at] - a[at]
-        found.append((a[at][:, None] + u * one[:, None] + v * two[:, None]).reshape(-1, 3))
-    return np.concatenate(found)
+def _touched(
+    shape: Shape, low: Float[np.ndarray, " 3"], voxel: float, counts: Int[np.ndarray, " 3"]
+) -> Bool[np.ndarray, "x y z"]:
+    """Return the voxels that the surface passes through, by points DENSE voxels apart on it.
+
+    Rows of points run along every triangle's longest side, from it to the corner across.
+    """
+    touched = np.zeros(counts, dtype=bool)
+    corners = ((shape.vertices[shape.faces] - low) / voxel).astype(np.float32)
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    order = (sides.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.moveaxis(np.take_along_axis(corners, order[..., None], axis=1), 1, 0)
+    longest = sides.max(axis=1)
+    height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-6)
+    along, rows = (np.ceil(size / DENSE).astype(np.int64) + 1 for size in (longest, height))
+    each = along * rows
+    ends = np.cumsum(each)
+    for cut in np.split(np.arange(len(ends)), np.flatnonzero(np.diff(ends // AT_ONCE)) + 1):
+        face = np.repeat(cut, each[cut])
+        first = ends[cut] - each[cut]
+        index = np.arange(len(face)) + first[0] - np.repeat(first, each[cut])
+        u = (index % along[face] / np.maximum(along[face] - 1, 1))[:, None].astype(np.float32)
+        v = (index // along[face] / np.maximum(rows[face] - 1, 1))[:, None].astype(np.float32)
+        points = (1 - v) * (a[face] + u * (b[face] - a[face])) + v * c[face]
+        touched[tuple(points.astype(np.int32).T)] = True
+    return touched

@@ -21,9 +21,10 @@ LINED = 0.6  # of the pixels on the steps above `least` must lie on a line
 ON_LINE_PX = 2.0  # a step so near to a line lies on it: drawings and depth disagree a little
 LINE = 0.5  # coverage from which a pixel is a line's
 APART = (
-    2.0  # times the line's width, and pixels, from outlines and deeper steps: lines of their own
+    2.0  # times the line's width and a pixel, from outlines and deeper steps: lines of their own
 )
-WIDEST_PX = 12  # from a step, in which its line's width is measured
+WIDEST_PX, WIDEST = 12, 2.0  # from a step, in which its line is measured; times the outline's width
+THINNEST_PX = 0.3  # thinner lines are none
 GAP_PX = 0.5  # between places at which a line is looked for
 FAINT = 0.3  # coverage from which there is a line
 
@@ -160,7 +161,9 @@ def learned_steps(
     level = _level(on, count)
     if level is None:
         return None
-    return StepLines(STEPS[level], *_reaches(covers, depths, STEPS[level] * height, room))
+    widest = int(np.ceil(max(WIDEST_PX, WIDEST * width_px)))
+    near_px, far_px = _reaches(covers, depths, STEPS[level] * height, room, widest)
+    return StepLines(STEPS[level], near_px, far_px) if near_px + far_px > THINNEST_PX else None
 
 
 def drawn_steps(depth: Depth, style: StepLines, height: float, finer: int, scale: float) -> Cover:
@@ -194,10 +197,10 @@ def _level(on: Float[np.ndarray, " n"], count: Float[np.ndarray, " n"]) -> int |
 
 
 def _reaches(
-    covers: Sequence[Cover], depths: Sequence[Depth], least: float, room: float
+    covers: Sequence[Cover], depths: Sequence[Depth], least: float, room: float, widest: int
 ) -> tuple[float, float]:
     """Return how far a line reaches from its step onto the near and the far side, in the mean."""
-    inked, seen = np.zeros((2, WIDEST_PX)), np.zeros((2, WIDEST_PX))
+    inked, seen = np.zeros((2, widest)), np.zeros((2, widest))
     lined = count = 0
     for cover, depth in zip(covers, depths, strict=True):
         sides = step_sides(depth, least)
@@ -205,15 +208,15 @@ def _reaches(
         nearer = away.argmin(axis=0)
         clear = (_distance(np.isnan(depth)) > room) & np.isfinite(depth)
         for side in range(2):
-            at = clear & (nearer == side) & (away[side] < WIDEST_PX)
+            at = clear & (nearer == side) & (away[side] < widest)
             index = away[side][at].astype(int)
-            inked[side] += np.bincount(index, cover[at], WIDEST_PX)
-            seen[side] += np.bincount(index, minlength=WIDEST_PX)
+            inked[side] += np.bincount(index, cover[at], widest)
+            seen[side] += np.bincount(index, minlength=widest)
         there = sides[0] & clear
-        lined += int((_spread(cover, WIDEST_PX / 2)[there] >= LINE).sum())
+        lined += int((_spread(cover, widest / 2)[there] >= LINE).sum())
         count += int(there.sum())
     share = inked / np.maximum(seen, 1)
-    beside = float(share[:, -WIDEST_PX // 4 :].mean(axis=1).min())  # ink that is no step's
+    beside = float(share[:, -widest // 4 :].mean(axis=1).min())  # ink that is no step's
     near_px, far_px = np.maximum(share - beside, 0).sum(axis=1) * (count / max(lined, 1))
     return float(near_px), float(far_px)
 

@@ -94,7 +94,7 @@ class DrawnView:
         alpha: (height, width) coverage in [0, 1].
         ink: (height, width) share of every pixel that lines cover.
         labels: (height, width) of `Drawings.paints`.
-        by_field: share of the figure's pixels that no drawing shows.
+        by_field: share of the figure's pixels that have the field's colour: no drawing shows them.
     """
 
     rgb: Float[np.ndarray, "height width 3"]

@@ -102,7 +102,7 @@ def flat_paint(
     return FlatPaint(paints, steps, shade)
 
 
-def step_edges(sight: Sight, least: float) -> Mask:
+def pixels_on_steps(sight: Sight, least: float) -> Mask:
     """Return the pixels on steps in depth of at least `least` world units."""
     near, far = step_sides(sight.fine, least)
     edge = (near | far).astype(np.float32)
@@ -129,7 +129,7 @@ def _at_steps(
     drawn = np.floor(places[there] + off[there, None] * across[there]).astype(int)
     drawn = drawn.clip(0, np.array(cover.shape)[::-1] - 1)
     lines[drawn[:, 1], drawn[:, 0]] = True
-    near = distance_to(lines | step_edges(sight, least)) <= WIDER * steps.width_px
+    near = distance_to(lines | pixels_on_steps(sight, least)) <= WIDER * steps.width_px
     ink = ((cover * 255 >= INK) & near).astype(np.uint8)
     return (cv2.dilate(ink, np.ones((3, 3), np.uint8)) > 0) & near
 
@@ -182,5 +182,5 @@ def _without_grain(paint: Paint, inside: Mask) -> Float[np.ndarray, "height widt
 def _clear(rgba: Picture, sight: Sight, width: float, height: float) -> Mask:
     """Return pixels that show paint of the shape, away from all edges."""
     edge = np.minimum(depth_inside(mask_of(rgba)) - width, depth_inside(sight.alpha >= 0.5))
-    to_step = distance_to(step_edges(sight, SAME * height))
+    to_step = distance_to(pixels_on_steps(sight, SAME * height))
     return (np.minimum(edge, to_step) > EDGE_PX) & np.isfinite(sight.depth)

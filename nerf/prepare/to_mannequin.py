@@ -27,6 +27,7 @@ from toonset.nerf.prepare.unwarp import Unbending, Warp, warped
 from toonset.palette.pixels.ink_lines import find_contour
 
 OUTSIDE = 0.25  # of an outline's width: lines that reach farther beyond the silhouette lie about it
+MOST_OUTSIDE = 1.5  # of its width: what is farther out is no line
 SURE = 2.5  # standard errors, from drawing to drawing
 
 
@@ -64,7 +65,7 @@ def posed(scene: Scene, *, unbend: bool = True) -> Posed:
     fit = mannequin_fit(scene, shape)
     if fit is None or not fit.chosen:
         return Posed(scene, None, fit)
-    bent, unbending = bent_to(scene, shape)
+    bent, unbending = bent_to(scene, shape)  # even if not kept: what no bend explains is a part
     frames = [frame for frame in bent.frames if has_figure(frame)]
     fit = replace(fit, left=parts_left(_beside(frames, shape)))
     if not fit.chosen:
@@ -86,21 +87,17 @@ def _outside(scene: Scene, shape: Shape) -> float:
     half its width beyond it.
     """
     frames = [frame for frame in scene.frames if has_figure(frame)]
-    width = float(np.median([outline_width(frame.rgba) for frame in frames])) if frames else 0.0
-    if (
-        len(frames) < 2
-        or width <= 0
-        or not all((shape.seen(f.camera).alpha >= LEVEL).any() for f in frames)
-    ):
+    widths = [outline_width(frame.rgba) / frame.camera.scale for frame in frames]
+    width = float(np.median(widths)) if len(frames) > 1 else 0.0
+    if width <= 0 or not all((shape.seen(f.camera).alpha >= LEVEL).any() for f in frames):
         return 0.0
     outlines = _beside(frames, shape).views
-    drawn, shapes = outlines[: len(frames)], outlines[len(frames) :]
-    off = [
-        -float(np.median(own.at(line.rim)[0])) / own.camera.scale
-        for line, own in zip(drawn, shapes, strict=True)
-    ]
+    pairs = list(zip(outlines[: len(frames)], outlines[len(frames) :], strict=True))
+    if not all(len(drawn.rim) for drawn, _ in pairs):
+        return 0.0
+    off = [-float(np.median(own.at(drawn.rim)[0])) / own.camera.scale for drawn, own in pairs]
     found, sure = float(np.mean(off)), SURE * float(np.std(off, ddof=1)) / len(off) ** 0.5
-    return found if found > max(sure, OUTSIDE * width / frames[0].camera.scale) else 0.0
+    return found if max(sure, OUTSIDE * width) < found < MOST_OUTSIDE * width else 0.0
 
 
 def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:

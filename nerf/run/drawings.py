@@ -29,7 +29,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
 from toonset.errors import BundleError
-from toonset.nerf.hull.mannequin_shape import Shape
+from toonset.nerf.hull.mannequin_shape import MOST_FACES, MOST_STEPS, Shape
 from toonset.nerf.lines.step_lines import StepLines
 from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
 from toonset.nerf.look.outline import Outline
@@ -117,8 +117,7 @@ class DrawingsRecord(BaseModel):
                 "height": drawings.height,
                 "depths": drawings.depths,
                 "bent": drawings.bent,
-                "shape": shape
-                and {"low": shape.low.tolist(), "step": shape.step, "beyond": shape.beyond},
+                "shape": shape and _where(shape),
                 "steps": drawings.steps and asdict(drawings.steps),
                 "shade": drawings.shade and asdict(drawings.shade),
             }
@@ -221,9 +220,9 @@ def _check_tensors(
     if record.shape is None:
         wanted["depth"] = (_whole(cameras), torch.uint8)
     else:
-        for name in ("places", "faces"):
+        for name, most in (("places", MOST_STEPS), ("faces", MOST_FACES)):
             rows = found[name].shape[0] if name in found and found[name].dim() else 0
-            wanted[name] = ((max(1, rows), 3), torch.uint16)
+            wanted[name] = ((min(max(1, rows), most), 3), torch.uint16)
     if there != wanted:
         odd = ", ".join(
             sorted(name for name in there | wanted if there.get(name) != wanted.get(name))

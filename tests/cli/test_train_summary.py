@@ -27,7 +27,8 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
                 "views": {"a.png": 0.01, "b.png": 0.027},
             },
         },
-        "drawings": dict.fromkeys(("turning", "registration", "unbending", "ink")) | drawings,
+        "drawings": dict.fromkeys(("mannequin", "turning", "registration", "unbending", "ink"))
+        | drawings,
     }
 
 
@@ -80,3 +81,17 @@ def test_evidence_is_for_those_who_ask() -> None:
         "verdict: weak",
         "run: look at preview.png; next: toonset render run --turntable 36",
     ]
+
+
+def test_it_says_whether_the_mannequin_gives_the_shape() -> None:
+    fit = {"mannequin_off": 0.006, "drawings_off": 0.011, "parts_left": 0.0}
+    body = metrics(mannequin=fit | {"chosen": True}, unbending=step(90, applied=True))
+    lines = summary(Path("run"), body).splitlines()
+    assert lines[1] == "shape: the mannequin's"
+    assert lines[2] == "drawings bent to the mannequin: outlines 1.00 px apart, 0.50 px after"
+    loud = summary(Path("run"), body, verbose=True)
+    assert "outlines predicted 0.60 % off, by the other drawings 1.10 %" in loud
+    assert "hull: filled" not in loud
+    other = metrics(mannequin=fit | {"chosen": False, "drawings_off": None})
+    assert "shape" not in summary(Path("run"), other)
+    assert "the mannequin is another body" in summary(Path("run"), other, verbose=True)

@@ -73,3 +73,19 @@ def test_points_that_coincide_in_depth_are_seen() -> None:
     depth = depth_map(vertices, faces, looking(0.0, 0.0))
     assert np.isfinite(depth).sum() == 1600
     np.testing.assert_allclose(depth[np.isfinite(depth)], 0, atol=1e-6)
+
+
+def test_a_camera_sees_nothing_of_what_is_behind_it() -> None:
+    vertices, faces = square(20.0, 0.6)  # yaw 0 looks from +Z: behind a pinhole at 5
+    camera = looking(0.0, 0.2)
+    assert np.isinf(depth_map(vertices, faces, camera)).all()
+    assert not depth_and_normals(vertices, faces, camera)[1].any()
+
+
+@pytest.mark.parametrize("distance", [1e3, 1e4, 1e6, 1e8])
+def test_far_pinholes_keep_their_depth(distance: float) -> None:
+    vertices, faces = square(0.2, 0.6)
+    depth = depth_map(vertices, faces, looking(0.0, 1 / distance))
+    seen = np.isfinite(depth)
+    assert seen.sum() == pytest.approx((1.2 * 40) ** 2, rel=0.05)
+    np.testing.assert_allclose(depth[seen], -0.2, atol=2e-3)

@@ -137,3 +137,43 @@ def test_two_drawings_and_unseen_mannequins_say_nothing() -> None:
         replace(f, camera=f.camera.moved((400, 0), f.camera.size_wh)) for f in sheet(body()).frames
     ]
     assert mannequin_fit(replace(sheet(body()), frames=tuple(cut)), aside) is None
+
+
+def test_a_speck_among_the_drawings_is_no_outline() -> None:
+    scene = sheet(body())
+    speck = np.zeros_like(scene.frames[0].rgba)
+    speck[74:77, 74:77] = 255
+    frames = (replace(scene.frames[0], rgba=speck), *scene.frames[1:])
+    fit = mannequin_fit(replace(scene, frames=frames), shape_of(body(), ring()))
+    assert fit is not None
+    assert np.isfinite([fit.mannequin, fit.drawings or 0.0]).all()
+
+
+def test_faces_partly_in_the_picture_are_kept() -> None:
+    """Long thin faces whose middles lie outside."""
+    tube = trimesh.creation.cylinder(radius=0.4, height=20, sections=24)
+    mesh = Mesh(np.array(tube.vertices)[:, [0, 2, 1]], np.array(tube.faces))
+    camera = camera_at(0.2)
+    exact = depths(mesh, camera)
+    seen = shape_of(mesh, [camera]).seen(camera).depth
+    both = np.isfinite(exact) & np.isfinite(seen)
+    assert both.sum() > 0.99 * np.isfinite(exact).sum()
+    assert np.abs(seen - exact)[both].max() < 0.03
+
+
+def test_very_fine_meshes_keep_their_place() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=6)
+    mesh = Mesh(np.array(ball.vertices) * 0.9, np.array(ball.faces))
+    camera = camera_at(0.3, 800)
+    shape = shape_of(mesh, [camera])
+    assert len(shape.faces) <= 40_000
+    exact, seen = depths(mesh, camera), shape.seen(camera).depth
+    assert (np.isfinite(exact) ^ np.isfinite(seen)).sum() < 400
+    both = np.isfinite(exact) & np.isfinite(seen)
+    assert np.sqrt(np.mean((exact - seen)[both] ** 2)) * camera.scale < 0.5
+
+
+def test_a_mesh_in_other_units_is_refused() -> None:
+    tiny = replace(body(), vertices=body().vertices / 1000)
+    with pytest.raises(MeshError, match="smaller than a pixel"):
+        shape_of(tiny, ring())

@@ -104,3 +104,15 @@ def test_lines_of_a_shape_are_those_of_the_drawing() -> None:
     truth = drawn_steps(exact, STEPS, HEIGHT, FINE, 1.0)
     assert truth.sum() > 20
     assert np.abs(line - truth).sum() < 0.1 * truth.sum()
+
+
+@pytest.mark.parametrize("width", [2, 8, 24])
+def test_lines_of_any_width_are_measured(width: int) -> None:
+    """A line about a step, in a large picture."""
+    depth = np.broadcast_to(0.2 * (np.arange(400.0) >= 200), (400, 400)).copy()
+    depth[:4] = depth[-4:] = np.nan
+    cover = np.zeros((400, 400))
+    cover[:, 200 - width // 2 : 200 + width // 2] = 1
+    found = learned_steps([cover], [depth], 2.0, float(width))
+    assert found is not None
+    assert found.width_px == pytest.approx(width, abs=1.5)

@@ -86,7 +86,7 @@ def test_preparation_takes_the_mannequin_where_it_is_the_body() -> None:
     assert ready.registration is None
     report = ready.to_json()["mannequin"]
     assert report["chosen"] is True
-    assert report["mannequin_off_height"] < report["drawings_off_height"]
+    assert report["mannequin_off"] < report["drawings_off"]
 
 
 def test_preparation_leaves_another_body_alone() -> None:
@@ -136,3 +136,9 @@ def test_a_mannequin_that_lacks_a_small_part_is_another_body() -> None:
     assert found.fit is not None
     assert found.fit.left > 0.006
     assert found.fit.mannequin < found.fit.drawings
+
+
+def test_a_fatter_drawing_is_no_line_outside() -> None:
+    """Far more than a line's width all round: another body."""
+    found = posed(sheet(body(), Hand(beyond_px=9), body()))
+    assert found.shape is None
