@@ -35,6 +35,7 @@ class Prepared:
 
     Attributes:
         scene: the drawings that a field is fitted to.
+        drawn: what they were made of: as drawn, perhaps with room round the figures.
         turning: how cameras turned; None: switched off, or they are known exactly.
         registration: how cameras moved; None: switched off.
         unbending: how drawings were bent; None: switched off.
@@ -45,6 +46,7 @@ class Prepared:
     """
 
     scene: Scene
+    drawn: Scene
     turning: Turning | None
     registration: Registration | None
     unbending: Unbending | None
@@ -117,30 +119,31 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
     Raises:
         MeshError: the mannequin lies in none of the pictures.
     """
-    given = posed(scene, unbend=options.unbend) if options.mannequin else Posed(scene, None, None)
+    given = posed(scene, unbend=options.unbend) if options.mannequin else Posed.left_alone(scene)
     straight, unbending = given.scene, given.unbending
     turning = registration = None
     if given.shape is None:
         straight, turning, registration, unbending = _agreeing(scene, options)
     ink = None
     if options.ink and scene.palette is not None:
-        straight, ink = without_ink(straight, scene)
-    return Prepared(straight, turning, registration, unbending, ink, None, given.fit, given.shape)
+        straight, ink = without_ink(straight, given.drawn)
+    steps = (turning, registration, unbending, ink)
+    return Prepared(straight, given.drawn, *steps, None, given.fit, given.shape)
 
 
-def with_paint(ready: Prepared, drawn: Scene, depth_of: Depths, height: float) -> Prepared:
+def with_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
     """Return bent drawings bent and tinted further, so that their paint agrees over a hull.
 
     Args:
         ready: where its drawings did not bend, it is returned as it is.
-        drawn: what it was prepared from.
         depth_of: the body's surface as a camera sees it, nan where there is none.
         height: of the figure, world units.
     """
     unbending = ready.unbending
     if unbending is None or not unbending.applied:
         return ready
-    scene, warps, found = with_paint_agreed(drawn, ready.scene, unbending.warps, depth_of, height)
+    agreed = with_paint_agreed(ready.drawn, ready.scene, unbending.warps, depth_of, height)
+    scene, warps, found = agreed
     unbending = replace(unbending, warps=warps)
     return replace(ready, scene=scene, unbending=unbending, paint=found)
 

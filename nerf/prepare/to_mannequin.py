@@ -7,6 +7,7 @@ views is known, too.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -14,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.dataset.silhouettes.mask import alpha_of, has_figure
+from toonset.dataset.silhouettes.mask import alpha_of, figure_px, has_figure
 from toonset.dataset.silhouettes.outlines import RIM_POINTS, ROOM, Outlines, Square
 from toonset.dataset.silhouettes.register import Fit
 from toonset.nerf.hull.hull import LEVEL
@@ -23,8 +24,9 @@ from toonset.nerf.hull.mannequin_shape import FINER, Shape, Sight, shape_of
 from toonset.nerf.lines.step_lines import learned_steps, step_places
 from toonset.nerf.lines.strokes import outline_width
 from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
-from toonset.nerf.prepare.unwarp import Unbending, Warp, warped
+from toonset.nerf.prepare.unwarp import MOST, Unbending, Warp, warped
 from toonset.palette.pixels.ink_lines import find_contour
+from toonset.palette.pixels.labels import UNLABELLED
 
 OUTSIDE = 0.25  # of an outline's width: lines that reach farther beyond the silhouette lie about it
 MOST_OUTSIDE = 1.5  # of its width: what is farther out is no line
@@ -37,15 +39,22 @@ class Posed:
 
     Attributes:
         scene: its drawings, bent to show the mannequin where that is taken for the shape.
+        drawn: what was bent: as drawn, with room round the figures.
         shape: the mannequin, where it is taken for the character's shape; None: it is not.
         fit: what speaks for it; None: it could not be asked.
         unbending: how drawings were bent; None: they were not asked.
     """
 
     scene: Scene
+    drawn: Scene
     shape: Shape | None
     fit: MannequinFit | None
     unbending: Unbending | None = None
+
+    @classmethod
+    def left_alone(cls, scene: Scene, fit: MannequinFit | None = None) -> Posed:
+        """Return a scene whose mannequin is not its shape."""
+        return cls(scene, scene, None, fit)
 
 
 def posed(scene: Scene, *, unbend: bool = True) -> Posed:
@@ -59,18 +68,39 @@ def posed(scene: Scene, *, unbend: bool = True) -> Posed:
         MeshError: it lies in none of the pictures.
     """
     if scene.mannequin is None:
-        return Posed(scene, None, None)
+        return Posed.left_alone(scene)
     shape = shape_of(scene.mannequin, [frame.camera for frame in scene.frames])
     shape = replace(shape, beyond=_outside(scene, shape))
     fit = mannequin_fit(scene, shape)
     if fit is None or not fit.chosen:
-        return Posed(scene, None, fit)
-    bent, unbending = bent_to(scene, shape)  # even if not kept: what no bend explains is a part
+        return Posed.left_alone(scene, fit)
+    drawn = _with_room(scene)
+    bent, unbending = bent_to(drawn, shape)  # even if not kept: what no bend explains is a part
     frames = [frame for frame in bent.frames if has_figure(frame)]
     fit = replace(fit, left=parts_left(_beside(frames, shape)))
     if not fit.chosen:
-        return Posed(scene, None, fit)
-    return Posed(bent, shape, fit, unbending) if unbend else Posed(scene, shape, fit)
+        return Posed.left_alone(scene, fit)
+    if not unbend:
+        return Posed(scene, scene, shape, fit)
+    if not unbending.applied:
+        return Posed(scene, scene, shape, fit, unbending)
+    return Posed(bent, drawn, shape, fit, unbending)
+
+
+def _with_room(scene: Scene) -> Scene:
+    """Return the scene with pictures so large that bent figures stay within them."""
+    room = math.ceil(MOST * ROOM * max(figure_px(frame) for frame in scene.frames))
+
+    def larger(frame: Frame) -> Frame:
+        width, height = frame.camera.size_wh
+        camera = frame.camera.moved((-room, -room), (width + 2 * room, height + 2 * room))
+        labels = frame.labels
+        if labels is not None:
+            labels = np.pad(labels, room, constant_values=UNLABELLED)
+        rgba = np.pad(frame.rgba, [(room, room), (room, room), (0, 0)])
+        return replace(frame, camera=camera, rgba=rgba, labels=labels)
+
+    return replace(scene, frames=tuple(map(larger, scene.frames)))
 
 
 def _beside(frames: list[Frame], shape: Shape) -> Outlines:

@@ -99,7 +99,7 @@ def fit_field(
     tell("carving the hull" if options.carve else "placing the box")
     hull, evidence = _hull(whole, options, ready)
     if options.carve and agree:
-        ready = with_paint(ready, scene, _depths(ready, hull), _height(hull))
+        ready = with_paint(ready, _depths(ready, hull), _height(hull))
     scene = with_mirrored(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None

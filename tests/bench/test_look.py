@@ -153,9 +153,11 @@ def short() -> Iterator[list[LookResult]]:
     known = dict(LOOKS)
     quick = TrainOptions(steps=30, field="triplane")
     for name, look in known.items():
-        options = replace(quick, ink=look.recipe.options.ink)
+        own = look.recipe.options
+        options = replace(quick, ink=own.ink, mannequin=own.mannequin)
         LOOKS[name] = replace(look, recipe=Recipe(options, look.recipe.paint))
-    case, _ = drawn_case(0, replace(DRAWN, cell_px=80, outline_px=1.2, views=6))
+    case, made = drawn_case(0, replace(DRAWN, cell_px=80, outline_px=1.2, views=6))
+    case = replace(case, train=replace(case.train, mannequin=made.mesh))
     turn = replace(case.test, frames=case.test.frames[:3])
     case = replace(case, turn=turn, test=replace(case.test, frames=case.test.frames[:3]))
     yield bench_look([case], 5)

@@ -86,7 +86,7 @@ def test_paint_that_was_mixed_anew_becomes_one_paint() -> None:
 def test_exact_drawings_are_untouched_to_the_bit() -> None:
     scene = scene_of(ring())
     ready = prepared(scene, TrainOptions())
-    after = with_paint(ready, scene, *body_of(scene))
+    after = with_paint(ready, *body_of(scene))
     assert after.paint is None
     for one, other in zip(after.scene.frames, scene.frames, strict=True):
         assert one.rgba.tobytes() == other.rgba.tobytes()
@@ -94,8 +94,8 @@ def test_exact_drawings_are_untouched_to_the_bit() -> None:
 
 def test_drawings_that_did_not_bend_are_returned_as_they_are() -> None:
     scene = sheet(3.0)
-    ready = Prepared(scene, None, None, None, None)
-    assert with_paint(ready, scene, *body_of(scene)) is ready
+    ready = Prepared(scene, scene, None, None, None, None)
+    assert with_paint(ready, *body_of(scene)) is ready
 
 
 @pytest.mark.parametrize("shown", [0, 1, 2])

@@ -142,3 +142,23 @@ def test_a_fatter_drawing_is_no_line_outside() -> None:
     """Far more than a line's width all round: another body."""
     found = posed(sheet(body(), Hand(beyond_px=9), body()))
     assert found.shape is None
+
+
+def test_figures_that_bends_move_past_their_pictures_edge_stay_whole() -> None:
+    scene = sheet(body(), BEND)
+    tight = []
+    for frame in scene.frames:
+        mask = frame.rgba[..., 3] > 0
+        rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+        box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+        size = (columns[-1] + 1 - columns[0], rows[-1] + 1 - rows[0])
+        camera = frame.camera.moved((columns[0], rows[0]), size)
+        tight.append(replace(frame, camera=camera, rgba=frame.rgba[box]))
+    found = posed(replace(scene, frames=tuple(tight), mannequin=body()))
+    assert found.shape is not None
+    for frame in found.scene.frames:
+        seen = found.shape.seen(frame.camera).alpha
+        alpha = frame.rgba[..., 3] / 255
+        assert np.abs(alpha - seen).sum() < 0.02 * seen.sum()
+        edge = np.concatenate([alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]])
+        assert not edge.any()

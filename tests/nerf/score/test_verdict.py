@@ -54,7 +54,7 @@ def scene(*yaws_deg: float, rgba: np.ndarray | None = None) -> Scene:
 def training(drawn: Scene, **changed: Any) -> Training:
     """Return a finished training; of its field there is no more than that it has drawings."""
     field = cast(Any, SimpleNamespace(drawings=object()))
-    parts = (field, TrainOptions(), DONE, "steps", Prepared(drawn, None, None, None, None))
+    parts = (field, TrainOptions(), DONE, "steps", Prepared(drawn, drawn, None, None, None, None))
     return replace(Training(*parts, HullEvidence(0, ()), {}, {}), **changed)
 
 
@@ -158,8 +158,9 @@ def test_an_undrawn_side_that_is_the_mirror_image_of_another_is_no_guess(whole) 
 def test_outlines_are_compared_where_every_step_that_would_is_switched_off() -> None:
     drawn = scene(*TURN)
     lifted = replace(drawn.frames[0], rgba=disc(0, 6))
-    apart = Prepared(replace(drawn, frames=(lifted, *drawn.frames[1:])), None, None, None, None)
-    assert Prepared(drawn, None, None, None, None).outlines_px < 0.5 < apart.outlines_px
+    moved = replace(drawn, frames=(lifted, *drawn.frames[1:]))
+    apart = Prepared(moved, moved, None, None, None, None)
+    assert Prepared(drawn, drawn, None, None, None, None).outlines_px < 0.5 < apart.outlines_px
 
 
 # ---- whether drawings agree, which decides how much a field is smoothed
@@ -175,4 +176,4 @@ def test_drawings_agree_as_they_are_or_once_cameras_follow_them(
 def test_drawings_that_were_bent_or_stay_apart_do_not_agree() -> None:
     assert not moved(training(scene(*TURN)), 0.5, applied=True).prepared.agree
     bends = Unbending(True, 5.0, 1.0, (9.0, 0.01), ())
-    assert not Prepared(scene(*TURN), None, None, bends, None).agree
+    assert not Prepared(scene(*TURN), scene(*TURN), None, None, bends, None).agree
