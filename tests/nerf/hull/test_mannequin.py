@@ -98,6 +98,7 @@ def test_the_drawn_body_is_recognised(bend: float) -> None:
     fit = mannequin_fit(scene, shape_of(body(), ring()))
     assert fit is not None
     assert fit.chosen
+    assert fit.drawings is not None
     assert fit.mannequin < 0.8 * fit.drawings
 
 

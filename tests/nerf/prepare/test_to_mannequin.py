@@ -135,6 +135,7 @@ def test_a_mannequin_that_lacks_a_small_part_is_another_body() -> None:
     assert found.scene is scene
     assert found.fit is not None
     assert found.fit.left > 0.006
+    assert found.fit.drawings is not None
     assert found.fit.mannequin < found.fit.drawings
 
 
