@@ -76,8 +76,7 @@ def posed(scene: Scene, *, unbend: bool = True) -> Posed:
         return Posed.left_alone(scene, fit)
     drawn = _with_room(scene)
     bent, unbending = bent_to(drawn, shape)  # even if not kept: what no bend explains is a part
-    frames = [frame for frame in bent.frames if has_figure(frame)]
-    fit = replace(fit, left=parts_left(_beside(frames, shape)))
+    fit = replace(fit, left=parts_left(_beside(_in_pictures(bent, scene), shape)))
     if not fit.chosen:
         return Posed.left_alone(scene, fit)
     if not unbend:
@@ -85,6 +84,17 @@ def posed(scene: Scene, *, unbend: bool = True) -> Posed:
     if not unbending.applied:
         return Posed(scene, scene, shape, fit, unbending)
     return Posed(bent, drawn, shape, fit, unbending)
+
+
+def _in_pictures(bent: Scene, scene: Scene) -> list[Frame]:
+    """Return the figures within their first pictures, which may have cut off what lies beyond."""
+    frames = []
+    for own, frame in zip(bent.frames, scene.frames, strict=True):
+        width, height = frame.camera.size_wh
+        room = (own.camera.size_wh[0] - width) // 2
+        rgba = own.rgba[room : room + height, room : room + width]
+        frames.append(replace(frame, rgba=rgba))
+    return [frame for frame in frames if has_figure(frame)]
 
 
 def _with_room(scene: Scene) -> Scene:
