@@ -32,7 +32,8 @@ from toonset.nerf.kernels.threads import side_by_side
 FEWEST_VIEWS = 3  # two drawings leave no hull to compare with
 MOST_OFF = 0.016  # of the square: another body, whatever else is known
 FARTHEST = 0.06  # of the square: what is farther apart counts no more
-PART, MOST_LEFT = 0.02, 0.006  # of the square, that bent outlines are never off; of the outlines
+PART = 0.02  # of the square: where outlines are so far apart after bending, a part is missing
+MOST_LEFT = 0.006  # of the outlines' length may be so far apart
 VOXELS = 96  # of the other drawings' hull, along its longest side
 RAYS = 2  # per pixel and axis, of that hull's outline
 

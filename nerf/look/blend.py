@@ -201,7 +201,7 @@ def _drawn(
     )
     color, labels = _voted(candidates, view, len(drawings.paints), STRAY * figure_px**2)
     if sight is not None:
-        source, covered = _continued(
+        source, covered = _sliver_sources(
             covered, view.depth, STEP * drawings.height, SLIVER * figure_px
         )
         color, labels = color[tuple(source)], labels[tuple(source)]
@@ -374,7 +374,7 @@ def _voted(
     return color, winner
 
 
-def _continued(
+def _sliver_sources(
     covered: Bool[np.ndarray, "h w"], depth: Float[np.ndarray, "h w"], apart: float, reach_px: float
 ) -> tuple[Int[np.ndarray, "2 h w"], Bool[np.ndarray, "h w"]]:
     """Return from where every pixel takes its paint, and which have that of a drawing then.

@@ -58,14 +58,15 @@ class Posed:
 
 
 def posed(scene: Scene, *, unbend: bool = True) -> Posed:
-    """Return whether a scene's mannequin is the body that was drawn.
+    """Judge whether a scene's mannequin is the drawn body, and bend the drawings to it if so.
 
     Args:
         scene: posed drawings.
         unbend: whether drawings may be bent.
 
     Raises:
-        MeshError: it lies in none of the pictures.
+        BundleError: the cameras do not belong together (see `box_of_masks`).
+        MeshError: the mannequin lies in none of the pictures, or is smaller than a pixel.
     """
     if scene.mannequin is None:
         return Posed.left_alone(scene)
@@ -79,10 +80,8 @@ def posed(scene: Scene, *, unbend: bool = True) -> Posed:
     fit = replace(fit, left=parts_left(_beside(_in_pictures(bent, scene), shape)))
     if not fit.chosen:
         return Posed.left_alone(scene, fit)
-    if not unbend:
-        return Posed(scene, scene, shape, fit)
-    if not unbending.applied:
-        return Posed(scene, scene, shape, fit, unbending)
+    if not unbend or not unbending.applied:
+        return Posed(scene, scene, shape, fit, unbending if unbend else None)
     return Posed(bent, drawn, shape, fit, unbending)
 
 
