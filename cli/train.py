@@ -37,7 +37,12 @@ def train(
         ),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option("--steps", min=1, help="Optimiser steps (default: 600).")
+        int | None,
+        typer.Option(
+            "--steps",
+            min=1,
+            help="Optimiser steps (default: 600, or 300 on the mannequin's shape).",
+        ),
     ] = None,
     budget: Annotated[
         float | None,

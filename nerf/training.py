@@ -23,8 +23,7 @@ from toonset.nerf.look.build import drawings_of
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.symmetry import with_all_mirrored
 from toonset.nerf.prepare.view_coverage import guesses
-from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.views import render
+from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.checkpoint import Checkpoint, check_scene, versions
 from toonset.nerf.run.manifest import WRITTEN
 from toonset.nerf.run.monitor import INTERRUPTED, Looking, Onlooker
@@ -162,14 +161,16 @@ def train(
 
 def with_drawings(training: Training, scene: Scene) -> TrainedField:
     """Return the field with what the drawn look is made of."""
-    baked, ready = Baked.of(training.result), training.prepared
+    ready, baked = training.prepared, baked_of(training.result)
     drawn = [frame.rgba for frame in scene.frames]
 
     def depth_of(camera: Camera) -> Float[np.ndarray, "height width"]:
         return render(baked, camera).depth
 
     found = drawings_of(ready.scene, drawn, depth_of, ready.shape, bent=ready.bent)
-    return replace(training.result, drawings=found)
+    result = replace(training.result, drawings=found)
+    keep(result, baked)
+    return result
 
 
 def _with_palette(scene: Scene, told: Listener) -> Scene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +23,7 @@ from toonset.nerf.fields.trained_field import (
 )
 from toonset.nerf.look.blend import DrawnView, Geometry, drawn_view
 from toonset.nerf.options import LAYERS
-from toonset.nerf.prepare.warp_back import give_back
+from toonset.nerf.prepare.warp_back import bends_back, give_back
 from toonset.nerf.render.depth_levels import DepthLevels
 from toonset.nerf.render.line_drawing import inked
 from toonset.nerf.render.normals import normal_picture
@@ -50,6 +51,7 @@ class Rendering:
             (premultiplied by alpha); None without palette.
         camera: it is seen from.
         field: that was rendered.
+        render: returns another view of it.
         ink: (height, width) share of a pixel that contour lines cover, already part of `rgb`; None
             where the drawings have no lines.
         ink_rgb: sRGB of the lines; None without.
@@ -62,6 +64,7 @@ class Rendering:
     shares: Float[np.ndarray, "height width colors"] | None
     camera: Camera
     field: TrainedField
+    render: Callable[[Camera], Rendering]
     ink: Float[np.ndarray, "height width"] | None = None
     ink_rgb: tuple[int, int, int] | None = None
 
@@ -87,8 +90,6 @@ class Rendering:
         Raises:
             ToonsetError: there is no such layer, or the run has no palette, lines or bends for it.
         """
-        if as_drawn and self.field.keys is None:
-            raise BundleError(NO_BENDS)
         if layer not in LAYERS:
             raise ToonsetError(f"layer {layer!r} is none of {', '.join(LAYERS)}; choose one")
         made: dict[str, Callable[[], Layer]] = {
@@ -104,10 +105,23 @@ class Rendering:
                 self.depth, self.alpha, self.camera, in_camera=True
             ),
         }
-        picture = made[layer]()
-        if not as_drawn or self.field.keys is None or layer not in BENT:
-            return picture
-        return give_back({layer: picture}, self.camera, self.field.keys)[layer]
+        if as_drawn and layer in BENT:
+            return self._as_drawn(layer)
+        return made[layer]()
+
+    def _as_drawn(self, layer: str) -> Layer:
+        """Return a layer bent, with what bends move into the picture from beyond its edges."""
+        keys = self.field.keys
+        if keys is None:
+            raise BundleError(NO_BENDS)
+        width, height = self.camera.size_wh
+        moves = bends_back(self.camera.pixel_grid().reshape(-1, 2), self.camera, keys)
+        room = math.ceil(float(np.abs(moves).max()))
+        wide = self.camera.moved((-room, -room), (width + 2 * room, height + 2 * room))
+        shown = self if _is_whole(self.alpha) else self.render(wide)
+        bent = give_back({layer: shown.picture(layer)}, shown.camera, keys)[layer]
+        top, left = (bent.shape[0] - height) // 2, (bent.shape[1] - width) // 2
+        return bent[top : top + height, left : left + width]
 
     def png(
         self, layer: str = "rgb", *, as_drawn: bool = False, levels: DepthLevels | None = None
@@ -142,6 +156,11 @@ class Rendering:
         if Path(path).suffix.lower() != ".png":
             raise OutputError(f"{path}: a rendering is a PNG; give a name that ends in .png")
         write_bytes(Path(path), self.png(layer, as_drawn=as_drawn)[0])
+
+
+def _is_whole(alpha: Float[np.ndarray, "height width"]) -> bool:
+    """Return whether no edge of the picture cuts the figure."""
+    return not any(edge.any() for edge in (alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]))
 
 
 def default_layer(trained: TrainedField) -> str:

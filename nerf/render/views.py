@@ -7,6 +7,7 @@ folds, where one colour meets the next. Outlines are soft through the hull's occ
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -40,13 +41,12 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
         source: a trained field; what is prepared for its first view is kept for the next ones.
         camera: where it is seen from.
     """
-    return _render(source if isinstance(source, Baked) else _baked(source), camera)
+    return _render(source if isinstance(source, Baked) else baked_of(source), camera)
 
 
 @torch.no_grad()
 @one_thread()
 def _render(baked: Baked, camera: Camera) -> Rendering:
-    trained = baked.trained
     width, height = camera.size_wh
     sight = Sight.of(baked, camera)
     seen = cast(sight, _grid(height, width)).view(5, height, width)
@@ -62,17 +62,25 @@ def _render(baked: Baked, camera: Camera) -> Rendering:
         shares = palette_shares(baked.labels, baked.paints, seen[3], labels, chosen, more)
     seen[:, chosen] = more.mean(dim=2)
     means = seen.numpy(), None if shares is None else shares.numpy()
-    return _with_lines(_rendering(*means, camera, trained))
+    return _with_lines(_rendering(*means, camera, baked))
 
 
-def _baked(field: TrainedField) -> Baked:
+def baked_of(field: TrainedField) -> Baked:
     """Return what a field's views share: kept with the field, made anew when its values change."""
-    models = [model for model in (field.field, field.classifier) if model is not None]
-    state = [values._version for model in models for values in model.parameters()]
-    if field.kept.get("state") != state:
-        field.kept.update(state=state, baked=Baked.of(field))
+    if field.kept.get("state") != _state(field):
+        keep(field, Baked.of(field))
     baked: Baked = field.kept["baked"]
     return baked
+
+
+def keep(field: TrainedField, baked: Baked) -> None:
+    """Let a field's views share what was prepared for the same field in other clothes."""
+    field.kept.update(state=_state(field), baked=replace(baked, trained=field))
+
+
+def _state(field: TrainedField) -> list[int]:
+    models = [model for model in (field.field, field.classifier) if model is not None]
+    return [values._version for model in models for values in model.parameters()]
 
 
 def _grid(height: int, width: int) -> Float[Tensor, "2 pixels"]:
@@ -95,7 +103,7 @@ def _rendering(
     mean: Float[np.ndarray, "5 height width"],
     shares: Float[np.ndarray, "height width colors"] | None,
     camera: Camera,
-    field: TrainedField,
+    baked: Baked,
 ) -> Rendering:
     alpha = mean[3].clip(0, 1)
     seen = alpha >= SEEN_FROM
@@ -104,7 +112,8 @@ def _rendering(
     if shares is not None:
         labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
     rgb = np.ascontiguousarray(np.moveaxis(mean[:3], 0, -1))
-    return Rendering(rgb, alpha, depth, labels, shares, camera, field)
+    again = partial(_render, baked)
+    return Rendering(rgb, alpha, depth, labels, shares, camera, baked.trained, again)
 
 
 def borders(

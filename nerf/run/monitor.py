@@ -94,7 +94,7 @@ class Onlooker:
     def look(self, moment: Moment) -> str:
         """Look at a training after a step; return why it should end, or nothing."""
         spent = moment.history[-1].seconds
-        unfinished = len(moment.history) < self.options.steps
+        unfinished = len(moment.history) < moment.of
         if self.looking.stop() and unfinished and self._save(moment):
             return INTERRUPTED
         if self._views and spent >= self._test_at:
@@ -106,7 +106,7 @@ class Onlooker:
         if spent - self._saved_at >= CHECKPOINT_S:
             self._save(moment)
         seen = self.held_out[-1] if self.held_out else None
-        self.looking.tell(status_of(moment, self.options.steps, seen))
+        self.looking.tell(status_of(moment, seen))
         return ""
 
     def _save(self, moment: Moment) -> bool:

@@ -21,7 +21,7 @@ from toonset.nerf.kernels.threads import side_by_side, threads_in_use
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import color_picture, default_layer
 from toonset.nerf.render.turntable import turntable
-from toonset.nerf.render.views import render
+from toonset.nerf.render.views import baked_of, render
 from toonset.nerf.run.folder import write_field
 from toonset.nerf.run.manifest import write_manifest
 from toonset.nerf.score.metrics import compare, means
@@ -53,7 +53,7 @@ def write_run(
         held_out: what was seen of them on the way.
     """
     drawn = training.prepared.scene
-    baked = Baked.of(training.result)
+    baked = baked_of(training.result)
     shown = pictures_of(replace(baked, trained=replace(training.result, ink=None)), drawn)
     metrics = {
         **_course(training, held_out),

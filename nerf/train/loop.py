@@ -37,11 +37,13 @@ class Moment:
 
     Attributes:
         history: every step so far.
+        of: how many steps are asked for.
         progress: how much of the training is over, 0 to 1.
         state: returns a copy of everything that the rest depends on.
     """
 
     history: list[Step]
+    of: int
     progress: float
     state: Callable[[], FitState]
 
@@ -76,7 +78,7 @@ def fit(
         model: parameters to fit.
         rays: where batches come from.
         weights: of the loss's terms.
-        options: steps and budget.
+        options: steps, which are chosen, and budget.
         generator: shuffles the batches.
         watch: looks on after every step, and may end the training.
         start: go on from here; None: from the model as it is.
@@ -87,7 +89,7 @@ def fit(
         loop.restore(start)
     good = LastGood(model, [step.loss for step in loop.history])
     stopped = "steps"
-    while len(loop.history) < options.steps:
+    while len(loop.history) < loop.of:
         if loop.out_of_time():
             stopped = "budget"
             break
@@ -95,7 +97,7 @@ def fit(
             return loop.history, wrong
         if watch is not None:
             with loop.clock.stopped():
-                stopped = watch.look(Moment(loop.history, loop.progress(), loop.state))
+                stopped = watch.look(Moment(loop.history, loop.of, loop.progress(), loop.state))
             if stopped:
                 break
             stopped = "steps"
@@ -143,7 +145,9 @@ class _Loop:
         spent_s: float,
     ) -> None:
         self._model, self._rays, self._weights = model, rays, weights
-        self._options, self._generator, self._spent_s = options, generator, spent_s
+        assert options.steps is not None
+        self.of, self._options = options.steps, options
+        self._generator, self._spent_s = generator, spent_s
         tables = {id(values) for values in model.field.tables()}
         named = sorted(model.named_parameters(), key=lambda pair: id(pair[1]) not in tables)
         self._parameters: dict[str, Tensor] = dict(named)  # tables first, as in the groups
@@ -162,7 +166,7 @@ class _Loop:
     def progress(self) -> float:
         """Return how much of the training is over, by steps or by the clock if that is further."""
         steps = len(self.history)
-        return max(steps / self._options.steps, min(self._by_clock(), steps / LEAST_STEPS, 1.0))
+        return max(steps / self.of, min(self._by_clock(), steps / LEAST_STEPS, 1.0))
 
     def _by_clock(self) -> float:
         """Return which share of the budget's seconds for steps is over."""

@@ -31,13 +31,13 @@ class Status:
     held_out: HeldOut | None
 
 
-def status_of(moment: Moment, of: int, held_out: HeldOut | None) -> Status:
+def status_of(moment: Moment, held_out: HeldOut | None) -> Status:
     """Return where a training stands."""
     recent = [step.loss for step in moment.history[-RECENT:]]
     last = moment.history[-1]
     left_s = last.seconds * (1 / max(moment.progress, 1e-9) - 1)
     loss = sum(recent) / len(recent)
-    return Status(len(moment.history), of, loss, last.seconds, left_s, held_out)
+    return Status(len(moment.history), moment.of, loss, last.seconds, left_s, held_out)
 
 
 def line_of(status: Status) -> str:

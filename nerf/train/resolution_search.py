@@ -100,6 +100,7 @@ def choose_cells(ground: Ground, finest: int, build: Build, *, agree: bool) -> F
 def _why_untried(views: int, options: TrainOptions) -> str:
     if not options.carve:
         return "no hull to try them in"
+    assert options.steps is not None
     if options.budget_s is not None or options.steps < 2 * STEPS:
         return "too short a training for trials"
     return "too few drawings to leave one out" if views < FEWEST_VIEWS else ""

@@ -47,7 +47,7 @@ class Training:
 
     Attributes:
         result: the field.
-        options: as given.
+        options: as given, with the steps that the scene needs.
         history: every step.
         stopped: why it ended: "steps", "budget", "interrupted", or what went wrong at which step.
         prepared: the drawings as they were trained on, and what was done to them.

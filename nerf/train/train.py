@@ -31,7 +31,7 @@ from toonset.nerf.hull.scene_hull import VOXELS, VOXELS_PER_PX, as_stored, hull_
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
-from toonset.nerf.options import TrainOptions
+from toonset.nerf.options import STEPS, STEPS_ON_SHAPE, TrainOptions
 from toonset.nerf.prepare.paint import Depths
 from toonset.nerf.prepare.prepare import Prepared, prepared, with_paint
 from toonset.nerf.prepare.symmetry import completed, with_mirrored
@@ -94,6 +94,8 @@ def fit_field(
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")
     ready = prepared(scene, options)
+    if options.steps is None:
+        options = replace(options, steps=STEPS_ON_SHAPE if ready.shape else STEPS)
     whole, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")

@@ -273,7 +273,9 @@ def test_a_state_with_what_is_no_number_is_never_kept(
         folder = tmp_path / (expected or "bad")
         watch = Onlooker(Looking(quiet, lambda: True, folder=folder), SCENE, OPTIONS)
         watch.begin(cut[0].result)
-        assert watch.look(Moment(list(kept.history), 0.5, lambda kept=kept: kept)) == expected
+        assert (
+            watch.look(Moment(list(kept.history), STEPS, 0.5, lambda kept=kept: kept)) == expected
+        )
         assert folder.exists() == bool(expected)
 
 
