@@ -33,6 +33,7 @@ from toonset.write import write_bytes
 Picture = UInt8[np.ndarray, "height width 4"]
 Layer = UInt8[np.ndarray, "height width *channels"]
 
+REACH = 2  # pixels beside a place that resampling reads
 BENT = ("drawn", "rgb", "palette", "labels")  # layers that can be bent as the drawings were
 
 
@@ -116,7 +117,7 @@ class Rendering:
             raise BundleError(NO_BENDS)
         width, height = self.camera.size_wh
         moves = bends_back(self.camera.pixel_grid().reshape(-1, 2), self.camera, keys)
-        room = math.ceil(float(np.abs(moves).max()))
+        room = math.ceil(float(np.abs(moves).max())) + REACH
         wide = self.camera.moved((-room, -room), (width + 2 * room, height + 2 * room))
         shown = self if _is_whole(self.alpha) else self.render(wide)
         bent = give_back({layer: shown.picture(layer)}, shown.camera, keys)[layer]
