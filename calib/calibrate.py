@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from threadpoolctl import threadpool_limits
 
@@ -20,6 +20,8 @@ from toonset.calib.landmarks.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import Calibration
+from toonset.calib.without_body.find import calibrate_without_body
+from toonset.calib.without_body.rival import without_body_if_better
 from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.mannequin.files import landmarks_path
 from toonset.dataset.mannequin.landmark_file import read_known_points
@@ -35,7 +37,7 @@ PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless")
 
 def calibrate(
     views: Sequence[View],
-    mesh: Mesh | None = None,
+    mesh: Mesh | Literal["none"] | None = None,
     hints: Hints = Hints(),
     *,
     seed: int = 0,
@@ -47,7 +49,8 @@ def calibrate(
 
     Args:
         views: the drawings, at least one, as `split_sheet` cuts them out.
-        mesh: the posed mannequin; its frame and units become the world's. None: a plain body.
+        mesh: the posed mannequin; its frame and units become the world's. None: a plain body, where
+            it explains the drawings better than no body does. "none": no body.
         hints: what is known of the views.
         seed: recorded with the result; nothing is random.
         progress: called with the step's name and the share of it that is done.
@@ -58,6 +61,11 @@ def calibrate(
     """
     hints.check()
     _check_names([view.name for view in views])
+    if isinstance(mesh, str):
+        _check_without_body(hints)
+        with threadpool_limits(1, user_api="blas"):
+            known = known_of(hints, views, {})
+            return _alone(views, calibrate_without_body(views, known, progress), hints, seed)
     body = _Body.of(mesh)
     known = known_of(hints, views, body.points_for(hints))
     with threadpool_limits(1, user_api="blas"):  # more only wait, and change the last digits
@@ -66,6 +74,11 @@ def calibrate(
             found = calibrate_by_landmarks(views, body.mesh, known.landmarks)
         else:
             found = find_cameras(views, body.mesh, CalibrationOptions(), progress, known)
+            alone = without_body_if_better(
+                views, found, known, given=body.looks is None, tell=progress
+            )
+            if alone is not None:
+                return _alone(views, alone, hints, seed)
     drawings, found = at_cuts(views, found)
     drawings, filled = without_false_holes(drawings, found.views, found.mannequin)
     return replace(
@@ -76,6 +89,21 @@ def calibrate(
         mesh=body.mesh,
         origin=_origin(views, body, hints, seed),
     )
+
+
+def _check_without_body(hints: Hints) -> None:
+    for name, value in {
+        "--landmarks": hints.landmarks,
+        "--init": hints.init,
+        "--lock": hints.lock,
+    }.items():
+        if value:
+            raise UsageError(f"{name} needs a mannequin; drop it or --mesh none")
+
+
+def _alone(views: Sequence[View], found: Calibration, hints: Hints, seed: int) -> Calibration:
+    """Return a calibration without a body with its drawings and where it comes from."""
+    return replace(found, drawings=tuple(views), origin=_origin(views, None, hints, seed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +163,16 @@ def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
     return [fit for fit in landmark_starts(known.landmarks, prepare_surface(mesh)) if fit]
 
 
-def _origin(views: Sequence[View], body: _Body, hints: Hints, seed: int) -> dict[str, Any]:
+def _origin(views: Sequence[View], body: _Body | None, hints: Hints, seed: int) -> dict[str, Any]:
     """Return what calibration.json says of where its cameras come from."""
     origins = list(dict.fromkeys(view.origin for view in views if view.origin is not None))
     files = [file for origin in origins for file in origin.files]
-    if body.mesh.path is not None and body.mesh.sha256:
+    if body is not None and body.mesh.path is not None and body.mesh.sha256:
         files.append(InputFile("mesh", body.mesh.path.name, body.mesh.sha256))
-    files += [InputFile.of(*each) for each in _hint_files(body.mesh, hints)]
+    mesh = None if body is None else body.mesh
+    files += [InputFile.of(*each) for each in _hint_files(mesh, hints)]
     cut = origins[0].options if origins else {}
-    made = {} if body.looks is None else {"mannequin": asdict(body.looks)}
+    made = {} if body is None or body.looks is None else {"mannequin": asdict(body.looks)}
     return {
         "options": asdict(CalibrationOptions()) | hints.as_options(views) | dict(cut) | made,
         "seed": seed,
@@ -154,12 +183,12 @@ def _origin(views: Sequence[View], body: _Body, hints: Hints, seed: int) -> dict
     }
 
 
-def _hint_files(mesh: Mesh, hints: Hints) -> list[tuple[str, Path]]:
+def _hint_files(mesh: Mesh | None, hints: Hints) -> list[tuple[str, Path]]:
     """Return role and path of every file that says what is known."""
     files = []
     if hints.landmarks is not None:
         files.append(("landmarks", Path(hints.landmarks)))
-        if mesh.path is not None and landmarks_path(mesh.path).exists():
+        if mesh is not None and mesh.path is not None and landmarks_path(mesh.path).exists():
             files.append(("points of the mesh", landmarks_path(mesh.path)))
     if hints.init is not None:
         files.append(("init", transforms_file(Path(hints.init))))

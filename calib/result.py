@@ -160,7 +160,8 @@ class Calibration:
         filled_holes: holes of the drawings that turned out to be paint.
         landmarks: what the landmarks of each view say, where there are any.
         drawings: the drawings that the cameras belong to: cropped at cuts, holes filled.
-        mesh: the mannequin as it was given; `mannequin` has its vertices as they were fitted.
+        mesh: the mannequin as it was given; `mannequin` has its vertices as they were fitted. None:
+            the cameras were found without a body.
         origin: the options that were set, versions and input files, as calibration.json has them.
     """
 

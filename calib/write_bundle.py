@@ -8,9 +8,9 @@ from pathlib import Path
 from toonset.calib.result import Calibration
 from toonset.calib.verdict.overlay import draw_overlay
 from toonset.calib.verdict.report import calibration_dict
+from toonset.calib.without_body.placing import size_of_figures
 from toonset.dataset.bundle.bundle import WRITTEN, Bundle, bundle_folder, read_bundle
 from toonset.dataset.bundle.palette_files import write_labelled
-from toonset.errors import BundleError
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.write import check_output
@@ -28,20 +28,18 @@ def write_bundle(
         force: replace an existing bundle.
 
     Raises:
-        BundleError: `found` has no mannequin.
         OutputError: the folder exists and `force` is off or it holds what no bundle does, or it
             cannot be written.
     """
     folder = Path(folder)
     check_output(folder, [], WRITTEN, force=force)
-    if found.mesh is None:
-        raise BundleError(f"{folder}: the calibration has no mannequin; make it with `calibrate`")
-    fitted = replace(found.mesh, vertices=found.mannequin)
     cameras = [view.camera for view in found.views]
-    overlay = draw_overlay(found.drawings, found.mesh, found)
+    fitted = found.mesh and replace(found.mesh, vertices=found.mannequin)
+    size = (fitted.height, fitted.radius) if fitted else size_of_figures(found.drawings, cameras)
+    overlay = draw_overlay(found.drawings, fitted, found)
     report = calibration_dict(found)
     with bundle_folder(
-        folder, found.drawings, cameras, fitted, report, overlay, force=force
+        folder, found.drawings, cameras, fitted, size, report, overlay, force=force
     ) as place:
         if palette is not None:
             pictures = [view.rgba for view in found.drawings]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from toonset.dataset.split_folder.load import Sheet
     from toonset.mesh import Mesh
 
+NO_BODY: Literal["none"] = "none"
 UNCERTAIN = 3  # exit code: files are written, but a view is not certain
 KNOWN_PANEL = "What you know"
 
@@ -59,7 +60,8 @@ def calibrate(
         typer.Option(
             "--mesh",
             metavar="FILE",
-            help="Posed mannequin: obj, ply, stl, glb, off (default: a plain body).",
+            help="Posed mannequin: obj, ply, stl, glb, off; none: no body (default: a plain body, "
+            "or none where that explains the drawings better).",
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = None,
@@ -135,8 +137,11 @@ def calibrate(
     hints.check()
     Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet, verbose)
-    check_output(out, [*sheets, mesh, landmarks, init, boxes], WRITTEN, force=force)
-    body = None if mesh is None else load_mesh(mesh)
+    given = None if str(mesh) == NO_BODY else mesh
+    check_output(out, [*sheets, given, landmarks, init, boxes], WRITTEN, force=force)
+    body: Mesh | Literal["none"] | None = None
+    if mesh is not None:
+        body = NO_BODY if str(mesh) == NO_BODY else load_mesh(mesh)
     sheet = split_sheet(
         sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
     )
@@ -158,18 +163,20 @@ def calibrate(
         raise typer.Exit(UNCERTAIN)
 
 
-def _say_inputs(sheet: Sheet, mesh: Mesh | None, printer: Printer) -> None:
+def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Printer) -> None:
     from toonset.dataset.mannequin.options import MannequinOptions
 
     for note in (*sheet.skipped, *sheet.warnings):
         printer.say(note)
     looks = MannequinOptions()
-    body = (
-        f"no --mesh: the default mannequin, {looks.heads_tall:g} heads tall, {looks.pose} pose "
-        "(`toonset mannequin` makes others)"
-        if mesh is None
-        else f"mannequin of {len(mesh.faces)} faces"
-    )
+    body = "no mannequin"
+    if mesh is None:
+        body = (
+            f"no --mesh: the default mannequin, {looks.heads_tall:g} heads tall, {looks.pose} pose "
+            "(`toonset mannequin` makes others)"
+        )
+    elif not isinstance(mesh, str):
+        body = f"mannequin of {len(mesh.faces)} faces"
     count = len(sheet.views)
     printer.say(f"{'1 view' if count == 1 else f'{count} views'}, {body}")
 

@@ -133,7 +133,7 @@ def _moments(figure: Sections) -> Float[np.ndarray, "2 cues"] | None:
     row, column = np.nonzero(figure.inside[:HEAD_PX])
     if len(row) < LEAST_PIXELS:
         return None
-    densities = [_skin(figure.lab), _detail(figure.lab), _dark_spots(figure.lab)]
+    densities = [_skin(figure.lab), drawn_detail(figure.lab), _dark_spots(figure.lab)]
     cues = np.stack(densities, axis=-1)[row, column]
     across = figure.across[row, column]
     facing = np.sqrt(1 - across**2)
@@ -147,7 +147,8 @@ def _skin(lab: Float[np.ndarray, "height width 3"]) -> Float[np.ndarray, "height
     return np.exp(-0.5 * (z**2).sum(axis=-1))
 
 
-def _detail(lab: Float[np.ndarray, "height width 3"]) -> Float[np.ndarray, "height width"]:
+def drawn_detail(lab: Float[np.ndarray, "height width 3"]) -> Float[np.ndarray, "height width"]:
+    """Return how much is drawn at every pixel: the colour's slope, OKLab per pixel."""
     smooth = cv2.GaussianBlur(lab.astype(np.float32), (0, 0), 1.0)
     slopes = [cv2.Sobel(smooth, cv2.CV_32F, *way, scale=1 / 8) for way in ((1, 0), (0, 1))]
     return np.minimum(np.sqrt(np.sum(np.square(slopes), axis=(0, 3))), STRONGEST_EDGE)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -31,10 +30,15 @@ INK: dict[Verdict, tuple[int, int, int]] = {
 
 
 def draw_overlay(
-    views: Sequence[View], mesh: Mesh, calibration: Calibration
+    views: Sequence[View], mesh: Mesh | None, calibration: Calibration
 ) -> UInt8[np.ndarray, "height width 3"]:
-    """Return the picture: drawings faded, mannequin outlines in the verdict's colour, captions."""
-    mesh = replace(mesh, vertices=calibration.mannequin)  # as it was bent
+    """Return the picture: drawings faded, captions, and outlines in the verdict's colour.
+
+    Args:
+        views: the drawings.
+        mesh: the mannequin as it was fitted; None: none is traced.
+        calibration: their cameras.
+    """
     cells = [_cell(view, mesh, found) for view, found in zip(views, calibration.views, strict=True)]
     rows = [cells[i : i + COLUMNS] for i in range(0, len(cells), COLUMNS)]
     width = max(sum(c.shape[1] + GAP for c in row) for row in rows) + GAP
@@ -47,7 +51,9 @@ def draw_overlay(
     return picture
 
 
-def _cell(view: View, mesh: Mesh, found: ViewCalibration) -> UInt8[np.ndarray, "height width 3"]:
+def _cell(
+    view: View, mesh: Mesh | None, found: ViewCalibration
+) -> UInt8[np.ndarray, "height width 3"]:
     height, width = view.rgba.shape[:2]
     factor = CELL_HEIGHT / height
     drawn_wide = max(1, round(width * factor))
@@ -55,8 +61,9 @@ def _cell(view: View, mesh: Mesh, found: ViewCalibration) -> UInt8[np.ndarray, "
     left = (cell_wide - drawn_wide) // 2
     cell = np.full((CELL_HEIGHT + CAPTION, cell_wide, 3), 255, np.uint8)
     cell[:CELL_HEIGHT, left : left + drawn_wide] = _faded(view, (drawn_wide, CELL_HEIGHT))
-    pixels = found.camera.project(mesh.vertices)[0] * (drawn_wide / width, factor) + (left, 0)
-    _trace(cell, pixels, mesh, INK[found.verdict])
+    if mesh is not None:
+        pixels = found.camera.project(mesh.vertices)[0] * (drawn_wide / width, factor) + (left, 0)
+        _trace(cell, pixels, mesh, INK[found.verdict])
     return _captioned(cell, found)
 
 

@@ -4,7 +4,7 @@
     images/000.png     RGBA crops, straight alpha
     calibration.json   native cameras, uncertainty, verdicts (`calibration_schema`)
     overlay.png        every drawing with the mannequin's outline over it
-    mannequin.obj      the mannequin as it was fitted, in the cameras' world
+    mannequin.obj      the mannequin as it was fitted, in the cameras' world; none without a body
     palette.json       the colours, once `toonset palette` has found them; .gpl .ase .hex .png are
                        copies for other programs
     labels/000.png     indexed PNG per picture: which colour a pixel is, 255 = none
@@ -96,7 +96,8 @@ def bundle_folder(
     folder: Path,
     views: Sequence[View],
     cameras: Sequence[Camera],
-    mesh: Mesh,
+    mesh: Mesh | None,
+    size: tuple[float, float],
     calibration: Mapping[str, Any],
     overlay: UInt8[np.ndarray, "height width channels"],
     *,
@@ -108,8 +109,9 @@ def bundle_folder(
         folder: where; replaced as a whole with `force`.
         views: the drawings in sheet order.
         cameras: one per view, in pixels of its crop.
-        mesh: the mannequin as it was fitted; its height and radius set the far pinholes and their
-            error bound.
+        mesh: the mannequin as it was fitted; None: cameras were found without one.
+        size: height and radius of the body, world units: they set the far pinholes and their error
+            bound.
         calibration: the report of `toonset.calib.verdict.report`.
         overlay: the picture for people.
         force: replace an existing bundle.
@@ -124,8 +126,9 @@ def bundle_folder(
     with new_folder(folder, force=force) as temporary:
         for view in views:
             write_bytes(temporary / IMAGES / view.name, encode_png(view.rgba))
-        write_json(temporary / "transforms.json", transforms_dict(named, mesh.height, mesh.radius))
+        write_json(temporary / "transforms.json", transforms_dict(named, *size))
         write_json(temporary / CALIBRATION, content)
         write_bytes(temporary / OVERLAY, encode_png(overlay))
-        write_bytes(temporary / MANNEQUIN, save_obj(mesh))
+        if mesh is not None:
+            write_bytes(temporary / MANNEQUIN, save_obj(mesh))
         yield temporary

@@ -17,7 +17,7 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.alignment import FEWEST_VIEWS, Alignment
 from toonset.dataset.silhouettes.mask import alpha_of, has_figure
 from toonset.dataset.silhouettes.outlines import Square, outlines_of
-from toonset.nerf.prepare.refine_fit import PLACE, YAW, camera_moved, fit_turns
+from toonset.dataset.silhouettes.turn_fit import PLACE, YAW, camera_moved, fit_turns
 from toonset.nerf.prepare.registration import ViewMove
 
 ROUNDS = 6  # of Gauss-Newton

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.alignment import Alignment, alignment_of
 from toonset.dataset.silhouettes.displacement import ShiftAndScale
 from toonset.dataset.silhouettes.outlines import Square
+from toonset.dataset.silhouettes.turn_fit import moved
 
 ROUNDS = 6  # of Gauss-Newton
 
@@ -77,11 +77,3 @@ def registered(scene: Scene) -> tuple[Scene, Registration]:
         views[i] = ViewMove.of(square, own)
     registration = Registration(**vars(found), views=tuple(views))
     return (replace(scene, frames=tuple(frames)) if found.applied else scene), registration
-
-
-def moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
-    """Return the camera whose pixel of a point is the moved one: u + d(u), exactly."""
-    growth = 1 + 2 * own[2]
-    middle = square.low + square.size / 2
-    center = middle + growth * (camera.center - middle) + square.size * own[:2]
-    return replace(camera, center=center, scale=camera.scale * growth)

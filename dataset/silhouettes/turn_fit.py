@@ -37,7 +37,6 @@ from toonset.dataset.silhouettes.register import (
     common,
 )
 from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
-from toonset.nerf.prepare.registration import moved
 
 PLACE, YAW, OWN = slice(0, 3), 3, 4  # a camera's numbers: shift x, shift y, growth; yaw
 STEP = 1e-3  # of central differences: of the square, radians, or log k
@@ -119,6 +118,14 @@ def camera_moved(
     rotation = rotation_from_angles(yaw + float(own[YAW]), elevation, roll)
     turned = replace(camera, rotation=rotation, k=camera.k * float(np.exp(log_k)))
     return moved(turned, square, own[PLACE])
+
+
+def moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
+    """Return the camera whose pixel of a point is the moved one: u + d(u), exactly."""
+    growth = 1 + 2 * own[2]
+    middle = square.low + square.size / 2
+    center = middle + growth * (camera.center - middle) + square.size * own[:2]
+    return replace(camera, center=center, scale=camera.scale * growth)
 
 
 def _deviations(

@@ -1,0 +1,179 @@
+"""Cameras of a turn without a body: placed by the drawings' boxes, then made to cohere.
+
+World frame: +Y up, the axis of the turn; +Z the front; the origin in the middle of the figure,
+which is about 1 high. All cameras of a sheet have one elevation, one perspective and one scale;
+then each is shifted, sized and turned until the outlines are those of one body
+(`toonset.dataset.silhouettes.turn_fit`).
+
+The elevation is the one under which outlines come nearest to each other. That tells which way
+round a turn goes, too: reversed, the same outlines want cameras that look up, and nobody draws so.
+
+Source: Hernandez, Schmitt, Cipolla, "Silhouette coherence for camera calibration under circular
+motion", PAMI 2007; Wong and Cipolla, "Reconstruction of sculpture from its profiles with unknown
+camera positions", IEEE TIP 2004.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from toonset.camera import Camera
+from toonset.dataset.silhouettes.hull_rays import Silhouette, contradiction, cut_rays
+from toonset.dataset.silhouettes.outlines import Square, outlines_of
+from toonset.dataset.silhouettes.turn_fit import camera_moved, fit_turns
+from toonset.view import View
+
+ELEVATIONS = np.radians([0.0, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 37, 45])
+# 1 / distance in heights, and how usual it is: orthographic, a long lens, a common one
+NEARNESS = {0.0: 0.8, 0.2: 0.1, 0.45: 0.1}
+USUAL, SPREAD, P_STEEP = np.radians(5.0), np.radians(6.0), 0.3  # of elevations of sheets
+FLOOR = 0.003  # of the height: outlines that are drawn well are this far apart
+MEASUREMENTS = 2.0  # that count, per view: its outline errs together
+TRIED = 4  # elevations, per nearness, that are fitted
+SKETCH_ROUNDS, ROUNDS = 3, 6  # of Gauss-Newton
+TAU = 0.01  # of the figure's square: first guess of how far a drawing is misplaced
+LEAST_SIGMA = np.radians(1.5)  # of the elevation
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A sheet's cameras under one turn.
+
+    Attributes:
+        cameras: one per view.
+        turned: (views,) by how much each was turned from the turn's own yaw, radians.
+        elevation: radians.
+        elevation_sigma: radians.
+        apart: what is left between the outlines, root mean square over the height.
+    """
+
+    cameras: tuple[Camera, ...]
+    turned: Float[np.ndarray, " views"]
+    elevation: float
+    elevation_sigma: float
+    apart: float
+
+
+class Figures:
+    """The drawings of a sheet, measured once."""
+
+    def __init__(self, views: Sequence[View]) -> None:
+        """Measure the views."""
+        self.views = views
+        boxes = [_box(view) for view in views]
+        self.middles = [(low + high) / 2 for low, high in boxes]
+        self.height_px = float(np.median([high[1] - low[1] for low, high in boxes]))
+        self.alphas = [view.rgba[..., 3].astype(np.float32) / 255 for view in views]
+        level = self.cameras(np.zeros(len(views)), 0.0)
+        self.silhouettes = [Silhouette(*pair) for pair in zip(views, level, strict=True)]
+
+    def cameras(
+        self, yaws: Float[np.ndarray, " views"], elevation: float, k: float = 0.0
+    ) -> list[Camera]:
+        """Return cameras that see the figure's middle in the middle of its box."""
+        return [
+            Camera.looking_at(
+                np.zeros(3),
+                float(yaw),
+                elevation,
+                self.height_px,
+                (view.rgba.shape[1], view.rgba.shape[0]),
+                center=middle,
+                k=k,
+            )
+            for view, yaw, middle in zip(self.views, yaws, self.middles, strict=True)
+        ]
+
+    def contradiction(self, cameras: Sequence[Camera]) -> float:
+        """Return how far outlines lie outside of the others' hull, RMS over the height."""
+        seen = [own.seen_by(c) for own, c in zip(self.silhouettes, cameras, strict=True)]
+        if len(seen) < 2:
+            return 0.0
+        return float(
+            np.sqrt(np.mean([contradiction(cut_rays(seen, i)[1]) for i in range(len(seen))]))
+        )
+
+
+def elevation_log_prior(elevations: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return how usual elevations are, nats: a few degrees, or, of sprites, anything up to 50."""
+    usual = np.exp(-0.5 * ((elevations - USUAL) / SPREAD) ** 2) / (SPREAD * np.sqrt(2 * np.pi))
+    return np.log((1 - P_STEEP) * usual + P_STEEP / np.radians(50.0))
+
+
+def coherence_log_likelihood(
+    apart: Float[np.ndarray, " n"], views: int, floor: float = FLOOR
+) -> Float[np.ndarray, " n"]:
+    """Return the log-likelihood of outlines that lie so far apart, their noise profiled out."""
+    return -0.5 * MEASUREMENTS * views * np.log(np.square(apart) + floor**2)
+
+
+def place(figures: Figures, yaws: Float[np.ndarray, " views"], yaw_sigma: float) -> Placed:
+    """Return cameras of the turn whose outlines cohere best.
+
+    Args:
+        figures: the drawings.
+        yaws: of the turn, radians.
+        yaw_sigma: by how much a view may leave its place in the turn, radians; 0: not at all.
+    """
+    views = len(figures.views)
+    prior = elevation_log_prior(ELEVATIONS)
+    if views < 3:
+        return Placed(
+            tuple(figures.cameras(yaws, USUAL)), np.zeros(views), float(USUAL), float(SPREAD), 0.0
+        )
+    tried, worth = [], []
+    for k, p_k in NEARNESS.items():
+        rough = np.array([figures.contradiction(figures.cameras(yaws, e, k)) for e in ELEVATIONS])
+        likely = coherence_log_likelihood(rough, views) + prior
+        for i in np.sort(np.argsort(-likely)[:TRIED]):
+            cameras = figures.cameras(yaws, float(ELEVATIONS[i]), k)
+            fitted = _fitted(figures, cameras, yaw_sigma, SKETCH_ROUNDS)
+            tried.append((float(ELEVATIONS[i]), k))
+            worth.append(
+                coherence_log_likelihood(np.array(fitted.apart), views) + prior[i] + np.log(p_k)
+            )
+    shares = np.exp(np.array(worth) - max(worth))
+    shares /= shares.sum()
+    elevations = np.array([elevation for elevation, _ in tried])
+    _, k = tried[int(np.argmax(shares))]
+    of_k = np.array([nearness == k for _, nearness in tried]) * shares
+    elevation = float(of_k @ elevations / of_k.sum())
+    spread = float(np.sqrt(shares @ np.square(elevations - elevation)))
+    found = _fitted(figures, figures.cameras(yaws, elevation, k), yaw_sigma, ROUNDS)
+    return replace(found, elevation=elevation, elevation_sigma=max(spread, float(LEAST_SIGMA)))
+
+
+def size_of_figures(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[float, float]:
+    """Return height and radius about the cameras' targets that figures have, world units."""
+    boxes = [_box(view) for view in views]
+    heights = [
+        (high - low)[1] / camera.scale for (low, high), camera in zip(boxes, cameras, strict=True)
+    ]
+    reach = [
+        float(np.abs(corner - camera.center).max()) / camera.scale
+        for box, camera in zip(boxes, cameras, strict=True)
+        for corner in box
+    ]
+    return float(np.median(heights)), max(reach)
+
+
+def _fitted(figures: Figures, cameras: list[Camera], yaw_sigma: float, rounds: int) -> Placed:
+    outlines = outlines_of(cameras, figures.alphas)
+    ratio = outlines.ratio(cameras[0])
+    fit = fit_turns(outlines, np.full(len(cameras), yaw_sigma), 0.0, TAU, rounds)
+    moved = [
+        camera_moved(camera, Square(view.square.low / ratio, view.square.size / ratio), own, 0.0)
+        for camera, view, own in zip(cameras, outlines.views, fit.numbers, strict=True)
+    ]
+    apart = fit.apart_px[1] / ratio / figures.height_px
+    return Placed(tuple(moved), fit.numbers[:, 3], cameras[0].angles[1], 0.0, apart)
+
+
+def _box(view: View) -> tuple[Float[np.ndarray, " 2"], Float[np.ndarray, " 2"]]:
+    rows, columns = np.nonzero(view.mask)
+    low = np.array([columns.min(), rows.min()], dtype=np.float64)
+    return low, np.array([columns.max() + 1.0, rows.max() + 1.0])

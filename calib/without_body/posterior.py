@@ -1,0 +1,151 @@
+"""How probable the turns of a sheet are, from all that drawings show without a body.
+
+- **Paint** moves as the body turns: which way round, and where the axis of symmetry lies.
+- **Faces and detail** look to the front: heads have eyes, fronts have buttons.
+- **Outlines** are those of one body, seen from above a little rather than from below.
+
+Each may be wrong as a whole, so that none excludes a turn. Front and back, the way round and the
+pattern are three doubts; they are told apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import logsumexp
+
+from toonset.calib.evidence.cylinder import figure_height, read_sections
+from toonset.calib.evidence.face import FaceEvidence, drawn_detail, face_log_likelihood, read_faces
+from toonset.calib.evidence.texture import Paint, paint_evidence, read_paint
+from toonset.calib.without_body.placing import (
+    ELEVATIONS,
+    Figures,
+    coherence_log_likelihood,
+    elevation_log_prior,
+)
+from toonset.calib.without_body.turns import NEAR, Turns, wrapped
+from toonset.view import View
+
+HEIGHT_PX = 160  # working height of a figure
+RIM_PX = 3.0
+DETAIL = 1.0  # nats per relative difference of detail
+FAINTEST = 0.005  # OKLab per pixel: detail below is none
+ROUGH = 0.006  # of the height: outlines whose places are not fitted are this far apart
+PAINT_BROKEN, FACES_BROKEN, OUTLINES_BROKEN = 0.02, 0.02, 0.05  # of sheets
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What a sheet shows without a body.
+
+    Attributes:
+        paint: the colours, band by band.
+        faces: what the heads say.
+        detail: (views,) how much more is drawn in a view's upper half than in the others'.
+    """
+
+    paint: Paint
+    faces: FaceEvidence
+    detail: Float[np.ndarray, " views"]
+
+    @classmethod
+    def of(cls, views: Sequence[View]) -> Evidence:
+        """Read the views of a sheet."""
+        return cls(read_paint(views), read_faces(views), _detail(views))
+
+    def log_likelihood(
+        self, yaws: Float[np.ndarray, "turns views"], outlines: Float[np.ndarray, " turns"]
+    ) -> Float[np.ndarray, " turns"]:
+        """Return the log-likelihoods of turns, nats; only their differences mean something.
+
+        Args:
+            yaws: radians.
+            outlines: log-likelihood of the outlines under every turn.
+        """
+        heads = np.array(
+            [sum(face_log_likelihood(self.faces, i, y) for i, y in enumerate(row)) for row in yaws]
+        )
+        front = heads + DETAIL * np.cos(yaws) @ self.detail
+        return (
+            _doubted(paint_evidence(self.paint, yaws), PAINT_BROKEN)
+            + _doubted(front, FACES_BROKEN)
+            + _doubted(outlines, OUTLINES_BROKEN)
+        )
+
+
+def outlines_log_likelihood(figures: Figures, turns: Turns) -> Float[np.ndarray, " turns"]:
+    """Return the log-likelihood of the outlines under every turn, elevations integrated out.
+
+    A common yaw changes nothing, so one turn of every pattern is looked at.
+    """
+    found = np.zeros(len(turns.yaws))
+    for pattern in np.unique(turns.pattern):
+        rows = turns.pattern == pattern
+        yaws = turns.yaws[rows][0]
+        apart = np.array([figures.contradiction(figures.cameras(yaws, e)) for e in ELEVATIONS])
+        likely = coherence_log_likelihood(apart, len(yaws), ROUGH)
+        found[rows] = logsumexp(likely + elevation_log_prior(ELEVATIONS))
+    return found
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """How probable it is that the chosen turn is wrong, by what is wrong about it.
+
+    Attributes:
+        front: front and back are confused, the axis is right.
+        way: views run the other way round.
+        spacing: anything else: where the axis lies, or the pattern.
+    """
+
+    front: float
+    way: float
+    spacing: float
+
+
+def doubts(turns: Turns, posterior: Float[np.ndarray, " turns"], chosen: int) -> Doubts:
+    """Return the doubts about a turn."""
+    yaws = turns.yaws[chosen]
+
+    def mass(other: Float[np.ndarray, " views"]) -> tuple[float, np.ndarray]:
+        there = (np.abs(wrapped(turns.yaws - other)) <= NEAR).all(axis=1)
+        return float(posterior[there].sum()), there
+
+    right, _ = mass(yaws)
+    front, _ = mass(yaws + np.pi)
+    way = mass(2 * yaws[0] - yaws)[0] + mass(2 * yaws[0] + np.pi - yaws)[0]
+    if np.abs(wrapped(2 * (yaws - yaws[0]))).max() < NEAR:  # front and back only
+        way = 0.0
+    return Doubts(front, way, max(0.0, 1 - right - front - way))
+
+
+def view_doubt(
+    turns: Turns, posterior: Float[np.ndarray, " turns"], chosen: int
+) -> Float[np.ndarray, " views"]:
+    """Return the probability of every view that it is seen from elsewhere."""
+    away = np.abs(wrapped(turns.yaws - turns.yaws[chosen])) > NEAR
+    return np.asarray(posterior @ away)
+
+
+def _doubted(
+    log_likelihood: Float[np.ndarray, " turns"], broken: float
+) -> Float[np.ndarray, " turns"]:
+    """Return log-likelihoods of a cue that means nothing on some sheets."""
+    relative = np.exp(log_likelihood - log_likelihood.max())
+    return np.log((1 - broken) * relative + broken)
+
+
+def _detail(views: Sequence[View]) -> Float[np.ndarray, " views"]:
+    factor = HEIGHT_PX / figure_height(views)
+    shown = []
+    for view in views:
+        sections = read_sections(view, factor, RIM_PX, HEIGHT_PX)
+        upper = sections.inside.copy()
+        upper[HEIGHT_PX // 2 :] = False
+        facing = np.sqrt(np.clip(1 - sections.across**2, 0, 1)) * upper
+        shown.append((drawn_detail(sections.lab) * facing).sum() / max(facing.sum(), 1.0))
+    mean = float(np.mean(shown))
+    return (np.array(shown) - mean) / (mean + FAINTEST)

@@ -1,0 +1,70 @@
+"""A mannequin against no body at all: whose cameras explain the drawings better?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from toonset.calib.known import Known
+from toonset.calib.options import Progress
+from toonset.calib.result import Calibration
+from toonset.calib.without_body.find import calibrate_without_body
+from toonset.calib.without_body.placing import Figures, coherence_log_likelihood
+from toonset.calib.without_body.posterior import ROUGH, Evidence
+from toonset.calib.without_body.turns import NEAR, STARTS, possible_turns, wrapped
+from toonset.view import View
+
+FEWEST = 3  # views: fewer say nothing by themselves
+P_ELSEWHERE = 0.05  # that a sheet is no turn that artists lay out
+WITHOUT = "no body explains the drawings better than the mannequin: cameras are theirs alone"
+
+
+def without_body_if_better(
+    views: Sequence[View], found: Calibration, known: Known, *, given: bool, tell: Progress
+) -> Calibration | None:
+    """Return the calibration without a body if it explains the drawings better, else None.
+
+    Nothing is tried where the mannequin's cameras are certain, or, where somebody gave it, not
+    failed; nor where landmarks, cameras or locks belong to it.
+
+    Args:
+        views: the drawings.
+        found: with the mannequin.
+        known: beforehand.
+        given: somebody chose the mannequin; then no view without it is better than weak.
+        tell: called with the step's name and the share of it that is done.
+    """
+    fine = found.verdict != "failed" if given else found.is_certain
+    if fine or len(views) < FEWEST or known.landmarks or known.cameras or known.locked:
+        return None
+    alone = calibrate_without_body(views, known, tell)
+    if _odds(views, alone, found, known) <= 0:
+        return None
+    if not given:
+        return alone
+    weak = tuple(
+        replace(view, verdict="weak", reason=WITHOUT) if view.verdict == "ok" else view
+        for view in alone.views
+    )
+    verdict = "weak" if alone.verdict == "ok" else alone.verdict
+    return replace(alone, views=weak, verdict=verdict, reason=f"{WITHOUT}; {alone.reason}")
+
+
+def _odds(views: Sequence[View], one: Calibration, other: Calibration, known: Known) -> float:
+    """Return by how many nats the first calibration's cameras are the likelier ones."""
+    figures, evidence = Figures(views), Evidence.of(views)
+    turns = possible_turns(len(views), known.labels)
+    cameras = [[view.camera for view in found.views] for found in (one, other)]
+    yaws = np.array([[camera.angles[0] for camera in own] for own in cameras])
+    apart = np.array([figures.contradiction(own) for own in cameras])
+    outlines = coherence_log_likelihood(apart, len(views), ROUGH)
+    elsewhere = np.log(P_ELSEWHERE) - len(views) * np.log(STARTS)
+    prior = []
+    for own in yaws:
+        near = (np.abs(wrapped(turns.yaws - own)) <= NEAR).all(axis=1)
+        prior.append(logsumexp(np.append(turns.log_prior[near], elsewhere)))
+    total = np.array(prior) + evidence.log_likelihood(yaws, outlines)
+    return float(total[0] - total[1])

@@ -1,0 +1,107 @@
+"""Which way the views of a sheet may be seen from: the turns that artists lay out.
+
+A turn is a pattern of steps, where it starts and which way round it goes. Before anything is
+looked at, a sheet of four or more is probably an even ring, starts at the front and runs to the
+character's left; labels that a person gave count for more than all of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from toonset.dataset.split_folder.view_labels import Label, label_rows
+
+STARTS = 8  # in a circle
+P_EVEN = 0.9  # that four views or more are an even ring
+P_FRONT_FIRST = 0.5  # the other starts share the rest
+P_LEFT = 0.7  # that views run to the character's left
+P_LABEL_WRONG = 0.01  # of each label
+P_AS_LABELLED = 0.5  # that views labelled one and all are seen from just there
+NEAR = np.radians(22.5)  # half of what neighbouring directions lie apart
+FEW: dict[int, tuple[tuple[float, ...], ...]] = {  # degrees
+    1: ((0,),),
+    2: ((0, 90), (0, 180), (0, 45)),
+    3: ((0, 90, 180), (0, 45, 90), (0, 45, 180), (0, 120, 240)),
+    4: ((0, 45, 90, 180),),
+    5: ((0, 45, 90, 135, 180),),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """Where the views may be seen from: alternatives.
+
+    Attributes:
+        yaws: (turns, views) radians.
+        log_prior: (turns,) nats.
+        pattern: (turns,) turns of one pattern and direction differ by a common yaw only.
+    """
+
+    yaws: Float[np.ndarray, "turns views"]
+    log_prior: Float[np.ndarray, " turns"]
+    pattern: Float[np.ndarray, " turns"]
+
+
+def possible_turns(views: int, labels: Sequence[Label] = ()) -> Turns:
+    """Return the turns that `views` drawings may be, with their log probabilities.
+
+    Args:
+        views: their number.
+        labels: possible yaws of every view, radians; empty where nothing is said.
+    """
+    patterns = [np.radians(steps) for steps in FEW.get(views, ())]
+    shares = np.full(len(patterns), 1.0 / max(len(patterns), 1))
+    if views >= 4:
+        ring = np.arange(views) * 2 * np.pi / views
+        shares = np.append(P_EVEN, (1 - P_EVEN) * shares)
+        patterns = [ring, *patterns]
+    yaws, log_prior, pattern = [], [], []
+    for number, (steps, share) in enumerate(zip(patterns, shares, strict=True)):
+        for way, p_way in ((1, P_LEFT), (-1, 1 - P_LEFT)):
+            for start in range(STARTS):
+                p_start = P_FRONT_FIRST if start == 0 else (1 - P_FRONT_FIRST) / (STARTS - 1)
+                yaws.append(start * 2 * np.pi / STARTS + way * steps)
+                log_prior.append(np.log(share * p_way * p_start))
+                pattern.append(2 * number + (way < 0))
+    found = Turns(np.array(yaws), np.array(log_prior), np.array(pattern))
+    return _labelled(found, labels) if any(labels) else found
+
+
+def _labelled(turns: Turns, labels: Sequence[Label]) -> Turns:
+    """Return the turns as labels make them likely, and the labels' own readings."""
+    log_prior = turns.log_prior + sum(
+        np.where(_is_near(turns.yaws[:, i], label), 0.0, np.log(P_LABEL_WRONG))
+        for i, label in enumerate(labels)
+        if label
+    )
+    if not all(labels):
+        return Turns(turns.yaws, log_prior, turns.pattern)
+    rows, odds = label_rows(tuple(labels))
+    whole = np.isfinite(rows).all(axis=1)
+    rows, odds = rows[whole], odds[whole] + np.log(P_AS_LABELLED)
+    own = turns.pattern.max() + 1 + np.arange(len(rows))
+    return Turns(
+        np.concatenate([turns.yaws, rows]),
+        np.concatenate([log_prior, odds]),
+        np.concatenate([turns.pattern, own]),
+    )
+
+
+def _is_near(yaws: Float[np.ndarray, " turns"], label: Label) -> np.ndarray:
+    return np.min([np.abs(wrapped(yaws - yaw)) for yaw in label], axis=0) <= NEAR
+
+
+def wrapped(angles: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    """Return angles in [-pi, pi)."""
+    return (angles + np.pi) % (2 * np.pi) - np.pi
+
+
+def is_even(yaws: Sequence[float]) -> bool:
+    """Return whether yaws, in their order, are an even ring."""
+    steps = wrapped(np.array([b - a for a, b in pairwise([*yaws, yaws[0]])]))
+    return bool(np.allclose(np.abs(steps), 2 * np.pi / len(yaws), atol=1e-6))
