@@ -226,7 +226,9 @@ def small_bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rgba[4:20, 5:15, 3] = 255
     views = [View(rgba, (20 * i, 0, 20, 24), 1.5, f"{i:03d}.png") for i in range(3)]
     report = calibration_report([view.name for view in views], cameras)
-    with bundle_folder(folder, views, cameras, load_mesh(obj), report, rgba[..., :3]):
+    mesh = load_mesh(obj)
+    size = (mesh.height, mesh.radius)
+    with bundle_folder(folder, views, cameras, mesh, size, report, rgba[..., :3]):
         pass
     named = [PaletteColor((200, 30, 20), 0.5, "red"), PaletteColor((20, 60, 200), 0.5, "blue")]
     palette = Palette(tuple(named), "by hand")

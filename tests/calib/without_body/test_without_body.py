@@ -1,0 +1,145 @@
+"""Cameras without a body: turns, labels, elevation, verdicts, and the bundle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toonset.calib.calibrate import calibrate
+from toonset.calib.hints import Hints
+from toonset.calib.known import Known
+from toonset.calib.verdict.judge import SURE
+from toonset.calib.without_body.find import calibrate_without_body
+from toonset.calib.without_body.placing import Figures, place
+from toonset.calib.without_body.turns import is_even, possible_turns, wrapped
+from toonset.calib.write_bundle import write_bundle
+from toonset.camera import Camera
+from toonset.dataset.split_folder.view_labels import parse_labels
+from toonset.errors import UsageError
+from toonset.view import View
+
+SIDE = 120
+RING = np.arange(8) * np.pi / 4
+EYES = tuple(((s * 0.13, 0.62, 0.27), 0.06, (20, 20, 30)) for s in (-1, 1))
+BALLS = (  # middle, radius, colour: body, head, a nose, feet that point ahead, eyes
+    ((0.0, -0.1, 0.0), 0.45, (200, 40, 40)),
+    ((0.0, 0.55, 0.0), 0.3, (240, 200, 160)),
+    ((0.0, 0.5, 0.32), 0.09, (220, 150, 120)),
+    ((0.2, -0.6, 0.12), 0.17, (60, 40, 30)),
+    ((-0.2, -0.6, 0.12), 0.17, (60, 40, 30)),
+    ((0.0, 0.0, -0.42), 0.2, (40, 80, 200)),
+    *EYES,
+)
+
+
+def drawing(yaw: float, elevation: float, name: str = "000.png") -> View:
+    """Return the balls, seen orthographically, nearer ones before farther ones."""
+    camera = Camera.looking_at(np.zeros(3), yaw, elevation, 60.0, (SIDE, SIDE))
+    grid = camera.pixel_grid()
+    rgba, near = np.zeros((SIDE, SIDE, 4), np.uint8), np.full((SIDE, SIDE), np.inf)
+    for middle, radius, color in BALLS:
+        (pixel,), (depth,), _ = camera.project(np.array([middle]))
+        off = np.linalg.norm(grid - pixel, axis=-1) / camera.scale
+        here = off < radius
+        front = depth - np.sqrt(np.maximum(radius**2 - off**2, 0))
+        shown = here & (front < near)
+        rgba[shown], near[shown] = (*color, 255), front[shown]
+    return View(rgba, (0, 0, SIDE, SIDE), 0.0, name)
+
+
+def sheet(yaws: Sequence[float], elevation: float = 0.17) -> list[View]:
+    return [drawing(yaw, elevation, f"{i:03d}.png") for i, yaw in enumerate(yaws)]
+
+
+def yaws_of(cameras: Sequence[Camera]) -> np.ndarray:
+    return np.array([camera.angles[0] for camera in cameras])
+
+
+@pytest.mark.parametrize("views", range(1, 10))
+def test_turns_are_alternatives_and_labels_outweigh_them(views: int) -> None:
+    turns = possible_turns(views)
+    assert np.exp(turns.log_prior).sum() == pytest.approx(1)
+    assert turns.yaws.shape == (len(turns.log_prior), views)
+    if views >= 4:
+        assert is_even(turns.yaws[int(turns.log_prior.argmax())])
+    labels = parse_labels(",".join(["?"] * (views - 1) + ["back"]), views)
+    labelled = possible_turns(views, labels)
+    best = labelled.yaws[int(labelled.log_prior.argmax())]
+    assert abs(wrapped(best[-1] - np.pi)) < 0.4
+
+
+def test_odd_labels_are_read_as_they_are() -> None:
+    labels = parse_labels("10,70,200", 3)
+    turns = possible_turns(3, labels)
+    best = turns.yaws[int(turns.log_prior.argmax())]
+    np.testing.assert_allclose(np.degrees(best), [10, 70, 200])
+
+
+@pytest.mark.parametrize("elevation", [0.1, 0.35])
+def test_the_elevation_is_the_one_under_which_outlines_cohere(elevation: float) -> None:
+    placed = place(Figures(sheet(RING, elevation)), RING, 0.0)
+    assert placed.elevation == pytest.approx(elevation, abs=0.1)
+    assert placed.apart < 0.01
+    np.testing.assert_allclose(wrapped(yaws_of(placed.cameras) - RING), 0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("start", "way"), [(0, 1), (0, -1), (3, 1), (6, -1)])
+def test_a_turn_is_found_wherever_it_starts_and_whichever_way_it_goes(start: int, way: int) -> None:
+    yaws = np.roll(RING[::way], start)
+    found = calibrate_without_body(sheet(yaws), Known())
+    off = wrapped(yaws_of([view.camera for view in found.views]) - yaws)
+    assert np.abs(off).max() < np.radians(22.5)
+    assert all(view.verdict != "ok" for view in found.views)  # nobody has said what is the front
+
+
+def test_five_views_may_stand_anywhere() -> None:
+    yaws = np.radians([0.0, 40.0, 100.0, 150.0, 235.0])
+    found = calibrate_without_body(sheet(yaws), Known())
+    off = wrapped(yaws_of([view.camera for view in found.views]) - yaws)
+    assert np.degrees(np.median(np.abs(off - np.median(off)))) < 10
+
+
+def test_labels_settle_what_is_in_doubt() -> None:
+    labels = parse_labels(",".join(f"{yaw:.0f}" for yaw in np.degrees(RING)), 8)
+    found = calibrate_without_body(sheet(RING), Known(labels=labels))
+    assert found.is_certain
+    assert "front or back 0.00" in found.reason
+    turned = calibrate_without_body(sheet(np.roll(RING, 4)), Known(labels=labels))
+    off = wrapped(yaws_of([view.camera for view in turned.views]) - RING)
+    np.testing.assert_allclose(off, 0, atol=1e-6)
+    assert not turned.is_certain  # the faces say otherwise
+    assert "is a label wrong" in turned.views[0].reason
+
+
+def test_drawings_that_are_no_turn_are_never_ok() -> None:
+    one, view = drawing(0.0, 0.1), sheet([0.0])[0]
+    alone = calibrate_without_body([view], Known())
+    assert (alone.verdict, alone.views[0].verdict) == ("ambiguous", "ambiguous")
+    same = calibrate_without_body([one] * 4, Known())
+    assert not same.is_certain
+    flat = np.zeros((SIDE, SIDE, 4), np.uint8)
+    flat[60:100, 50:60] = (10, 200, 10, 255)
+    pole = View(flat, (0, 0, SIDE, SIDE), 0.0, "pole.png")
+    labels = parse_labels("front,left,back,right", 4)
+    mixed = calibrate_without_body([one, pole, one, pole], Known(labels=labels))
+    assert mixed.verdict == "failed"
+    assert "from being one turning body's" in mixed.views[0].reason
+
+
+def test_a_bundle_without_a_body_has_no_mannequin(tmp_path: Path) -> None:
+    found = calibrate(sheet(RING), "none", Hints(labels="front,?,?,?,?,?,?,?"))
+    assert found.views[0].p_flip < 1 - SURE
+    bundle = write_bundle(tmp_path / "bundle", found)
+    assert bundle.mannequin is None
+    names = sorted(path.name for path in (tmp_path / "bundle").iterdir())
+    assert names == ["calibration.json", "images", "overlay.png", "transforms.json"]
+    off = wrapped(yaws_of([frame.camera for frame in bundle.scene.frames]) - RING)
+    np.testing.assert_allclose(off, 0, atol=1e-6)
+
+
+def test_what_belongs_to_a_mannequin_is_refused_without_one() -> None:
+    with pytest.raises(UsageError, match="--landmarks needs a mannequin"):
+        calibrate(sheet(RING), "none", Hints(landmarks="points.json"))
