@@ -21,6 +21,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
+from toonset.palette.palette import Shadow
 from toonset.palette.pixels.antialias import OPAQUE
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
@@ -43,21 +44,6 @@ Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
 Mask = Bool[np.ndarray, "height width"]
 Way = tuple[int, int]
-
-
-@dataclass(frozen=True)
-class Shadow:
-    """A sheet's shadow.
-
-    Attributes:
-        factor: red, green and blue in shadow over those in light, of levels.
-        spread: of a border's ratio about it, the median of the channels' absolute deviations.
-        bits: that one direction of the light saves.
-    """
-
-    factor: tuple[float, float, float]
-    spread: tuple[float, float, float]
-    bits: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +264,7 @@ def _in_shadow(rgb: np.ndarray, clear: Mask, votes: np.ndarray, table: np.ndarra
         cv2.ximgproc.fastGlobalSmootherFilter(rgb, values, SPREAD, SIMILAR)
         for values in (weight, said * weight)
     )
-    return (mean > 0) & (total > 0)
+    return np.asarray((mean > 0) & (total > 0))
 
 
 def lit_picture(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
@@ -290,18 +276,24 @@ def lit_picture(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> P
         dark: where it lies in shadow.
         shadow: of the sheet.
     """
-    factor = np.array(shadow.factor)
-    floor = 255 * FLOOR
-    raised = (picture[..., :3] + floor) / factor - floor
-    light = np.where(dark[..., None], np.clip(raised, 0, 255), picture[..., :3])
+    raised = shaded(picture[..., :3], 1 / np.array(shadow.factor))
+    light = np.where(dark[..., None], raised, picture[..., :3])
     edge = _beside(dark)
     pure = _clear(picture, contour) & ~edge
     if pure.any():
         light = np.where((edge & (contour < LINE))[..., None], _nearest(light, pure), light)
     lit = picture.copy()
     paint = (contour < LINE)[..., None]
-    lit[..., :3] = np.where(paint, np.rint(light).astype(np.uint8), picture[..., :3])
+    lit[..., :3] = np.where(paint, light, picture[..., :3])
     return lit
+
+
+def shaded(
+    rgb: np.ndarray, factor: Sequence[float] | Float[np.ndarray, " 3"]
+) -> UInt8[np.ndarray, "*n 3"]:
+    """Return colours multiplied by a shadow's factor, or by its inverse: in light again."""
+    floor = 255 * FLOOR
+    return np.rint(np.clip((rgb + floor) * np.asarray(factor) - floor, 0, 255)).astype(np.uint8)
 
 
 def _beside(dark: Mask) -> Mask:
@@ -315,3 +307,12 @@ def _nearest(values: np.ndarray, pure: Mask) -> np.ndarray:
 
     rows, columns = distance_transform_edt(~pure, return_distances=False, return_indices=True)
     return values[rows, columns]
+
+
+def lit_pictures(
+    pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow
+) -> tuple[list[Picture], list[Mask]]:
+    """Return the drawings without their shadow, and where it lay."""
+    tones = find_tones(pictures, contours, shadow)
+    drawn = zip(pictures, contours, tones, strict=True)
+    return [lit_picture(*each, shadow) for each in drawn], tones
