@@ -35,7 +35,8 @@ LINE = 64  # of 255: so much of a pixel is a drawn line's, or of what lies besid
 LEAST_PIECE = 4  # pixels of a border: shorter ones are noise
 PRICE_BITS = 3 * float(np.log2(MOST_DROP / (2 * ALIKE)))  # of a factor: which of all that differ
 WAYS = ((0, 1), (1, 0), (1, 1), (1, -1))  # rows and columns across a border
-SURE, SPREAD, SIMILAR = 8.0, 300.0, 6.0  # of a border's vote; of its spreading, over which levels
+SURE, SPREAD, SIMILAR = 8.0, 300.0, 3.0  # of a border's vote; of its spreading, over which levels
+LEVELS = 255 / float(-np.log(FLOOR))  # of a logarithm: as many as fit into a byte
 COLOR_CELL = 12  # levels: colours that shadows' borders speak of together
 FEW_VOTES = 3.0  # of a cell: says next to nothing
 MIXED_PX = 2  # beside a tone's border
@@ -259,9 +260,10 @@ def _blurred(counts: np.ndarray) -> np.ndarray:
 def _in_shadow(rgb: np.ndarray, clear: Mask, votes: np.ndarray, table: np.ndarray) -> Mask:
     """Return where a picture lies in shadow."""
     said = SURE * votes + table[_cell(rgb)].astype(np.float32)
+    guide = np.rint((_logs(rgb) - np.log(FLOOR)) * LEVELS).clip(0, 255).astype(np.uint8)
     weight = (clear * (1 + 2 * np.abs(votes))).astype(np.float32)
     total, mean = (
-        cv2.ximgproc.fastGlobalSmootherFilter(rgb, values, SPREAD, SIMILAR)
+        cv2.ximgproc.fastGlobalSmootherFilter(guide, values, SPREAD, SIMILAR)
         for values in (weight, said * weight)
     )
     return np.asarray((mean > 0) & (total > 0))
