@@ -278,8 +278,8 @@ def lit_picture(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> P
         dark: where it lies in shadow.
         shadow: of the sheet.
     """
-    raised = shaded(picture[..., :3], 1 / np.array(shadow.factor))
-    light = np.where(dark[..., None], raised, picture[..., :3])
+    rgb = smoothed(picture)
+    light = np.where(dark[..., None], shaded(rgb, 1 / np.array(shadow.factor)), rgb)
     edge = _beside(dark)
     pure = _clear(picture, contour) & ~edge
     if pure.any():
