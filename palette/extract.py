@@ -13,12 +13,13 @@ from toonset.errors import PaletteError, UsageError
 from toonset.palette.formats.registry import parse_colors
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
+from toonset.palette.paints.features import find_features
 from toonset.palette.paints.places import with_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
-from toonset.palette.pixels.shadow import find_shadow, lit_pictures, shaded
+from toonset.palette.pixels.shadow import find_shadow, find_tones, lit_pictures, shaded
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -36,6 +37,7 @@ def extract_palette(
     max_colors: int = MAX_COLORS,
     keep: str = "",
     contour: bool = True,
+    features: bool | None = None,
     colors: str | None = None,
     method: str = "toonset",
 ) -> Palette:
@@ -47,6 +49,7 @@ def extract_palette(
         max_colors: at most so many, the largest.
         keep: colours to keep however small they are: "#aabbcc,...".
         contour: count drawn lines to their colour; without, only what is painted with it.
+        features: keep eyes, mouths and buttons under that share, too; None: on shaded sheets.
         colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file.
         method: "toonset", or "extcolors", the paper's tool.
 
@@ -56,7 +59,7 @@ def extract_palette(
     """
     pictures = [picture_of(view) for view in views]
     contours = [find_contour(picture) for picture in pictures]
-    options = options_of(min_share, max_colors, keep, contour=contour)
+    options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     return choose_palette(pictures, contours, options, colors, method)
 
 
@@ -96,14 +99,22 @@ def picture_of(view: View | Picture) -> Picture:
     return rgba
 
 
-def options_of(min_share: float, max_colors: int, keep: str, *, contour: bool) -> PaletteOptions:
+def options_of(
+    min_share: float,
+    max_colors: int,
+    keep: str,
+    *,
+    contour: bool = True,
+    features: bool | None = None,
+) -> PaletteOptions:
     """Return the rule that the arguments of `extract_palette` state.
 
     Raises:
         PaletteError: out of range, or a colour that cannot be understood.
     """
     kept = _typed("--keep", keep).tolist() if keep else []
-    return PaletteOptions(min_share, max_colors, tuple((r, g, b) for r, g, b in kept), contour)
+    wanted = tuple((r, g, b) for r, g, b in kept)
+    return PaletteOptions(min_share, max_colors, wanted, contour, features)
 
 
 def choose_palette(
@@ -127,10 +138,25 @@ def choose_palette(
         return with_places(extcolors_palette(pictures, options), pictures)
     shadow = find_shadow(pictures, contours)
     if shadow is None:
-        return with_places(find_palette(pictures, options, lines), pictures)
-    lit, dark = lit_pictures(pictures, contours, shadow)
-    palette = with_places(find_palette(lit, options, lines), lit)
+        return _of_flat(pictures, options, lines, features=options.features is True)
+    dark = find_tones(pictures, contours, shadow)
+    lit = lit_pictures(pictures, contours, dark, shadow)
+    palette = _of_flat(lit, options, lines, features=options.features is not False)
     return with_tones(palette, shadow, lit, dark)
+
+
+def _of_flat(
+    pictures: Sequence[Picture], options: PaletteOptions, lines: Sequence[Mask], *, features: bool
+) -> Palette:
+    """Return the palette of pictures without a shadow; with features, those are kept."""
+    palette = with_places(find_palette(pictures, options, lines), pictures)
+    found = find_features(palette, pictures) if features else ()
+    found = found[: max(options.max_colors - len(palette.colors), 0)]
+    if not found:
+        return palette
+    wider = replace(options, keep=(*options.keep, *found))
+    kept = with_places(find_palette(pictures, wider, lines), pictures)
+    return replace(kept, features=found)
 
 
 def with_tones(
@@ -169,7 +195,8 @@ def label_drawings(
 ) -> list[Map]:
     """Return the label maps of pictures whose drawn lines are known; see `label_image`."""
     if palette.shadow is not None:
-        pictures, _ = lit_pictures(pictures, contours, palette.shadow)
+        dark = find_tones(pictures, contours, palette.shadow)
+        pictures = lit_pictures(pictures, contours, dark, palette.shadow)
     maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
     ink = palette.contour
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:

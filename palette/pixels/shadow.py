@@ -269,15 +269,22 @@ def _in_shadow(rgb: np.ndarray, clear: Mask, votes: np.ndarray, table: np.ndarra
     return np.asarray((mean > 0) & (total > 0))
 
 
-def lit_picture(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
-    """Return a drawing as it would be without its shadow; drawn lines stay as they are.
+def lit_pictures(
+    pictures: Sequence[Picture], contours: Sequence[Map], dark: Sequence[Mask], shadow: Shadow
+) -> list[Picture]:
+    """Return drawings as they would be without shadow and grain; drawn lines stay as they are.
 
     Args:
-        picture: the drawing.
-        contour: how far lines cover its pixels.
-        dark: where it lies in shadow.
+        pictures: the drawings.
+        contours: how far lines cover each of their pixels.
+        dark: where they lie in shadow.
         shadow: of the sheet.
     """
+    drawn = zip(pictures, contours, dark, strict=True)
+    return [_lit(*each, shadow) for each in drawn]
+
+
+def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
     rgb = smoothed(picture)
     light = np.where(dark[..., None], shaded(rgb, 1 / np.array(shadow.factor)), rgb)
     edge = _beside(dark)
@@ -309,12 +316,3 @@ def _nearest(values: np.ndarray, pure: Mask) -> np.ndarray:
 
     rows, columns = distance_transform_edt(~pure, return_distances=False, return_indices=True)
     return values[rows, columns]
-
-
-def lit_pictures(
-    pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow
-) -> tuple[list[Picture], list[Mask]]:
-    """Return the drawings without their shadow, and where it lay."""
-    tones = find_tones(pictures, contours, shadow)
-    drawn = zip(pictures, contours, tones, strict=True)
-    return [lit_picture(*each, shadow) for each in drawn], tones
