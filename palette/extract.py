@@ -149,14 +149,13 @@ def _of_flat(
     pictures: Sequence[Picture], options: PaletteOptions, lines: Sequence[Mask], *, features: bool
 ) -> Palette:
     """Return the palette of pictures without a shadow; with features, those are kept."""
-    palette = with_places(find_palette(pictures, options, lines), pictures)
+    palette = find_palette(pictures, options, lines)
     found = find_features(palette, pictures) if features else ()
-    found = found[: max(options.max_colors - len(palette.colors), 0)]
-    if not found:
-        return palette
-    wider = replace(options, keep=(*options.keep, *found))
-    kept = with_places(find_palette(pictures, wider, lines), pictures)
-    return replace(kept, features=found)
+    found = found[: options.max_colors - len(palette.colors)]
+    if found:
+        wider = replace(options, keep=(*options.keep, *found))
+        palette = replace(find_palette(pictures, wider, lines), features=found)
+    return with_places(palette, pictures)
 
 
 def with_tones(

@@ -25,6 +25,7 @@ from toonset.palette.palette import Shadow
 from toonset.palette.pixels.antialias import OPAQUE
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
+NARROWEST_PX = 2 * SIDE_PX  # a picture; there is no border in it to look across
 FLAT = 0.03  # logarithms per pixel: steeper is no flat paint
 BETWEEN = 0.1  # logarithms: a line between the sides is darker than both by more
 LEAST_DROP, MOST_DROP = 0.1, 1.4  # logarithms: weaker is noise, deeper is another paint
@@ -78,6 +79,8 @@ def find_shadow(pictures: Sequence[Picture], contours: Sequence[Map]) -> Shadow 
     borders = []
     for picture, contour in zip(pictures, contours, strict=True):
         small, line = (_shrunk(each, shrink) for each in (picture, contour))
+        if min(line.shape) <= NARROWEST_PX:
+            continue
         borders.append((line.shape, _borders(smoothed(small), _clear(small, line))))
     factor = _commonest([each for _, found in borders for each in found])
     if factor is None:
@@ -92,7 +95,7 @@ def find_shadow(pictures: Sequence[Picture], contours: Sequence[Map]) -> Shadow 
 
 
 def _shrunk(picture: np.ndarray, shrink: float) -> np.ndarray:
-    if shrink == 1 or not picture.size:
+    if shrink == 1 or not picture.size:  # OpenCV wants a pixel at least
         return picture
     size = tuple(max(1, round(shrink * n)) for n in picture.shape[1::-1])
     return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
@@ -116,8 +119,6 @@ def _logs(rgb: UInt8[np.ndarray, "*n 3"]) -> Float32[np.ndarray, "*n 3"]:
 
 def _borders(rgb: UInt8[np.ndarray, "height width 3"], clear: Mask) -> list[_Borders]:
     """Return borders without a line on them that darken every channel, a way after the other."""
-    if min(clear.shape) <= 2 * SIDE_PX:
-        return []
     logs = _logs(rgb)
     light = logs.mean(axis=-1)
     across, down = (cv2.Sobel(light, cv2.CV_32F, *axis) / 8 for axis in ((1, 0), (0, 1)))
@@ -196,9 +197,7 @@ def _direction_bits(
     return float(-norm.logsf(uneven) / np.log(2) - 1)
 
 
-def find_tones(
-    pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow
-) -> list[Mask]:
+def find_tones(pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow) -> list[Mask]:
     """Return where every picture lies in shadow.
 
     Borders of the shadow's ratio vote, and so do the colours that they have on either side, on all
@@ -211,11 +210,15 @@ def find_tones(
         shadow: of them.
     """
     factor = np.log(shadow.factor)
-    smooth = [smoothed(picture) for picture in pictures]
-    clear = [_clear(*both) for both in zip(pictures, contours, strict=True)]
+    wide = [n for n, contour in enumerate(contours) if min(contour.shape) > NARROWEST_PX]
+    smooth = [smoothed(pictures[number]) for number in wide]
+    clear = [_clear(pictures[number], contours[number]) for number in wide]
     votes = [_votes(*both, factor) for both in zip(smooth, clear, strict=True)]
     table = _votes_of_colors(smooth, votes)
-    return [_in_shadow(*each, table) for each in zip(smooth, clear, votes, strict=True)]
+    dark = [np.zeros(contour.shape, dtype=bool) for contour in contours]
+    for number, rgb, paint, own in zip(wide, smooth, clear, votes, strict=True):
+        dark[number] = _in_shadow(rgb, paint, own, table)
+    return dark
 
 
 def _votes(rgb: np.ndarray, clear: Mask, factor: np.ndarray) -> Float32[np.ndarray, "height width"]:
@@ -281,7 +284,7 @@ def lit_pictures(
         shadow: of the sheet.
     """
     drawn = zip(pictures, contours, dark, strict=True)
-    return [_lit(*each, shadow) for each in drawn]
+    return [_lit(*each, shadow) if each[2].any() else each[0] for each in drawn]
 
 
 def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
