@@ -138,19 +138,23 @@ def choose_palette(
         return with_places(extcolors_palette(pictures, options), pictures)
     shadow = find_shadow(pictures, contours)
     if shadow is None:
-        return _of_flat(pictures, options, lines, features=options.features is True)
+        return _in_light(pictures, options, lines)
     dark = find_tones(pictures, contours, shadow)
     lit = lit_pictures(pictures, contours, dark, shadow)
-    palette = _of_flat(lit, options, lines, features=options.features is not False)
+    palette = _in_light(lit, options, lines, shadow)
     return with_tones(palette, shadow, lit, dark)
 
 
-def _of_flat(
-    pictures: Sequence[Picture], options: PaletteOptions, lines: Sequence[Mask], *, features: bool
+def _in_light(
+    pictures: Sequence[Picture],
+    options: PaletteOptions,
+    lines: Sequence[Mask],
+    shadow: Shadow | None = None,
 ) -> Palette:
-    """Return the palette of pictures without a shadow; with features, those are kept."""
+    """Return the palette of pictures in light; if wanted, or if a shadow was taken off, features."""
+    features = shadow is not None if options.features is None else options.features
     palette = find_palette(pictures, options, lines)
-    found = find_features(palette, pictures) if features else ()
+    found = find_features(palette, pictures, shadow) if features else ()
     found = found[: options.max_colors - len(palette.colors)]
     if found:
         wider = replace(options, keep=(*options.keep, *found))

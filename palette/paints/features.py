@@ -11,35 +11,47 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.paints.clusters import UNLIKE
-from toonset.palette.palette import MAX_COLORS, Palette
+from toonset.palette.palette import MAX_COLORS, Palette, Shadow
 from toonset.palette.pixels.labels import nearest_labels
+from toonset.palette.pixels.shadow import shaded
 
 RGB = tuple[int, int, int]
 
 PLACES = 2  # drawings that show it, or patches in a single one
 THICK = 3  # pixels: a patch of a blend is thinner
+LEFT = 2 * JUST_NOTICEABLE  # from a paint's colour in shadow: such a colour is a rest of it
 ALIKE = 0.05  # of the figure's height: heights of one feature differ by less, the median
 
 
 def find_features(
-    palette: Palette, pictures: Sequence[UInt8[np.ndarray, "_ _ 4"]]
+    palette: Palette, pictures: Sequence[UInt8[np.ndarray, "_ _ 4"]], shadow: Shadow | None = None
 ) -> tuple[RGB, ...]:
     """Return those of a palette's left-out colours that are features.
 
     Args:
         palette: of the pictures.
-        pictures: the character on transparent ground, without shadows.
+        pictures: the character on transparent ground, in light.
+        shadow: that was taken off: what looks like a colour of the palette in it was left there.
     """
     unlike = [color.rgb for color in palette.dropped if color.cost >= UNLIKE]
+    if shadow is not None:
+        shades = oklab_from_rgb(shaded(palette.rgb, shadow.factor))
+        unlike = [rgb for rgb in unlike if _away(rgb, shades) > LEFT]
     listed = [*(color.rgb for color in palette.colors), *(color.rgb for color in palette.dropped)]
     listed = listed[:MAX_COLORS]
     labels = [nearest_labels(picture, np.array(listed, dtype=np.uint8)) for picture in pictures]
     return tuple(
         rgb for rgb in unlike if rgb in listed and _recurs(listed.index(rgb), labels, pictures)
     )
+
+
+def _away(rgb: RGB, others: Float[np.ndarray, "n 3"]) -> float:
+    own = oklab_from_rgb(np.array(rgb, dtype=np.uint8))
+    return float(np.linalg.norm(others - own, axis=1).min())
 
 
 def _recurs(

@@ -33,6 +33,7 @@ ALIKE = 0.12  # logarithms that a channel's ratio may be off the factor
 FLOOR = 4 / 255  # added before logarithms: black says nothing of ratios
 TALL_PX = 400  # figures are looked at no taller: a shadow's border is long
 LINE = 64  # of 255: so much of a pixel is a drawn line's, or of what lies beside it
+DRAWN = 128  # of 255: covered by half, a pixel is a drawn line's
 LEAST_PIECE = 4  # pixels of a border: shorter ones are noise
 PRICE_BITS = 3 * float(np.log2(MOST_DROP / (2 * ALIKE)))  # of a factor: which of all that differ
 WAYS = ((0, 1), (1, 0), (1, 1), (1, -1))  # rows and columns across a border
@@ -295,7 +296,7 @@ def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
     if pure.any():
         light = np.where((edge & (contour < LINE))[..., None], _nearest(light, pure), light)
     lit = picture.copy()
-    paint = (contour < LINE)[..., None]
+    paint = (contour < DRAWN)[..., None]
     lit[..., :3] = np.where(paint, light, picture[..., :3])
     return lit
 
