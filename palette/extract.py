@@ -151,7 +151,7 @@ def _in_light(
     lines: Sequence[Mask],
     shadow: Shadow | None = None,
 ) -> Palette:
-    """Return the palette of pictures in light; if wanted, or if a shadow was taken off, features."""
+    """Return the palette of pictures in light, with features if a shadow was taken off."""
     features = shadow is not None if options.features is None else options.features
     palette = find_palette(pictures, options, lines)
     found = find_features(palette, pictures, shadow) if features else ()
