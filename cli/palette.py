@@ -19,7 +19,7 @@ from toonset.cli.common.output import (
 from toonset.write import check_output
 
 if TYPE_CHECKING:
-    from toonset.palette.palette import DroppedColor, Evidence, Palette
+    from toonset.palette.palette import DroppedColor, Evidence, Palette, PaletteColor
 
 WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette.png")
 FOLDERS = ("labels", "contours")
@@ -79,6 +79,15 @@ def palette(
             rich_help_panel=CHOICE_PANEL,
         ),
     ] = True,
+    features: Annotated[
+        bool | None,
+        typer.Option(
+            "--features/--no-features",
+            help="Keep eyes, mouths, buttons under that share (default: on shaded sheets).",
+            rich_help_panel=CHOICE_PANEL,
+            show_default=False,
+        ),
+    ] = None,
     method: Annotated[
         Literal["toonset", "extcolors"],
         typer.Option(
@@ -122,7 +131,7 @@ def palette(
     target = out or bundle or OUT
     if target != bundle:
         check_output(target, places, (*WRITTEN, *FOLDERS), force=force)
-    options = options_of(min_share, max_colors, keep, contour=contour)
+    options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     drawn = load_pictures(places)
     for note in drawn.notes:
         printer.say(note)
@@ -146,10 +155,13 @@ def _report(found: Palette, target: Path, printer: Printer, *, in_bundle: bool) 
 
 def palette_lines(found: Palette, *, verbose: bool) -> list[str]:
     """Return a line per colour, then what is left out; if verbose, the rule and the evidence."""
-    lines = [_line(color.rgb, color.share, color.name) for color in found.colors]
+    lines = [_color_line(color, found) for color in found.colors]
     if not verbose:
         return [*lines, *_left_out(found)]
     lines.append(f"shares are of all the character's pixels; rule: {found.rule}")
+    if found.shadow is not None:
+        factor = ", ".join(f"{value:.2f}" for value in found.shadow.factor)
+        lines.append(f"shadow: colours in light times {factor}; colours are those in light")
     lines += _contour_lines(found)
     if found.dropped:
         lines.append("left out (with the mean OKLab error that this costs, and the largest patch):")
@@ -157,6 +169,13 @@ def palette_lines(found: Palette, *, verbose: bool) -> list[str]:
     if found.evidence is not None:
         lines.append(_evidence_line(found.evidence))
     return lines
+
+
+def _color_line(color: PaletteColor, found: Palette) -> str:
+    """Return a colour's line, with how much of it lies in shadow, and whether it is a feature."""
+    notes = [f"{HUNDRED * dark.share:.1f} % in shadow" for dark in color.tones[1:]]
+    notes += ["feature"] if color.rgb in found.features else []
+    return _line(color.rgb, color.share, color.name) + (f" ({', '.join(notes)})" if notes else "")
 
 
 def _left_out(found: Palette) -> list[str]:

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError, UsageError
 from toonset.palette.formats.registry import parse_colors
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
+from toonset.palette.paints.features import find_features
 from toonset.palette.paints.places import with_places
 from toonset.palette.paints.select import PaletteOptions
-from toonset.palette.palette import MAX_COLORS, Palette
+from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
 from toonset.palette.pixels.ink_lines import find_contour
-from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels
+from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
+from toonset.palette.pixels.shadow import find_shadow, find_tones, lit_pictures, shaded
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
+Mask = Bool[np.ndarray, "height width"]
 
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 METHODS = ("toonset", "extcolors")
@@ -33,6 +37,7 @@ def extract_palette(
     max_colors: int = MAX_COLORS,
     keep: str = "",
     contour: bool = True,
+    features: bool | None = None,
     colors: str | None = None,
     method: str = "toonset",
 ) -> Palette:
@@ -44,6 +49,7 @@ def extract_palette(
         max_colors: at most so many, the largest.
         keep: colours to keep however small they are: "#aabbcc,...".
         contour: count drawn lines to their colour; without, only what is painted with it.
+        features: keep eyes, mouths and buttons under that share, too; None: on shaded sheets.
         colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file.
         method: "toonset", or "extcolors", the paper's tool.
 
@@ -53,7 +59,7 @@ def extract_palette(
     """
     pictures = [picture_of(view) for view in views]
     contours = [find_contour(picture) for picture in pictures]
-    options = options_of(min_share, max_colors, keep, contour=contour)
+    options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     return choose_palette(pictures, contours, options, colors, method)
 
 
@@ -75,7 +81,7 @@ def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb")
     if space not in get_args(Space):
         raise UsageError(f"--space: {space!r} is none of {', '.join(get_args(Space))}")
     picture = picture_of(view)
-    return label_drawing(picture, find_contour(picture), palette, space)
+    return label_drawings([picture], [find_contour(picture)], palette, space)[0]
 
 
 def picture_of(view: View | Picture) -> Picture:
@@ -93,14 +99,22 @@ def picture_of(view: View | Picture) -> Picture:
     return rgba
 
 
-def options_of(min_share: float, max_colors: int, keep: str, *, contour: bool) -> PaletteOptions:
+def options_of(
+    min_share: float,
+    max_colors: int,
+    keep: str,
+    *,
+    contour: bool = True,
+    features: bool | None = None,
+) -> PaletteOptions:
     """Return the rule that the arguments of `extract_palette` state.
 
     Raises:
         PaletteError: out of range, or a colour that cannot be understood.
     """
     kept = _typed("--keep", keep).tolist() if keep else []
-    return PaletteOptions(min_share, max_colors, tuple((r, g, b) for r, g, b in kept), contour)
+    wanted = tuple((r, g, b) for r, g, b in kept)
+    return PaletteOptions(min_share, max_colors, wanted, contour, features)
 
 
 def choose_palette(
@@ -122,16 +136,76 @@ def choose_palette(
         return pick_palette(pictures, _typed("--colors", colors), lines)
     if method == "extcolors":
         return with_places(extcolors_palette(pictures, options), pictures)
-    return with_places(find_palette(pictures, options, lines), pictures)
+    shadow = find_shadow(pictures, contours)
+    if shadow is None:
+        return _in_light(pictures, options, lines)
+    dark = find_tones(pictures, contours, shadow)
+    lit = lit_pictures(pictures, contours, dark, shadow)
+    palette = _in_light(lit, options, lines, shadow)
+    return with_tones(palette, shadow, lit, dark)
 
 
-def label_drawing(picture: Picture, contour: Map, palette: Palette, space: Space = "rgb") -> Map:
-    """Return the label map of a picture whose drawn lines are known; see `label_image`."""
-    labels = label_pixels(picture, palette.rgb, space=space)
+def _in_light(
+    pictures: Sequence[Picture],
+    options: PaletteOptions,
+    lines: Sequence[Mask],
+    shadow: Shadow | None = None,
+) -> Palette:
+    """Return the palette of pictures in light, with features if a shadow was taken off."""
+    features = shadow is not None if options.features is None else options.features
+    palette = find_palette(pictures, options, lines)
+    found = find_features(palette, pictures, shadow) if features else ()
+    found = found[: options.max_colors - len(palette.colors)]
+    if found:
+        wider = replace(options, keep=(*options.keep, *found))
+        palette = replace(find_palette(pictures, wider, lines), features=found)
+    return with_places(palette, pictures)
+
+
+def with_tones(
+    palette: Palette, shadow: Shadow, lit: Sequence[Picture], dark: Sequence[Mask]
+) -> Palette:
+    """Return a palette of drawings without their shadow with every paint's tones.
+
+    Args:
+        palette: of these drawings.
+        shadow: of the sheet.
+        lit: the drawings without it.
+        dark: where it lay.
+    """
+    pixels = np.zeros((2, 256))
+    for picture, where in zip(lit, dark, strict=True):
+        labels = nearest_labels(picture, palette.rgb)
+        pixels += [np.bincount(labels[part], minlength=256) for part in (~where, where)]
+    shares = pixels / np.maximum(pixels.sum(axis=0), 1)
+    colors = tuple(
+        replace(color, tones=_tones(color, shadow, float(in_shadow)))
+        for color, in_shadow in zip(palette.colors, shares[1], strict=False)
+    )
+    return replace(palette, colors=colors, shadow=shadow)
+
+
+def _tones(color: PaletteColor, shadow: Shadow, in_shadow: float) -> tuple[Tone, ...]:
+    """Return a colour's tones that occur, the light one first."""
+    red, green, blue = shaded(np.array(color.rgb), shadow.factor).tolist()
+    dark = Tone((red, green, blue), in_shadow * color.share)
+    light = Tone(color.rgb, (1 - in_shadow) * color.share)
+    return (light, dark) if in_shadow > 0 else (light,)
+
+
+def label_drawings(
+    pictures: Sequence[Picture], contours: Sequence[Map], palette: Palette, space: Space = "rgb"
+) -> list[Map]:
+    """Return the label maps of pictures whose drawn lines are known; see `label_image`."""
+    if palette.shadow is not None:
+        dark = find_tones(pictures, contours, palette.shadow)
+        pictures = lit_pictures(pictures, contours, dark, palette.shadow)
+    maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
     ink = palette.contour
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:
-        labels[contour >= LINE] = UNLABELLED
-    return labels
+        for labels, contour in zip(maps, contours, strict=True):
+            labels[contour >= LINE] = UNLABELLED
+    return maps
 
 
 def _typed(option: str, text: str) -> UInt8[np.ndarray, "colors 3"]:

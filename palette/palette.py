@@ -13,18 +13,48 @@ MAX_COLORS = 255  # a label is one byte, and 255 means unlabelled
 
 
 @dataclass(frozen=True)
-class PaletteColor:
-    """One colour.
+class Tone:
+    """A paint's colour in light, or in shadow.
 
     Attributes:
         rgb: 8-bit sRGB.
         share: of the character's pixels over all pictures, 0 to 1.
+    """
+
+    rgb: tuple[int, int, int]
+    share: float
+
+
+@dataclass(frozen=True)
+class PaletteColor:
+    """One colour.
+
+    Attributes:
+        rgb: 8-bit sRGB; of a shaded paint its colour in light.
+        share: of the character's pixels over all pictures, 0 to 1; all tones together.
         name: a plain name for people.
+        tones: in light and in shadow, where the sheet has a shadow.
     """
 
     rgb: tuple[int, int, int]
     share: float
     name: str
+    tones: tuple[Tone, ...] = ()
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """A sheet's two-tone shadow: colour in shadow = factor * colour in light.
+
+    Attributes:
+        factor: red, green and blue, of levels of sRGB.
+        spread: median deviation of single borders from it, logarithms.
+        bits: that one direction of the light saves over all borders.
+    """
+
+    factor: tuple[float, float, float]
+    spread: tuple[float, float, float]
+    bits: float
 
 
 @dataclass(frozen=True)
@@ -105,6 +135,8 @@ class Palette:
         warnings: what a person should know.
         contour: the drawn lines' colour; None without lines, or where nobody looked for them.
         evidence: of the number of colours; None where it was not chosen by us.
+        shadow: of a sheet that is shaded in two tones; None of a flat one.
+        features: those of the colours that are under the rule, but kept: eyes, mouths, buttons.
     """
 
     colors: tuple[PaletteColor, ...]
@@ -113,6 +145,8 @@ class Palette:
     warnings: tuple[str, ...] = ()
     contour: ContourColor | None = None
     evidence: Evidence | None = None
+    shadow: Shadow | None = None
+    features: tuple[tuple[int, int, int], ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse palettes that cannot label anything.

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
-from toonset.palette.extract import label_drawing
+from toonset.palette.extract import label_drawings
 from toonset.palette.formats.registry import encode_palette
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
@@ -38,8 +38,7 @@ def write_labelled(
     space: Space = "rgb",
 ) -> None:
     """Label pictures whose contour maps are known, and write all; see `write_palette`."""
-    drawn = zip(pictures, contours, strict=True)
-    labels = [label_drawing(picture, contour, palette, space) for picture, contour in drawn]
+    labels = label_drawings(pictures, contours, palette, space)
     named = [list(zip(names, maps, strict=True)) for maps in (labels, contours)]
     write_palette(folder, palette, *named)
 

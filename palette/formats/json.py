@@ -7,7 +7,7 @@ from typing import Any
 from toonset.errors import PaletteError
 from toonset.palette.formats.hex import rgb_of_hex
 from toonset.palette.names import NamedColor, clean_name, hex_of
-from toonset.palette.palette import Palette
+from toonset.palette.palette import Palette, Tone
 from toonset.read import parse_json
 
 NAME, VERSION = "toonset-palette", 1  # toonset.palette.formats.schema says what may change
@@ -33,7 +33,13 @@ def to_json(palette: Palette) -> dict[str, Any]:
     contour, evidence = palette.contour, palette.evidence
     return {
         "schema": f"{NAME}/{VERSION}",
-        "colors": [_record(color.rgb, color.share, color.name) for color in palette.colors],
+        "colors": [
+            {
+                **_record(color.rgb, color.share, color.name),
+                **({"tones": [_tone(tone) for tone in color.tones]} if color.tones else {}),
+            }
+            for color in palette.colors
+        ],
         "rule": palette.rule,
         "dropped": [
             {
@@ -52,7 +58,27 @@ def to_json(palette: Palette) -> dict[str, Any]:
             "one_less": round(evidence.one_less, 3),
             "one_more": round(evidence.one_more, 3),
         },
+        **_shaded_keys(palette),
     }
+
+
+def _shaded_keys(palette: Palette) -> dict[str, Any]:
+    """Return what only shaded sheets and those with features have."""
+    shadow = palette.shadow
+    keys: dict[str, Any] = {}
+    if shadow is not None:
+        keys["shadow"] = {
+            "factor": [round(value, 4) for value in shadow.factor],
+            "spread": [round(value, 4) for value in shadow.spread],
+            "bits": round(shadow.bits, 3),
+        }
+    if palette.features:
+        keys["features"] = [hex_of(rgb) for rgb in palette.features]
+    return keys
+
+
+def _tone(tone: Tone) -> dict[str, Any]:
+    return {"hex": hex_of(tone.rgb), "share": round(tone.share, 6)}
 
 
 def _entry(entry: Any, where: str) -> NamedColor:

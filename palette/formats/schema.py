@@ -25,6 +25,8 @@ from toonset.palette.palette import (
     Palette,
     PaletteColor,
     Place,
+    Shadow,
+    Tone,
 )
 from toonset.read import parse_json, read_whole, schema_version
 
@@ -55,6 +57,27 @@ class ColorRecord(Record):
     def rgb(self) -> RGB:
         """Return the colour as 8-bit sRGB."""
         return rgb_of_hex(self.hex, "hex")
+
+
+class ToneRecord(Record):
+    """A paint's colour in light or in shadow."""
+
+    hex: Hex
+    share: Share
+
+
+class PaintRecord(ColorRecord):
+    """A colour of the palette, perhaps with its tones."""
+
+    tones: list[ToneRecord] = []
+
+
+class ShadowRecord(Record):
+    """A sheet's shadow."""
+
+    factor: Annotated[list[Annotated[float, Field(gt=0, le=1)]], Field(min_length=3, max_length=3)]
+    spread: Annotated[list[Cost], Field(min_length=3, max_length=3)]
+    bits: float
 
 
 class PlaceRecord(Record):
@@ -88,12 +111,14 @@ class EvidenceRecord(Record):
 class PaletteRecord(Record):
     """The whole file."""
 
-    colors: Annotated[list[ColorRecord], Field(min_length=1, max_length=MAX_COLORS)]
+    colors: Annotated[list[PaintRecord], Field(min_length=1, max_length=MAX_COLORS)]
     rule: Line
     dropped: list[DroppedRecord] = []
     warnings: list[Line] = []
     contour: ContourRecord | None = None
     evidence: EvidenceRecord | None = None
+    shadow: ShadowRecord | None = None
+    features: list[Hex] = []
 
 
 def read_palette_json(path: Path) -> Palette:
@@ -121,7 +146,7 @@ def palette_of(content: Any, where: str) -> Palette:
         ) from error
     contour, evidence = record.contour, record.evidence
     return Palette(
-        tuple(PaletteColor(color.rgb, color.share, color.name) for color in record.colors),
+        tuple(_color(color) for color in record.colors),
         record.rule,
         tuple(_dropped(color) for color in record.dropped),
         tuple(record.warnings),
@@ -131,7 +156,19 @@ def palette_of(content: Any, where: str) -> Palette:
         None
         if evidence is None
         else Evidence(evidence.colors, evidence.one_less, evidence.one_more),
+        None if record.shadow is None else _shadow(record.shadow),
+        tuple(rgb_of_hex(one, "hex") for one in record.features),
     )
+
+
+def _color(color: PaintRecord) -> PaletteColor:
+    tones = tuple(Tone(rgb_of_hex(tone.hex, "hex"), tone.share) for tone in color.tones)
+    return PaletteColor(color.rgb, color.share, color.name, tones)
+
+
+def _shadow(shadow: ShadowRecord) -> Shadow:
+    (red, green, blue), spread = shadow.factor, shadow.spread
+    return Shadow((red, green, blue), (spread[0], spread[1], spread[2]), shadow.bits)
 
 
 def _dropped(color: DroppedRecord) -> DroppedColor:

@@ -33,12 +33,15 @@ class PaletteOptions:
         keep: 8-bit sRGB: the found colours nearest to these stay, however small they are.
         contour: count the drawn lines to their colour, as the paper does; False leaves that colour
             to what else is painted with it. Matters only where the lines are given.
+        features: keep small colours that recur at one place of the character; None: on sheets
+            that are shaded.
     """
 
     min_share: float = 0.05
     max_colors: int = MAX_COLORS
     keep: tuple[RGB, ...] = ()
     contour: bool = True
+    features: bool | None = None
 
     def __post_init__(self) -> None:
         """Refuse shares and numbers without a meaning.

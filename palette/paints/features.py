@@ -1,0 +1,74 @@
+"""Features: eyes, mouths, buttons, which cover too little for the rule but make the character.
+
+A colour under the rule is a feature if people tell it from every colour of the palette, and if it
+is where the character has it: at the same height in two drawings or more, for turning leaves
+heights as they are. In a single drawing it must be there twice, at one height.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.paints.clusters import UNLIKE
+from toonset.palette.palette import MAX_COLORS, Palette, Shadow
+from toonset.palette.pixels.labels import nearest_labels
+from toonset.palette.pixels.shadow import shaded
+
+RGB = tuple[int, int, int]
+
+PLACES = 2  # drawings that show it, or patches in a single one
+THICK = 3  # pixels: a patch of a blend is thinner
+LEFT = 2 * JUST_NOTICEABLE  # from a paint's colour in shadow: such a colour is a rest of it
+ALIKE = 0.05  # of the figure's height: heights of one feature differ by less, the median
+
+
+def find_features(
+    palette: Palette, pictures: Sequence[UInt8[np.ndarray, "_ _ 4"]], shadow: Shadow | None = None
+) -> tuple[RGB, ...]:
+    """Return those of a palette's left-out colours that are features.
+
+    Args:
+        palette: of the pictures.
+        pictures: the character on transparent ground, in light.
+        shadow: that was taken off: what looks like a colour of the palette in it was left there.
+    """
+    unlike = [color.rgb for color in palette.dropped if color.cost >= UNLIKE]
+    if shadow is not None:
+        shades = oklab_from_rgb(shaded(palette.rgb, shadow.factor))
+        unlike = [rgb for rgb in unlike if _away(rgb, shades) > LEFT]
+    listed = [*(color.rgb for color in palette.colors), *(color.rgb for color in palette.dropped)]
+    listed = listed[:MAX_COLORS]
+    labels = [nearest_labels(picture, np.array(listed, dtype=np.uint8)) for picture in pictures]
+    return tuple(
+        rgb for rgb in unlike if rgb in listed and _recurs(listed.index(rgb), labels, pictures)
+    )
+
+
+def _away(rgb: RGB, others: Float[np.ndarray, "n 3"]) -> float:
+    own = oklab_from_rgb(np.array(rgb, dtype=np.uint8))
+    return float(np.linalg.norm(others - own, axis=1).min())
+
+
+def _recurs(
+    number: int, labels: Sequence[UInt8[np.ndarray, "_ _"]], pictures: Sequence[np.ndarray]
+) -> bool:
+    """Return whether a label's patches are at one height of the figure."""
+    square = np.ones((THICK, THICK), dtype=np.uint8)
+    heights: list[float] = []
+    for label, picture in zip(labels, pictures, strict=True):
+        patches = cv2.morphologyEx((label == number).view(np.uint8), cv2.MORPH_OPEN, square)
+        if not patches.any():
+            continue
+        rows = np.flatnonzero((picture[..., 3] > 0).any(axis=1))
+        _, _, stats, centers = cv2.connectedComponentsWithStats(patches)
+        areas, level = stats[1:, cv2.CC_STAT_AREA], (centers[1:, 1] - rows[0]) / len(rows)
+        if len(pictures) > 1:  # of its largest patch
+            level = level[[int(areas.argmax())]]
+        heights += level.tolist()
+    off = np.abs(np.array(heights) - np.median(heights)) if heights else np.array([])
+    return int((off <= ALIKE).sum()) >= max(PLACES, (len(heights) + 1) // 2)

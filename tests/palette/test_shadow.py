@@ -1,0 +1,160 @@
+"""Sheets shaded in two tones: a paint is one colour with tones; flat sheets stay as they are."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.palette.shaded import EYE, FACTOR, PAINTS, Drawing, drawings
+from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.extract import extract_palette, label_drawings
+from toonset.palette.formats.json import to_json
+from toonset.palette.formats.schema import palette_of
+from toonset.palette.paints.features import find_features
+from toonset.palette.palette import Palette
+from toonset.palette.pixels.ink_lines import find_contour
+from toonset.palette.pixels.shadow import find_shadow, find_tones
+
+
+def pictures(drawn: list[Drawing]) -> list[np.ndarray]:
+    return [one.rgba for one in drawn]
+
+
+def contours(drawn: list[Drawing]) -> list[np.ndarray]:
+    return [find_contour(one.rgba) for one in drawn]
+
+
+def inner(paint: np.ndarray) -> np.ndarray:
+    """Return pixels two away from every border."""
+    square = np.ones((5, 5), dtype=np.uint8)
+    return (cv2.erode(paint, square) == cv2.dilate(paint, square)) & (paint < 255)
+
+
+def away(rgb: tuple[int, int, int], other: tuple[int, int, int]) -> float:
+    lab = oklab_from_rgb(np.array([rgb, other], dtype=np.uint8))
+    return float(np.linalg.norm(lab[0] - lab[1]))
+
+
+def test_a_shadow_is_found_with_its_factor_and_its_place() -> None:
+    drawn = drawings(shadow=True, noisy=True)
+    shadow = find_shadow(pictures(drawn), contours(drawn))
+    assert shadow is not None
+    assert shadow.factor == pytest.approx(FACTOR, abs=0.03)
+    for one, dark in zip(drawn, find_tones(pictures(drawn), contours(drawn), shadow), strict=True):
+        sure = inner(one.paint) & inner(one.dark.astype(np.uint8)) & (one.paint != 4)
+        assert (dark == one.dark)[sure].mean() > 0.95
+
+
+@pytest.mark.parametrize("noisy", [False, True])
+def test_a_flat_sheet_has_no_shadow(noisy: bool) -> None:
+    drawn = drawings(shadow=False, noisy=noisy)
+    assert find_shadow(pictures(drawn), contours(drawn)) is None
+
+
+def test_paint_that_is_darker_on_one_side_in_half_of_the_views_is_no_shadow() -> None:
+    half = [drawings(shadow=True, noisy=False, views=4, light=side) for side in (1, -1)]
+    drawn = [*half[0], *half[1]]
+    assert find_shadow(pictures(drawn), contours(drawn)) is None
+
+
+def test_the_light_may_be_on_the_other_side_and_the_drawing_larger() -> None:
+    drawn = drawings(shadow=True, noisy=False, light=-1)
+    large = [one.rgba.repeat(2, axis=0).repeat(2, axis=1) for one in drawn]
+    shadow = find_shadow(large, [find_contour(picture) for picture in large])
+    assert shadow is not None
+    assert shadow.factor == pytest.approx(FACTOR, abs=0.03)
+
+
+def test_pictures_without_room_have_no_shadow() -> None:
+    small = [np.full((h, w, 4), 255, dtype=np.uint8) for h, w in ((0, 0), (1, 9), (4, 4))]
+    assert find_shadow(small, [picture[..., 0] * 0 for picture in small]) is None
+    assert find_shadow([], []) is None
+    shaded = pictures(drawings(shadow=True, noisy=False))
+    assert extract_palette([*shaded, *small[1:]]).shadow is not None
+
+
+def test_paints_are_what_they_are_in_light_with_both_tones() -> None:
+    drawn = drawings(shadow=True, noisy=True)
+    palette = extract_palette(pictures(drawn), features=False)
+    assert len(palette.colors) == len(PAINTS)
+    paint = np.concatenate([one.paint.ravel() for one in drawn])
+    dark = np.concatenate([one.dark.ravel() for one in drawn])
+    figure = paint < 255
+    for number, rgb in enumerate(PAINTS):
+        color = min(palette.colors, key=lambda one: away(one.rgb, rgb))
+        assert away(color.rgb, rgb) < 0.02
+        light, shade = color.tones
+        assert light.rgb == color.rgb
+        assert away(shade.rgb, tuple(np.rint(np.multiply(rgb, FACTOR)).astype(int))) < 0.03
+        assert light.share + shade.share == pytest.approx(color.share)
+        for tone, where in ((light, ~dark), (shade, dark)):
+            true = (figure & where & (paint == number)).sum() / figure.sum()
+            assert tone.share == pytest.approx(true, abs=0.03)
+
+
+def test_labels_are_of_paints_whatever_their_tone() -> None:
+    drawn = drawings(shadow=True, noisy=True)
+    palette = extract_palette(pictures(drawn))
+    names = [min(range(5), key=lambda n: away(c.rgb, (*PAINTS, EYE)[n])) for c in palette.colors]
+    table = np.full(256, 255)
+    table[: len(names)] = names
+    found = label_drawings(pictures(drawn), contours(drawn), palette)
+    right, sure = 0, 0
+    for one, labels in zip(drawn, found, strict=True):
+        pure = inner(one.paint)
+        right += int((table[labels] == one.paint)[pure].sum())
+        sure += int(pure.sum())
+    assert right / sure > 0.95
+
+
+def test_small_eyes_are_features_of_a_shaded_sheet() -> None:
+    drawn = drawings(shadow=True, noisy=True)
+    palette = extract_palette(pictures(drawn))
+    (eye,) = palette.features
+    assert away(eye, EYE) < 0.05
+    assert eye in [color.rgb for color in palette.colors]
+    assert eye not in [color.rgb for color in palette.dropped]
+    plain = extract_palette(pictures(drawn), features=False)
+    assert plain.features == ()
+    assert [color.rgb for color in plain.dropped] == [eye]
+    few = extract_palette(pictures(drawn), max_colors=len(PAINTS))
+    assert few.features == ()
+
+
+def test_features_of_flat_sheets_are_kept_if_wanted() -> None:
+    drawn = pictures(drawings(shadow=False, noisy=False))
+    assert {color.rgb for color in extract_palette(drawn).colors} == set(PAINTS)
+    palette = extract_palette(drawn, features=True)
+    assert palette.features == (EYE,)
+    assert {color.rgb for color in palette.colors} == {*PAINTS, EYE}
+
+
+def test_spots_at_another_height_in_every_drawing_are_no_features() -> None:
+    drawn = drawings(shadow=False, noisy=False, eyes=False)
+    spotted = pictures(drawn)
+    assert find_features(_with_spots(spotted, [40] * 8), spotted) == (EYE,)
+    spotted = pictures(drawings(shadow=False, noisy=False, eyes=False))
+    heights = [20, 45, 70, 95, 120, 145, 170, 205]
+    assert find_features(_with_spots(spotted, heights), spotted) == ()
+
+
+def _with_spots(spotted: list[np.ndarray], heights: list[int]) -> Palette:
+    """Draw a white spot into every picture and return their palette."""
+    for picture, row in zip(spotted, heights, strict=True):
+        picture[row : row + 9, 62:72] = (*EYE, 255)
+    return extract_palette(spotted)
+
+
+def test_only_shaded_sheets_and_features_add_to_the_file() -> None:
+    added = {"shadow", "features"}
+    flat = to_json(extract_palette(pictures(drawings(shadow=False, noisy=False))))
+    assert not added & set(flat)
+    assert all("tones" not in color for color in flat["colors"])
+    palette = extract_palette(pictures(drawings(shadow=True, noisy=False)))
+    content = to_json(palette)
+    assert added <= set(content)
+    again = palette_of(content, "palette.json")
+    assert to_json(again) == content
+    assert again.features == palette.features
+    assert to_json(replace(again, shadow=None, features=())).keys() == flat.keys()
