@@ -27,8 +27,9 @@ def without_body_if_better(
 ) -> Calibration | None:
     """Return the calibration without a body if it explains the drawings better, else None.
 
-    Nothing is tried where the mannequin's cameras are certain, or, where somebody gave it, not
-    failed; nor where landmarks, cameras or locks belong to it.
+    A body that explains nothing loses to drawings that cohere; else paint, faces, detail, outlines
+    and layout decide. Nothing is tried where the mannequin's cameras are certain, or, where
+    somebody gave it, not failed; nor where landmarks, cameras or locks belong to it.
 
     Args:
         views: the drawings.
@@ -41,7 +42,9 @@ def without_body_if_better(
     if fine or len(views) < FEWEST or known.landmarks or known.cameras or known.locked:
         return None
     alone = calibrate_without_body(views, known, tell)
-    if _odds(views, alone, found, known) <= 0:
+    explains = found.verdict != "failed"
+    worse = _odds(views, alone, found, known) <= 0 if explains else alone.verdict == "failed"
+    if worse:
         return None
     if not given:
         return alone

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
@@ -14,11 +15,13 @@ from toonset.calib.known import Known
 from toonset.calib.verdict.judge import SURE
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
+from toonset.calib.without_body.rival import WITHOUT
 from toonset.calib.without_body.turns import is_even, possible_turns, wrapped
 from toonset.calib.write_bundle import write_bundle
 from toonset.camera import Camera
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.errors import UsageError
+from toonset.mesh import Mesh
 from toonset.view import View
 
 SIDE = 120
@@ -138,6 +141,25 @@ def test_a_bundle_without_a_body_has_no_mannequin(tmp_path: Path) -> None:
     assert names == ["calibration.json", "images", "overlay.png", "transforms.json"]
     off = wrapped(yaws_of([frame.camera for frame in bundle.scene.frames]) - RING)
     np.testing.assert_allclose(off, 0, atol=1e-6)
+
+
+def test_a_body_that_explains_nothing_loses_to_none() -> None:
+    found = calibrate(sheet(RING))  # the plain body has legs and arms
+    assert found.mesh is None
+    assert found.verdict != "failed"
+    off = wrapped(yaws_of([view.camera for view in found.views]) - RING)
+    assert np.abs(off).max() < np.radians(22.5)
+    labels = Hints(labels="front,45,left,135,back,225,right,315")
+    pole = load_mesh_of_a_pole()
+    given = calibrate(sheet(RING), pole, labels)
+    assert (given.mesh, given.verdict) == (None, "weak")
+    assert given.views[0].reason == WITHOUT
+
+
+def load_mesh_of_a_pole() -> Mesh:
+    """Return a mesh that no drawing resembles."""
+    made = trimesh.creation.box((0.05, 2.0, 0.02))
+    return Mesh(np.array(made.vertices), np.array(made.faces))
 
 
 def test_what_belongs_to_a_mannequin_is_refused_without_one() -> None:
