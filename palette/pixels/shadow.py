@@ -318,5 +318,6 @@ def _nearest(values: np.ndarray, pure: Mask) -> np.ndarray:
     """Return the value of the nearest pure pixel."""
     from scipy.ndimage import distance_transform_edt
 
-    rows, columns = distance_transform_edt(~pure, return_distances=False, return_indices=True)
-    return values[rows, columns]
+    found = distance_transform_edt(~pure, return_distances=False, return_indices=True)
+    assert isinstance(found, np.ndarray)
+    return values[found[0], found[1]]

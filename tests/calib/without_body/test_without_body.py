@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +53,7 @@ def drawing(yaw: float, elevation: float, name: str = "000.png") -> View:
     return View(rgba, (0, 0, SIDE, SIDE), 0.0, name)
 
 
-def sheet(yaws: Sequence[float], elevation: float = 0.17) -> list[View]:
+def sheet(yaws: Iterable[float], elevation: float = 0.17) -> list[View]:
     return [drawing(yaw, elevation, f"{i:03d}.png") for i, yaw in enumerate(yaws)]
 
 
