@@ -43,6 +43,7 @@ from toonset.nerf.training import with_drawings
 from toonset.palette.palette import Palette
 from toonset.view import over_white
 
+STEPS: int | None = None  # of the optimiser: what users get
 SILENT, REPAIRED, REFUSED, CRASHED = "silent", "repaired", "refused", "crashed"
 WARNED = "palette warned"
 
@@ -105,7 +106,7 @@ def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
     try:
         scene = draw()
         ready, palette = labelled(scene.train)
-        training = fit_field(ready, TrainOptions(seed=seed))
+        training = fit_field(ready, TrainOptions(steps=STEPS, seed=seed))
         training = replace(training, result=with_drawings(training, ready))
         field, layer = training.result, default_layer(training.result)
         views = [render(field, frame.camera).picture(layer) for frame in scene.test.frames]
