@@ -15,7 +15,7 @@ DEVICES = ("auto", "cpu", "cuda")
 PRESETS = ("fast", "paper")
 LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
 LEAST |= {"smoothness": 0, "palette_weight": 0}
-STEPS, STEPS_ON_SHAPE = 600, 300  # by default: without the mannequin's shape, and with it
+USUAL_STEPS, STEPS_ON_SHAPE = 600, 300  # by default: without the mannequin's shape, and with it
 PAPER_STEPS = 2000
 
 

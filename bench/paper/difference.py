@@ -19,7 +19,7 @@ from bench.paper.table import AFTER, BEFORE, LOWER, METRICS
 from bench.records.record import aligned
 from bench.train.plan import METHODS, PALETTES, PAPER
 from bench.train.run import RunResult
-from toonset.nerf.options import STEPS
+from toonset.nerf.options import USUAL_STEPS
 
 CONFIDENCE = 0.95
 BARE, *WITH_PALETTE = PALETTES
@@ -201,4 +201,4 @@ def _method(palette: str, steps: int) -> str:
 def _steps(name: str) -> int:
     options = PAPER[name].options
     assert options is not None
-    return options.steps or STEPS
+    return options.steps or USUAL_STEPS

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from bench.cases.cases import TrainCase
 from bench.charts.chart import DEFAULT
 from bench.train.plan import METHODS, PAPER, PAPER_STEPS, Job, side_px, view_counts
-from toonset.nerf.options import STEPS
+from toonset.nerf.options import USUAL_STEPS
 
 CASES, SEEDS, VIEWS = 8, 3, 8
 QUICK_CASES = 3  # of each condition and size, with one seed and the fewest iterations
@@ -43,7 +43,7 @@ def paper_plan(cases: Sequence[TrainCase], seed: int, only: str, *, quick: bool)
 
 def _steps(method: str) -> int:
     options = METHODS[method].options
-    return 0 if options is None else options.steps or STEPS
+    return 0 if options is None else options.steps or USUAL_STEPS
 
 
 def _has_palette(case: TrainCase, method: str) -> bool:

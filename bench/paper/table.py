@@ -14,7 +14,7 @@ from bench.charts.chart import DEFAULT
 from bench.records.record import aligned
 from bench.train.plan import METHODS, PAPER
 from bench.train.run import RunResult, reached
-from toonset.nerf.options import STEPS
+from toonset.nerf.options import USUAL_STEPS
 
 METRICS = ("psnr", "ssim", "flip", "lpips")
 LOWER = ("flip", "lpips")  # are errors
@@ -41,7 +41,7 @@ def paper_rows(runs: Sequence[RunResult]) -> list[dict[str, Any]]:
                 "condition": group,
                 "method": "paper" if method in PAPER else method,
                 "palette": METHODS[method].palette,
-                "iterations": options.steps or STEPS,
+                "iterations": options.steps or USUAL_STEPS,
                 "layer": layer,
                 "n": len({run.case for run in found}),
                 "trainings": len(found),

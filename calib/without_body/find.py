@@ -22,7 +22,7 @@ from toonset.calib.known import Known
 from toonset.calib.options import Progress
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.verdict.judge import SURE, judge_sheet
-from toonset.calib.without_body.placing import Figures, Placed, place
+from toonset.calib.without_body.placing import Figures, SheetCameras, place
 from toonset.calib.without_body.posterior import (
     Doubts,
     Evidence,
@@ -34,9 +34,10 @@ from toonset.calib.without_body.turns import (
     NEAR,
     P_FRONT_FIRST,
     STARTS,
-    Turns,
+    TurnHypotheses,
     is_even,
-    possible_turns,
+    labelled,
+    turn_hypotheses,
     wrapped,
 )
 from toonset.calib.without_body.uneven import uneven_yaws
@@ -52,6 +53,7 @@ LEAST_GAIN = 2.0  # nats, of free yaws over an even ring
 LEAST_YAW_SIGMA, YAW_PER_APART, FREE_SIGMA = np.radians(1.0), np.radians(200.0), np.radians(7.0)
 ROLL_SIGMA, SCALE_SIGMA, SHIFT = np.radians(1.0), 0.01, 0.01  # the last of the height
 WEAK_APART, FAILED_APART = 0.03, 0.06  # of the height
+FEWEST_TO_CONFIRM = 3  # views
 MOST_AGAINST = 3.0  # nats by which drawings speak against a label
 MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 4, 0.01
 
@@ -69,11 +71,11 @@ class Found:
         is_even: it is an even ring.
     """
 
-    turns: Turns
+    turns: TurnHypotheses
     posterior: Float[np.ndarray, " turns"]
     log_likelihood: Float[np.ndarray, " turns"]
     chosen: int
-    placed: Placed
+    placed: SheetCameras
     is_even: bool
 
 
@@ -95,7 +97,7 @@ def calibrate_without_body(
     weighed = time.perf_counter()
     progress("cameras", 0.0)
     yaws = turns.yaws[chosen]
-    even = is_even(yaws) or any(known.labels)
+    even = is_even(yaws)
     placed = place(figures, yaws, 0.0 if even else float(FREE_YAW))
     found = Found(turns, posterior, likelihood, chosen, placed, even)
     seconds = {"turns": weighed - began, "cameras": time.perf_counter() - weighed}
@@ -104,13 +106,13 @@ def calibrate_without_body(
 
 def _weighed(
     figures: Figures, labels: Sequence[Label]
-) -> tuple[Turns, Float[np.ndarray, " turns"], Float[np.ndarray, " turns"]]:
+) -> tuple[TurnHypotheses, Float[np.ndarray, " turns"], Float[np.ndarray, " turns"]]:
     """Return the turns, their probabilities and the drawings' part in them, nats."""
     views = len(figures.views)
     evidence = Evidence.of(figures.views)
-    turns = possible_turns(views, labels)
+    turns = turn_hypotheses(views, labels)
     if views in FREE_VIEWS and not (labels and all(labels)):
-        turns = _with_free(figures, evidence, turns)
+        turns = _with_free(figures, evidence, turns, labels)
     outlines = outlines_log_likelihood(figures, turns) if views > 1 else np.zeros(len(turns.yaws))
     likelihood = evidence.log_likelihood(turns.yaws, outlines)
     total = turns.log_prior + likelihood
@@ -118,7 +120,9 @@ def _weighed(
     return turns, posterior / posterior.sum(), likelihood
 
 
-def _with_free(figures: Figures, evidence: Evidence, turns: Turns) -> Turns:
+def _with_free(
+    figures: Figures, evidence: Evidence, turns: TurnHypotheses, labels: Sequence[Label]
+) -> TurnHypotheses:
     """Return the turns, the even ones replaced where drawings prove that theirs is another."""
     relative, gain = uneven_yaws(figures, evidence.paint)
     if gain < LEAST_GAIN:
@@ -126,7 +130,8 @@ def _with_free(figures: Figures, evidence: Evidence, turns: Turns) -> Turns:
     rows = np.arange(3 * STARTS) * 2 * np.pi / (3 * STARTS)
     first = np.full(len(rows), np.log((1 - P_FRONT_FIRST) / (len(rows) - 1)))
     first[0] = np.log(P_FRONT_FIRST)
-    return Turns(rows[:, None] + relative, first, np.zeros(len(rows)))
+    free = TurnHypotheses(rows[:, None] + relative, first, np.zeros(len(rows)))
+    return labelled(free, labels) if any(labels) else free
 
 
 def _judged(
@@ -144,7 +149,7 @@ def _judged(
     judged = []
     for i, (view, camera) in enumerate(zip(views, placed.cameras, strict=True)):
         verdict, reason = _verdict(
-            len(views), apart, float(wrong[i]), doubt, against, labelled=bool(labels and labels[i])
+            len(views), apart, float(wrong[i]), doubt, against, has_label=bool(labels and labels[i])
         )
         if verdict == "ok" and i == odd:
             verdict, reason = "weak", "disagrees with the other drawings"
@@ -189,12 +194,14 @@ def _judged(
 
 
 def _verdict(
-    views: int, apart: float, wrong: float, doubt: Doubts, against: float, *, labelled: bool
+    views: int, apart: float, wrong: float, doubt: Doubts, against: float, *, has_label: bool
 ) -> tuple[Verdict, str]:
     if views == 1:
-        if labelled:
+        if has_label:
             return "weak", "a single drawing: nothing confirms its label, scale and elevation"
         return "ambiguous", "a single drawing without a body shows no direction"
+    if views < FEWEST_TO_CONFIRM and has_label:
+        return "weak", "two drawings: nothing confirms their labels, scale and elevation"
     if apart > FAILED_APART:
         off = f"{100 * apart:.1f} % of the height"
         return "failed", f"the outlines are {off} from being one turning body's"
@@ -203,7 +210,7 @@ def _verdict(
         kinds["where the axis lies"] = doubt.spacing
         kind, p = max(kinds.items(), key=lambda pair: pair[1])
         return "ambiguous", f"{kind} is open: p = {p:.2f} that it is another"
-    if not labelled:
+    if not has_label:
         return "weak", "no body, no label: only faces, paint and layout tell the front"
     if against > MOST_AGAINST:
         return "weak", "what is drawn speaks for another direction: is a label wrong?"

@@ -40,7 +40,7 @@ LEAST_SIGMA = np.radians(1.5)  # of the elevation
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class SheetCameras:
     """A sheet's cameras under one turn.
 
     Attributes:
@@ -111,7 +111,7 @@ def coherence_log_likelihood(
     return -0.5 * MEASUREMENTS * views * np.log(np.square(apart) + floor**2)
 
 
-def place(figures: Figures, yaws: Float[np.ndarray, " views"], yaw_sigma: float) -> Placed:
+def place(figures: Figures, yaws: Float[np.ndarray, " views"], yaw_sigma: float) -> SheetCameras:
     """Return cameras of the turn whose outlines cohere best.
 
     Args:
@@ -122,7 +122,7 @@ def place(figures: Figures, yaws: Float[np.ndarray, " views"], yaw_sigma: float)
     views = len(figures.views)
     prior = elevation_log_prior(ELEVATIONS)
     if views < 3:
-        return Placed(
+        return SheetCameras(
             tuple(figures.cameras(yaws, USUAL)), np.zeros(views), float(USUAL), float(SPREAD), 0.0
         )
     tried, worth = [], []
@@ -161,7 +161,7 @@ def size_of_figures(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[f
     return float(np.median(heights)), max(reach)
 
 
-def _fitted(figures: Figures, cameras: list[Camera], yaw_sigma: float, rounds: int) -> Placed:
+def _fitted(figures: Figures, cameras: list[Camera], yaw_sigma: float, rounds: int) -> SheetCameras:
     outlines = outlines_of(cameras, figures.alphas)
     ratio = outlines.ratio(cameras[0])
     fit = fit_turns(outlines, np.full(len(cameras), yaw_sigma), 0.0, TAU, rounds)
@@ -170,7 +170,7 @@ def _fitted(figures: Figures, cameras: list[Camera], yaw_sigma: float, rounds: i
         for camera, view, own in zip(cameras, outlines.views, fit.numbers, strict=True)
     ]
     apart = fit.apart_px[1] / ratio / figures.height_px
-    return Placed(tuple(moved), fit.numbers[:, 3], cameras[0].angles[1], 0.0, apart)
+    return SheetCameras(tuple(moved), fit.numbers[:, 3], cameras[0].angles[1], 0.0, apart)
 
 
 def _box(view: View) -> tuple[Float[np.ndarray, " 2"], Float[np.ndarray, " 2"]]:

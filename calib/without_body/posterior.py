@@ -26,7 +26,7 @@ from toonset.calib.without_body.placing import (
     coherence_log_likelihood,
     elevation_log_prior,
 )
-from toonset.calib.without_body.turns import NEAR, Turns, wrapped
+from toonset.calib.without_body.turns import NEAR, TurnHypotheses, wrapped
 from toonset.view import View
 
 HEIGHT_PX = 160  # working height of a figure
@@ -76,7 +76,7 @@ class Evidence:
         )
 
 
-def outlines_log_likelihood(figures: Figures, turns: Turns) -> Float[np.ndarray, " turns"]:
+def outlines_log_likelihood(figures: Figures, turns: TurnHypotheses) -> Float[np.ndarray, " turns"]:
     """Return the log-likelihood of the outlines under every turn, elevations integrated out.
 
     A common yaw changes nothing, so one turn of every pattern is looked at.
@@ -106,24 +106,23 @@ class Doubts:
     spacing: float
 
 
-def doubts(turns: Turns, posterior: Float[np.ndarray, " turns"], chosen: int) -> Doubts:
+def doubts(turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen: int) -> Doubts:
     """Return the doubts about a turn."""
     yaws = turns.yaws[chosen]
 
-    def mass(other: Float[np.ndarray, " views"]) -> tuple[float, np.ndarray]:
+    def mass(other: Float[np.ndarray, " views"]) -> float:
         there = (np.abs(wrapped(turns.yaws - other)) <= NEAR).all(axis=1)
-        return float(posterior[there].sum()), there
+        return float(posterior[there].sum())
 
-    right, _ = mass(yaws)
-    front, _ = mass(yaws + np.pi)
-    way = mass(2 * yaws[0] - yaws)[0] + mass(2 * yaws[0] + np.pi - yaws)[0]
+    right, front = mass(yaws), mass(yaws + np.pi)
+    way = mass(2 * yaws[0] - yaws) + mass(2 * yaws[0] + np.pi - yaws)
     if np.abs(wrapped(2 * (yaws - yaws[0]))).max() < NEAR:  # front and back only
         way = 0.0
     return Doubts(front, way, max(0.0, 1 - right - front - way))
 
 
 def view_doubt(
-    turns: Turns, posterior: Float[np.ndarray, " turns"], chosen: int
+    turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen: int
 ) -> Float[np.ndarray, " views"]:
     """Return the probability of every view that it is seen from elsewhere."""
     away = np.abs(wrapped(turns.yaws - turns.yaws[chosen])) > NEAR

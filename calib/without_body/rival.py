@@ -14,7 +14,7 @@ from toonset.calib.result import Calibration
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, coherence_log_likelihood
 from toonset.calib.without_body.posterior import ROUGH, Evidence
-from toonset.calib.without_body.turns import NEAR, STARTS, possible_turns, wrapped
+from toonset.calib.without_body.turns import NEAR, STARTS, turn_hypotheses, wrapped
 from toonset.view import View
 
 FEWEST = 3  # views: fewer say nothing by themselves
@@ -59,7 +59,7 @@ def without_body_if_better(
 def _odds(views: Sequence[View], one: Calibration, other: Calibration, known: Known) -> float:
     """Return by how many nats the first calibration's cameras are the likelier ones."""
     figures, evidence = Figures(views), Evidence.of(views)
-    turns = possible_turns(len(views), known.labels)
+    turns = turn_hypotheses(len(views), known.labels)
     cameras = [[view.camera for view in found.views] for found in (one, other)]
     yaws = np.array([[camera.angles[0] for camera in own] for own in cameras])
     apart = np.array([figures.contradiction(own) for own in cameras])

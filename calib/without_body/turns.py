@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -33,7 +32,7 @@ FEW: dict[int, tuple[tuple[float, ...], ...]] = {  # degrees
 
 
 @dataclass(frozen=True, eq=False)
-class Turns:
+class TurnHypotheses:
     """Where the views may be seen from: alternatives.
 
     Attributes:
@@ -47,7 +46,7 @@ class Turns:
     pattern: Float[np.ndarray, " turns"]
 
 
-def possible_turns(views: int, labels: Sequence[Label] = ()) -> Turns:
+def turn_hypotheses(views: int, labels: Sequence[Label] = ()) -> TurnHypotheses:
     """Return the turns that `views` drawings may be, with their log probabilities.
 
     Args:
@@ -68,11 +67,11 @@ def possible_turns(views: int, labels: Sequence[Label] = ()) -> Turns:
                 yaws.append(start * 2 * np.pi / STARTS + way * steps)
                 log_prior.append(np.log(share * p_way * p_start))
                 pattern.append(2 * number + (way < 0))
-    found = Turns(np.array(yaws), np.array(log_prior), np.array(pattern))
-    return _labelled(found, labels) if any(labels) else found
+    found = TurnHypotheses(np.array(yaws), np.array(log_prior), np.array(pattern))
+    return labelled(found, labels) if any(labels) else found
 
 
-def _labelled(turns: Turns, labels: Sequence[Label]) -> Turns:
+def labelled(turns: TurnHypotheses, labels: Sequence[Label]) -> TurnHypotheses:
     """Return the turns as labels make them likely, and the labels' own readings."""
     log_prior = turns.log_prior + sum(
         np.where(_is_near(turns.yaws[:, i], label), 0.0, np.log(P_LABEL_WRONG))
@@ -80,12 +79,12 @@ def _labelled(turns: Turns, labels: Sequence[Label]) -> Turns:
         if label
     )
     if not all(labels):
-        return Turns(turns.yaws, log_prior, turns.pattern)
+        return TurnHypotheses(turns.yaws, log_prior, turns.pattern)
     rows, odds = label_rows(tuple(labels))
     whole = np.isfinite(rows).all(axis=1)
     rows, odds = rows[whole], odds[whole] + np.log(P_AS_LABELLED)
     own = turns.pattern.max() + 1 + np.arange(len(rows))
-    return Turns(
+    return TurnHypotheses(
         np.concatenate([turns.yaws, rows]),
         np.concatenate([log_prior, odds]),
         np.concatenate([turns.pattern, own]),
@@ -101,7 +100,8 @@ def wrapped(angles: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
     return (angles + np.pi) % (2 * np.pi) - np.pi
 
 
-def is_even(yaws: Sequence[float]) -> bool:
-    """Return whether yaws, in their order, are an even ring."""
-    steps = wrapped(np.array([b - a for a, b in pairwise([*yaws, yaws[0]])]))
-    return bool(np.allclose(np.abs(steps), 2 * np.pi / len(yaws), atol=1e-6))
+def is_even(yaws: Float[np.ndarray, " views"]) -> bool:
+    """Return whether four yaws or more, in their order, are an even ring."""
+    steps = wrapped(np.diff(np.append(yaws, yaws[0])))
+    one_way = np.allclose(steps, steps[0], atol=1e-6)
+    return len(yaws) >= 4 and one_way and bool(np.isclose(abs(steps[0]), 2 * np.pi / len(yaws)))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf.options import STEPS, STEPS_ON_SHAPE
+from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS
 from toonset.nerf.prepare.symmetry import with_mirrored
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.baked import Baked
@@ -98,7 +98,7 @@ def _measured(worst: LeftOut) -> str:
 def _remedy(training: Training, worst: LeftOut, *, stands_out: bool) -> str:
     """Return what helps, by what is most likely the cause."""
     done = len(training.history)
-    usual = STEPS_ON_SHAPE if training.prepared.shape else STEPS
+    usual = STEPS_ON_SHAPE if training.prepared.shape else USUAL_STEPS
     ended = training.stopped in ("steps", "budget") and training.options.field != "hull"
     if ended and done < usual // 2:
         return f"these were {done} steps: train longer"

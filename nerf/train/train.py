@@ -31,7 +31,7 @@ from toonset.nerf.hull.scene_hull import VOXELS, VOXELS_PER_PX, as_stored, hull_
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
-from toonset.nerf.options import STEPS, STEPS_ON_SHAPE, TrainOptions
+from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint import Depths
 from toonset.nerf.prepare.prepare import Prepared, prepared, with_paint
 from toonset.nerf.prepare.symmetry import completed, with_mirrored
@@ -95,7 +95,7 @@ def fit_field(
     tell("comparing the drawings")
     ready = prepared(scene, options)
     if options.steps is None:
-        options = replace(options, steps=STEPS_ON_SHAPE if ready.shape else STEPS)
+        options = replace(options, steps=STEPS_ON_SHAPE if ready.shape else USUAL_STEPS)
     whole, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")

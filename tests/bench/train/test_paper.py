@@ -21,7 +21,7 @@ from bench.train.plan import METHODS, PAPER, Job, Method
 from bench.train.run import RunResult, Seen, run_job
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.options import STEPS, TrainOptions
+from toonset.nerf.options import USUAL_STEPS, TrainOptions
 from toonset.nerf.score.evaluation_picture import TILE_PX
 from toonset.nerf.score.metrics_view import Judges
 
@@ -68,8 +68,8 @@ def test_the_table_has_a_row_per_palette_steps_and_layer() -> None:
         ("paper", "no palette", 200, "field"),
         ("paper", "automatic palette", 2000, "field"),
         ("paper", "automatic palette", 2000, "classifier"),
-        ("default", "automatic palette", STEPS, "field"),
-        ("default", "automatic palette", STEPS, "classifier"),
+        ("default", "automatic palette", USUAL_STEPS, "field"),
+        ("default", "automatic palette", USUAL_STEPS, "classifier"),
     ]
     assert [row["psnr"] for row in rows] == [20.0, 26.0, 24.0, 27.5, 27.2]
     assert rows[1]["lpips"] is None
@@ -103,7 +103,7 @@ def test_a_stopped_plan_has_all_palettes_of_what_it_has_come_to() -> None:
     jobs = paper_plan(own, 5, "", quick=False)
     assert len(jobs) == CASES * (len(PAPER) * SEEDS + 1)
     options = [METHODS[job.method].options for job in jobs]
-    steps = [found.steps or STEPS for found in options if found]
+    steps = [found.steps or USUAL_STEPS for found in options if found]
     assert steps == sorted(steps)
     few = jobs[: steps.count(200)]
     keys = [(job.seed, job.case.name) for job in few]

@@ -16,7 +16,7 @@ from toonset.calib.verdict.judge import SURE
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
 from toonset.calib.without_body.rival import WITHOUT
-from toonset.calib.without_body.turns import is_even, possible_turns, wrapped
+from toonset.calib.without_body.turns import is_even, turn_hypotheses, wrapped
 from toonset.calib.write_bundle import write_bundle
 from toonset.camera import Camera
 from toonset.dataset.split_folder.view_labels import parse_labels
@@ -63,20 +63,20 @@ def yaws_of(cameras: Sequence[Camera]) -> np.ndarray:
 
 @pytest.mark.parametrize("views", range(1, 10))
 def test_turns_are_alternatives_and_labels_outweigh_them(views: int) -> None:
-    turns = possible_turns(views)
+    turns = turn_hypotheses(views)
     assert np.exp(turns.log_prior).sum() == pytest.approx(1)
     assert turns.yaws.shape == (len(turns.log_prior), views)
     if views >= 4:
         assert is_even(turns.yaws[int(turns.log_prior.argmax())])
     labels = parse_labels(",".join(["?"] * (views - 1) + ["back"]), views)
-    labelled = possible_turns(views, labels)
+    labelled = turn_hypotheses(views, labels)
     best = labelled.yaws[int(labelled.log_prior.argmax())]
     assert abs(wrapped(best[-1] - np.pi)) < 0.4
 
 
 def test_odd_labels_are_read_as_they_are() -> None:
     labels = parse_labels("10,70,200", 3)
-    turns = possible_turns(3, labels)
+    turns = turn_hypotheses(3, labels)
     best = turns.yaws[int(turns.log_prior.argmax())]
     np.testing.assert_allclose(np.degrees(best), [10, 70, 200])
 
@@ -105,6 +105,23 @@ def test_five_views_may_stand_anywhere() -> None:
     assert np.degrees(np.median(np.abs(off - np.median(off)))) < 10
 
 
+def test_a_label_places_views_that_stand_anywhere() -> None:
+    yaws = np.radians([125.0, 165.0, 225.0, 275.0, 0.0])
+    labels = parse_labels("?,?,?,?,front", 5)
+    found = calibrate_without_body(sheet(yaws), Known(labels=labels))
+    off = np.degrees(wrapped(yaws_of([view.camera for view in found.views]) - yaws))
+    assert abs(off[-1]) < 22.5
+    assert np.median(np.abs(off)) < 15
+    assert found.views[0].sigmas.yaw > np.radians(5)  # no even turn: its yaws are fitted
+
+
+def test_rings_go_one_way_round() -> None:
+    assert is_even(RING)
+    assert is_even(-RING + 1)
+    assert not is_even(np.array([0, 1, 0, 1]) * np.pi / 2)
+    assert not is_even(np.array([0.0, np.pi]))
+
+
 def test_labels_settle_what_is_in_doubt() -> None:
     labels = parse_labels(",".join(f"{yaw:.0f}" for yaw in np.degrees(RING)), 8)
     found = calibrate_without_body(sheet(RING), Known(labels=labels))
@@ -119,6 +136,8 @@ def test_labels_settle_what_is_in_doubt() -> None:
 
 def test_drawings_that_are_no_turn_are_never_ok() -> None:
     one, view = drawing(0.0, 0.1), sheet([0.0])[0]
+    pair = calibrate_without_body(sheet(RING[:3:2]), Known(labels=parse_labels("front,left", 2)))
+    assert (pair.verdict, pair.views[0].sigmas.yaw > np.radians(5)) == ("weak", True)
     alone = calibrate_without_body([view], Known())
     assert (alone.verdict, alone.views[0].verdict) == ("ambiguous", "ambiguous")
     same = calibrate_without_body([one] * 4, Known())
@@ -150,13 +169,13 @@ def test_a_body_that_explains_nothing_loses_to_none() -> None:
     off = wrapped(yaws_of([view.camera for view in found.views]) - RING)
     assert np.abs(off).max() < np.radians(22.5)
     labels = Hints(labels="front,45,left,135,back,225,right,315")
-    pole = load_mesh_of_a_pole()
+    pole = pole_mesh()
     given = calibrate(sheet(RING), pole, labels)
     assert (given.mesh, given.verdict) == (None, "weak")
     assert given.views[0].reason == WITHOUT
 
 
-def load_mesh_of_a_pole() -> Mesh:
+def pole_mesh() -> Mesh:
     """Return a mesh that no drawing resembles."""
     made = trimesh.creation.box((0.05, 2.0, 0.02))
     return Mesh(np.array(made.vertices), np.array(made.faces))

@@ -14,7 +14,7 @@ import pytest
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.hull.tolerance import HullEvidence
-from toonset.nerf.options import STEPS, TrainOptions
+from toonset.nerf.options import USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.prepare import Prepared
 from toonset.nerf.prepare.registration import Registration
 from toonset.nerf.prepare.symmetry import Symmetry
@@ -26,7 +26,7 @@ from toonset.nerf.train.result import Step, Training
 
 SIDE, HEIGHT = 120, 80
 TURN = tuple(range(0, 360, 45))
-DONE = (Step(1, 0.0, 0.0, 0.0, 0.0),) * STEPS
+DONE = (Step(1, 0.0, 0.0, 0.0, 0.0),) * USUAL_STEPS
 
 
 def disc(
