@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -69,6 +70,17 @@ def calibrate(
         str,
         typer.Option("--views", metavar="LABELS", help=LABELS_HELP, rich_help_panel=KNOWN_PANEL),
     ] = "",
+    front: Annotated[
+        int | None,
+        typer.Option(
+            "--front",
+            metavar="N",
+            min=0,
+            help="Number of the view that shows the front, as in overlay.png; of the others nothing "
+            "is said.",
+            rich_help_panel=KNOWN_PANEL,
+        ),
+    ] = None,
     landmarks: Annotated[
         Path | None,
         typer.Option(
@@ -131,10 +143,14 @@ def calibrate(
     from toonset.dataset.mesh.load import load_mesh
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
+    from toonset.dataset.split_folder.view_labels import front_label
+    from toonset.errors import UsageError
 
     lock = tuple(lock.value for lock in locked or ())
     hints = Hints(labels, landmarks, landmarks_only, init, lock)
     hints.check()
+    if front is not None and labels:
+        raise UsageError("--front says what --views says; drop one")
     Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet, verbose)
     given = None if str(mesh) == NO_BODY else mesh
@@ -145,6 +161,9 @@ def calibrate(
     sheet = split_sheet(
         sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
     )
+
+    if front is not None:
+        hints = replace(hints, labels=front_label(front, len(sheet.views)))
 
     @cache
     def say_inputs() -> None:  # once, when nothing of them is refused any more

@@ -55,6 +55,7 @@ ROLL_SIGMA, SCALE_SIGMA, SHIFT = np.radians(1.0), 0.01, 0.01  # the last of the 
 WEAK_APART, FAILED_APART = 0.03, 0.06  # of the height
 FEWEST_TO_CONFIRM = 3  # views
 MOST_AGAINST = 3.0  # nats by which drawings speak against a label
+ASK = "say which view is the front, such as --front 0"
 MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 4, 0.01
 
 
@@ -148,9 +149,7 @@ def _judged(
     sigmas = _sigmas(figures, found)
     judged = []
     for i, (view, camera) in enumerate(zip(views, placed.cameras, strict=True)):
-        verdict, reason = _verdict(
-            len(views), apart, float(wrong[i]), doubt, against, has_label=bool(labels and labels[i])
-        )
+        verdict, reason = _verdict(found, labels, apart, float(wrong[i]), doubt, against)
         if verdict == "ok" and i == odd:
             verdict, reason = "weak", "disagrees with the other drawings"
         own = cohering.views[i] if cohering else None
@@ -171,9 +170,8 @@ def _judged(
         )
     state = SheetState(True, float("nan"), odd, len(views), placed.elevation)
     verdict, reason = judge_sheet(judged, state)
-    text = _doubts_text(doubt) + (
-        f"; {_ask(len(views))}" if verdict != "ok" and not any(labels) else ""
-    )
+    reason = "" if verdict == "ok" else reason
+    text = _doubts_text(doubt) + (f"; {ASK}" if verdict != "ok" and not any(labels) else "")
     near = placed.cameras[0].k
     return Calibration(
         tuple(judged),
@@ -194,8 +192,9 @@ def _judged(
 
 
 def _verdict(
-    views: int, apart: float, wrong: float, doubt: Doubts, against: float, *, has_label: bool
+    found: Found, labels: Sequence[Label], apart: float, wrong: float, doubt: Doubts, against: float
 ) -> tuple[Verdict, str]:
+    views, has_label = len(found.placed.cameras), any(labels)
     if views == 1:
         if has_label:
             return "weak", "a single drawing: nothing confirms its label, scale and elevation"
@@ -212,15 +211,13 @@ def _verdict(
         return "ambiguous", f"{kind} is open: p = {p:.2f} that it is another"
     if not has_label:
         return "weak", "no body, no label: only faces, paint and layout tell the front"
+    if not all(labels) and (views in FREE_VIEWS or not found.is_even):
+        return "weak", "its steps may be uneven: label every view to confirm them"
     if against > MOST_AGAINST:
         return "weak", "what is drawn speaks for another direction: is a label wrong?"
     if apart > WEAK_APART and views >= TELLING_VIEWS:
         return "weak", f"the outlines are {100 * apart:.1f} % of the height apart"
     return "ok", ""
-
-
-def _ask(views: int) -> str:
-    return f"say which view is the front, such as --views {','.join(['front', *'?' * (views - 1)])}"
 
 
 def _doubts_text(doubt: Doubts) -> str:

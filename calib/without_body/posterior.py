@@ -2,6 +2,7 @@
 
 - **Paint** moves as the body turns: which way round, and where the axis of symmetry lies.
 - **Faces and detail** look to the front: heads have eyes, fronts have buttons.
+- **Shins** stand behind the figure's middle: heads, arms and toes reach ahead of them.
 - **Outlines** are those of one body, seen from above a little rather than from below.
 
 Each may be wrong as a whole, so that none excludes a turn. Front and back, the way round and the
@@ -34,7 +35,10 @@ RIM_PX = 3.0
 DETAIL = 1.0  # nats per relative difference of detail
 FAINTEST = 0.005  # OKLab per pixel: detail below is none
 ROUGH = 0.006  # of the height: outlines whose places are not fitted are this far apart
-PAINT_BROKEN, FACES_BROKEN, OUTLINES_BROKEN = 0.02, 0.02, 0.05  # of sheets
+SHINS_FROM, SHINS_TO = 0.05, 0.2  # of the height, from the ground
+BEHIND = 30.0  # nats per height by which they stand behind the figure's middle
+# Of sheets: where a cue means nothing
+PAINT_BROKEN, FACES_BROKEN, SHINS_BROKEN, OUTLINES_BROKEN = 0.02, 0.02, 0.05, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +49,19 @@ class Evidence:
         paint: the colours, band by band.
         faces: what the heads say.
         detail: (views,) how much more is drawn in a view's upper half than in the others'.
+        shins: (views,) how far to the right of the figure's middle they stand, in heights, less
+            the sheet's mean.
     """
 
     paint: Paint
     faces: FaceEvidence
     detail: Float[np.ndarray, " views"]
+    shins: Float[np.ndarray, " views"]
 
     @classmethod
     def of(cls, views: Sequence[View]) -> Evidence:
         """Read the views of a sheet."""
-        return cls(read_paint(views), read_faces(views), _detail(views))
+        return cls(read_paint(views), read_faces(views), _detail(views), _shins(views))
 
     def log_likelihood(
         self, yaws: Float[np.ndarray, "turns views"], outlines: Float[np.ndarray, " turns"]
@@ -69,9 +76,12 @@ class Evidence:
             [sum(face_log_likelihood(self.faces, i, y) for i, y in enumerate(row)) for row in yaws]
         )
         front = heads + DETAIL * np.cos(yaws) @ self.detail
+        sideways = np.sin(yaws)
+        behind = sideways @ self.shins / np.maximum(np.square(sideways).sum(axis=1), 1.0)
         return (
             _doubted(paint_evidence(self.paint, yaws), PAINT_BROKEN)
             + _doubted(front, FACES_BROKEN)
+            + _doubted(BEHIND * behind, SHINS_BROKEN)
             + _doubted(outlines, OUTLINES_BROKEN)
         )
 
@@ -148,3 +158,15 @@ def _detail(views: Sequence[View]) -> Float[np.ndarray, " views"]:
         shown.append((drawn_detail(sections.lab) * facing).sum() / max(facing.sum(), 1.0))
     mean = float(np.mean(shown))
     return (np.array(shown) - mean) / (mean + FAINTEST)
+
+
+def _shins(views: Sequence[View]) -> Float[np.ndarray, " views"]:
+    offsets = []
+    for view in views:
+        row, column = np.nonzero(view.mask)
+        height = row.max() + 1 - row.min()
+        above_ground = (row.max() + 0.5 - row) / height
+        low = (above_ground > SHINS_FROM) & (above_ground < SHINS_TO)
+        at = column[low].mean() if low.any() else column.mean()
+        offsets.append((at - column.mean()) / height)
+    return np.array(offsets) - np.mean(offsets)

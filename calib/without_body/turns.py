@@ -2,7 +2,7 @@
 
 A turn is a pattern of steps, where it starts and which way round it goes. Before anything is
 looked at, a sheet of four or more is probably an even ring, starts at the front and runs to the
-character's left; labels that a person gave count for more than all of that.
+character's left, read from the left; labels that a person gave count for more than all of that.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ STARTS = 8  # in a circle
 P_EVEN = 0.9  # that four views or more are an even ring
 P_FRONT_FIRST = 0.5  # the other starts share the rest
 P_LEFT = 0.7  # that views run to the character's left
+P_FROM_RIGHT = 0.1  # that a sheet is to be read from the right
 P_LABEL_WRONG = 0.01  # of each label
 P_AS_LABELLED = 0.5  # that views labelled one and all are seen from just there
 NEAR = np.radians(22.5)  # half of what neighbouring directions lie apart
@@ -59,16 +60,28 @@ def turn_hypotheses(views: int, labels: Sequence[Label] = ()) -> TurnHypotheses:
         ring = np.arange(views) * 2 * np.pi / views
         shares = np.append(P_EVEN, (1 - P_EVEN) * shares) if patterns else np.ones(1)
         patterns = [ring, *patterns]
-    yaws, log_prior, pattern = [], [], []
-    for number, (steps, share) in enumerate(zip(patterns, shares, strict=True)):
+    yaws, odds = [], []
+    for steps, share in zip(patterns, shares, strict=True):
         for way, p_way in ((1, P_LEFT), (-1, 1 - P_LEFT)):
             for start in range(STARTS):
                 p_start = P_FRONT_FIRST if start == 0 else (1 - P_FRONT_FIRST) / (STARTS - 1)
-                yaws.append(start * 2 * np.pi / STARTS + way * steps)
-                log_prior.append(np.log(share * p_way * p_start))
-                pattern.append(2 * number + (way < 0))
-    found = TurnHypotheses(np.array(yaws), np.array(log_prior), np.array(pattern))
+                turn = start * 2 * np.pi / STARTS + way * steps
+                yaws += [turn, turn[::-1]]
+                odds += [share * p_way * p_start * p for p in (1 - P_FROM_RIGHT, P_FROM_RIGHT)]
+    found = _distinct(np.array(yaws), np.array(odds))
     return labelled(found, labels) if any(labels) else found
+
+
+def _distinct(
+    yaws: Float[np.ndarray, "turns views"], odds: Float[np.ndarray, " turns"]
+) -> TurnHypotheses:
+    """Return turns once each, with the sum of their odds."""
+    degrees = np.round(np.degrees(yaws)) % 360
+    _, first, same = np.unique(degrees, axis=0, return_index=True, return_inverse=True)
+    relative = (degrees[first] - degrees[first, :1]) % 360
+    _, pattern = np.unique(relative, axis=0, return_inverse=True)
+    total = np.bincount(same.ravel(), odds)
+    return TurnHypotheses(yaws[first], np.log(total), pattern.ravel())
 
 
 def labelled(turns: TurnHypotheses, labels: Sequence[Label]) -> TurnHypotheses:

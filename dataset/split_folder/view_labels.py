@@ -56,6 +56,21 @@ def parse_labels(text: str, views: int) -> tuple[Label, ...]:
     return tuple(_label(entry) for entry in entries)
 
 
+def front_label(number: int, views: int) -> str:
+    """Return the labels of a sheet of which only the front is known.
+
+    Args:
+        number: of the view that shows the front, from 0 as in overlay.png.
+        views: number of views of the sheet.
+
+    Raises:
+        SheetError: there is no such view.
+    """
+    if number not in range(views):
+        raise SheetError(f"--front {number}: the views are numbered 0 to {views - 1}; give one")
+    return ",".join("front" if i == number else "?" for i in range(views))
+
+
 def label_rows(
     labels: tuple[Label, ...],
 ) -> tuple[Float[np.ndarray, "rows views"], Float[np.ndarray, " rows"]]:

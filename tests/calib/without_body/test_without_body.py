@@ -19,20 +19,20 @@ from toonset.calib.without_body.rival import WITHOUT
 from toonset.calib.without_body.turns import is_even, turn_hypotheses, wrapped
 from toonset.calib.write_bundle import write_bundle
 from toonset.camera import Camera
-from toonset.dataset.split_folder.view_labels import parse_labels
-from toonset.errors import UsageError
+from toonset.dataset.split_folder.view_labels import front_label, parse_labels
+from toonset.errors import SheetError, UsageError
 from toonset.mesh import Mesh
 from toonset.view import View
 
 SIDE = 120
 RING = np.arange(8) * np.pi / 4
 EYES = tuple(((s * 0.13, 0.62, 0.27), 0.06, (20, 20, 30)) for s in (-1, 1))
-BALLS = (  # middle, radius, colour: body, head, a nose, feet that point ahead, eyes
+BALLS = (  # middle, radius, colour: body, head, a nose, shins that stand behind, eyes
     ((0.0, -0.1, 0.0), 0.45, (200, 40, 40)),
     ((0.0, 0.55, 0.0), 0.3, (240, 200, 160)),
     ((0.0, 0.5, 0.32), 0.09, (220, 150, 120)),
-    ((0.2, -0.6, 0.12), 0.17, (60, 40, 30)),
-    ((-0.2, -0.6, 0.12), 0.17, (60, 40, 30)),
+    ((0.2, -0.6, -0.12), 0.17, (60, 40, 30)),
+    ((-0.2, -0.6, -0.12), 0.17, (60, 40, 30)),
     ((0.0, 0.0, -0.42), 0.2, (40, 80, 200)),
     *EYES,
 )
@@ -72,6 +72,33 @@ def test_turns_are_alternatives_and_labels_outweigh_them(views: int) -> None:
     labelled = turn_hypotheses(views, labels)
     best = labelled.yaws[int(labelled.log_prior.argmax())]
     assert abs(wrapped(best[-1] - np.pi)) < 0.4
+
+
+def test_sheets_are_read_from_the_left_or_from_the_right() -> None:
+    turns = turn_hypotheses(8)
+    odds = {}
+    for name, yaws in {"left": RING, "right": RING[::-1], "side": RING + np.pi / 2}.items():
+        same = np.abs(wrapped(turns.yaws - yaws)).max(axis=1) < 1e-6
+        assert same.sum() == 1  # every turn once
+        odds[name] = float(turns.log_prior[same][0])
+    assert odds["left"] > odds["right"] > odds["side"]
+
+
+def test_one_hint_settles_the_front_of_an_even_ring_only() -> None:
+    hint = parse_labels(front_label(3, 8), 8)
+    ring = np.roll(RING, 3)
+    found = calibrate_without_body(sheet(ring), Known(labels=hint))
+    off = wrapped(yaws_of([view.camera for view in found.views]) - ring)
+    np.testing.assert_allclose(off, 0, atol=1e-6)
+    assert all(view.verdict == "ok" for view in found.views)
+    five = sheet(np.radians([0.0, 40.0, 100.0, 150.0, 235.0]))
+    uneven = calibrate_without_body(five, Known(labels=parse_labels(front_label(0, 5), 5)))
+    assert all(view.verdict != "ok" for view in uneven.views)
+
+
+def test_the_front_is_one_of_the_views() -> None:
+    with pytest.raises(SheetError, match="--front 8: the views are numbered 0 to 7"):
+        front_label(8, 8)
 
 
 def test_odd_labels_are_read_as_they_are() -> None:
