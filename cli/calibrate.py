@@ -76,8 +76,7 @@ def calibrate(
             "--front",
             metavar="N",
             min=0,
-            help="Number of the view that shows the front, as in overlay.png; of the others nothing "
-            "is said.",
+            help="Number, as in overlay.png, of the view that shows the front.",
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = None,

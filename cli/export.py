@@ -84,7 +84,7 @@ def export(
         views = tuple(centred(view) for view in views)
     body = mannequin_of(transforms_file(bundle).parent, mesh)
     points = None
-    if body is not None and target.wants_points:
+    if target.wants_points:
         printer.progress("colouring points")
         points = _points(body, views, seed, is_given=mesh is not None)
     job = Job(out, views, points, body, text, layout == "old", force)
@@ -92,18 +92,20 @@ def export(
 
 
 def _points(
-    body: Mesh, views: Sequence[ExportView], seed: int, *, is_given: bool
+    body: Mesh | None, views: Sequence[ExportView], seed: int, *, is_given: bool
 ) -> TrackedPoints | None:
+    """Return points of the mannequin, or, without one, of the drawings' visual hull."""
     from toonset.calib.mannequin_points import mannequin_points
+    from toonset.dataset.exporters.hull_points import hull_points
     from toonset.errors import MeshError
 
-    points = mannequin_points(body, views, seed)
-    if points is None and is_given:
+    points = None if body is None else mannequin_points(body, views, seed)
+    if points is None and body is not None and is_given:
         raise MeshError(
             f"{body.name}: no point of it lies on the figure in every drawing; give the mannequin "
             "of the calibration, or none"
         )
-    return points
+    return points or hull_points(views, seed)
 
 
 def _report(printer: Printer, to: Format, job: Job, views: Sequence[ExportView]) -> None:

@@ -134,6 +134,7 @@ SPRITE_COLUMNS = (
     Column(("right", "bin %"), _percent("right 45 deg bin")),
     Column(("wrong", "as ok"), _total("wrong but ok")),
     Column(("ok/weak/", "amb/fail %"), _verdicts),
+    Column(("sheets", "all ok"), _part("ok sheets")),
     Column(("sec.", "median"), _median("seconds")),
     Column(("", "p95"), _p95("seconds")),
 )

@@ -2,8 +2,9 @@
 
 A folder holds one folder per character: `info.json` with `yaw_deg` of every view, and `view_0.png`
 and so on with transparent ground. Rendered sprites name their `mesh`, a path relative to the
-folder's parent, and their yaws are exact. Drawn ones have no mesh: the default mannequin stands in,
-and only the 45 degree bin is asked for.
+folder's parent, and their yaws are exact. Drawn ones have no mesh: the default mannequin stands in
+where it explains more than no body does, and only the 45 degree bin is asked for. All are also
+calibrated without a body, as laid out and laid out anew: the usual layout alone shall not win.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,10 @@ from bench.records.record import Record
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.known import Known
 from toonset.calib.outline.occluding_contour import prepare_surface
+from toonset.calib.result import Calibration
 from toonset.calib.search.template_cache import load_bank
+from toonset.calib.without_body.find import calibrate_without_body
+from toonset.calib.without_body.rival import without_body_if_better
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.mannequin.make import default_mannequin
 from toonset.dataset.mesh.load import load_mesh
@@ -36,6 +41,8 @@ from toonset.view import View
 
 OWN_MESH, MANNEQUIN = "rendered sprites, own mesh", "drawn sprites, default mannequin"
 SHADOW_BELOW = 200  # alpha of a cast shadow, where the sheet's description speaks of one
+NO_BODY = "no body"  # as laid out, and then: where it starts instead, and which way round
+ANEW = {"": (False, 1), ", rolled": (True, 1), ", reversed": (False, -1), ", both": (True, -1)}
 EXACT, BIN = math.radians(3.0), math.radians(22.5)
 
 
@@ -87,15 +94,14 @@ def sprite_cases(folder: Path, only: str = "") -> Iterator[SpriteCase]:
 def bench_sprites(
     cases: Iterable[SpriteCase], seed: int, progress: Callable[[str], None] = lambda text: None
 ) -> list[Record]:
-    """Return records of yaw errors, verdicts and seconds, with nothing known and with labels."""
+    """Return records of yaw errors, verdicts and seconds: with the mesh, without, with labels."""
     found: dict[tuple[str, str], list[MeasuredSprites]] = {}
     for case in cases:
         with own_cache():
             load_bank(prepare_surface(case.mesh))  # fills the cache
-            for method in ("default", "labels"):
+            for method, calibrated in _methods(case).items():
                 progress(f"{case.name}: {method}")
-                known = Known(labels=named_directions(case.yaws)) if method == "labels" else None
-                found.setdefault((case.group, method), []).append(_calibrated(case, known))
+                found.setdefault((case.group, method), []).append(calibrated())
     return [
         record
         for (group, method), sheets in found.items()
@@ -103,9 +109,53 @@ def bench_sprites(
     ]
 
 
-def _calibrated(case: SpriteCase, known: Known | None) -> MeasuredSprites:
+def laid_out_anew(case: SpriteCase, *, rolled: bool, way: int) -> SpriteCase:
+    """Return the case with its views in another order: begun elsewhere (rolled), then reversed."""
+    order = np.roll(np.arange(len(case.yaws)), -(len(case.yaws) // 2 - 1) if rolled else 0)[::way]
+    return replace(
+        case, views=tuple(case.views[i] for i in order), yaws=tuple(case.yaws[i] for i in order)
+    )
+
+
+def _methods(case: SpriteCase) -> dict[str, Callable[[], MeasuredSprites]]:
+    """Return how a case is calibrated, by name."""
+    labels = Known(labels=named_directions(case.yaws))
+    front = min(range(len(case.yaws)), key=lambda i: abs(angle_between(case.yaws[i], 0.0)))
+    hint = Known(labels=tuple((0.0,) if i == front else () for i in range(len(case.yaws))))
+
+    def with_mesh(known: Known) -> MeasuredSprites:
+        return _measured(case, lambda: _with_mesh(case, known))
+
+    def alone(laid: SpriteCase, known: Known) -> MeasuredSprites:
+        return _measured(laid, lambda: calibrate_without_body(laid.views, known))
+
+    anew = {
+        f"{NO_BODY}{name}": partial(alone, laid_out_anew(case, rolled=rolled, way=way), Known())
+        for name, (rolled, way) in ANEW.items()
+    }
+    return {
+        "default": partial(with_mesh, Known()),
+        "labels": partial(with_mesh, labels),
+        **anew,
+        f"{NO_BODY}, front": partial(alone, case, hint),
+        f"{NO_BODY}, labels": partial(alone, case, labels),
+    }
+
+
+def _with_mesh(case: SpriteCase, known: Known) -> Calibration:
+    """Return what a person gets who gives the mesh, or, of a case without one, none."""
+    found = find_cameras(case.views, case.mesh, known=known)
+    if case.group == OWN_MESH:
+        return found
+    better = without_body_if_better(
+        case.views, found, known, given=False, tell=lambda step, share: None
+    )
+    return better or found
+
+
+def _measured(case: SpriteCase, calibrated: Callable[[], Calibration]) -> MeasuredSprites:
     start = time.perf_counter()
-    result = find_cameras(case.views, case.mesh, known=known)
+    result = calibrated()
     seconds = time.perf_counter() - start
     errors = tuple(
         abs(angle_between(view.camera.angles[0], yaw))
@@ -128,6 +178,7 @@ def _records(sheets: list[MeasuredSprites], recorder: Recorder) -> list[Record]:
         *recorder.share("right 45 deg bin", [e < BIN for e in errors]),
         recorder.total("wrong but ok", silent),
         *recorder.verdicts(verdicts),
+        *recorder.share("ok sheets", [set(sheet.verdicts) == {"ok"} for sheet in sheets]),
         seconds_record([(sheet.case, sheet.seconds) for sheet in sheets], recorder),
     ]
 

@@ -74,10 +74,9 @@ def figure_mask(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, 
 
 
 def _about(points: TrackedPoints | None) -> dict[str, Any]:
-    return {
-        "points": 0 if points is None else len(points.xyz),
-        "points_are": "on the mannequin, projected (not measured), coloured from the drawings",
-    }
+    if points is None:
+        return {"points": 0}
+    return {"points": len(points.xyz), "points_are": points.what}
 
 
 def _write_model(model: Any, sparse: Path, *, text: bool, old_layout: bool) -> None:

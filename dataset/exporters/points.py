@@ -40,12 +40,14 @@ class TrackedPoints:
         rgb: (points, 3) sRGB.
         seen: (views, points) which view sees which point.
         pixels: (views, points, 2) projections; projected, not measured.
+        what: they are, in words.
     """
 
     xyz: Float[np.ndarray, "points 3"]
     rgb: UInt8[np.ndarray, "points 3"]
     seen: Bool[np.ndarray, "views points"]
     pixels: Float[np.ndarray, "views points 2"]
+    what: str = "on the mannequin, projected (not measured), coloured from the drawings"
 
 
 def sample_surface(mesh: Mesh, count: int, seed: int) -> Float[np.ndarray, "count 3"]:
@@ -83,13 +85,28 @@ def track_points(
     deepest = np.full(count, -1.0)
     for i, (frame, camera) in enumerate(zip(frames, pinholes, strict=True)):
         pixels[i], _, _ = camera.project(candidates)
-        away, inside, color = _look_up(frame.rgba, pixels[i])
+        away, inside, color = look_up(frame.rgba, pixels[i])
         kept &= away <= OUTSIDE * mesh.height * camera.scale
         seen[i] = _visible(candidates, mesh, camera)
         better = seen[i] & (inside > deepest)
         rgb[better], deepest[better] = color[better], inside[better]
     kept &= seen.any(axis=0)
     return TrackedPoints(candidates[kept], rgb[kept], seen[:, kept], pixels[:, kept])
+
+
+def look_up(
+    rgba: UInt8[np.ndarray, "height width 4"], pixels: Float[np.ndarray, "n 2"]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], UInt8[np.ndarray, "n 3"]]:
+    """Return px to the figure, px inside of it, and the colour of its nearest pixel."""
+    height, width = rgba.shape[:2]
+    figure = np.pad(rgba[..., 3] >= 128, 1)  # a figure cut off by the frame ends there
+    found: Any = distance_transform_edt(~figure, return_indices=True)
+    away, (rows, columns) = found
+    inside: Any = distance_transform_edt(figure)
+    column, row, within = _cells(pixels, (width, height))
+    at = row + 1, column + 1
+    color = rgba[rows[at] - 1, columns[at] - 1, :3]
+    return np.where(within, away[at], np.inf), inside[at], color
 
 
 def _visible(
@@ -103,21 +120,6 @@ def _visible(
     pixels, depth, in_front = pinhole.project(points)
     column, row, within = _cells(pixels, pinhole.size_wh)
     return within & in_front & (depth <= deepest[row, column] + BEHIND * mesh.height)
-
-
-def _look_up(
-    rgba: UInt8[np.ndarray, "height width 4"], pixels: Float[np.ndarray, "n 2"]
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], UInt8[np.ndarray, "n 3"]]:
-    """Return px to the figure, px inside of it, and the colour of its nearest pixel."""
-    height, width = rgba.shape[:2]
-    figure = np.pad(rgba[..., 3] >= 128, 1)  # a figure cut off by the frame ends there
-    found: Any = distance_transform_edt(~figure, return_indices=True)
-    away, (rows, columns) = found
-    inside: Any = distance_transform_edt(figure)
-    column, row, within = _cells(pixels, (width, height))
-    at = row + 1, column + 1
-    color = rgba[rows[at] - 1, columns[at] - 1, :3]
-    return np.where(within, away[at], np.inf), inside[at], color
 
 
 def _cells(

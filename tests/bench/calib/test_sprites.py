@@ -12,13 +12,31 @@ import pytest
 
 from bench.calib.table import sprites_table
 from bench.cases.bodies import random_body
-from bench.cases.sprites import MANNEQUIN, OWN_MESH, bench_sprites, sprite_cases
+from bench.cases.sprites import (
+    MANNEQUIN,
+    OWN_MESH,
+    SpriteCase,
+    bench_sprites,
+    laid_out_anew,
+    sprite_cases,
+)
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import save_obj
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import BundleError
+
+METHODS = {
+    "default",
+    "labels",
+    "no body",
+    "no body, rolled",
+    "no body, reversed",
+    "no body, both",
+    "no body, front",
+    "no body, labels",
+}
 
 
 def calibration_at(*yaws_deg: float) -> SimpleNamespace:
@@ -31,7 +49,7 @@ def calibration_at(*yaws_deg: float) -> SimpleNamespace:
         )
         for yaw in yaws_deg
     ]
-    return SimpleNamespace(views=views)
+    return SimpleNamespace(views=views, is_certain=True)
 
 
 @pytest.fixture(scope="module")
@@ -64,9 +82,22 @@ def test_a_shadow_is_cut_where_the_sprites_have_one(sprites: Path) -> None:
     assert exact.yaws == pytest.approx(np.radians([0, 90, 180, 270]))
 
 
+def laid_out(case: SpriteCase, *, rolled: bool, way: int) -> list[int]:
+    return [round(math.degrees(yaw)) for yaw in laid_out_anew(case, rolled=rolled, way=way).yaws]
+
+
+def test_a_sheet_is_laid_out_anew(sprites: Path) -> None:
+    case, _ = sprite_cases(sprites)
+    assert laid_out(case, rolled=False, way=1) == [0, 90, 180, 270]
+    assert laid_out(case, rolled=True, way=1) == [90, 180, 270, 0]
+    assert laid_out(case, rolled=True, way=-1) == [0, 270, 180, 90]
+    anew = laid_out_anew(case, rolled=True, way=-1)
+    assert anew.views[-1] is case.views[1]
+
+
 def test_sprites_with_their_mesh_are_measured_in_degrees(sprites: Path) -> None:
     records = bench_sprites(sprite_cases(sprites, "exact"), 0)
-    assert {r.method for r in records} == {"default", "labels"}
+    assert {r.method for r in records} == METHODS
     exact = {r.metric: r for r in records if r.method == "labels"}
     assert exact["yaw error"].median < 3
     assert exact["right 45 deg bin"].value == 1
@@ -76,7 +107,8 @@ def test_sprites_without_a_mesh_are_asked_for_their_bin(
     sprites: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = calibration_at(20, 70, 0, 0)
-    monkeypatch.setattr("bench.cases.sprites.find_cameras", lambda *_, **__: found)
+    for name in ("find_cameras", "calibrate_without_body"):
+        monkeypatch.setattr(f"bench.cases.sprites.{name}", lambda *_, **__: found)
     records = bench_sprites(sprite_cases(sprites), 0)
     free = {r.metric: r for r in records if (r.group, r.method) == (MANNEQUIN, "default")}
     assert (free["right 45 deg bin"].value, free["right 45 deg bin"].n) == (0.5, 4)
@@ -100,7 +132,8 @@ def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
 ):
     out = tmp_path / "out"
     found = calibration_at(1, 88, 180, 9)
-    monkeypatch.setattr("bench.cases.sprites.find_cameras", lambda *_, **__: found)
+    for name in ("find_cameras", "calibrate_without_body"):
+        monkeypatch.setattr(f"bench.cases.sprites.{name}", lambda *_, **__: found)
     command = ("calib", "--sprites", sprites, "--quiet", "-o", out)
     done = bench(*command, "--only", "exact")
     assert done.code == 0, done
@@ -110,8 +143,6 @@ def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
         "report.html",
         *(f"chart-rendered-sprites-own-mesh.{form}" for form in ("png", "svg", "csv")),
     }
-    assert {r["method"] for r in json.loads((out / "records.json").read_text())} == {
-        "default",
-        "labels",
-    }
+    records = json.loads((out / "records.json").read_text())
+    assert {r["method"] for r in records} == METHODS
     assert "'dog'" in bench(*command, "--force", "--only", "dog").reason
