@@ -5,7 +5,8 @@ A peer is a shell command in which these stand for paths:
     {data}   a folder with transforms.json and RGBA pictures: what is trained on
     {test}   a transforms.json of the held-out cameras, without pictures
     {out}    a folder that is there; the command writes a picture per held-out camera into it, named
-             as the file of its frame, of the frame's size; what is not opaque is seen over white
+             as the file of its frame, of the frame's size; what is not opaque is seen over white,
+             and a picture that is opaque all over has no outline to compare
 
 Its CPU seconds are those of the shell and of all that it has waited for, user and system, imports
 and rendering included, as the system counts them. Toonset's own command runs beside it as a peer.

@@ -267,10 +267,20 @@ def _untrained(
 ) -> RunResult:
     """Return the result of pictures of all held-out views, and what was spent on them."""
     pairs = list(zip(views, case.test.frames, strict=True))
-    figures = means([figures_of(view, frame.rgba, judges)[0] for view, frame in pairs])
+    figures = means([_figures(view, frame.rgba, judges) for view, frame in pairs])
     sample = curve_frames(case.test)
     psnr = _mean_psnr((view, frame) for view, frame in pairs if frame in sample)
     return RunResult(*_named(job), figures, *spent, 0, (Seen(*spent[:2], psnr),))
+
+
+def _figures(
+    view: UInt8[np.ndarray, "height width 4"],
+    drawn: UInt8[np.ndarray, "height width 4"],
+    judges: Judges,
+) -> Figures:
+    """Return the figures of a picture; one that is opaque all over has no outline to compare."""
+    figures, _ = figures_of(view, drawn, judges)
+    return figures | {"silhouette_iou": None} if (view[..., 3] == 255).all() else figures
 
 
 def _nearest(scene: Scene, frame: Frame) -> UInt8[np.ndarray, "height width 4"]:

@@ -29,6 +29,13 @@ for frame in json.load(open(test))["frames"]:
     shutil.copy(f"{data}/{drawn[0]}", f"{out}/{frame['file_path']}")
 total = sum(i * i for i in range(int(loops)))
 """
+FLATTENS = """
+import pathlib, sys
+from PIL import Image
+for path in pathlib.Path(sys.argv[1]).glob("*.png"):
+    seen = Image.open(path).convert("RGBA")
+    Image.alpha_composite(Image.new("RGBA", seen.size, "white"), seen).convert("RGB").save(path)
+"""
 
 
 def scene(count: int, side: int = 24) -> Scene:
@@ -69,6 +76,18 @@ def test_a_peer_gets_drawings_and_bare_cameras_and_its_pictures_are_scored(copyi
     assert "copies" in text
     assert text.endswith("fails, seed 3: fails: ended with 7: no GPU")
     assert draw_curves([copied], "n", "svg").count(b"copies (n = 1)") == 1
+
+
+def test_pictures_without_transparency_have_no_outline_to_compare(copying: str) -> None:
+    flat = f"{sys.executable} -c {shlex.quote(FLATTENS)} {{out}}"
+    peers = (Peer("cut out", copying), Peer("opaque", f"{copying} && {flat}"))
+    case = TrainCase("block-exact", "exact", scene(4), scene(2))
+    cut_out, opaque = (
+        found for _, found in run_jobs(plan([case], 0, "", Scope((), views=(4,)), peers))
+    )
+    assert cut_out.figures["silhouette_iou"] == 1
+    assert opaque.figures["silhouette_iou"] is None
+    assert opaque.figures["psnr"] == cut_out.figures["psnr"]
 
 
 def test_cpu_seconds_are_those_of_all_that_the_command_waits_for(copying: str) -> None:
