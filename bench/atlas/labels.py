@@ -1,4 +1,4 @@
-"""Trying the labels of an artist's sheet: which of its pixels get the paint they are of?
+"""Trying an artist's sheet: which of its pixels get the paint they are of, which paints are found?
 
 Counted are pixels that are one paint's and nothing else's, in light or in shadow; paints under 5 %
 of the character, which no palette need have, are left out. A label is right if its colour is nearer
@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -41,17 +42,20 @@ Labels = UInt8[np.ndarray, "height width"]
 
 @dataclass(frozen=True)
 class LabelPage(Page):
-    """A page about labels.
+    """A page about labels, or about the palette that they are taken from.
 
     Attributes:
         options: step to a sheet's options.
+        counted: "labels": right pixels; "paints": F1 of the palette's colours, the line's among
+            them.
     """
 
     options: Callable[[Step], SynthOptions]
+    counted: Literal["labels", "paints"] = "labels"
 
 
 def try_labels(page: LabelPage, step: Step, seed: int) -> tuple[Tried, bytes]:
-    """Return the percentage of pixels that got their paint, and a picture of the worst drawing.
+    """Return the percentage that the page counts, and a picture of the worst drawing.
 
     It shows the drawing, its labels in the palette's colours, and wrong pixels in vermilion.
     """
@@ -80,18 +84,21 @@ def try_labels(page: LabelPage, step: Step, seed: int) -> tuple[Tried, bytes]:
     case = PaletteCase("", "", (), *_with_ink(made, shares))
     colors = score([color.rgb for color in palette.colors], case)
     evidence = {
+        "right": 100 * all_right / max(all_counted, 1),
         "f1": f1([colors]),
         "spurious": float(colors.spurious),
         "right_of_labelled": 100 * all_right / max(labelled, 1),
     }
     voice = WARNED if palette.warnings else SILENT
-    words = f"F1 {evidence['f1']:.2f}; " + "; ".join(palette.warnings)
+    words = f"F1 {evidence['f1']:.2f}, {evidence['right']:.1f} % right"
     worst = int(np.argmin(accuracies))
     wrong = counted[worst] & ~right[worst]
     picture = _side_by_side(pictures[worst], found[worst], palette, wrong)
     taken = time.perf_counter() - began
-    figure = 100 * all_right / max(all_counted, 1)
-    return Tried(seed, figure, voice, words.removesuffix("; "), evidence, taken), picture
+    figure = evidence["right"] if page.counted == "labels" else 100 * evidence["f1"]
+    return Tried(
+        seed, figure, voice, "; ".join([words, *palette.warnings]), evidence, taken
+    ), picture
 
 
 def _truths(made: Turnaround, cut: DrawnSheet) -> list[Labels]:

@@ -59,13 +59,14 @@ LABEL_PAGES = (
         artist.with_quality,
     ),
     LabelPage(
-        "labels colours",
+        "paints colours",
         "colours off by up to, % per view",
         (0, 3, 6, 10, 15, 20),
         (0, 3, 20),
         "Every drawing mixes its paints anew: red, green and blue are off.",
         None,
         artist.with_color_error,
+        "paints",
     ),
 )
 TRAIN_PAGES = (

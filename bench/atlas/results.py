@@ -4,7 +4,8 @@ A calibrated view is fine within 5 degrees of the truth and has failed beyond 15
 failed where the worst held-out view looks as if moved by 1.1 % of the height more than that of the
 same body's clean scene; below 0.8 % it is fine. The drawn look has failed where its FLIP is above
 the field's, and is fine where it is 5 % below. A palette has failed that lacks a colour, labels
-where a tenth of the pixels has another paint than the drawing's, or none.
+where a tenth of the pixels has another paint than the drawing's, or none; paints where their F1 is
+below 0.75.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ LOST_FINE, LOST_FAILED = 0.8, 1.1  # % of the height; a person is unhappy from t
 LOOK_FINE, LOOK_FAILED = 95.0, 100.0  # % of the field's FLIP
 NONE_MISSED = 0.1  # %
 LABELS_FINE, LABELS_FAILED = 5.0, 10.0  # % of the pixels; a person sees patches from there on
+F1_FINE, F1_FAILED = 10.0, 25.0  # % short of 100: of six paints one too many, two too many
 HUNDRED = 100.0
 CALIBRATION = Kind(
     *("calibration", "views", "rotation error", "degrees", SOLVED_DEG, WRONG_DEG),
@@ -58,9 +60,11 @@ PALETTE = Kind(
 )
 
 LABELS = Kind(
-    *("labels", "sheets", "pixels of a wrong paint or none", "%", LABELS_FINE, LABELS_FAILED),
+    *("labels", "sheets", "pixels labelled wrong", "%", LABELS_FINE, LABELS_FAILED),
     {SILENT: GREEN, PALETTE_WARNED: VERMILION, REFUSED: BLACK},
 )
+
+PAINTS = Kind(*("paints", "sheets", "F1 short of 1", "%", F1_FINE, F1_FAILED), LABELS.voices)
 
 
 def tried_pages(results: Sequence[Result]) -> list[TriedPage]:
@@ -87,7 +91,7 @@ def _kind(page: AnyPage) -> Kind:
     if isinstance(page, LookPage):
         return LOOK
     if isinstance(page, LabelPage):
-        return LABELS
+        return LABELS if page.counted == "labels" else PAINTS
     return PALETTE if isinstance(page, PalettePage) else CALIBRATION
 
 
