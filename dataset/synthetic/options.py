@@ -92,9 +92,9 @@ class SynthOptions:
             self,
             views=views,
             columns=0,
-            yaw_jitter_deg=0,
-            warp_percent=0,
-            scale_error_percent=0,
+            yaw_jitter_deg=0.0,
+            warp_percent=0.0,
+            scale_error_percent=0.0,
             background="white",
             artist=ArtistOptions(shadow_strength=self.artist.shadow_strength),
         )
@@ -111,8 +111,10 @@ class SynthOptions:
 
 
 ARTIST = ArtistOptions(
-    body=BodyErrors(head_turn_deg=4, arm_swing_deg=5, face_turn_deg=6, field_height_fraction=0.01),
-    elevation_jitter_deg=1,
+    body=BodyErrors(
+        head_turn_deg=4.0, arm_swing_deg=5.0, face_turn_deg=6.0, field_height_fraction=0.01
+    ),
+    elevation_jitter_deg=1.0,
     shadow_strength=0.3,
     line_width_spread=0.3,
     color_error_fraction=0.03,
@@ -123,9 +125,9 @@ ARTIST = ArtistOptions(
 CONDITIONS: dict[str, SynthOptions] = {
     "plain": SynthOptions(),
     "artist": SynthOptions(
-        yaw_jitter_deg=5,
-        elevation_deg=4,
-        distance_heights=8,  # nearly orthographic
+        yaw_jitter_deg=5.0,
+        elevation_deg=4.0,
+        distance_heights=8.0,  # nearly orthographic
         label_lines=False,
         warp_percent=0.7,  # of the cell: 0.8 % of a figure's height
         background="#f4f1e8",  # off-white paper

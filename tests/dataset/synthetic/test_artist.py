@@ -80,7 +80,7 @@ def test_a_body_without_names_gets_the_smooth_field_alone(body: Mesh) -> None:
     unnamed = replace(body, face_parts=None, part_names=("body",))
     found = find_body_parts(unnamed, {})
     assert (found.head, found.arms) == (None, ())
-    only_limbs = BodyErrors(head_turn_deg=4, arm_swing_deg=5, face_turn_deg=6)
+    only_limbs = BodyErrors(head_turn_deg=4.0, arm_swing_deg=5.0, face_turn_deg=6.0)
     np.testing.assert_array_equal(moved(unnamed, only_limbs), body.vertices)
     assert np.abs(moved(unnamed, ARTIST.body) - body.vertices).max() > 0
 
@@ -99,7 +99,7 @@ def test_field_is_as_large_as_asked_and_smooth(body: Mesh, seed: int) -> None:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_head_and_arms_turn_as_rigid_parts(body: Mesh, seed: int) -> None:
     parts = find_body_parts(body, {})
-    after = moved(body, BodyErrors(head_turn_deg=4, arm_swing_deg=5), seed=seed)
+    after = moved(body, BodyErrors(head_turn_deg=4.0, arm_swing_deg=5.0), seed=seed)
     assert parts.head is not None
     still = ~parts.head.vertices
     for limb, most in ((parts.head, 4 * 1.5), *((arm, 5 * 2) for arm in parts.arms)):
@@ -116,8 +116,8 @@ def test_head_and_arms_turn_as_rigid_parts(body: Mesh, seed: int) -> None:
 def test_face_is_pulled_to_the_viewer(mannequin: Mannequin) -> None:
     body = mannequin.mesh
     nose = int(np.linalg.norm(body.vertices - mannequin.landmarks["nose"], axis=1).argmin())
-    errors = BodyErrors(face_turn_deg=10)
-    sides = [moved(body, errors, yaw)[nose, 0] for yaw in (0, math.pi / 2, math.pi, -math.pi / 2)]
+    errors = BodyErrors(face_turn_deg=10.0)
+    sides = [moved(body, errors, yaw)[nose, 0] for yaw in (0.0, math.pi / 2, math.pi, -math.pi / 2)]
     assert sides[1] > 0.01 * body.height
     assert sides[3] == pytest.approx(-sides[1], abs=1e-3 * body.height)
     np.testing.assert_allclose([sides[0], sides[2]], body.vertices[nose, 0], atol=1e-9)
@@ -128,7 +128,7 @@ def test_face_is_pulled_to_the_viewer(mannequin: Mannequin) -> None:
 
 def test_no_strength_is_the_plain_drawing(body: Mesh) -> None:
     plain = make_turnaround(body, replace(SMALL, artist=ArtistOptions()), 1)
-    none = make_turnaround(body, alone(body=ARTIST.body.scaled(0)), 1)
+    none = make_turnaround(body, alone(body=ARTIST.body.scaled(0.0)), 1)
     np.testing.assert_array_equal(plain.sheet, none.sheet)
     assert not any(shadow.any() for shadow in plain.shadows)
     grainy = make_turnaround(body, alone(grain_levels=2.0, captions=True), 1)
@@ -156,7 +156,7 @@ def test_other_bodies_leave_cameras_and_other_habits_alone(body: Mesh) -> None:
 
 
 def test_light_stays_with_the_camera(body: Mesh) -> None:
-    shaded = make_turnaround(body, replace(alone(shadow_strength=0.3), yaw_jitter_deg=0), 1)
+    shaded = make_turnaround(body, replace(alone(shadow_strength=0.3), yaw_jitter_deg=0.0), 1)
     skin = shaded.palette.tolist().index(list(SKIN))
     for labels, shadow in zip(shaded.labels, shaded.shadows, strict=True):
         _, columns = np.nonzero(labels != UNLABELLED)
