@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -15,18 +16,44 @@ from toonset.cli.common.output import (
     QuietFlag,
     SeedOption,
 )
-from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.artist_options import ArtistOptions
+from toonset.dataset.synthetic.options import CONDITIONS, SynthOptions
 from toonset.write import check_output
 
-WRITTEN = ("sheet.png", "views", "labels", "ink", "mannequin.obj", "truth.json")
+WRITTEN = (
+    *("sheet.png", "sheet.jpg", "views", "labels", "ink", "shadows", "test"),
+    *("mannequin.obj", "truth.json"),
+)
 DEFAULT = SynthOptions()
+FIELDS = {  # of SynthOptions, by the function's parameter
+    "views": "views",
+    "cell": "cell_px",
+    "columns": "columns",
+    "yaw_jitter": "yaw_jitter_deg",
+    "elevation": "elevation_deg",
+    "distance": "distance_heights",
+    "outline": "outline_px",
+    "label_lines": "label_lines",
+    "warp": "warp_percent",
+    "scale_error": "scale_error_percent",
+    "background": "background",
+}
+TEST_VIEWS = 16
 
 
 def synth(
+    context: typer.Context,
     mesh: Annotated[Path, typer.Argument(help="Character: obj, ply, stl, glb, off; colours kept.")],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],
+    condition: Annotated[
+        Literal["plain", "artist"],
+        typer.Option(
+            help="artist: another body in every drawing, shadow, paper, captions, JPEG; "
+            "other options go before it."
+        ),
+    ] = "plain",
     views: Annotated[int, typer.Option(help="Drawings, evenly round.")] = DEFAULT.views,
     yaw_jitter: Annotated[
         float, typer.Option(help="Each view is turned wrongly by up to this, degrees.")
@@ -65,21 +92,12 @@ def synth(
 ) -> None:
     """Draw a turnaround sheet of a mesh, with errors of a hand as asked, and write its truth.
 
-    Writes sheet.png, views/ with transforms.json, labels/, ink/, mannequin.obj and truth.json.
+    Writes sheet.png, views/ with transforms.json, labels/, ink/, mannequin.obj and truth.json;
+    with --condition artist sheet.jpg instead, shadows/ and 16 exact views in test/, and
+    MESH.landmarks.json, if there is one, says where head and arms are.
     """
-    options = SynthOptions(
-        views=views,
-        cell_px=cell,
-        columns=columns,
-        yaw_jitter_deg=yaw_jitter,
-        elevation_deg=elevation,
-        distance_heights=distance,
-        outline_px=outline,
-        label_lines=label_lines,
-        warp_percent=warp,
-        scale_error_percent=scale_error,
-        following_parts=tuple(following or ()),
-        background=background,
+    options = replace(
+        CONDITIONS[condition], **_typed(context), following_parts=tuple(following or ())
     )
     from toonset.dataset.mesh.load import load_mesh
     from toonset.dataset.synthetic.files import write_turnaround
@@ -87,8 +105,33 @@ def synth(
 
     printer = Printer(as_json, quiet)
     check_output(out, [mesh], WRITTEN, force=force)
-    turnaround = make_turnaround(load_mesh(mesh), options, seed)
-    write_turnaround(turnaround, out, force=force)
-    height, width = turnaround.sheet.shape[:2]
-    printer.say(f"{views} views, {len(turnaround.palette)} colours, sheet {width} x {height} px")
-    printer.result({"folder": out, "views": views, "colors": len(turnaround.palette)}, str(out))
+    body = load_mesh(mesh)
+    made = make_turnaround(body, options, seed, _landmarks(mesh))
+    test = None
+    if options.artist != ArtistOptions():
+        test = make_turnaround(body, options.without_error(TEST_VIEWS), seed)
+    write_turnaround(made, out, force=force, test=test)
+    height, width = made.sheet.shape[:2]
+    count = len(made.views)
+    printer.say(f"{count} views, {len(made.palette)} colours, sheet {width} x {height} px")
+    printer.result({"folder": out, "views": count, "colors": len(made.palette)}, str(out))
+
+
+def _typed(context: typer.Context) -> dict[str, Any]:
+    """Return the options that were typed: what was not is the condition's."""
+    given = (name for name in FIELDS if _is_typed(context, name))
+    return {FIELDS[name]: context.params[name] for name in given}
+
+
+def _is_typed(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name not in ("DEFAULT", "DEFAULT_MAP")
+
+
+def _landmarks(mesh: Path) -> dict[str, tuple[float, ...]]:
+    """Return the named points of the landmark file beside a mesh; none without one."""
+    from toonset.dataset.mannequin.files import landmarks_path
+    from toonset.dataset.mannequin.landmark_formats import read_landmark_file
+
+    path = landmarks_path(mesh)
+    return read_landmark_file(path).points if path.is_file() else {}

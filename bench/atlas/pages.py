@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from bench.atlas import look, scenes
+from bench.atlas.labels import LabelPage
 from bench.atlas.look import LookPage
 from bench.atlas.palette import PalettePage, near_equal, tiny_feature
 from bench.atlas.training import TrainPage
+from bench.stability import artist
 from bench.stability.draws import HARD, LOSSLESS
 
 PALETTE_PAGES = (
@@ -26,6 +28,45 @@ PALETTE_PAGES = (
         "Tiny features: eyes in a colour of their own, which is to be found.",
         None,
         tiny_feature,
+    ),
+)
+LABEL_PAGES = (
+    LabelPage(
+        "labels shadow",
+        "light that the shadow takes, %",
+        (0, 15, 30, 45, 60, 80),
+        (0, 30, 80),
+        "A two-tone shadow on an artist's sheet: the paint is wanted, whatever its tone.",
+        None,
+        artist.with_shadow,
+    ),
+    LabelPage(
+        "labels grain",
+        "grain of the paper, levels of 255",
+        (0, 1.3, 4, 8, 16, 32),
+        (0, 4, 32),
+        "Ever rougher paper, which shows through the paint.",
+        None,
+        artist.with_grain,
+    ),
+    LabelPage(
+        "labels jpeg",
+        "JPEG quality",
+        (LOSSLESS, 88, 60, 30, 10, 5),
+        (LOSSLESS, 88, 10),
+        "An artist's sheet saved as JPEG.",
+        None,
+        artist.with_quality,
+    ),
+    LabelPage(
+        "paints colours",
+        "colours off by up to, % per view",
+        (0, 3, 6, 10, 15, 20),
+        (0, 3, 20),
+        "Every drawing mixes its paints anew: red, green and blue are off.",
+        None,
+        artist.with_color_error,
+        "paints",
     ),
 )
 TRAIN_PAGES = (

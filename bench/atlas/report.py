@@ -46,6 +46,9 @@ KEYS = {
     "and where these differ.",
     "look": "Pictures: the held-out view of a step where the drawn layer is worst beside the "
     "field: as it should be, from the drawings, from the field.",
+    "labels": "Pictures: the worst drawing of a step, its labels in the palette's colours (grey: "
+    "none), and what is wrong in vermilion.",
+    "paints": "Pictures: as on the pages about labels.",
     "palette": "Pictures: a drawing, the colours that were to be found, the palette that was.",
 }
 RULES = {
@@ -57,6 +60,10 @@ RULES = {
     "weak. What it set right it says, too, but that is no alarm.",
     "look": "The drawn layer has failed where its FLIP over all held-out views is above the "
     "field's, and is fine where it is at least 5 % below; it gives no verdict of itself.",
+    "labels": "Of the pixels that are one paint's alone, fewer than 5 % are wrong on a fine sheet "
+    "and more than 10 % on one that has failed; it is announced by a warning of the palette's.",
+    "paints": "The palette of a fine sheet has an F1 of 0.9 or more, one below 0.75 has failed; it "
+    "is announced by a warning of the palette's.",
     "palette": "A palette has failed that lacks one of the colours; it is announced if that colour "
     "is listed as left out, the number of colours is called a close call, or there is a warning.",
 }

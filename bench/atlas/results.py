@@ -3,7 +3,9 @@
 A calibrated view is fine within 5 degrees of the truth and has failed beyond 15. A training has
 failed where the worst held-out view looks as if moved by 1.1 % of the height more than that of the
 same body's clean scene; below 0.8 % it is fine. The drawn look has failed where its FLIP is above
-the field's, and is fine where it is 5 % below. A palette has failed that lacks a colour.
+the field's, and is fine where it is 5 % below. A palette has failed that lacks a colour, labels
+where a tenth of the pixels has another paint than the drawing's, or none; paints where their F1 is
+below 0.75.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import math
 from collections.abc import Sequence
 
 from bench.atlas.figures import Kind, Trial, TriedPage, TriedStep
+from bench.atlas.labels import LabelPage
 from bench.atlas.look import LookPage
 from bench.atlas.palette import CLOSE, LISTED, PalettePage
 from bench.atlas.palette import WARNED as PALETTE_WARNED
@@ -27,6 +30,8 @@ BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, BLACK, GREY = COLORS
 LOST_FINE, LOST_FAILED = 0.8, 1.1  # % of the height; a person is unhappy from there on
 LOOK_FINE, LOOK_FAILED = 95.0, 100.0  # % of the field's FLIP
 NONE_MISSED = 0.1  # %
+LABELS_FINE, LABELS_FAILED = 5.0, 10.0  # % of the pixels; a person sees patches from there on
+F1_FINE, F1_FAILED = 10.0, 25.0  # % short of 100: of six paints one too many, two too many
 HUNDRED = 100.0
 CALIBRATION = Kind(
     *("calibration", "views", "rotation error", "degrees", SOLVED_DEG, WRONG_DEG),
@@ -54,6 +59,13 @@ PALETTE = Kind(
     {SILENT: GREEN, CLOSE: ORANGE, LISTED: SKY, PALETTE_WARNED: VERMILION, REFUSED: BLACK},
 )
 
+LABELS = Kind(
+    *("labels", "sheets", "pixels labelled wrong", "%", LABELS_FINE, LABELS_FAILED),
+    {SILENT: GREEN, PALETTE_WARNED: VERMILION, REFUSED: BLACK},
+)
+
+PAINTS = Kind(*("paints", "sheets", "F1 short of 1", "%", F1_FINE, F1_FAILED), LABELS.voices)
+
 
 def tried_pages(results: Sequence[Result]) -> list[TriedPage]:
     """Return the pages of which there are results, steps as listed.
@@ -78,6 +90,8 @@ def _kind(page: AnyPage) -> Kind:
         return TRAINING
     if isinstance(page, LookPage):
         return LOOK
+    if isinstance(page, LabelPage):
+        return LABELS if page.counted == "labels" else PAINTS
     return PALETTE if isinstance(page, PalettePage) else CALIBRATION
 
 

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
+from bench.atlas.labels import LabelPage, try_labels
 from bench.atlas.look import LookPage, try_look
-from bench.atlas.pages import LOOK_PAGES, PALETTE_PAGES, TRAIN_PAGES
+from bench.atlas.pages import LABEL_PAGES, LOOK_PAGES, PALETTE_PAGES, TRAIN_PAGES
 from bench.atlas.palette import PalettePage, try_palette
 from bench.atlas.training import TrainPage, Tried, try_training
 from bench.cases.workers import in_order
@@ -15,7 +16,7 @@ from bench.stability.sheet import Step
 from bench.stability.steps import SheetResult, StepResult, badness, run_sheet, worst_view
 from bench.stability.sweeps import SWEEPS, Sweep
 
-AnyPage = Sweep | PalettePage | TrainPage | LookPage
+AnyPage = Sweep | PalettePage | LabelPage | TrainPage | LookPage
 Plan = Sequence[tuple[AnyPage, Step]]
 
 
@@ -33,7 +34,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class TriedStepResult:
-    """All bodies of one step of a page about training, look or palettes."""
+    """All bodies of one step of a page about training, look, palettes or labels."""
 
     page: str
     step: str
@@ -54,7 +55,7 @@ Result = StepResult | TriedStepResult
 
 def all_pages() -> tuple[AnyPage, ...]:
     """Return the pages, in the order of the report."""
-    return (*SWEEPS, *PALETTE_PAGES, *TRAIN_PAGES, *LOOK_PAGES)
+    return (*SWEEPS, *PALETTE_PAGES, *LABEL_PAGES, *TRAIN_PAGES, *LOOK_PAGES)
 
 
 def run_steps(
@@ -87,6 +88,8 @@ def run_job(job: Job) -> tuple[SheetResult | Tried, bytes]:
         return run_sheet(job.page, job.step, job.seed)
     if isinstance(job.page, PalettePage):
         return try_palette(job.page, job.step, job.seed)
+    if isinstance(job.page, LabelPage):
+        return try_labels(job.page, job.step, job.seed)
     if isinstance(job.page, LookPage):
         return try_look(job.page, job.step, job.seed)
     return try_training(job.page, job.step, job.seed)

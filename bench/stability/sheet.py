@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -16,14 +17,23 @@ from toonset.mesh import Mesh
 BASE = SynthOptions(views=5, cell_px=200, yaw_jitter_deg=8, elevation_deg=10, outline_px=2)
 
 Step = float | str
+GivenBody = Literal["own", "plain", "none"]
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnSheet:
-    """Drawings with their exact cameras, and the mannequin they are calibrated with."""
+    """Drawings with their exact cameras, and the mannequin they are calibrated with.
+
+    Attributes:
+        mesh: the mannequin; where it is not given, the body that was drawn.
+        drawings: with their cameras.
+        given: "own": the mannequin is; "plain": none is, a body made by code stands in, as without
+            --mesh; "none": none at all, as with --mesh none.
+    """
 
     mesh: Mesh
     drawings: tuple[Drawn, ...]
+    given: GivenBody = "own"
 
 
 def draw_sheet(

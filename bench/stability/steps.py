@@ -21,15 +21,18 @@ from bench.stability.damage import Drawn
 from bench.stability.picture import outlines_picture
 from bench.stability.sheet import DrawnSheet, Step, draw_sheet
 from bench.stability.sweeps import Sweep
+from toonset.calib.calibrate import calibrate
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.align import align
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import Calibration
+from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import ToonsetError
+from toonset.mesh import Mesh
 
 NO_VERDICT = ""  # an alignment alone judges nothing
 REFUSED = ViewError(math.pi, math.pi, "failed")  # no camera at all: as wrong as can be
@@ -89,7 +92,7 @@ def _tried(sweep: Sweep, step: Step, seed: int) -> tuple[SheetResult, bytes]:
         if sweep.from_start:
             views = align_from(sheet, math.radians(float(step)), seed)
         else:
-            found = find_cameras([view for view, _ in sheet.drawings], sheet.mesh)
+            found = _calibrated(sheet)
             views = _errors(found, sheet)
     except ToonsetError as error:
         views, note = (REFUSED,) * len(sheet.drawings), str(error)
@@ -97,11 +100,32 @@ def _tried(sweep: Sweep, step: Step, seed: int) -> tuple[SheetResult, bytes]:
         views, note = (CRASHED,) * len(sheet.drawings), f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - start
     worst = worst_view(views)
-    camera = None if found is None else found.views[worst].camera
-    body = sheet.mesh if found is None else replace(sheet.mesh, vertices=found.mannequin)
+    camera, body = _found_body(sheet, found, worst)
     picture = encode_png(outlines_picture(*sheet.drawings[worst], sheet.mesh, camera, body))
     reasons = () if found is None else tuple(view.reason for view in found.views)
     return SheetResult(views, seconds, note, reasons), picture
+
+
+def _calibrated(sheet: DrawnSheet) -> Calibration:
+    views = [view for view, _ in sheet.drawings]
+    if sheet.given == "own":
+        return find_cameras(views, sheet.mesh)
+    return calibrate(views, "none" if sheet.given == "none" else None)
+
+
+def _found_body(
+    sheet: DrawnSheet, found: Calibration | None, view: int
+) -> tuple[Camera | None, Mesh]:
+    """Return the camera and the body to show what was found of a view.
+
+    Without a mannequin of the drawn body, it is turned as was found, where it is in truth.
+    """
+    if found is None:
+        return None, sheet.mesh
+    camera = found.views[view].camera
+    if sheet.given == "own":
+        return camera, replace(sheet.mesh, vertices=found.mannequin)
+    return replace(sheet.drawings[view][1], rotation=camera.rotation), sheet.mesh
 
 
 def worst_view(views: Sequence[ViewError]) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bench.stability import draws
+from bench.stability import artist, draws
 from bench.stability.page import Page
 from bench.stability.sheet import DrawnSheet, Step
 
@@ -236,5 +236,52 @@ SWEEPS = (
         "Large and small drawings.",
         200,
         draws.sized,
+    ),
+    Sweep(
+        "drift",
+        "bodies' differences, times an artist's",
+        (0, 1, 2, 3),
+        (0, 1, 3),
+        "Every drawing of an artist's sheet shows another body: head turned, arms swung, the face "
+        "pulled to the viewer, all points moved smoothly.",
+        None,
+        artist.drifted,
+    ),
+    Sweep(
+        "shadow",
+        "light that the shadow takes, %",
+        (0, 15, 30, 45, 60, 80),
+        (0, 30, 80),
+        "A two-tone shadow whose light stays with the camera, on an artist's sheet.",
+        None,
+        artist.shadowed,
+    ),
+    Sweep(
+        "grain",
+        "grain of the paper, levels of 255",
+        (0, 1.3, 4, 8, 16, 32),
+        (0, 4, 32),
+        "Ever rougher paper under an artist's sheet.",
+        None,
+        artist.grainy,
+    ),
+    Sweep(
+        "mannequin",
+        "mannequin",
+        ("own", artist.OTHER, "plain", "none"),
+        ("own", "plain", "none"),
+        "An artist's sheet and the character's own body, another one's, a plain body made by code, "
+        "and no body at all.",
+        None,
+        artist.of_mannequin,
+    ),
+    Sweep(
+        "no mannequin",
+        "views",
+        (12, 8, 6, 5, 4, 3, 2),
+        (8, 5, 3),
+        "An artist's sheet without any mannequin, of fewer and fewer drawings.",
+        None,
+        artist.without_mannequin,
     ),
 )

@@ -100,6 +100,13 @@ def encode_png(rgba: UInt8[np.ndarray, "height width channels"]) -> bytes:
     return buffer.getvalue()
 
 
+def encode_jpeg(rgba: UInt8[np.ndarray, "height width channels"], quality: int) -> bytes:
+    """Return an opaque picture as JPEG bytes, colours at half resolution as usual."""
+    buffer = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(rgba[..., :3])).save(buffer, "JPEG", quality=quality)
+    return buffer.getvalue()
+
+
 def encode_grey_png(
     values: UInt8[np.ndarray, "height width"] | UInt16[np.ndarray, "height width"],
 ) -> bytes:

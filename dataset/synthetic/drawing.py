@@ -67,7 +67,7 @@ def draw(
     labels: UInt8[np.ndarray, "height width"],
     lines: Lines,
     palette: UInt8[np.ndarray, "colors 3"],
-    outline_px: float,
+    outline_px: float | Float[np.ndarray, "height width"],
     supersample: int,
 ) -> Drawing:
     """Return the finished cell, smaller than its input by `supersample`.
@@ -76,12 +76,13 @@ def draw(
         labels: large picture, 255 = background.
         lines: large picture.
         palette: sRGB.
-        outline_px: width of the silhouette line in pixels of the result; 0 = no lines.
+        outline_px: width of the silhouette line in pixels of the result, in all the large picture
+            or at each of its pixels; 0 = no lines.
         supersample: samples per pixel and axis.
     """
     figure = (labels != UNLABELLED).astype(np.float32)
     ink = np.zeros_like(figure)
-    if outline_px > 0:
+    if np.any(np.asarray(outline_px) > 0):
         half = outline_px * supersample / 2
         for distance, reach in ((lines.silhouette, half), (lines.inner, INNER_LINE * half)):
             ink = np.maximum(ink, np.clip(np.float32(reach + 0.5) - distance, 0, 1))

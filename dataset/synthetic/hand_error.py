@@ -1,6 +1,6 @@
-"""The error of a hand-drawn view: a smooth random displacement of the whole drawing.
+"""The errors of a hand in the picture: a smooth random displacement, and pens that swell.
 
-The field is a sum of cosines that fit 1 to 3 half waves into the cell, per axis,
+The displacement is a sum of cosines that fit 1 to 3 half waves into the cell, per axis,
 
     d(x, y) = sum over i, j in 0..3, not both 0, of a_ij cos(pi i x) cos(pi j y),   x, y in [0, 1],
 
@@ -18,6 +18,7 @@ from toonset.dataset.synthetic.drawing import Lines
 from toonset.palette.pixels.labels import UNLABELLED
 
 HALF_WAVES = 3
+SWELLS = 9  # per side of the cell: how often a line may grow wider and thinner
 
 
 def bend(
@@ -55,6 +56,24 @@ def displacement_field(
     field = np.einsum("hi,wj,ijc->hwc", rows, columns, weights, optimize=True)
     field -= field[figure].mean(axis=0)
     return field * (rms_px / np.sqrt((field[figure] ** 2).sum(axis=1).mean()))
+
+
+def pen_width(
+    outline_px: float, spread: float, shape: tuple[int, int], generator: np.random.Generator
+) -> float | Float[np.ndarray, "height width"]:
+    """Return the width of a view's lines, at each pixel where it varies along them.
+
+    Args:
+        outline_px: the width meant.
+        spread: the view's is off by up to this share, and again by half of it along the line.
+        shape: height and width of the picture.
+        generator: asked for the same number of draws, whatever the width and the size.
+    """
+    of_view, along = generator.uniform(-1, 1), generator.uniform(-1, 1, (SWELLS, SWELLS))
+    if not outline_px * spread:
+        return outline_px
+    smooth = cv2.resize(along.astype(np.float32), shape[::-1], interpolation=cv2.INTER_LINEAR)
+    return outline_px * (1 + spread * of_view) * (1 + spread / 2 * smooth.astype(np.float64))
 
 
 def displace(

@@ -18,21 +18,25 @@ class CellGrid:
         count: cells.
         columns: cells in a full row.
         cell_px: width and height of a cell.
+        caption_px: height of the strip for a caption below every cell.
     """
 
     count: int
     columns: int
     cell_px: int
+    caption_px: int = 0
 
     @property
     def size_wh(self) -> tuple[int, int]:
         """Return width and height of the sheet."""
-        return self.columns * self.cell_px, math.ceil(self.count / self.columns) * self.cell_px
+        rows = math.ceil(self.count / self.columns)
+        return self.columns * self.cell_px, rows * (self.cell_px + self.caption_px)
 
     def box(self, index: int) -> tuple[int, int, int, int]:
         """Return (x, y, width, height) of a cell in the sheet."""
         row, column = divmod(index, self.columns)
-        return column * self.cell_px, row * self.cell_px, self.cell_px, self.cell_px
+        y = row * (self.cell_px + self.caption_px)
+        return column * self.cell_px, y, self.cell_px, self.cell_px
 
     def figure_box(
         self, index: int, rgba: UInt8[np.ndarray, "cell cell 4"]

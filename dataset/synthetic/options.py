@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from toonset.dataset.synthetic.artist_options import ArtistOptions, BodyErrors, check_ranges
 from toonset.errors import SheetError
 
 MAX_SAMPLES = 4096  # px a side of a supersampled cell: what off-screen buffers hold in < 1 GiB
@@ -31,6 +32,7 @@ class SynthOptions:
         following_parts: mesh parts that keep facing the viewer (the ears of a famous mouse).
         background: "white", "transparent" or a colour such as "#aabbcc"; artists export white.
         supersample: samples per pixel and axis for anti-aliasing; 3 gives 10 levels or more.
+        artist: what artists do besides: other bodies, shadow, paper.
     """
 
     views: int = 8
@@ -46,12 +48,14 @@ class SynthOptions:
     following_parts: tuple[str, ...] = ()
     background: str = "white"
     supersample: int = 3
+    artist: ArtistOptions = ArtistOptions()
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn.
 
         Raises:
-            SheetError: a number is out of its range, or the background is no colour.
+            SheetError: a number is out of its range, the background is no colour, or there is no
+                paper for what would be on it.
         """
         limits = {
             "views": (1, 360),
@@ -65,16 +69,35 @@ class SynthOptions:
             "scale_error_percent": (0, 50),
             "supersample": (1, 16),
         }
-        for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high:  # NaN, too
-                raise SheetError(f"synth: {name} is {value}, {low:g} to {high:g} is needed")
+        check_ranges(self, limits)
         if self.background not in ("white", "transparent") and not HEX_COLOR.fullmatch(
             self.background
         ):
             raise SheetError(
                 f"synth: background {self.background!r} is none of white, transparent, #rrggbb"
             )
+        on_paper = self.artist.grain_levels or self.artist.captions or self.artist.jpeg_quality
+        if self.background == "transparent" and on_paper:
+            raise SheetError(
+                "synth: grain, captions and JPEG need paper, the background is transparent; "
+                "choose white or #rrggbb"
+            )
+
+    def without_error(self, views: int) -> SynthOptions:
+        """Return options of `views` exact pictures in the same style, evenly round, on white.
+
+        Lines, shadow, elevation and distance stay; whatever differs from view to view goes.
+        """
+        return replace(
+            self,
+            views=views,
+            columns=0,
+            yaw_jitter_deg=0.0,
+            warp_percent=0.0,
+            scale_error_percent=0.0,
+            background="white",
+            artist=ArtistOptions(shadow_strength=self.artist.shadow_strength),
+        )
 
     @property
     def background_rgb(self) -> tuple[int, int, int] | None:
@@ -85,3 +108,29 @@ class SynthOptions:
             return 255, 255, 255
         red, green, blue = bytes.fromhex(self.background.removeprefix("#"))
         return red, green, blue
+
+
+ARTIST = ArtistOptions(
+    body=BodyErrors(
+        head_turn_deg=4.0, arm_swing_deg=5.0, face_turn_deg=6.0, field_height_fraction=0.01
+    ),
+    elevation_jitter_deg=1.0,
+    shadow_strength=0.3,
+    line_width_spread=0.3,
+    color_error_fraction=0.03,
+    grain_levels=1.3,
+    captions=True,
+    jpeg_quality=88,
+)
+CONDITIONS: dict[str, SynthOptions] = {
+    "plain": SynthOptions(),
+    "artist": SynthOptions(
+        yaw_jitter_deg=5.0,
+        elevation_deg=4.0,
+        distance_heights=8.0,  # nearly orthographic
+        label_lines=False,
+        warp_percent=0.7,  # of the cell: 0.8 % of a figure's height
+        background="#f4f1e8",  # off-white paper
+        artist=ARTIST,
+    ),
+}

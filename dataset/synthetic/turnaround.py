@@ -3,29 +3,33 @@
 One generator feeds tests, benchmarks and examples. Every view is drawn from labels and depth of
 `toonset.dataset.synthetic.gl_render`: flat colours, black contours, then the errors of a hand:
 turned a little too far, a little too large, smoothly bent; or cheated, with parts that keep facing
-the viewer. The bend is in the picture alone; all else is in the camera (or the mesh) of the truth.
+the viewer; or with all that artists do besides (`ArtistOptions`). Bends and other bodies are in the
+picture alone; all else is in the camera (or the mesh) of the truth.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from PIL import Image
 
 from toonset.camera import Camera
-from toonset.dataset.synthetic.drawing import Drawing, draw, find_lines
+from toonset.dataset.synthetic.body_error import deform
+from toonset.dataset.synthetic.body_parts import find_body_parts
+from toonset.dataset.synthetic.cell import Hand, draw_cell
 from toonset.dataset.synthetic.follow_viewer import part_numbers, turn_parts
-from toonset.dataset.synthetic.gl_render import render_labels
-from toonset.dataset.synthetic.hand_error import bend
 from toonset.dataset.synthetic.layout import CellGrid, paste
 from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.paper import with_captions, with_grain
 from toonset.mesh import Mesh
 from toonset.view import View
 
 JUMP = 0.02  # of the body's height: a larger step in depth is drawn as a line
+CAPTION = 0.1  # of the cell: the strip below it
 MARGIN = 0.04  # of the cell on every side, beside what outline and bend may need
 BEND_REACH = 3.0  # times the bend's root mean square: as far as a figure's rim is assumed to move
 PLAIN = (204, 204, 204)  # a mesh without colours
@@ -37,12 +41,14 @@ class Turnaround:
     """A sheet and everything that is true of it.
 
     Attributes:
-        sheet: (height, width, 4) sRGB with the options' background.
+        sheet: (height, width, 4) sRGB with the options' background, before any JPEG.
         views: the cells on transparent ground, in sheet order; `box` is the cell in the sheet.
         cameras: one per view, exact, in pixels of its cell; the bend is not in them.
         labels: per view (cell, cell) index into `palette`; 255 = background, ink, mixed pixel.
         ink: per view (cell, cell) coverage of lines, 0 to 255.
-        palette: (colors, 3) sRGB.
+        shadows: per view (cell, cell) which pixels that have a label are in shadow.
+        palette: (colors, 3) sRGB, in light.
+        color_factors: per view (3,) its colours over the palette's.
         figure_boxes: per view (x, y, width, height) of the figure in the sheet.
         yaws: per view in radians, with jitter, in [0, 2 pi).
         mesh: what was drawn (parts that follow the viewer stand as in the mesh).
@@ -55,7 +61,9 @@ class Turnaround:
     cameras: tuple[Camera, ...]
     labels: tuple[UInt8[np.ndarray, "cell cell"], ...]
     ink: tuple[UInt8[np.ndarray, "cell cell"], ...]
+    shadows: tuple[Bool[np.ndarray, "cell cell"], ...]
     palette: UInt8[np.ndarray, "colors 3"]
+    color_factors: tuple[Float[np.ndarray, " 3"], ...]
     figure_boxes: tuple[tuple[int, int, int, int], ...]
     yaws: tuple[float, ...]
     mesh: Mesh
@@ -63,48 +71,69 @@ class Turnaround:
     seed: int
 
 
-def make_turnaround(mesh: Mesh, options: SynthOptions, seed: int) -> Turnaround:
+def make_turnaround(
+    mesh: Mesh,
+    options: SynthOptions,
+    seed: int,
+    landmarks: Mapping[str, Sequence[float]] | None = None,
+) -> Turnaround:
     """Return a turnaround of `mesh`; the same arguments give the same bytes.
 
     Args:
         mesh: posed, +Y up, front +Z; face colours are used as they are, none means grey.
         options: what to draw.
-        seed: of jitter, scale errors and bends; each of them draws from its own stream, so that
-            changing one option leaves the others' randomness as it was.
+        seed: of jitter, scale errors, bends and the rest; each of them draws from its own stream,
+            so that changing one option leaves the others' randomness as it was.
+        landmarks: world points by name, which say where head and arms are; without them the names
+            of the mesh's parts do.
 
     Raises:
         MeshError: a part that should follow the viewer does not exist.
         CameraError: the perspective's camera stands within the mesh.
         SetupError: EGL or Mesa is missing.
     """
-    jitter, sizes, bends = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)
+    jitter, sizes, bends, artist = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
     )
     following = part_numbers(mesh, options.following_parts)
     turns = np.arange(options.views) * (2 * math.pi / options.views)
     spread = math.radians(options.yaw_jitter_deg)
     yaws = (turns + spread * jitter.uniform(-1, 1, options.views)) % (2 * math.pi)
     errors = 1 + options.scale_error_percent / 100 * sizes.uniform(-1, 1, options.views)
-    meshes = [turn_parts(mesh, following, yaw) for yaw in yaws]
-    cameras = _cameras(meshes, yaws, errors, options)
-    palette, face_labels = flat_palette(mesh)
     seeds = bends.integers(2**63, size=options.views)
-    cells = [
-        _draw_cell(posed, face_labels, palette, camera, JUMP * mesh.height, options, int(bend_seed))
-        for posed, camera, bend_seed in zip(meshes, cameras, seeds, strict=True)
+    paper, *own = artist.spawn(options.views + 1)
+    hands = [Hand(int(s), *hand.spawn(4)) for s, hand in zip(seeds, own, strict=True)]
+    limbs, of_body = find_body_parts(mesh, landmarks or {}), options.artist.body
+    drawn = [
+        turn_parts(deform(mesh, limbs, of_body, yaw, hand.body), following, yaw)
+        for yaw, hand in zip(yaws, hands, strict=True)
     ]
-    grid = CellGrid(options.views, options.columns or options.views, options.cell_px)
-    pictures = [cell.rgba for cell in cells]
+    tilts = [options.artist.elevation_jitter_deg * h.tilt.standard_normal() for h in hands]
+    elevations = np.radians(options.elevation_deg + np.array(tilts))
+    body = turn_parts(mesh, following, yaws[0])
+    cameras = _cameras(body, drawn, np.stack([yaws, elevations, errors], axis=1), options)
+    paints = flat_palette(mesh)
+    cells = [
+        draw_cell(posed, paints, camera, JUMP * mesh.height, options, hand)
+        for posed, camera, hand in zip(drawn, cameras, hands, strict=True)
+    ]
+    grid = _grid(options)
+    pictures = [cell.drawing.rgba for cell in cells]
+    sheet = paste(pictures, grid, options.background_rgb)
+    if options.artist.captions:
+        sheet = with_captions(sheet, grid)
     return Turnaround(
-        sheet=paste(pictures, grid, options.background_rgb),
+        sheet=with_grain(sheet, options.artist.grain_levels, paper),
         views=tuple(
-            View(rgba, grid.box(i), options.outline_px, f"{i:03d}.png")
-            for i, rgba in enumerate(pictures)
+            View(cell.drawing.rgba, grid.box(i), cell.line_px, f"{i:03d}.png")
+            for i, cell in enumerate(cells)
         ),
         cameras=tuple(cameras),
-        labels=tuple(cell.labels for cell in cells),
-        ink=tuple(cell.ink for cell in cells),
-        palette=palette,
+        labels=tuple(cell.drawing.labels for cell in cells),
+        ink=tuple(cell.drawing.ink for cell in cells),
+        shadows=tuple(cell.shadow for cell in cells),
+        palette=paints[0],
+        color_factors=tuple(cell.color_factor for cell in cells),
         figure_boxes=tuple(grid.figure_box(i, rgba) for i, rgba in enumerate(pictures)),
         yaws=tuple(float(yaw) for yaw in yaws),
         mesh=mesh,
@@ -113,19 +142,30 @@ def make_turnaround(mesh: Mesh, options: SynthOptions, seed: int) -> Turnaround:
     )
 
 
+def _grid(options: SynthOptions) -> CellGrid:
+    caption = round(CAPTION * options.cell_px) if options.artist.captions else 0
+    return CellGrid(options.views, options.columns or options.views, options.cell_px, caption)
+
+
 def _cameras(
-    meshes: list[Mesh], yaws: np.ndarray, errors: np.ndarray, options: SynthOptions
+    body: Mesh, drawn: Sequence[Mesh], placed: Float[np.ndarray, "views 3"], options: SynthOptions
 ) -> list[Camera]:
-    """Return cameras of one common scale (times each view's error) that keep figures in cells."""
-    body, size = meshes[0], (options.cell_px, options.cell_px)
+    """Return cameras of one common scale (times each view's error) that keep figures in cells.
+
+    Args:
+        body: what they look at.
+        drawn: what each shows.
+        placed: yaw, elevation (radians) and error of the scale of each.
+        options: of the sheet.
+    """
+    size = (options.cell_px, options.cell_px)
     k = 1 / (options.distance_heights * body.height) if options.distance_heights else 0.0
-    elevation = math.radians(options.elevation_deg)
     zero = np.zeros(2)
     unit = [
         Camera.looking_at(body.middle, yaw, elevation, error, size, center=zero, k=k)
-        for yaw, error in zip(yaws, errors, strict=True)
+        for yaw, elevation, error in placed
     ]
-    spans = [_span(mesh, camera) for mesh, camera in zip(meshes, unit, strict=True)]
+    spans = [_span(mesh, camera) for mesh, camera in zip(drawn, unit, strict=True)]
     low = np.min([span[0] for span in spans], axis=0)
     high = np.max([span[1] for span in spans], axis=0)
     half_extent = max(abs(low[0]), abs(high[0]), (high[1] - low[1]) / 2)
@@ -143,26 +183,6 @@ def _room_px(options: SynthOptions) -> float:
     """Return how far from the cell's middle the undrawn figure may reach."""
     bend = BEND_REACH * options.warp_percent / 100 * options.cell_px
     return options.cell_px * (0.5 - MARGIN) - options.outline_px / 2 - bend
-
-
-def _draw_cell(
-    mesh: Mesh,
-    face_labels: Int[np.ndarray, " faces"],
-    palette: UInt8[np.ndarray, "colors 3"],
-    camera: Camera,
-    jump: float,
-    options: SynthOptions,
-    seed: int,
-) -> Drawing:
-    seen = render_labels(mesh, face_labels, camera.resized(options.supersample))
-    lines = find_lines(seen, jump, label_lines=options.label_lines)
-    bent = bend(
-        seen.labels,
-        lines,
-        rms_px=options.warp_percent / 100 * options.cell_px * options.supersample,
-        generator=np.random.default_rng(seed),
-    )
-    return draw(*bent, palette, options.outline_px, options.supersample)
 
 
 def flat_palette(mesh: Mesh) -> tuple[UInt8[np.ndarray, "colors 3"], Int[np.ndarray, " faces"]]:

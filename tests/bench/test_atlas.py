@@ -23,7 +23,8 @@ from bench.atlas.figures import (
     summary_rows,
     tally,
 )
-from bench.atlas.pages import PALETTE_PAGES, TRAIN_PAGES
+from bench.atlas.labels import try_labels
+from bench.atlas.pages import LABEL_PAGES, PALETTE_PAGES, TRAIN_PAGES
 from bench.atlas.palette import (
     EYE,
     SKIN_AND_HAIR,
@@ -38,6 +39,7 @@ from bench.atlas.run import TriedStepResult
 from bench.atlas.scenes import draw_scene, misscaled, misturned, shifted, squashed
 from bench.atlas.training import REFUSED, REPAIRED, SILENT, Tried, try_training
 from bench.cases.bodies import random_body
+from bench.stability import artist
 from bench.stability.bodies import (
     EARS,
     vase,
@@ -221,6 +223,17 @@ def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monke
     assert picture.startswith(b"\x89PNG")
     assert "left out" in eye.words
     assert hex_of(EYE) in eye.words
+
+
+def test_labels_are_right_where_paints_are_plain_and_wrong_in_deep_shadow(monkeypatch):
+    monkeypatch.setattr(artist, "SHEET", replace(artist.SHEET, views=3, cell_px=150))
+    page = next(page for page in LABEL_PAGES if page.name == "labels shadow")
+    plain, picture = try_labels(page, 0, 0)
+    deep, _ = try_labels(page, 80, 0)
+    assert picture.startswith(b"\x89PNG")
+    assert plain.figure > 95
+    assert deep.figure < plain.figure - 5
+    assert plain.evidence["right_of_labelled"] >= plain.figure
 
 
 # ---- figures

@@ -16,6 +16,7 @@ from bench.atlas.training import Tried
 from bench.calib.measure import ViewError
 from bench.cases.bodies import random_body
 from bench.cases.workers import THREADS, in_order
+from bench.stability import artist
 from bench.stability import steps as stability
 from bench.stability.chart import draw_stability
 from bench.stability.files import RunKey, as_plain, from_plain, in_table_order, name_of
@@ -65,6 +66,8 @@ def test_the_worst_step_can_be_drawn_twice_alike(sweep, monkeypatch):
     small = replace(BASE, cell_px=80, views=2, supersample=1)
     for place in ("sheet", "draws"):
         monkeypatch.setattr(f"bench.stability.{place}.BASE", small)
+    of_artist = replace(artist.SHEET, cell_px=120, views=2, supersample=1)
+    monkeypatch.setattr(artist, "SHEET", of_artist)
     first, second = (sweep.draw(sweep.steps[-1], 5) for _ in range(2))
     for (view, camera), (again, same) in zip(first.drawings, second.drawings, strict=True):
         np.testing.assert_array_equal(view.rgba, again.rgba)
@@ -94,6 +97,21 @@ def test_a_refused_and_a_crashed_sheet_are_results(sheet, monkeypatch):
         assert picture.startswith(b"\x89PNG")
         assert [view.verdict for view in result.views] == [verdict] * 3
         assert "too faint" in result.note or result.note == "KeyError: 'k'"
+
+
+def test_a_missing_mannequin_is_what_users_get_without_one(sheet, monkeypatch):
+    asked = []
+
+    def found(views, mesh):
+        asked.append(mesh)
+        raise SheetError("stop")
+
+    monkeypatch.setattr(stability, "calibrate", found)
+    monkeypatch.setattr(stability, "find_cameras", found)
+    for given in ("own", "plain", "none"):
+        same = replace(sheet, given=given)
+        run_sheet(Sweep("x", "x", (0,), (0,), "", None, lambda step, seed, s=same: s), 0, 0)
+    assert asked == [sheet.mesh, None, "none"]
 
 
 def tiny(step, seed):
