@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from toonset.palette.palette import DroppedColor, Evidence, Palette, PaletteColor
 
 WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette.png")
-FOLDERS = ("labels", "contours")
+FOLDERS = ("labels", "tones", "contours")
 BUNDLE, OUT = Path("bundle"), Path("palette")
 CHOICE_PANEL = "Choice of colours"
 HUNDRED = 100.0
@@ -116,8 +116,9 @@ def palette(
 ) -> None:
     """List the colours that make up at least 5 % of the character, and label every pixel.
 
-    Writes palette.json, .gpl, .ase, .hex, .png, labels/ and contours/ into the bundle, replacing
-    those of an earlier run; for images and other folders, or with -o, into a folder of their own.
+    Writes palette.json, .gpl, .ase, .hex, .png, labels/, contours/ and, for shaded sheets, tones/
+    into the bundle, replacing those of an earlier run; for images and other folders, or with -o,
+    into a folder of their own.
     """
     from toonset.dataset.bundle.palette_files import write_labelled
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures

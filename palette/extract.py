@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -28,6 +28,21 @@ Mask = Bool[np.ndarray, "height width"]
 
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 METHODS = ("toonset", "extcolors")
+IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
+
+
+@dataclass(frozen=True, eq=False)
+class PaintMap:
+    """What every pixel of a drawing is painted with.
+
+    Attributes:
+        labels: palette index; 255 = background, blend, or a drawn line whose colour is no paint's.
+        tones: 0 = in light, 1 = in shadow, 255 where there is no label; None: the sheet has no
+            shadow. Drawn lines lie in light.
+    """
+
+    labels: Map
+    tones: Map | None
 
 
 def extract_palette(
@@ -81,7 +96,7 @@ def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb")
     if space not in get_args(Space):
         raise UsageError(f"--space: {space!r} is none of {', '.join(get_args(Space))}")
     picture = picture_of(view)
-    return label_drawings([picture], [find_contour(picture)], palette, space)[0]
+    return paint_maps([picture], [find_contour(picture)], palette, space)[0].labels
 
 
 def picture_of(view: View | Picture) -> Picture:
@@ -142,7 +157,8 @@ def choose_palette(
     dark = find_tones(pictures, contours, shadow)
     lit = lit_pictures(pictures, contours, dark, shadow)
     palette = _in_light(lit, options, lines, shadow)
-    return with_tones(palette, shadow, lit, dark)
+    paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
+    return with_tones(palette, shadow, lit, paint)
 
 
 def _in_light(
@@ -171,7 +187,7 @@ def with_tones(
         palette: of these drawings.
         shadow: of the sheet.
         lit: the drawings without it.
-        dark: where it lay.
+        dark: where it lay on paint; drawn lines count as in light.
     """
     pixels = np.zeros((2, 256))
     for picture, where in zip(lit, dark, strict=True):
@@ -193,10 +209,11 @@ def _tones(color: PaletteColor, shadow: Shadow, in_shadow: float) -> tuple[Tone,
     return (light, dark) if in_shadow > 0 else (light,)
 
 
-def label_drawings(
+def paint_maps(
     pictures: Sequence[Picture], contours: Sequence[Map], palette: Palette, space: Space = "rgb"
-) -> list[Map]:
-    """Return the label maps of pictures whose drawn lines are known; see `label_image`."""
+) -> list[PaintMap]:
+    """Return labels and tones of pictures whose drawn lines are known; see `label_image`."""
+    dark = None
     if palette.shadow is not None:
         dark = find_tones(pictures, contours, palette.shadow)
         pictures = lit_pictures(pictures, contours, dark, palette.shadow)
@@ -205,7 +222,17 @@ def label_drawings(
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:
         for labels, contour in zip(maps, contours, strict=True):
             labels[contour >= LINE] = UNLABELLED
-    return maps
+    if dark is None:
+        return [PaintMap(labels, None) for labels in maps]
+    return [
+        PaintMap(labels, _tone_map(labels, shade & (contour < LINE)))
+        for labels, shade, contour in zip(maps, dark, contours, strict=True)
+    ]
+
+
+def _tone_map(labels: Map, dark: Mask) -> Map:
+    tones = np.where(dark, IN_SHADOW, IN_LIGHT)
+    return np.where(labels == UNLABELLED, UNLABELLED, tones).astype(np.uint8)
 
 
 def _typed(option: str, text: str) -> UInt8[np.ndarray, "colors 3"]:

@@ -8,7 +8,7 @@ import pytest
 
 from tests.palette.shaded import EYE, FACTOR, PAINTS, Drawing, drawings
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.extract import extract_palette, label_drawings
+from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.formats.json import to_json
 from toonset.palette.formats.schema import palette_of
 from toonset.palette.paints.features import find_features
@@ -99,7 +99,7 @@ def test_labels_are_of_paints_whatever_their_tone() -> None:
     names = [min(range(5), key=lambda n: away(c.rgb, (*PAINTS, EYE)[n])) for c in palette.colors]
     table = np.full(256, 255)
     table[: len(names)] = names
-    found = label_drawings(pictures(drawn), contours(drawn), palette)
+    found = [m.labels for m in paint_maps(pictures(drawn), contours(drawn), palette)]
     right, sure = 0, 0
     for one, labels in zip(drawn, found, strict=True):
         pure = inner(one.paint)
@@ -158,3 +158,18 @@ def test_only_shaded_sheets_and_features_add_to_the_file() -> None:
     assert to_json(again) == content
     assert again.features == palette.features
     assert to_json(replace(again, shadow=None, features=())).keys() == flat.keys()
+
+
+def test_tones_say_which_paint_lies_in_shadow() -> None:
+    drawn = drawings(shadow=True, noisy=True)
+    palette = extract_palette(pictures(drawn))
+    for one, found in zip(
+        drawn, paint_maps(pictures(drawn), contours(drawn), palette), strict=True
+    ):
+        assert found.tones is not None
+        assert np.array_equal(found.tones == 255, found.labels == 255)
+        sure = inner(one.paint) & inner(one.dark.astype(np.uint8)) & (found.labels < 255)
+        assert (found.tones == one.dark)[sure & (one.paint != 4)].mean() > 0.95
+    flat = pictures(drawings(shadow=False, noisy=False))
+    lines = [find_contour(one) for one in flat]
+    assert all(one.tones is None for one in paint_maps(flat, lines, extract_palette(flat)))
