@@ -135,11 +135,12 @@ def options_of(
 def choose_palette(
     pictures: Sequence[Picture],
     contours: Sequence[Map],
-    options: PaletteOptions,
-    colors: str | None,
-    method: str,
+    options: PaletteOptions | None = None,
+    colors: str | None = None,
+    method: str = "toonset",
 ) -> Palette:
     """Return the palette of pictures whose drawn lines are known; see `extract_palette`."""
+    options = options or PaletteOptions()
     if method not in METHODS:
         raise UsageError(f"--method: {method!r} is none of {', '.join(METHODS)}")
     if colors is not None and (options.keep or method != "toonset"):
