@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError, UsageError
-from toonset.palette.formats.registry import parse_colors
+from toonset.palette.formats.registry import names_tones, parse_colors
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
@@ -65,7 +65,8 @@ def extract_palette(
         keep: colours to keep however small they are: "#aabbcc,...".
         contour: count drawn lines to their colour; without, only what is painted with it.
         features: keep eyes, mouths and buttons under that share, too; None: on shaded sheets.
-        colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file.
+        colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file. Where the
+            file has tones in shadow, a sheet's shadow is taken off; else name both tones.
         method: "toonset", or "extcolors", the paper's tool.
 
     Raises:
@@ -148,16 +149,22 @@ def choose_palette(
     if options.keep and method != "toonset":
         raise UsageError("--keep belongs to --method toonset")
     lines = [contour >= LINE for contour in contours]
-    if colors is not None:
-        return pick_palette(pictures, _typed("--colors", colors), lines)
+    picked = None if colors is None else _typed("--colors", colors)
+    if picked is not None and not names_tones(colors or ""):
+        return pick_palette(pictures, picked, lines)
     if method == "extcolors":
         return with_places(extcolors_palette(pictures, options), pictures)
     shadow = find_shadow(pictures, contours)
+    if shadow is None and picked is not None:
+        return pick_palette(pictures, picked, lines)
     if shadow is None:
         return _in_light(pictures, options, lines)
     dark = find_tones(pictures, contours, shadow)
     lit = lit_pictures(pictures, contours, dark, shadow)
-    palette = _in_light(lit, options, lines, shadow)
+    if picked is None:
+        palette = _in_light(lit, options, lines, shadow)
+    else:
+        palette = pick_palette(lit, picked, lines)
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
     return with_tones(palette, shadow, lit, paint)
 
