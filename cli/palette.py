@@ -1,4 +1,4 @@
-"""`toonset palette`: a character's colours, and label and contour maps of every picture."""
+"""`toonset palette`: a character's colours and its label maps; `toonset recolor`: other colours."""
 
 from __future__ import annotations
 
@@ -19,17 +19,13 @@ from toonset.cli.common.output import (
 from toonset.write import check_output
 
 if TYPE_CHECKING:
-    from toonset.palette.palette import DroppedColor, Evidence, Palette, PaletteColor
+    from toonset.dataset.bundle.painted import Painted
+    from toonset.palette.palette import Palette
 
 WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette.png")
-FOLDERS = ("labels", "contours")
-BUNDLE, OUT = Path("bundle"), Path("palette")
+FOLDERS = ("labels", "tones", "contours")
+BUNDLE, OUT, RECOLORED = Path("bundle"), Path("palette"), Path("recolored")
 CHOICE_PANEL = "Choice of colours"
-HUNDRED = 100.0
-MOST_NAMED = 6  # left-out colours; more are counted
-PIXELS = 4096  # for which the evidence counts bits
-LEAST_BITS = 1.0  # less decides nothing
-LEAST_SHARE = 0.0005  # what rounds to 0.1 %
 
 
 def palette(
@@ -116,8 +112,9 @@ def palette(
 ) -> None:
     """List the colours that make up at least 5 % of the character, and label every pixel.
 
-    Writes palette.json, .gpl, .ase, .hex, .png, labels/ and contours/ into the bundle, replacing
-    those of an earlier run; for images and other folders, or with -o, into a folder of their own.
+    Writes palette.json, .gpl, .ase, .hex, .png, labels/, contours/ and, for shaded sheets, tones/
+    into the bundle, replacing those of an earlier run; for images and other folders, or with -o,
+    into a folder of their own.
     """
     from toonset.dataset.bundle.palette_files import write_labelled
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
@@ -143,6 +140,7 @@ def palette(
 
 
 def _report(found: Palette, target: Path, printer: Printer, *, in_bundle: bool) -> None:
+    from toonset.cli.common.palette_text import palette_lines
     from toonset.palette.formats.json import to_json
 
     for warning in found.warnings:
@@ -153,95 +151,65 @@ def _report(found: Palette, target: Path, printer: Printer, *, in_bundle: bool) 
     printer.result({"out": target, **to_json(found)}, text)
 
 
-def palette_lines(found: Palette, *, verbose: bool) -> list[str]:
-    """Return a line per colour, then what is left out; if verbose, the rule and the evidence."""
-    lines = [_color_line(color, found) for color in found.colors]
-    if not verbose:
-        return [*lines, *_left_out(found)]
-    lines.append(f"shares are of all the character's pixels; rule: {found.rule}")
-    if found.shadow is not None:
-        factor = ", ".join(f"{value:.2f}" for value in found.shadow.factor)
-        lines.append(f"shadow: colours in light times {factor}; colours are those in light")
-    lines += _contour_lines(found)
-    if found.dropped:
-        lines.append("left out (with the mean OKLab error that this costs, and the largest patch):")
-        lines += [_dropped_line(color, found) for color in found.dropped]
-    if found.evidence is not None:
-        lines.append(_evidence_line(found.evidence))
-    return lines
+def recolor(
+    changes: Annotated[
+        list[str],
+        typer.Option("--recolor", help="OLD=NEW, '#aa0000=#00aa00' or 'teal=#00aa00'; repeatable."),
+    ],
+    inputs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[BUNDLE|FOLDER|IMAGE...]",
+            help="A bundle (default: ./bundle) with its palette, or what `palette` takes.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--out", help="Folder for the pictures.", rich_help_panel=OUTPUT_PANEL),
+    ] = RECOLORED,
+    force: ForceFlag = False,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Write the drawings with some palette colours replaced, one PNG each.
+
+    A colour's shadow tone and soft edges go with it; drawn lines, and small features that no colour
+    of the palette stands for, stay as they are. Of a bundle, its palette.json, labels/ and tones/
+    count; of other pictures the palette is found first.
+    """
+    from toonset.dataset.images.picture import encode_png
+    from toonset.palette.recolor import changed_colors, recolored_drawing
+    from toonset.write import new_folder, write_bytes
+
+    printer = Printer(as_json, quiet)
+    places = inputs or [BUNDLE]
+    check_output(out, places, ("*.png",), force=force)
+    found, drawings = _painted(places, printer)
+    colors = changed_colors(found.rgb, changes)
+    with new_folder(out, force=force) as folder:
+        for one in drawings:
+            new = recolored_drawing(one.picture, one.paint, one.contour, found, colors)
+            write_bytes(folder / one.name, encode_png(new))
+    names = [one.name for one in drawings]
+    count = "1 picture" if len(names) == 1 else f"{len(names)} pictures"
+    printer.result({"out": out, "files": names}, f"{out}: {count}")
 
 
-def _color_line(color: PaletteColor, found: Palette) -> str:
-    """Return a colour's line, with how much of it lies in shadow, and whether it is a feature."""
-    notes = [f"{HUNDRED * dark.share:.1f} % in shadow" for dark in color.tones[1:]]
-    notes += ["feature"] if color.rgb in found.features else []
-    return _line(color.rgb, color.share, color.name) + (f" ({', '.join(notes)})" if notes else "")
+def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painted]]:
+    """Return palette and drawings: a bundle's own, or found here."""
+    from toonset.dataset.bundle.painted import Painted, read_painted
+    from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
+    from toonset.palette.extract import choose_palette, paint_maps
+    from toonset.palette.pixels.ink_lines import find_contour
 
-
-def _left_out(found: Palette) -> list[str]:
-    from toonset.palette.names import hex_of
-
-    if not found.dropped:
-        return []
-    names = [f"{hex_of(color.rgb)} {color.name}" for color in found.dropped[:MOST_NAMED]]
-    more = [f"{len(found.dropped) - MOST_NAMED} more"] if len(found.dropped) > MOST_NAMED else []
-    first = hex_of(found.dropped[0].rgb)
-    return [f"left out by the rule: {', '.join([*names, *more])} (--keep '{first}' keeps one)"]
-
-
-def _evidence_line(evidence: Evidence) -> str:
-    """Return why so many colours: with them the drawing is described most briefly."""
-    number = evidence.colors
-    others = [_other_number(number + 1, evidence.one_more)]
-    if number > 1:
-        others.insert(0, _other_number(number - 1, evidence.one_less))
-    colors = "1 colour describes" if number == 1 else f"{number} colours describe"
-    return f"{colors} the drawing most briefly; {', '.join(others)} (bits per {PIXELS:,} pixels)"
-
-
-def _other_number(number: int, more_bits: float) -> str:
-    if more_bits < LEAST_BITS:
-        return f"{number} would do nearly as well, a close call"
-    return f"{number} would take {more_bits:.0f} bits more"
-
-
-def _contour_lines(found: Palette) -> list[str]:
-    from toonset.palette.names import hex_of
-
-    ink = found.contour
-    if ink is None:
-        return []
-    kept = ink.rgb in [color.rgb for color in found.colors]
-    return [
-        f"lines: {hex_of(ink.rgb)}, {HUNDRED * ink.share:.1f} % of the character; without lines "
-        f"{HUNDRED * ink.cloth:.1f} % {'' if kept else '(left out) '}has this colour"
-    ]
-
-
-def _dropped_line(color: DroppedColor, found: Palette) -> str:
-    line = f"{_line(color.rgb, color.share, color.name)}  {color.cost:.3f}"
-    if color.place is not None:
-        x, y, width, height = color.place.box
-        line += f"  picture {color.place.view} at ({x}, {y}), {width} x {height} px"
-    return line + _like(color, found)
-
-
-def _like(color: DroppedColor, found: Palette) -> str:
-    """Return what colour of the palette a left-out one looks like; "" if it does not."""
-    import numpy as np
-
-    from toonset.palette.colors import JUST_NOTICEABLE
-    from toonset.palette.names import hex_of
-    from toonset.palette.pixels.labels import nearest_colors
-
-    if color.cost > JUST_NOTICEABLE:
-        return ""
-    number = int(nearest_colors(np.array([color.rgb], dtype=np.uint8), found.rgb)[0])
-    return f", looks like {hex_of(found.colors[number].rgb)} and is counted as that, too"
-
-
-def _line(rgb: tuple[int, int, int], share: float, name: str) -> str:
-    from toonset.palette.names import hex_of
-
-    percent = f"{HUNDRED * share:5.1f}" if share >= LEAST_SHARE else "< 0.1"
-    return f"{hex_of(rgb)}  {percent} %  {name}"
+    bundle = bundle_of(places)
+    if bundle is not None:
+        return read_painted(places[0])
+    drawn = load_pictures(places)
+    for note in drawn.notes:
+        printer.say(note)
+    contours = [find_contour(picture) for picture in drawn.pictures]
+    found = choose_palette(drawn.pictures, contours)
+    maps = paint_maps(drawn.pictures, contours, found)
+    parts = zip(drawn.names, drawn.pictures, maps, contours, strict=True)
+    return found, [Painted(*part) for part in parts]

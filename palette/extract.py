@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError, UsageError
-from toonset.palette.formats.registry import parse_colors
+from toonset.palette.formats.registry import names_tones, parse_colors
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
@@ -28,6 +28,21 @@ Mask = Bool[np.ndarray, "height width"]
 
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 METHODS = ("toonset", "extcolors")
+IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
+
+
+@dataclass(frozen=True, eq=False)
+class PaintMap:
+    """What every pixel of a drawing is painted with.
+
+    Attributes:
+        labels: palette index; 255 = background, blend, or a drawn line whose colour is no paint's.
+        tones: 0 = in light, 1 = in shadow, 255 where there is no label; None: the sheet has no
+            shadow. Drawn lines lie in light.
+    """
+
+    labels: Map
+    tones: Map | None
 
 
 def extract_palette(
@@ -50,7 +65,8 @@ def extract_palette(
         keep: colours to keep however small they are: "#aabbcc,...".
         contour: count drawn lines to their colour; without, only what is painted with it.
         features: keep eyes, mouths and buttons under that share, too; None: on shaded sheets.
-        colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file.
+        colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file. Where the
+            file has tones in shadow, a sheet's shadow is taken off; else name both tones.
         method: "toonset", or "extcolors", the paper's tool.
 
     Raises:
@@ -81,7 +97,7 @@ def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb")
     if space not in get_args(Space):
         raise UsageError(f"--space: {space!r} is none of {', '.join(get_args(Space))}")
     picture = picture_of(view)
-    return label_drawings([picture], [find_contour(picture)], palette, space)[0]
+    return paint_maps([picture], [find_contour(picture)], palette, space)[0].labels
 
 
 def picture_of(view: View | Picture) -> Picture:
@@ -120,11 +136,12 @@ def options_of(
 def choose_palette(
     pictures: Sequence[Picture],
     contours: Sequence[Map],
-    options: PaletteOptions,
-    colors: str | None,
-    method: str,
+    options: PaletteOptions | None = None,
+    colors: str | None = None,
+    method: str = "toonset",
 ) -> Palette:
     """Return the palette of pictures whose drawn lines are known; see `extract_palette`."""
+    options = options or PaletteOptions()
     if method not in METHODS:
         raise UsageError(f"--method: {method!r} is none of {', '.join(METHODS)}")
     if colors is not None and (options.keep or method != "toonset"):
@@ -132,17 +149,24 @@ def choose_palette(
     if options.keep and method != "toonset":
         raise UsageError("--keep belongs to --method toonset")
     lines = [contour >= LINE for contour in contours]
-    if colors is not None:
-        return pick_palette(pictures, _typed("--colors", colors), lines)
+    picked = None if colors is None else _typed("--colors", colors)
+    if picked is not None and not names_tones(colors or ""):
+        return pick_palette(pictures, picked, lines)
     if method == "extcolors":
         return with_places(extcolors_palette(pictures, options), pictures)
     shadow = find_shadow(pictures, contours)
+    if shadow is None and picked is not None:
+        return pick_palette(pictures, picked, lines)
     if shadow is None:
         return _in_light(pictures, options, lines)
     dark = find_tones(pictures, contours, shadow)
     lit = lit_pictures(pictures, contours, dark, shadow)
-    palette = _in_light(lit, options, lines, shadow)
-    return with_tones(palette, shadow, lit, dark)
+    if picked is None:
+        palette = _in_light(lit, options, lines, shadow)
+    else:
+        palette = pick_palette(lit, picked, lines)
+    paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
+    return with_tones(palette, shadow, lit, paint)
 
 
 def _in_light(
@@ -171,7 +195,7 @@ def with_tones(
         palette: of these drawings.
         shadow: of the sheet.
         lit: the drawings without it.
-        dark: where it lay.
+        dark: where it lay on paint; drawn lines count as in light.
     """
     pixels = np.zeros((2, 256))
     for picture, where in zip(lit, dark, strict=True):
@@ -193,10 +217,11 @@ def _tones(color: PaletteColor, shadow: Shadow, in_shadow: float) -> tuple[Tone,
     return (light, dark) if in_shadow > 0 else (light,)
 
 
-def label_drawings(
+def paint_maps(
     pictures: Sequence[Picture], contours: Sequence[Map], palette: Palette, space: Space = "rgb"
-) -> list[Map]:
-    """Return the label maps of pictures whose drawn lines are known; see `label_image`."""
+) -> list[PaintMap]:
+    """Return labels and tones of pictures whose drawn lines are known; see `label_image`."""
+    dark = None
     if palette.shadow is not None:
         dark = find_tones(pictures, contours, palette.shadow)
         pictures = lit_pictures(pictures, contours, dark, palette.shadow)
@@ -205,7 +230,17 @@ def label_drawings(
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:
         for labels, contour in zip(maps, contours, strict=True):
             labels[contour >= LINE] = UNLABELLED
-    return maps
+    if dark is None:
+        return [PaintMap(labels, None) for labels in maps]
+    return [
+        PaintMap(labels, _tone_map(labels, shade & (contour < LINE)))
+        for labels, shade, contour in zip(maps, dark, contours, strict=True)
+    ]
+
+
+def _tone_map(labels: Map, dark: Mask) -> Map:
+    tones = np.where(dark, IN_SHADOW, IN_LIGHT)
+    return np.where(labels == UNLABELLED, UNLABELLED, tones).astype(np.uint8)
 
 
 def _typed(option: str, text: str) -> UInt8[np.ndarray, "colors 3"]:

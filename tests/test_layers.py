@@ -19,7 +19,13 @@ OUTSIDE = ("bench", "tests", "examples")  # of the wheel: no stage imports them
 # Within a stage a room imports only rooms on a lower floor; "@" marks a file of the stage's own
 # folder. Rooms of one floor do not see each other, so there is no circle.
 FLOORS: dict[str, tuple[str, ...]] = {
-    "palette": ("@colors @palette", "@names pixels", "@swatch_image formats paints", "@extract"),
+    "palette": (
+        "@colors @palette",
+        "@names pixels",
+        "@swatch_image formats paints",
+        "@extract",
+        "@recolor",
+    ),
     "dataset": (
         "images split.figures",
         "mesh split.touching",

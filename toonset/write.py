@@ -139,14 +139,49 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
         ) from error
 
 
+def check_removable(path: Path, written: str) -> None:
+    """Refuse a folder that holds anything but files of one pattern; no folder is fine.
+
+    Raises:
+        OutputError: it does, or it is a file or a link.
+    """
+    if not path.exists() and not path.is_symlink():
+        return
+    if path.is_symlink() or not path.is_dir():
+        raise OutputError(f"{path}: is no folder of this command; move it away")
+    for name in sorted(entry.name for entry in path.iterdir()):
+        if not fnmatch.fnmatchcase(name, written) and name not in LEFT_BY_DESKTOPS:
+            raise OutputError(f"{path}: holds {name!r}, which this command does not write; move it")
+
+
+def remove_folder(path: Path) -> None:
+    """Take a folder away, whole or not at all; one that is not there is left so.
+
+    Raises:
+        OutputError: its parent cannot be written.
+    """
+    if not path.exists():
+        return
+    try:
+        shutil.rmtree(_put_aside(path), ignore_errors=True)
+    except OSError as error:
+        raise _output_error(path, error) from error
+
+
 def _swap_in(temporary: Path, path: Path) -> None:
     if not path.exists():
         os.replace(temporary, path)
         return
-    old = Path(tempfile.mkdtemp(prefix=f".{path.name}.old.", suffix=".tmp", dir=path.parent))
-    os.replace(path, old)
+    old = _put_aside(path)
     os.replace(temporary, path)
     shutil.rmtree(old, ignore_errors=True)
+
+
+def _put_aside(path: Path) -> Path:
+    """Give a folder a temporary name, and return it."""
+    old = Path(tempfile.mkdtemp(prefix=f".{path.name}.old.", suffix=".tmp", dir=path.parent))
+    os.replace(path, old)
+    return old
 
 
 def _umask() -> int:

@@ -176,7 +176,7 @@ def _model(found: dict[str, Any]) -> str:
 def _pictures(found: dict[str, Any]) -> str:
     total = len(found["views"])
     parts = [f"{found['pictures']} of {total}"]
-    parts += [f"{found[n]} {n}" for n in ("labels", "contours") if found[n]]
+    parts += [f"{found[n]} {n}" for n in ("labels", "tones", "contours") if found[n]]
     return ", ".join(parts)
 
 
@@ -185,7 +185,11 @@ def _palette(palette: dict[str, Any] | None) -> str:
         return "none; `toonset palette` finds it"
     colors = [f"{c['hex']} {c['name']} {HUNDRED * c['share']:.1f} %" for c in palette["colors"]]
     more = [f"{len(colors) - MOST_COLORS} more"] if len(colors) > MOST_COLORS else []
-    return f"{len(colors)}: {', '.join([*colors[:MOST_COLORS], *more])}"
+    notes = ["shaded in two tones"] if palette.get("shadow") else []
+    features = len(palette.get("features", ()))
+    notes += [f"{features} feature{'s' * (features > 1)}"] if features else []
+    shown = f"{len(colors)}: {', '.join([*colors[:MOST_COLORS], *more])}"
+    return shown + (f" ({', '.join(notes)})" if notes else "")
 
 
 def _mannequin(mesh: dict[str, int] | None) -> str:

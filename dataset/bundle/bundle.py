@@ -8,6 +8,7 @@
     palette.json       the colours, once `toonset palette` has found them; .gpl .ase .hex .png are
                        copies for other programs
     labels/000.png     indexed PNG per picture: which colour a pixel is, 255 = none
+    tones/000.png      8-bit grey per picture of a shaded sheet: 0 = in light, 1 = in shadow
     contours/000.png   8-bit grey per picture: how much of a pixel is drawn line
     run/               a trained field
 
@@ -43,10 +44,17 @@ from toonset.view import View
 from toonset.write import new_folder, write_bytes, write_json
 
 OVERLAY, CALIBRATION = "overlay.png", "calibration.json"
-LABELS, CONTOURS, IMAGES = "labels", "contours", "images"
+LABELS, TONES, CONTOURS, IMAGES = "labels", "tones", "contours", "images"
 WRITTEN = (
     *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
-    *("palette.*", "labels", "contours", "run", "run.unfinished"),  # what later verbs put beside
+    *(
+        "palette.*",
+        "labels",
+        "tones",
+        "contours",
+        "run",
+        "run.unfinished",
+    ),  # what later verbs put beside
 )
 
 

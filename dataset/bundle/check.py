@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, IMAGES, LABELS, OVERLAY
+from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, IMAGES, LABELS, OVERLAY, TONES
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile
 from toonset.dataset.bundle.palette_files import COPIES, PALETTE_JSON, SWATCHES
@@ -28,6 +28,7 @@ from toonset.dataset.bundle.read_scene import (
     read_labels,
     read_palette_of,
     read_picture,
+    read_tones,
 )
 from toonset.dataset.bundle.transforms_read import (
     PosedPicture,
@@ -41,7 +42,7 @@ from toonset.dataset.images.picture import load_indexed_png, load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.palette.formats.registry import parse_colors
 
-PICTURES = {IMAGES: load_rgba, LABELS: load_indexed_png, CONTOURS: load_rgba}
+PICTURES = {IMAGES: load_rgba, LABELS: load_indexed_png, TONES: load_rgba, CONTOURS: load_rgba}
 SAME_CAMERA = 1e-6  # relative: both files are written from the same numbers
 
 Colors = UInt8[np.ndarray, "colors 3"]
@@ -112,8 +113,13 @@ def _check_colors(log: ProblemLog, file: Path, frames: _Frames) -> None:
         return
     if frames.posed:
         log.attempt(file.name, check_label_names, file, frames.posed)
-    _check_maps(log, LABELS, frames, lambda frame: read_labels(log.root, frame, len(palette)))
-    _check_copies(log, palette)
+    count = len(palette.colors)
+    _check_maps(log, LABELS, frames, lambda frame: read_labels(log.root, frame, count))
+    if palette.shadow is not None:
+        _check_maps(log, TONES, frames, lambda frame: read_tones(log.root, frame))
+    elif (log.root / TONES).exists():
+        log.add(TONES, "is there but palette.json has no shadow; run `toonset palette` again")
+    _check_copies(log, palette.rgb)
 
 
 def _check_contours(log: ProblemLog, frames: _Frames) -> None:

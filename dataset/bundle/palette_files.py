@@ -3,6 +3,8 @@
 palette.json         the colours
 palette.gpl, .ase, .hex, .png   the same for other programs, and as a picture for people
 labels/000.png ..    per picture: indexed PNG with all 256 entries, 255 transparent and unlabelled
+tones/000.png ..     per picture of a shaded sheet: grey PNG, 0 = the paint lies in light, 1 = in
+                     shadow, 255 = no paint
 contours/000.png ..  per picture: grey PNG, how far drawn lines cover each pixel
 """
 
@@ -10,18 +12,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
-from toonset.palette.extract import label_drawings
+from toonset.palette.extract import paint_maps
 from toonset.palette.formats.registry import encode_palette
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
 from toonset.palette.swatch_image import draw_swatches
-from toonset.write import new_folder, write_bytes
+from toonset.write import check_removable, new_folder, remove_folder, write_bytes
 
 PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
 COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs
@@ -38,28 +41,37 @@ def write_labelled(
     space: Space = "rgb",
 ) -> None:
     """Label pictures whose contour maps are known, and write all; see `write_palette`."""
-    labels = label_drawings(pictures, contours, palette, space)
-    named = [list(zip(names, maps, strict=True)) for maps in (labels, contours)]
-    write_palette(folder, palette, *named)
+    found = paint_maps(pictures, contours, palette, space)
+    labels = [(name, one.labels) for name, one in zip(names, found, strict=True)]
+    pairs = zip(names, found, strict=True)
+    tones = [(name, one.tones) for name, one in pairs if one.tones is not None]
+    write_palette(folder, palette, labels, list(zip(names, contours, strict=True)), tones)
 
 
-def write_palette(folder: Path, palette: Palette, labels: Maps, contours: Maps = ()) -> None:
-    """Write palette.json and its copies, labels/ and contours/ into an existing folder.
+def write_palette(
+    folder: Path, palette: Palette, labels: Maps, contours: Maps = (), tones: Maps = ()
+) -> None:
+    """Write palette.json and its copies, labels/, tones/ and contours/ into an existing folder.
 
-    They replace older ones; without contours, older ones stay: they depend on the pictures alone.
+    They replace older ones. Without contours, older ones stay: they depend on the pictures alone;
+    without tones, older ones go: a flat sheet has none.
 
     Everything is written beside the old files first and renamed at the end, palette.json last: a
-    full disk leaves the older palette as it was, and whenever palette.json is there, labels fit it.
+    full disk leaves the older palette as it was, and whenever palette.json is there, labels and
+    tones fit it.
 
     Args:
         folder: a bundle, or a new folder.
         palette: the colours.
         labels: file name and label map of every picture.
         contours: file name and contour map of every picture.
+        tones: file name and tone map of every picture, where the palette has a shadow.
 
     Raises:
-        OutputError: the folder cannot be written.
+        OutputError: the folder cannot be written, or its tones/ holds what no palette wrote.
     """
+    if not tones:
+        check_removable(folder / "tones", "*.png")
     files = {f"palette{end}": encode_palette(palette, end) for end in COPIES}
     files[SWATCHES] = encode_png(draw_swatches(palette))
     files[PALETTE_JSON] = encode_palette(palette, ".json")
@@ -68,11 +80,18 @@ def write_palette(folder: Path, palette: Palette, labels: Maps, contours: Maps =
             for name, values in contours:
                 write_bytes(temporary / name, encode_grey_png(values))
     placed = folder / "labels"
-    with new_folder(placed, force=True) as temporary:
+    with ExitStack() as whole:
+        temporary = whole.enter_context(new_folder(placed, force=True))
+        if tones:
+            beside = whole.enter_context(new_folder(folder / "tones", force=True))
+            for name, values in tones:
+                write_bytes(beside / name, encode_grey_png(values))
         for name, values in labels:
             write_bytes(temporary / name, encode_indexed_png(values, palette.rgb))
         for name, data in files.items():
             write_bytes(temporary / name, data)
         (folder / PALETTE_JSON).unlink(missing_ok=True)
+        if not tones:
+            remove_folder(folder / "tones")
     for name in files:
         os.replace(placed / name, folder / name)

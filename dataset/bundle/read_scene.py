@@ -22,7 +22,9 @@ from toonset.dataset.bundle.transforms_read import (
 from toonset.dataset.images.picture import load_indexed_png, load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError
+from toonset.palette.extract import IN_LIGHT, IN_SHADOW
 from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import UNLABELLED
 
 MANNEQUIN = "mannequin.obj"
@@ -52,21 +54,22 @@ def read_scene(path: Path) -> Scene:
     frames = []
     for frame, sigma in zip(posed, sigmas, strict=True):
         rgba = read_picture(frame, file)
-        labels = None if palette is None else read_labels(root, frame, len(palette))
+        labels = None if palette is None else read_labels(root, frame, len(palette.colors))
         frames.append(Frame(Path(frame.file_path).name, frame.camera, rgba, labels, sigma))
     mannequin = member(root, MANNEQUIN)
     mesh = None if mannequin is None else load_mesh(mannequin)
-    return Scene(tuple(frames), palette, str(path), mesh)
+    colors, shadow = (None, None) if palette is None else (palette.rgb, palette.shadow)
+    return Scene(tuple(frames), colors, str(path), mesh, shadow)
 
 
-def read_palette_of(root: Path) -> UInt8[np.ndarray, "colors 3"] | None:
-    """Return the colours of a folder's palette.json, None where there is none.
+def read_palette_of(root: Path) -> Palette | None:
+    """Return the palette of a folder's palette.json, None where there is none.
 
     Raises:
         BundleError, PaletteError: it lies elsewhere, or is broken.
     """
     file = member(root, "palette.json")
-    return None if file is None else read_palette_json(file).rgb
+    return None if file is None else read_palette_json(file)
 
 
 def read_yaw_sigmas(root: Path, posed: Sequence[PosedPicture]) -> list[float | None]:
@@ -130,6 +133,28 @@ def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
     return labels
 
 
+def read_tones(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:
+    """Return whether each pixel's paint lies in light (0), in shadow (1) or is none (255).
+
+    None where the frame has no tones: those of a flat sheet, or of an older palette.
+
+    Raises:
+        PictureError: it cannot be read.
+        BundleError: it has another size than its camera, is not grey, or has another value.
+    """
+    file = member(root, f"tones/{label_name(frame)}")
+    if file is None:
+        return None
+    tones = _read_grey(file, frame)
+    odd = tones[~np.isin(tones, (IN_LIGHT, IN_SHADOW, UNLABELLED))]
+    if odd.size:
+        raise BundleError(
+            f"{file}: has the value {odd[0]}, only 0 (light), 1 (shadow) and 255 (none) are known; "
+            "write the tones again with `toonset palette`"
+        )
+    return tones
+
+
 def read_contour(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:
     """Return how much of each pixel of a frame is drawn line (255 = all), None where not known.
 
@@ -138,8 +163,10 @@ def read_contour(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height w
         BundleError: it has another size than its camera, or is not grey.
     """
     file = member(root, f"contours/{label_name(frame)}")
-    if file is None:
-        return None
+    return None if file is None else _read_grey(file, frame)
+
+
+def _read_grey(file: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"]:
     rgba = load_rgba(file)
     check_size(file, rgba, frame.camera, "transforms.json")
     grey = rgba[..., 0]

@@ -9,6 +9,7 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.mesh import Mesh
+from toonset.palette.palette import Shadow
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +40,11 @@ class Scene:
         palette: (colors, 3) sRGB that `Frame.labels` index; None without palette.
         name: where it came from, for messages.
         mannequin: as calibration fitted it, in the cameras' world; None: there is none.
+        shadow: of drawings that are shaded in two tones; None: they are flat, or nobody looked.
     """
 
     frames: tuple[Frame, ...]
     palette: UInt8[np.ndarray, "colors 3"] | None
     name: str
     mannequin: Mesh | None = None
+    shadow: Shadow | None = None

@@ -36,6 +36,7 @@ from toonset.nerf.look.outline import CRUMB_PX, crisp_outline
 from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.palette.pixels.recolor import tones_of
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
@@ -141,17 +142,8 @@ def flanking(cameras: list[Camera], camera: Camera) -> tuple[int, int, float]:
     return first, second, 1 - min(1.0, float(along[second] / whole[second]))
 
 
-def drawn_view(
-    drawings: Drawings, view: Geometry, palette: UInt8[np.ndarray, "colors 3"] | None = None
-) -> DrawnView:
-    """Return a view of the field in the look of its drawings.
-
-    Args:
-        drawings: of the field.
-        view: of the field.
-        palette: colours to show instead of the drawings' own, in the same order; tones of a paint
-            keep their distance from it.
-    """
+def drawn_view(drawings: Drawings, view: Geometry) -> DrawnView:
+    """Return a view of the field in the look of its drawings, in the colours that they show."""
     height, width = view.alpha.shape
     result = DrawnView(
         np.zeros((height, width, 3), np.float32),
@@ -164,11 +156,8 @@ def drawn_view(
     box = _box(view.alpha > 0) if shape is None else shape.box(view.camera)
     if box is None:
         return result
-    change: Float[np.ndarray, "colors 3"] = np.zeros((len(drawings.palette), 3), np.float32)
-    if palette is not None and len(palette) == len(drawings.palette):
-        change = (palette - drawings.palette.astype(np.float32)) / 255
     fitting, border = drawings.fitting(view.camera.scale), _border(drawings, view)
-    part = _drawn(fitting, view.crop(*box), border, change)
+    part = _drawn(fitting, view.crop(*box), border)
     for name in ("rgb", "alpha", "ink", "labels"):
         getattr(result, name)[box] = getattr(part, name)
     return replace(result, by_field=part.by_field)
@@ -184,9 +173,7 @@ def _box(mask: Bool[np.ndarray, "height width"], room: int = 4) -> tuple[slice, 
     return sides[0], sides[1]
 
 
-def _drawn(
-    drawings: Drawings, view: Geometry, border: float, change: Float[np.ndarray, "colors 3"]
-) -> DrawnView:
+def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     camera, pen, own_color = view.camera, drawings.pen, _straight(view)
     sight = None
     if drawings.shape is not None:
@@ -229,7 +216,7 @@ def _drawn(
     if pen == drawings.outline:  # the drawing's own line, too
         rgb = rgb + part * (np.minimum(whole[..., :3], whole[..., 3:]) - rgb)
         alpha = alpha + part * (whole[..., 3] - alpha)
-    return _recolored(DrawnView(rgb, alpha, ink, labels, by_field), change, tone)
+    return DrawnView(rgb, alpha, ink, labels, by_field)
 
 
 def _inner_lines(drawings: Drawings, sight: Sight, scale: float) -> Float[np.ndarray, "h w"]:
@@ -239,19 +226,6 @@ def _inner_lines(drawings: Drawings, sight: Sight, scale: float) -> Float[np.nda
         return np.zeros(sight.alpha.shape, np.float32)
     wider = pen.width_px / max(outline.width_px, 1e-6)
     return drawn_steps(sight.fine, style, drawings.height, FINER, scale * wider)
-
-
-def _recolored(
-    view: DrawnView, change: Float[np.ndarray, "colors 3"], tone: Float[np.ndarray, "h w 3"]
-) -> DrawnView:
-    """Return the view with every palette colour changed; pixels between two get some of both."""
-    if not change.any():
-        return view
-    own = np.concatenate([change, np.zeros((256 - len(change), 3), np.float32)])[view.labels]
-    own = cv2.blur(own, (3, 3)) * tone
-    body = view.alpha - view.ink
-    rgb = (view.rgb + own * body[..., None]).clip(0, 1)
-    return replace(view, rgb=np.minimum(rgb, view.alpha[..., None]))
 
 
 def _border(drawings: Drawings, view: Geometry) -> float:
@@ -332,8 +306,15 @@ def _straight(view: Geometry) -> Float[np.ndarray, "h w 3"]:
 def _of_field(
     color: Float[np.ndarray, "h w 3"], drawings: Drawings, covered: Bool[np.ndarray, "h w"]
 ) -> _Candidate:
-    paints = drawings.paints / np.float32(255)
-    label = ((color[..., None, :] - paints) ** 2).sum(axis=-1).argmin(axis=-1).astype(np.uint8)
+    paints, shadow = drawings.paints, drawings.painted_shadow
+    tones, new = (
+        tones_of(one, shadow)[: len(one) if shadow is None else None] / np.float32(255)
+        for one in (paints, drawings.new_paints)
+    )
+    tone = ((color[..., None, :] - tones) ** 2).sum(axis=-1).argmin(axis=-1)
+    label = (tone % len(paints)).astype(np.uint8)
+    if drawings.repaint is not None:
+        color = (color + cv2.blur((new - tones)[tone], (3, 3))).clip(0, 1)
     return _Candidate(color, label, np.where(covered, 0, OWN_VOTE).astype(np.float32))
 
 

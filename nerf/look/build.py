@@ -62,7 +62,7 @@ def drawings_of(
     )
     palette = ready.palette if ready.palette is not None else _common_colors(views)
     found = Drawings(views, (), line, line, palette, height, extent, bent, shape)
-    found = replace(found, steps=flat.steps, shade=flat.shade)
+    found = replace(found, steps=flat.steps, shade=flat.shade, shadow=ready.shadow)
     return replace(found, flows=pair_flows(found, depth_of))
 
 

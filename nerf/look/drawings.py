@@ -16,8 +16,9 @@ from toonset.nerf.lines.explain import step_edges
 from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
 from toonset.nerf.lines.step_lines import StepLines
 from toonset.nerf.look.outline import Outline, without_crumbs
+from toonset.nerf.look.paint_labels import paint_labels, repainted
 from toonset.nerf.look.shade import Shade
-from toonset.palette.pixels.labels import nearest_labels
+from toonset.palette.palette import Shadow
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
 BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
@@ -88,6 +89,8 @@ class Drawings:
         shape: the mannequin's, where it is the character's; None: the surface is the field's.
         steps: lines at steps in depth; None: there are none, or the paint has them.
         shade: a shadow that the paint lacks; None: there is none, or the paint has it.
+        shadow: that the drawings have, by their palette; None: there is none.
+        repaint: colours to show instead of the palette's, in the same order; None: its own.
     """
 
     views: tuple[Drawing, ...]
@@ -101,6 +104,8 @@ class Drawings:
     shape: Shape | None = None
     steps: StepLines | None = None
     shade: Shade | None = None
+    shadow: Shadow | None = None
+    repaint: UInt8[np.ndarray, "colors 3"] | None = None
 
     @cached_property
     def paints(self) -> UInt8[np.ndarray, "paints 3"]:
@@ -111,14 +116,40 @@ class Drawings:
         like = np.abs(self.palette.astype(int) - ink).sum(axis=1) < INK_LIKE
         return self.palette if like.any() else np.concatenate([self.palette, ink.astype(np.uint8)])
 
+    @property
+    def painted_shadow(self) -> Shadow | None:
+        """Return the shadow that the paint still has; None: it was taken off, or there is none."""
+        return self.shadow if self.shade is None else None
+
+    @property
+    def drawn_shadow(self) -> Shadow | None:
+        """Return the shadow that the drawings have, also where only the surface tells of it."""
+        if self.shadow is not None or self.shade is None:
+            return self.shadow
+        return Shadow(self.shade.factor, (0.0, 0.0, 0.0), 0.0)
+
+    @cached_property
+    def new_paints(self) -> UInt8[np.ndarray, "paints 3"]:
+        """Return what to show instead of `paints`."""
+        if self.repaint is None:
+            return self.paints
+        return np.concatenate([self.repaint, self.paints[len(self.repaint) :]])
+
     @cached_property
     def textures(self) -> tuple[Texture, ...]:
-        """Return the drawings, ready to be looked up."""
+        """Return the drawings, ready to be looked up, in the colours to show."""
+        paints, new, shadow = self.paints, self.new_paints, self.painted_shadow
+        plain = [_opaque(view.paint) for view in self.views]
+        labels = paint_labels(plain, paints, shadow)
+        plain = repainted(plain, paints, new, shadow)
+        whole = repainted([view.rgba for view in self.views], paints, new, self.drawn_shadow)
+        parts = zip(self.views, whole, plain, labels, strict=True)
         return tuple(
-            _texture(view, self._depth(view), self.paints, self.height) for view in self.views
+            _texture(replace(view, rgba=rgba, paint=paint[..., :3]), label, self)
+            for view, rgba, paint, label in parts
         )
 
-    def _depth(self, view: Drawing) -> Float[np.ndarray, "height width"]:
+    def depth(self, view: Drawing) -> Float[np.ndarray, "height width"]:
         """Return the depth of the surface that a drawing shows, nan where there is none."""
         if view.levels is not None:
             return depth_of(view.levels, self.depths)
@@ -240,16 +271,17 @@ def depth_of(
     return np.where(levels > 0, low + (levels - 1.0) / 254 * (high - low), np.nan)
 
 
+def _opaque(paint: UInt8[np.ndarray, "height width 3"]) -> UInt8[np.ndarray, "height width 4"]:
+    return np.dstack([paint, np.full(paint.shape[:2], 255, np.uint8)])
+
+
 def _texture(
-    view: Drawing,
-    depth: Float[np.ndarray, "height width"],
-    paints: UInt8[np.ndarray, "paints 3"],
-    height: float,
+    view: Drawing, labels: UInt8[np.ndarray, "height width"], drawings: Drawings
 ) -> Texture:
+    depth, height = drawings.depth(view), drawings.height
     inside = depth_inside(mask_of(view.rgba))
     whole = view.rgba / np.float32(255)
     whole[..., :3] *= whole[..., 3:]
-    opaque = np.dstack([view.paint, np.full(inside.shape, 255, np.uint8)])
     seen, deep = np.isfinite(depth), filled(depth)
     if view.levels is None:
         seen &= deep - cv2.erode(deep, AROUND) <= STEP * height
@@ -260,7 +292,7 @@ def _texture(
         view.camera,
         whole,
         view.paint / np.float32(255),
-        nearest_labels(opaque, paints),
+        labels,
         far.astype(np.float32),
         to_edge.astype(np.float32),
     )

@@ -79,7 +79,7 @@ class Rendering:
         if self.field.drawings is None:
             raise BundleError(NO_DRAWINGS)
         view = Geometry(self.camera, self.alpha, self.depth, self.rgb, self.shares)
-        return drawn_view(self.field.drawings, view, self.field.palette)
+        return drawn_view(self.field.drawings, view)
 
     def picture(self, layer: str = "rgb", *, as_drawn: bool = False) -> Layer:
         """Return one layer as RGBA with straight alpha, or as a label map.

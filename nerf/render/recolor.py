@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import UInt8
 
 from toonset.errors import BundleError, PaletteError
 from toonset.nerf.fields.trained_field import NO_LINES, NO_PALETTE, TrainedField
 from toonset.nerf.look.outline import Outline
-from toonset.palette.formats.hex import is_color, rgb_of_typed
+from toonset.palette.formats.hex import rgb_of_typed
 from toonset.palette.formats.registry import parse_colors
-from toonset.palette.names import RGB, hex_of, name_of
 from toonset.palette.pixels.labels import nearest_colors
+from toonset.palette.recolor import changed_colors
 
 
 def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
@@ -32,21 +32,7 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
         return trained
     if trained.palette is None:
         raise PaletteError(NO_PALETTE)
-    old: list[RGB] = [(r, g, b) for r, g, b in trained.palette.tolist()]
-    called = Counter(name_of(color) for color in old)
-    names = {name_of(color): color for color in old if called[name_of(color)] == 1}
-    palette = trained.palette.copy()
-    for change in changes:
-        words = change.split("=")
-        if len(words) != 2:
-            raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
-        source, where = words[0].strip().lower(), f"--recolor {change!r}"
-        known = names.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
-        if known not in old:
-            has = ", ".join(f"{hex_of(color)} ({name_of(color)})" for color in old)
-            raise PaletteError(f"{where}: the palette has {has}; choose one of them")
-        palette[old.index(known)] = rgb_of_typed(words[1].strip(), where)
-    return replace(trained, palette=palette)
+    return _in_colors(trained, changed_colors(trained.palette, changes))
 
 
 def with_pen(trained: TrainedField, width_px: float | None, color: str | None) -> TrainedField:
@@ -88,10 +74,18 @@ def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> 
     colors = np.asarray(parse_colors(palette))
     if nearest:
         place = nearest_colors(trained.palette, colors, space="oklab")
-        return replace(trained, palette=colors[place])
+        return _in_colors(trained, colors[place])
     if len(colors) != len(trained.palette):
         raise PaletteError(
             f"--palette {palette}: {len(colors)} colours, the run has {len(trained.palette)}; "
             "give as many in the same order, or pass --nearest"
         )
-    return replace(trained, palette=colors)
+    return _in_colors(trained, colors)
+
+
+def _in_colors(trained: TrainedField, colors: UInt8[np.ndarray, "colors 3"]) -> TrainedField:
+    """Return the run with as many other colours, its drawings in them, too."""
+    drawings = trained.drawings
+    if drawings is not None and len(colors) == len(drawings.palette):
+        drawings = replace(drawings, repaint=colors)
+    return replace(trained, palette=colors, drawings=drawings)

@@ -35,6 +35,7 @@ from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.run.records import MOST_VIEWS, Byte, Number, Width
+from toonset.palette.palette import Shadow
 from toonset.write import write_bytes
 
 PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
@@ -79,6 +80,15 @@ class ShadeRecord(BaseModel):
     factor: tuple[Share, Share, Share]
 
 
+class ShadowRecord(BaseModel):
+    """The shadow of the drawings' palette; fields as in `Shadow`."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    factor: tuple[Share, Share, Share]
+    spread: tuple[Number, Number, Number]
+    bits: Number
+
+
 class ShapeRecord(BaseModel):
     """Where the grid of a `Shape` lies."""
 
@@ -102,6 +112,7 @@ class DrawingsRecord(BaseModel):
     shape: ShapeRecord | None
     steps: StepsRecord | None
     shade: ShadeRecord | None
+    shadow: ShadowRecord | None = None
 
     @classmethod
     def of(cls, drawings: Drawings) -> DrawingsRecord:
@@ -120,6 +131,7 @@ class DrawingsRecord(BaseModel):
                 "shape": shape and _where(shape),
                 "steps": drawings.steps and asdict(drawings.steps),
                 "shade": drawings.shade and asdict(drawings.shade),
+                "shadow": drawings.shadow and asdict(drawings.shadow),
             }
         )
 
@@ -184,6 +196,7 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         shape,
         None if record.steps is None else StepLines(**record.steps.model_dump()),
         None if record.shade is None else Shade(**record.shade.model_dump()),
+        None if record.shadow is None else Shadow(**record.shadow.model_dump()),
     )
 
 

@@ -45,10 +45,7 @@ class Paint:
 
 
 def paint_of(
-    texture: Texture,
-    depth: Float[np.ndarray, "height width"],
-    drawings: Drawings,
-    palette: UInt8[np.ndarray, "colors 3"] | None,
+    texture: Texture, depth: Float[np.ndarray, "height width"], drawings: Drawings
 ) -> Paint:
     """Return a drawing as paint.
 
@@ -56,7 +53,6 @@ def paint_of(
         texture: the drawing.
         depth: of the surface as its camera sees it, nan where there is none.
         drawings: that it is one of.
-        palette: colours to show instead of the drawings' own, in the same order.
     """
     ink, paint = _outlines(texture, depth, drawings)
     trust = 1 - (1 - LEAST_TRUST) * np.exp(-((texture.to_edge / FEATHER_PX) ** 2))
@@ -66,11 +62,6 @@ def paint_of(
         texture = replace(
             texture, paint=texture.paint[rows, columns], labels=texture.labels[rows, columns]
         )
-    if palette is not None and len(palette) == len(drawings.palette):
-        change = np.zeros((256, 3), np.float32)
-        change[: len(palette)] = (palette - drawings.palette.astype(np.float32)) / 255
-        moved = cv2.blur(change[texture.labels], (3, 3)) if change.any() else np.float32(0)
-        texture = replace(texture, paint=(texture.paint + moved).clip(0, 1))
     figure_px = drawings.height * texture.camera.scale
     return Paint(texture, trust, _features(texture.labels, SMALL * figure_px**2))
 

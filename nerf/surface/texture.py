@@ -65,7 +65,7 @@ def textured_surface_of(
 
 
 def painted(surface: Surface, drawings: Drawings, *, outline: bool = False) -> TexturedSurface:
-    """Return a surface with the paint of drawings; where its palette is another, in that one.
+    """Return a surface with the paint of drawings, in the colours that they show.
 
     Raises:
         SetupError: xatlas is not installed.
@@ -76,7 +76,7 @@ def painted(surface: Surface, drawings: Drawings, *, outline: bool = False) -> T
     for texture in drawings.textures:
         depth = depth_map(vertices, faces, texture.camera)
         seen = np.where(np.isfinite(depth), depth, np.nan)
-        paints.append(paint_of(texture, seen, drawings, surface.palette))
+        paints.append(paint_of(texture, seen, drawings))
     merit = merits(vertices, faces, paints, drawings.height)
     source = chosen(vertices, faces, merit, paints, drawings.height)
     atlas = unwrap(vertices, faces, parts_of(vertices, faces, surface.labels), FINE * scale)

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.cie_lab import rgb_from_lab
+from toonset.palette.formats.tones import swatches_of
 from toonset.palette.names import RGB, NamedColor, clean_name, level, no_cmyk, within
 from toonset.palette.palette import Palette
 
@@ -46,7 +47,7 @@ def read_ase(data: bytes, where: str) -> list[NamedColor]:
 
 
 def to_ase(palette: Palette, title: str = "toonset") -> bytes:
-    """Return the palette as one group of RGB colours."""
+    """Return the palette as one group of RGB colours, tones too."""
     blocks = [
         _block(GROUP, _utf16(title)),
         *(
@@ -56,7 +57,7 @@ def to_ase(palette: Palette, title: str = "toonset") -> bytes:
                 + b"RGB "
                 + struct.pack(">3fH", *(part / 255 for part in color.rgb), NORMAL),
             )
-            for color in palette.colors
+            for color in swatches_of(palette)
         ),
         _block(GROUP_END, b""),
     ]

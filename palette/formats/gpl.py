@@ -10,6 +10,7 @@ import re
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.text import lines_of
+from toonset.palette.formats.tones import swatches_of
 from toonset.palette.names import NamedColor, clean_name, levels_of
 from toonset.palette.palette import Palette
 
@@ -44,10 +45,10 @@ def read_gpl(data: bytes, where: str) -> list[NamedColor]:
 
 
 def to_gpl(palette: Palette, title: str = "toonset") -> str:
-    """Return the palette as .gpl text; shares stand in palette.json, names stay as they are."""
+    """Return the palette as .gpl text, tones too; shares stand in palette.json."""
     rows = [
-        f"{red:3d} {green:3d} {blue:3d}\t{clean_name(color.name) or UNNAMED}"
-        for color in palette.colors
+        f"{red:3d} {green:3d} {blue:3d}\t{color.name or UNNAMED}"
+        for color in swatches_of(palette)
         for red, green, blue in [color.rgb]
     ]
     columns = min(len(rows), COLUMNS)  # never 0: Krita divides by it

@@ -6,6 +6,7 @@ from typing import Any
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.hex import rgb_of_hex
+from toonset.palette.formats.tones import SUFFIX
 from toonset.palette.names import NamedColor, clean_name, hex_of
 from toonset.palette.palette import Palette, Tone
 from toonset.read import parse_json
@@ -14,9 +15,9 @@ NAME, VERSION = "toonset-palette", 1  # toonset.palette.formats.schema says what
 
 
 def read_json(data: bytes, where: str) -> list[NamedColor]:
-    """Return the colours of a list, or of an object's "colors".
+    """Return the colours of a list, or of an object's "colors"; tones follow their colour.
 
-    An entry is "#rrggbb", or an object with "hex" and perhaps "name".
+    An entry is "#rrggbb", or an object with "hex" and perhaps "name" and "tones".
 
     Raises:
         PaletteError: no JSON, no such list, or an entry that is no colour.
@@ -25,7 +26,11 @@ def read_json(data: bytes, where: str) -> list[NamedColor]:
     entries = content.get("colors") if isinstance(content, dict) else content
     if not isinstance(entries, list):
         raise PaletteError(f'{where}: has no list of colours; ["#aabbcc", ...] is needed')
-    return [_entry(entry, f"{where}: colour {i}") for i, entry in enumerate(entries, start=1)]
+    return [
+        swatch
+        for i, entry in enumerate(entries, start=1)
+        for swatch in _swatches(entry, f"{where}: colour {i}")
+    ]
 
 
 def to_json(palette: Palette) -> dict[str, Any]:
@@ -81,13 +86,17 @@ def _tone(tone: Tone) -> dict[str, Any]:
     return {"hex": hex_of(tone.rgb), "share": round(tone.share, 6)}
 
 
-def _entry(entry: Any, where: str) -> NamedColor:
+def _swatches(entry: Any, where: str) -> list[NamedColor]:
+    """Return an entry's colour, and after it its tones in shadow."""
     if not isinstance(entry, dict):
-        return NamedColor(rgb_of_hex(entry, where))
-    name = entry.get("name")
-    return NamedColor(
-        rgb_of_hex(entry.get("hex"), where), clean_name(name) if isinstance(name, str) else ""
-    )
+        return [NamedColor(rgb_of_hex(entry, where))]
+    name, tones = entry.get("name"), entry.get("tones")
+    name = clean_name(name) if isinstance(name, str) else ""
+    found = [NamedColor(rgb_of_hex(entry.get("hex"), where), name)]
+    for tone in tones[1:] if isinstance(tones, list) and name else ():
+        rgb = rgb_of_hex(tone.get("hex") if isinstance(tone, dict) else tone, where)
+        found.append(NamedColor(rgb, name + SUFFIX))
+    return found
 
 
 def _record(rgb: tuple[int, int, int], share: float, name: str) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from toonset.palette.formats.kpl import MAX_BYTES as MAX_KPL_BYTES
 from toonset.palette.formats.kpl import read_kpl
 from toonset.palette.formats.pal import read_pal
 from toonset.palette.formats.text import without_mark
+from toonset.palette.formats.tones import paints_of
 from toonset.palette.names import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.read import describe, read_whole
@@ -68,6 +69,8 @@ WRITTEN = tuple(kind.extensions[0] for kind in FORMATS if kind.write is not None
 def parse_colors(text_or_path: str) -> UInt8[np.ndarray, "colors 3"]:
     """Return the sRGB colours of a typed list or of a palette file; repeated ones count once.
 
+    Swatches that a file names as another one's tone in shadow are none of them.
+
     Args:
         text_or_path: "#aabbcc,#123,white" (commas or spaces, # may be left out), or the path of a
             palette file (see FORMATS), which is recognised by its content.
@@ -98,7 +101,16 @@ def parse_named_colors(text_or_path: str) -> tuple[NamedColor, ...]:
             f"{shown[:SHOWN]}: neither colours such as '#aabbcc,#123,white' nor a palette file "
             f"({', '.join(EXTENSIONS)})"
         )
-    return _checked(_read(path), str(path))
+    return _checked(paints_of(_read(path)), str(path))
+
+
+def names_tones(text_or_path: str) -> bool:
+    """Return whether something that `parse_colors` understands has tones in shadow."""
+    path = Path(text_or_path)
+    if path.suffix.lower() not in EXTENSIONS:
+        return False
+    swatches = _read(path)
+    return len(paints_of(swatches)) < len(swatches)
 
 
 def encode_palette(palette: Palette, extension: str, title: str = "toonset") -> bytes:

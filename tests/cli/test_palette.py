@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.cli.palette import palette, palette_lines
+from toonset.cli.common.palette_text import palette_lines
+from toonset.cli.palette import palette, recolor
 from toonset.cli.split import split
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.transforms import transforms_dict
-from toonset.dataset.images.picture import encode_png, load_indexed_png
+from toonset.dataset.images.picture import encode_png, load_indexed_png, load_rgba
 from toonset.errors import ToonsetError, UsageError
 from toonset.palette.palette import Evidence, Palette, PaletteColor
 from toonset.write import write_bytes, write_json
@@ -230,3 +231,30 @@ def test_the_papers_tool_can_be_asked(tmp_path: Path) -> None:
     assert [color["hex"] for color in content["colors"]] == ["#c81e28", "#143cb4"]
     with pytest.raises(UsageError, match="--keep belongs to --method toonset"):
         palette([tmp_path / "a.png"], method="extcolors", keep="#fff", out=tmp_path / "o")
+
+
+def test_drawings_are_written_in_other_colours(tmp_path: Path) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    palette([bundle])
+    recolor(["red=#00ff00"], [bundle], tmp_path / "new")
+    assert tree(tmp_path / "new") == {"000.png", "001.png"}
+    new = load_rgba(tmp_path / "new" / "000.png")
+    red = (figure()[..., :3] == RED).all(axis=2)
+    assert (new[red] == (0, 255, 0, 255)).all()
+    assert np.array_equal(new[~red], figure()[~red])
+    found = sorted((bundle / "images").iterdir())
+    recolor(["red=#00ff00"], found, tmp_path / "found", as_json=True)
+    assert np.array_equal(load_rgba(tmp_path / "found" / "000.png"), new)
+
+
+def test_nothing_is_written_where_colours_cannot_be_changed(tmp_path: Path) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    with pytest.raises(ToonsetError, match=r"has no palette\.json; run `toonset palette` first"):
+        recolor(["red=#00ff00"], [bundle], tmp_path / "new")
+    palette([bundle])
+    with pytest.raises(ToonsetError, match="the palette has #c81e28"):
+        recolor(["green=#00ff00"], [bundle], tmp_path / "new")
+    (bundle / "labels" / "001.png").unlink()
+    with pytest.raises(ToonsetError, match=r"labels/001\.png: is missing"):
+        recolor(["red=#00ff00"], [bundle], tmp_path / "new")
+    assert tree(tmp_path) == {"b", *(f"b/{name}" for name in tree(bundle))}

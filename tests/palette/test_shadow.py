@@ -1,6 +1,7 @@
 """Sheets shaded in two tones: a paint is one colour with tones; flat sheets stay as they are."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -8,9 +9,11 @@ import pytest
 
 from tests.palette.shaded import EYE, FACTOR, PAINTS, Drawing, drawings
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.extract import extract_palette, label_drawings
+from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.formats.json import to_json
+from toonset.palette.formats.registry import encode_palette
 from toonset.palette.formats.schema import palette_of
+from toonset.palette.names import hex_of
 from toonset.palette.paints.features import find_features
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
@@ -99,7 +102,7 @@ def test_labels_are_of_paints_whatever_their_tone() -> None:
     names = [min(range(5), key=lambda n: away(c.rgb, (*PAINTS, EYE)[n])) for c in palette.colors]
     table = np.full(256, 255)
     table[: len(names)] = names
-    found = label_drawings(pictures(drawn), contours(drawn), palette)
+    found = [m.labels for m in paint_maps(pictures(drawn), contours(drawn), palette)]
     right, sure = 0, 0
     for one, labels in zip(drawn, found, strict=True):
         pure = inner(one.paint)
@@ -139,10 +142,20 @@ def test_spots_at_another_height_in_every_drawing_are_no_features() -> None:
     assert find_features(_with_spots(spotted, heights), spotted) == ()
 
 
-def _with_spots(spotted: list[np.ndarray], heights: list[int]) -> Palette:
+@pytest.mark.parametrize(("side", "is_one"), [(4, False), (5, True)])
+def test_specks_in_two_drawings_are_no_features_until_there_is_enough(
+    side: int, is_one: bool
+) -> None:
+    spotted = pictures(drawings(shadow=False, noisy=False, eyes=False))
+    palette = _with_spots(spotted[:2], [40, 40], side)
+    assert palette.dropped
+    assert find_features(palette, spotted) == ((EYE,) if is_one else ())
+
+
+def _with_spots(spotted: list[np.ndarray], heights: list[int], side: int = 9) -> Palette:
     """Draw a white spot into every picture and return their palette."""
     for picture, row in zip(spotted, heights, strict=True):
-        picture[row : row + 9, 62:72] = (*EYE, 255)
+        picture[row : row + side, 62 : 62 + side] = (*EYE, 255)
     return extract_palette(spotted)
 
 
@@ -158,3 +171,35 @@ def test_only_shaded_sheets_and_features_add_to_the_file() -> None:
     assert to_json(again) == content
     assert again.features == palette.features
     assert to_json(replace(again, shadow=None, features=())).keys() == flat.keys()
+
+
+def test_tones_say_which_paint_lies_in_shadow() -> None:
+    drawn = drawings(shadow=True, noisy=True)
+    palette = extract_palette(pictures(drawn))
+    for one, found in zip(
+        drawn, paint_maps(pictures(drawn), contours(drawn), palette), strict=True
+    ):
+        assert found.tones is not None
+        assert np.array_equal(found.tones == 255, found.labels == 255)
+        sure = inner(one.paint) & inner(one.dark.astype(np.uint8)) & (found.labels < 255)
+        assert (found.tones == one.dark)[sure & (one.paint != 4)].mean() > 0.95
+    flat = pictures(drawings(shadow=False, noisy=False))
+    lines = [find_contour(one) for one in flat]
+    assert all(one.tones is None for one in paint_maps(flat, lines, extract_palette(flat)))
+
+
+@pytest.mark.parametrize("extension", [".gpl", ".ase", ".json"])
+def test_a_file_with_tones_gives_the_same_paints_of_the_sheet(
+    extension: str, tmp_path: Path
+) -> None:
+    drawn = drawings(shadow=True, noisy=True)
+    found = extract_palette(pictures(drawn))
+    file = tmp_path / f"own{extension}"
+    file.write_bytes(encode_palette(found, extension))
+    again = extract_palette(pictures(drawn), colors=str(file))
+    assert again.shadow == found.shadow
+    assert np.array_equal(again.rgb, found.rgb)
+    for one, other in zip(again.colors, found.colors, strict=True):
+        assert [tone.rgb for tone in one.tones] == [tone.rgb for tone in other.tones]
+    plain = ",".join(hex_of(color.rgb) for color in found.colors)
+    assert extract_palette(pictures(drawn), colors=plain).shadow is None

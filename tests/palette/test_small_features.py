@@ -8,7 +8,7 @@ from PIL import Image
 
 from bench.palette.cases import palette_cases, random_paints
 from tests.palette.pictures import as_set, block, soft_stripes
-from toonset.cli.palette import palette_lines
+from toonset.cli.common.palette_text import palette_lines
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.paints.extract import LEAST_LISTED, find_palette
 from toonset.palette.paints.histogram import count_pixels

@@ -15,7 +15,7 @@ from PIL import Image
 
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.check import bundle_problems
-from toonset.dataset.bundle.read_scene import read_contour, read_scene
+from toonset.dataset.bundle.read_scene import read_contour, read_scene, read_tones
 from toonset.dataset.bundle.transforms_read import read_frames
 from toonset.errors import BundleError, ToonsetError
 from toonset.read import parse_json
@@ -84,6 +84,28 @@ def test_contours_are_read_as_coverage(place: Path):
     Image.new("RGB", (20, 24), "red").save(place / "contours" / "000.png")
     with pytest.raises(BundleError, match=r"contours/000.png: is coloured"):
         read_contour(place, frame)
+
+
+def test_tones_are_checked_like_labels(place: Path):
+    frame = read_frames(place / "transforms.json", need_pictures=True)[0]
+    assert read_tones(place, frame) is None
+    (place / "tones").mkdir()
+    assert problems(place) == [
+        "tones: is there but palette.json has no shadow; run `toonset palette` again"
+    ]
+    shadow = {"factor": [0.7, 0.7, 0.8], "spread": [0, 0, 0], "bits": 20.0}
+    edit(place, "palette.json", lambda content: content.update(shadow=shadow))
+    for name in ("000.png", "001.png"):
+        Image.new("L", (20, 24), 1).save(place / "tones" / name)
+    tones = read_tones(place, frame)
+    assert tones is not None
+    assert (tones == 1).all()
+    Image.new("L", (20, 24), 7).save(place / "tones" / "001.png")
+    assert problems(place) == [
+        "tones/001.png: has the value 7, only 0 (light), 1 (shadow) and 255 (none) are known; "
+        "write the tones again with `toonset palette`",
+        "tones/002.png: is missing; run `toonset palette` again",
+    ]
 
 
 # ---- versions

@@ -115,13 +115,14 @@ def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> N
     before = drawn_view(egg, shown)
     palette = PALETTE.copy()
     palette[2] = (40, 200, 220)
-    after = drawn_view(egg, shown, palette)
+    after = drawn_view(replace(egg, repaint=palette), shown)
     belt = (before.labels == 2) & (before.ink == 0)
     inner = belt & np.roll(belt, 2, 0) & np.roll(belt, -2, 0)
     np.testing.assert_allclose(np.median(after.rgb[inner] * 255, axis=0), palette[2], atol=3)
     far = (before.labels == 1) & (before.ink == 0)
     np.testing.assert_array_equal(after.rgb[far], before.rgb[far])
-    assert drawn_view(egg, shown, PALETTE).rgb.tobytes() == before.rgb.tobytes()
+    same = drawn_view(replace(egg, repaint=PALETTE), shown)
+    assert same.rgb.tobytes() == before.rgb.tobytes()
 
 
 def test_flanking_shares_are_linear_along_the_arc_and_whatever_the_elevation() -> None:

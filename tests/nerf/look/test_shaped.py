@@ -94,7 +94,8 @@ def test_recolouring_keeps_the_shadow(shaded: Drawings) -> None:
     shown = misty(camera_at(0.35))
     palette = PALETTE.copy()
     palette[1] = (200, 60, 60)
-    before, after = drawn_view(shaded, shown), drawn_view(shaded, shown, palette)
+    before = drawn_view(shaded, shown)
+    after = drawn_view(replace(shaded, repaint=palette), shown)
     belt = (before.labels == 1) & (before.ink == 0) & (before.alpha == 1)
     belt &= np.roll(belt, 2, 0) & np.roll(belt, -2, 0)
     red = after.rgb[belt][:, 0]

@@ -128,7 +128,7 @@ def test_small_parts_stay_in_the_chart_around_them(egg: Surface) -> None:
 def test_other_colours(egg: Surface, drawn: Drawings) -> None:
     other = PALETTE.copy()
     other[2] = (40, 200, 40)  # the belt
-    result = painted(replace(egg, palette=other), drawn)
+    result = painted(replace(egg, palette=other), replace(drawn, repaint=other))
     belt = (paint_of(egg.vertices[egg.faces].mean(axis=1)) == 2) & (result.source >= 0)
     assert np.median(np.abs(middles(result)[belt] - other[2].astype(int)).max(axis=1)) <= 12
     assert result.pen is None
@@ -210,7 +210,7 @@ def lined(step: float) -> tuple[Drawings, np.ndarray]:
 @pytest.mark.parametrize("step", [0.0, 0.3])
 def test_ink_goes_where_the_drawing_steps_in_depth(step: float) -> None:
     drawn, depth = lined(step)
-    paint = as_paint(drawn.textures[0], depth, drawn, None).texture.paint
+    paint = as_paint(drawn.textures[0], depth, drawn).texture.paint
     ink = np.abs(paint * 255 - INK).max(axis=-1) < 60
     assert ink[20:60, 36:43].any() == (step == 0.0)
     assert ink[39:42, 46:51].all()  # the eye is whole either way

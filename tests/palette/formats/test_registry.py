@@ -1,6 +1,7 @@
 """Palettes that people type or name: read by content, ours come back, nonsense refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,12 @@ from toonset.palette.formats.json import to_json
 from toonset.palette.formats.registry import (
     WRITTEN,
     encode_palette,
+    names_tones,
     parse_colors,
     parse_named_colors,
 )
 from toonset.palette.names import NamedColor
-from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor
+from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Tone
 
 PALETTE = Palette(
     (PaletteColor((200, 30, 40), 0.75, "red"), PaletteColor((1, 2, 3), 0.2, "7 o'clock \u5c71 ü")),
@@ -91,6 +93,27 @@ def test_what_is_written_comes_back(extension: str, count: int, tmp_path: Path) 
         NamedColor(color.rgb, color.name if named else "") for color in palette.colors
     )
     assert encode_palette(palette, extension) == file.read_bytes()
+
+
+@pytest.mark.parametrize("extension", WRITTEN)
+def test_tones_are_swatches_beside_their_paint_and_read_as_one(
+    extension: str, tmp_path: Path
+) -> None:
+    tones = (Tone((120, 80, 40), 0.6), Tone((86, 56, 32), 0.2))
+    brown = PaletteColor((120, 80, 40), 0.8, "brown", tones)
+    white = PaletteColor((255, 255, 255), 0.2, "white", (Tone((255, 255, 255), 0.2),))
+    shaded = Palette((brown, white), "by hand")
+    plain = Palette(tuple(replace(one, tones=()) for one in shaded.colors), "by hand")
+    file = tmp_path / f"p{extension}"
+    file.write_bytes(encode_palette(shaded, extension))
+    np.testing.assert_array_equal(parse_colors(str(file)), shaded.rgb)
+    assert names_tones(str(file)) == (extension != ".hex")
+    file.write_bytes(encode_palette(plain, extension))
+    assert not names_tones(str(file))
+    assert "brown, shadow" in to_gpl(shaded).splitlines()[5]
+    sea = "GIMP Palette\n#\n0 0 9 sea, shadow\n0 0 99 sea\n"
+    (tmp_path / "sea.gpl").write_text(sea)
+    assert len(parse_colors(str(tmp_path / "sea.gpl"))) == 2
 
 
 def test_every_colour_survives_every_writer(tmp_path: Path) -> None:

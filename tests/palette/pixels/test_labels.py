@@ -18,7 +18,7 @@ from toonset.dataset.bundle.palette_files import write_palette
 from toonset.dataset.images.picture import encode_indexed_png, load_indexed_png
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
-from toonset.errors import PictureError
+from toonset.errors import OutputError, PictureError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.palette import Palette, PaletteColor
 from toonset.palette.pixels import labels as labels_module
@@ -209,3 +209,21 @@ def test_labels_and_contours_lie_beside_the_palette(tmp_path: Path) -> None:
         "labels",
         *(f"palette.{end}" for end in ("ase", "gpl", "hex", "json", "png")),
     ]
+
+
+def test_tones_come_and_go_with_the_labels(tmp_path: Path) -> None:
+    palette = Palette((PaletteColor(RED, 0.7, "red"), PaletteColor(BLUE, 0.3, "blue")), "by hand")
+    maps = [("000.png", np.array([[0, 1, 255]], dtype=np.uint8))]
+    tones = [("000.png", np.array([[1, 0, 255]], dtype=np.uint8))]
+    write_palette(tmp_path, palette, maps, (), tones)
+    with Image.open(tmp_path / "tones" / "000.png") as grey:
+        assert grey.mode == "L"
+        assert np.array_equal(np.asarray(grey), tones[0][1])
+    write_palette(tmp_path, palette, maps)
+    assert not [place.name for place in tmp_path.iterdir() if "tones" in place.name]
+    (tmp_path / "tones").mkdir()
+    (tmp_path / "tones" / "song.ogg").write_bytes(b"")
+    before = (tmp_path / "palette.json").read_bytes()
+    with pytest.raises(OutputError, match=r"holds 'song\.ogg', which this command does not write"):
+        write_palette(tmp_path, palette, maps)
+    assert (tmp_path / "palette.json").read_bytes() == before

@@ -1,0 +1,68 @@
+"""Drawings in other colours of their palette: what `toonset recolor` does between files."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.errors import PaletteError
+from toonset.palette.extract import IN_SHADOW, PaintMap
+from toonset.palette.formats.hex import is_color, rgb_of_typed
+from toonset.palette.names import RGB, hex_of, name_of
+from toonset.palette.palette import Palette
+from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
+
+Picture = UInt8[np.ndarray, "height width 4"]
+Map = UInt8[np.ndarray, "height width"]
+Colors = UInt8[np.ndarray, "colors 3"]
+
+
+def changed_colors(colors: Colors, changes: Sequence[str]) -> Colors:
+    """Return a palette's colours with some replaced; all changes happen at once.
+
+    Args:
+        colors: of the palette.
+        changes: "OLD=NEW", hex colours; OLD must be one of the palette, or the name that `toonset
+            palette` gives one of them and no other.
+
+    Raises:
+        PaletteError: no such colour, or text that is no such pair.
+    """
+    old: list[RGB] = [(r, g, b) for r, g, b in colors.tolist()]
+    called = Counter(name_of(color) for color in old)
+    names = {name_of(color): color for color in old if called[name_of(color)] == 1}
+    new = colors.copy()
+    for change in changes:
+        words = change.split("=")
+        if len(words) != 2:
+            raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
+        source, where = words[0].strip().lower(), f"--recolor {change!r}"
+        known = names.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
+        if known not in old:
+            has = ", ".join(f"{hex_of(color)} ({name_of(color)})" for color in old)
+            raise PaletteError(f"{where}: the palette has {has}; choose one of them")
+        new[old.index(known)] = rgb_of_typed(words[1].strip(), where)
+    return new
+
+
+def recolored_drawing(
+    picture: Picture, paint: PaintMap, contour: Map, palette: Palette, colors: Colors
+) -> Picture:
+    """Return a drawing in other colours: see `toonset.palette.pixels.recolor`.
+
+    Left-out colours that are no shades of a paint stay as they are, and so do drawn lines.
+
+    Args:
+        picture: the drawing.
+        paint: what its pixels are painted with.
+        contour: how far lines cover every pixel.
+        palette: of the sheet.
+        colors: as many as it has, in its order.
+    """
+    dark = None if paint.tones is None else paint.tones == IN_SHADOW
+    tones = tone_map(paint.labels, dark, contour, len(colors))
+    old, new = (tones_of(one, palette.shadow) for one in (palette.rgb, colors))
+    return recolored(picture, tones, contour, old, new)
