@@ -28,7 +28,7 @@ from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import ToonsetError
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.extract import extract_palette, label_drawings
+from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED
@@ -65,7 +65,8 @@ def try_labels(page: LabelPage, step: Step, seed: int) -> tuple[Tried, bytes]:
         cut = as_cut_out(made)
         pictures = [view.rgba for view, _ in cut.drawings]
         palette = extract_palette(pictures)
-        found = label_drawings(pictures, [find_contour(p) for p in pictures], palette)
+        maps = paint_maps(pictures, [find_contour(p) for p in pictures], palette)
+        found = [one.labels for one in maps]
     except ToonsetError as error:
         return Tried(seed, 0.0, REFUSED, str(error)), b""
     truths = _truths(made, cut)
