@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -183,13 +184,20 @@ def recolor(
 
     printer = Printer(as_json, quiet)
     places = inputs or [BUNDLE]
-    check_output(out, places, ("*.png",), force=force)
+    read = [Path(os.path.abspath(place)) for place in places]
+    folders = [place if place.is_dir() else place.parent for place in read]
+    pictures = [folder / name for folder in folders for name in ("images", *FOLDERS)]
+    check_output(out, [*places, *pictures], ("*.png",), force=force)
     found, drawings = _painted(places, printer)
     colors = changed_colors(found.rgb, changes)
+    changed = False
     with new_folder(out, force=force) as folder:
         for one in drawings:
             new = recolored_drawing(one.picture, one.paint, one.contour, found, colors)
+            changed |= bool((new != one.picture).any())
             write_bytes(folder / one.name, encode_png(new))
+    if not changed:
+        printer.say("no pixel has changed: drawn lines keep their colour")
     names = [one.name for one in drawings]
     count = "1 picture" if len(names) == 1 else f"{len(names)} pictures"
     printer.result({"out": out, "files": names}, f"{out}: {count}")

@@ -51,7 +51,7 @@ def synth(
         Literal["plain", "artist"],
         typer.Option(
             help="artist: another body in every drawing, shadow, paper, captions, JPEG; "
-            "other options go before it."
+            "other options override it."
         ),
     ] = "plain",
     views: Annotated[int, typer.Option(help="Drawings, evenly round.")] = DEFAULT.views,

@@ -47,14 +47,8 @@ OVERLAY, CALIBRATION = "overlay.png", "calibration.json"
 LABELS, TONES, CONTOURS, IMAGES = "labels", "tones", "contours", "images"
 WRITTEN = (
     *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
-    *(
-        "palette.*",
-        "labels",
-        "tones",
-        "contours",
-        "run",
-        "run.unfinished",
-    ),  # what later verbs put beside
+    # what later verbs put beside
+    *("palette.*", "labels", "tones", "contours", "run", "run.unfinished"),
 )
 
 

@@ -27,17 +27,20 @@ FEWEST_VIEWS = 3  # two silhouettes leave the hull open
 def hull_points(views: Sequence[ExportView], seed: int) -> TrackedPoints | None:
     """Return coloured points of the visual hull; None where the drawings have none.
 
+    One that is transparent or opaque all over shows no silhouette: there is no hull, either.
+
     Args:
         views: drawings with their cameras; points are those of their pinholes.
         seed: of which pixels are chosen.
     """
-    if len(views) < FEWEST_VIEWS:
+    masks = [mask_of(view.rgba) for view in views]
+    if len(views) < FEWEST_VIEWS or any(mask.all() or not mask.any() for mask in masks):
         return None
     rng = np.random.default_rng(seed)
     silhouettes = [_silhouette(view) for view in views]
     found = []
-    for number, view in enumerate(views):
-        rows, columns = np.nonzero(mask_of(view.rgba))
+    for number, mask in enumerate(masks):
+        rows, columns = np.nonzero(mask)
         chosen = rng.choice(len(rows), min(len(rows), POINTS // len(views)), replace=False)
         pixels = np.stack([columns[chosen], rows[chosen]], axis=1) + rng.random((len(chosen), 2))
         points, depth = _entered(silhouettes, number, pixels)

@@ -18,12 +18,16 @@ SUFFIX = ", shadow"
 
 
 def swatches_of(palette: Palette) -> list[NamedColor]:
-    """Return the colours with their names, each followed by its tone in shadow if it has one."""
+    """Return the colours with their names, each followed by its tone in shadow if it has another.
+
+    Black is black in shadow, too.
+    """
     found = []
     for color in palette.colors:
         name = clean_name(color.name)
         found.append(NamedColor(color.rgb, name))
-        found += [NamedColor(tone.rgb, name + SUFFIX) for tone in color.tones[1:] if name]
+        dark = [tone.rgb for tone in color.tones[1:] if name and tone.rgb != color.rgb]
+        found += [NamedColor(rgb, name + SUFFIX) for rgb in dark]
     return found
 
 

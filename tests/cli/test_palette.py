@@ -247,6 +247,27 @@ def test_drawings_are_written_in_other_colours(tmp_path: Path) -> None:
     assert np.array_equal(load_rgba(tmp_path / "found" / "000.png"), new)
 
 
+@pytest.mark.parametrize("name", ["images", "labels", "contours"])
+def test_other_colours_never_replace_what_they_are_made_of(tmp_path: Path, name: str) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    palette([bundle])
+    before = {path: path.read_bytes() for path in bundle.rglob("*.png")}
+    for place in (bundle, bundle / "transforms.json"):
+        with pytest.raises(ToonsetError, match="--force would delete it"):
+            recolor(["red=#00ff00"], [place], bundle / name, force=True)
+    assert {path: path.read_bytes() for path in bundle.rglob("*.png")} == before
+
+
+def test_colours_that_change_nothing_are_spoken_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    palette([bundle])
+    for color, said in (("#c81e28", True), ("#00ff00", False)):
+        recolor([f"red={color}"], [bundle], tmp_path / color)
+        assert ("no pixel has changed" in capsys.readouterr().err) == said
+
+
 def test_nothing_is_written_where_colours_cannot_be_changed(tmp_path: Path) -> None:
     bundle = make_bundle(tmp_path / "b")
     with pytest.raises(ToonsetError, match=r"has no palette\.json; run `toonset palette` first"):

@@ -8,8 +8,8 @@ import pytest
 
 from tests.palette.shaded import EYE, FACTOR, PAINTS, TUNIC, Drawing, drawings
 from toonset.errors import PaletteError
-from toonset.palette.extract import IN_SHADOW, PaintMap, extract_palette, paint_maps
-from toonset.palette.palette import Palette
+from toonset.palette.extract import PaintMap, extract_palette, paint_maps
+from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
 from toonset.palette.recolor import changed_colors, recolored_drawing
@@ -101,14 +101,12 @@ def test_soft_edges_are_mixed_as_before_and_lines_and_eyes_stay() -> None:
 
 
 def test_a_shadow_of_a_new_colour_stays_within_8_bits() -> None:
-    palette, maps, contours = found(drawings(shadow=True, noisy=True, views=5))
-    black_and_white = np.zeros_like(palette.rgb)
-    black_and_white[::2] = 255
-    tones = tones_of(black_and_white, palette.shadow)
-    assert tones.dtype == np.uint8
-    assert np.array_equal(tones[: len(palette.rgb)], black_and_white)
-    assert IN_SHADOW in maps[0].tones if maps[0].tones is not None else False
-    assert len(contours) == 5
+    shadow = Shadow(FACTOR, (0.0, 0.0, 0.0), 0.0)
+    black_and_white = np.array([(0, 0, 0), (255, 255, 255)], dtype=np.uint8)
+    tones = tones_of(black_and_white, shadow)
+    assert np.array_equal(tones[:2], black_and_white)
+    assert np.array_equal(tones[2], (0, 0, 0))
+    np.testing.assert_allclose(tones[3], np.multiply(255, FACTOR), atol=2)
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,13 @@ def test_too_few_drawings_have_no_hull(count: int) -> None:
     assert hull_points(views(count), 0) is None
 
 
+@pytest.mark.parametrize("alpha", [0, 255])
+def test_a_drawing_without_a_silhouette_leaves_no_hull(alpha: int) -> None:
+    shown = views(4)
+    shown[1].rgba[..., 3] = alpha
+    assert hull_points(shown, 0) is None
+
+
 def test_drawings_that_share_no_volume_have_no_hull() -> None:
     shown = views(4)
     away = [

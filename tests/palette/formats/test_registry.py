@@ -102,7 +102,8 @@ def test_tones_are_swatches_beside_their_paint_and_read_as_one(
     tones = (Tone((120, 80, 40), 0.6), Tone((86, 56, 32), 0.2))
     brown = PaletteColor((120, 80, 40), 0.8, "brown", tones)
     white = PaletteColor((255, 255, 255), 0.2, "white", (Tone((255, 255, 255), 0.2),))
-    shaded = Palette((brown, white), "by hand")
+    black = PaletteColor((0, 0, 0), 0.1, "black", (Tone((0, 0, 0), 0.1), Tone((0, 0, 0), 0.0)))
+    shaded = Palette((brown, white, black), "by hand")
     plain = Palette(tuple(replace(one, tones=()) for one in shaded.colors), "by hand")
     file = tmp_path / f"p{extension}"
     file.write_bytes(encode_palette(shaded, extension))
@@ -111,6 +112,7 @@ def test_tones_are_swatches_beside_their_paint_and_read_as_one(
     file.write_bytes(encode_palette(plain, extension))
     assert not names_tones(str(file))
     assert "brown, shadow" in to_gpl(shaded).splitlines()[5]
+    assert "black, shadow" not in to_gpl(shaded)  # the same colour twice
     sea = "GIMP Palette\n#\n0 0 9 sea, shadow\n0 0 99 sea\n"
     (tmp_path / "sea.gpl").write_text(sea)
     assert len(parse_colors(str(tmp_path / "sea.gpl"))) == 2
