@@ -76,7 +76,7 @@ def calibrate(
             "--front",
             metavar="N",
             min=0,
-            help="Number, as in overlay.png, of the view that shows the front.",
+            help="Number of the view that shows the front, from 0, as the pictures are named.",
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = None,
@@ -148,8 +148,8 @@ def calibrate(
     lock = tuple(lock.value for lock in locked or ())
     hints = Hints(labels, landmarks, landmarks_only, init, lock)
     hints.check()
-    if front is not None and labels:
-        raise UsageError("--front says what --views says; drop one")
+    if front is not None and (labels or landmarks_only):
+        raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
     Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet, verbose)
     given = None if str(mesh) == NO_BODY else mesh

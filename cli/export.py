@@ -141,7 +141,7 @@ def _summary(to: Format, job: Job, views: Sequence[ExportView], error_px: float)
             "splatting's own reader, which takes them to be there, add --centre"
         )
     if target.wants_points and job.points is None:
-        lines.append("no points; give a mannequin that the drawings show as --mesh")
+        lines.append("no points: no three drawings share a volume; give a mannequin as --mesh")
     elif job.points is not None:
         several = int((job.points.seen.sum(axis=0) > 1).sum())
         lines.append(f"{len(job.points.xyz)} points, {several} of them seen by several views")

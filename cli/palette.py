@@ -190,14 +190,10 @@ def recolor(
     check_output(out, [*places, *pictures], ("*.png",), force=force)
     found, drawings = _painted(places, printer)
     colors = changed_colors(found.rgb, changes)
-    changed = False
     with new_folder(out, force=force) as folder:
         for one in drawings:
             new = recolored_drawing(one.picture, one.paint, one.contour, found, colors)
-            changed |= bool((new != one.picture).any())
             write_bytes(folder / one.name, encode_png(new))
-    if not changed:
-        printer.say("no pixel has changed: drawn lines keep their colour")
     names = [one.name for one in drawings]
     count = "1 picture" if len(names) == 1 else f"{len(names)} pictures"
     printer.result({"out": out, "files": names}, f"{out}: {count}")

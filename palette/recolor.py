@@ -29,21 +29,25 @@ def changed_colors(colors: Colors, changes: Sequence[str]) -> Colors:
             palette` gives one of them and no other.
 
     Raises:
-        PaletteError: no such colour, or text that is no such pair.
+        PaletteError: no such colour, one that is replaced twice, or text that is no such pair.
     """
     old: list[RGB] = [(r, g, b) for r, g, b in colors.tolist()]
     called = Counter(name_of(color) for color in old)
     names = {name_of(color): color for color in old if called[name_of(color)] == 1}
     new = colors.copy()
+    replaced: set[RGB] = set()
     for change in changes:
         words = change.split("=")
         if len(words) != 2:
             raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
         source, where = words[0].strip().lower(), f"--recolor {change!r}"
         known = names.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
-        if known not in old:
+        if known is None or known not in old:
             has = ", ".join(f"{hex_of(color)} ({name_of(color)})" for color in old)
             raise PaletteError(f"{where}: the palette has {has}; choose one of them")
+        if known in replaced:
+            raise PaletteError(f"{where}: {hex_of(known)} is replaced twice; drop one")
+        replaced.add(known)
         new[old.index(known)] = rgb_of_typed(words[1].strip(), where)
     return new
 

@@ -258,16 +258,6 @@ def test_other_colours_never_replace_what_they_are_made_of(tmp_path: Path, name:
     assert {path: path.read_bytes() for path in bundle.rglob("*.png")} == before
 
 
-def test_colours_that_change_nothing_are_spoken_of(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bundle = make_bundle(tmp_path / "b")
-    palette([bundle])
-    for color, said in (("#c81e28", True), ("#00ff00", False)):
-        recolor([f"red={color}"], [bundle], tmp_path / color)
-        assert ("no pixel has changed" in capsys.readouterr().err) == said
-
-
 def test_nothing_is_written_where_colours_cannot_be_changed(tmp_path: Path) -> None:
     bundle = make_bundle(tmp_path / "b")
     with pytest.raises(ToonsetError, match=r"has no palette\.json; run `toonset palette` first"):

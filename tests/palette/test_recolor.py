@@ -9,6 +9,7 @@ import pytest
 from tests.palette.shaded import EYE, FACTOR, PAINTS, TUNIC, Drawing, drawings
 from toonset.errors import PaletteError
 from toonset.palette.extract import PaintMap, extract_palette, paint_maps
+from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
@@ -120,3 +121,10 @@ def test_a_shadow_of_a_new_colour_stays_within_8_bits() -> None:
 def test_a_change_that_means_nothing_is_refused(change: str, words: str) -> None:
     with pytest.raises(PaletteError, match=words):
         changed_colors(np.array(PAINTS, dtype=np.uint8), [change])
+
+
+def test_a_colour_is_replaced_once() -> None:
+    colors = np.array(PAINTS, dtype=np.uint8)
+    first = hex_of(tuple(colors[0].tolist()))
+    with pytest.raises(PaletteError, match=f"{first} is replaced twice; drop one"):
+        changed_colors(colors, [f"{first}=#111111", f"{first}=#222222"])
