@@ -29,8 +29,8 @@ TAIL = 4.0  # degrees of freedom of a view's yaw about its place: one bad view p
 class Spreads:
     """Standard deviations between the views of a sheet; radians, relative for scale."""
 
-    elevation: float = np.radians(1.0)
-    roll: float = np.radians(0.7)
+    elevation: float = np.radians(3.0)
+    roll: float = np.radians(2.0)
     scale: float = 0.01
     yaw: float = np.radians(3.0)
 

@@ -45,7 +45,7 @@ def test_arms_that_hardly_show_in_the_outlines_are_raised(monkeypatch: pytest.Mo
         found = find_cameras(made.views, body)
         assert bending(found).is_proven
         assert found.model.bends_mannequin
-        assert errors(found, made).max() < 3.5
+        assert errors(found, made).max() < 4
         with monkeypatch.context() as never:
             never.setattr(pipeline, "GLANCE_MARGIN", np.inf)
             rigid = find_cameras(made.views, body)
