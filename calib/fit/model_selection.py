@@ -38,7 +38,7 @@ WIDTHS = np.geomspace(0.02, 0.01, 8)
 WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
 # Of bodies whose outlines lack something, hair or a bag, and of those that nearly meet
 BODY_WIDTHS, NEAR_BODY_WIDTHS = np.geomspace(0.04, 0.015, 8), np.geomspace(0.04, 0.01, 10)
-BODY_ELEVATION = np.radians(0.5)  # half of MEANT's: a bent body can look tilted
+BODY_ELEVATION = np.radians(1.5)  # half of `Spreads.elevation`: a bent body can look tilted
 # Where outlines nearly meet, a glance says whether proportions are worth a fit (docs/decisions.md)
 GLANCE_WIDTHS, GLANCE_MARGIN = np.array([0.02, 0.015]), 120.0
 # Drawings so far off a bent body look like another body to any (docs/decisions.md)
@@ -49,14 +49,12 @@ SHARED, PER_VIEW = "perspective", "perspective, a distance per view"
 GIVEN = "as given"
 PROPORTIONS = "the mannequin's proportions"
 STRETCHED, TALLER = "stretched drawings", "the mannequin's height over width"
-# What artists mean to draw, for the fit; the search is held less tightly (docs/decisions.md)
-MEANT = Spreads(elevation=np.radians(1.0), roll=np.radians(0.7))
 MODELS: dict[str, SheetModel] = {
-    GIVEN: SheetModel("given", MEANT),
-    ORTHOGRAPHIC: SheetModel("none", MEANT),
-    SCALES: SheetModel("none", replace(MEANT, scale=FREE_SCALE)),
-    SHARED: SheetModel("shared", MEANT),
-    PER_VIEW: SheetModel("per view", MEANT),
+    GIVEN: SheetModel("given"),
+    ORTHOGRAPHIC: SheetModel("none"),
+    SCALES: SheetModel("none", Spreads(scale=FREE_SCALE)),
+    SHARED: SheetModel("shared"),
+    PER_VIEW: SheetModel("per view"),
 }
 
 

@@ -19,7 +19,7 @@ from toonset.calib.fit.align import ElevationPrior, tilt
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.camera import angles_from_rotation
 
-PRIOR_VIEWS = 8.0  # how many views the expected spread is worth
+PRIOR_VIEWS = 4.0  # how many views the expected spread is worth
 LABEL_SIGMA = np.radians(5.0)  # of a sheet's mean yaw about its labels
 LOCK_SIGMA = 1e-5  # of what a person keeps
 TAIL = 4.0  # degrees of freedom of a view's yaw about its place: one bad view pulls little
