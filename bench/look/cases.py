@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 from bench.cases.bodies import random_body
 from bench.cases.cases import MANNEQUIN_FILE, case_folders
-from bench.look.eyes import EYES_FILE, Eye, eyes_of_body, read_eyes
+from bench.look.eyes import EYES_FILE, Eye, eyes_of_body, marked_eyes, read_eyes
 from bench.stability.bodies import with_eyes
 from toonset.calib.calibrate import calibrate
 from toonset.calib.write_bundle import write_bundle
@@ -124,7 +124,7 @@ def _from_folder(place: Path, group: str, *, calibrated: bool) -> LookCase:
         mesh = load_mesh(place / MANNEQUIN_FILE)
         train = _calibrated(split_sheet(sheets[0]).views, mesh)
     name = place.name.removesuffix(f"-{group}")
-    eyes = read_eyes(place / EYES_FILE)
+    eyes = read_eyes(place / EYES_FILE) or marked_eyes(name)
     return LookCase(name, group + CALIBRATED * calibrated, train, test, None, eyes)
 
 

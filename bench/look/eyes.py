@@ -27,6 +27,7 @@ from toonset.mesh import Mesh
 from toonset.view import over_white
 
 EYES_FILE = "eyes.json"
+MARKS = Path(__file__).with_name(EYES_FILE)
 PARTS = ("left eye", "right eye")
 FRONT, SEEN = 0.7, -0.2  # cosine of the view to the front: looks like itself; may be seen
 CORE, RING = 0.75, (1.5, 2.2)  # of the radius: where an eye's colour is measured, and that around
@@ -88,10 +89,18 @@ def read_eyes(path: Path) -> tuple[Eye, ...]:
     Raises:
         BundleError: it holds something else.
     """
-    if not path.is_file():
-        return ()
+    return _eyes(read_json(path), path) if path.is_file() else ()
+
+
+def marked_eyes(character: str) -> tuple[Eye, ...]:
+    """Return the eyes of a character of the public cases, marked by hand; none of another."""
+    known = read_json(MARKS)
+    return _eyes(known[character], MARKS) if character in known else ()
+
+
+def _eyes(entries: Any, path: Path) -> tuple[Eye, ...]:
     try:
-        return tuple(_eye(entry) for entry in read_json(path)["eyes"])
+        return tuple(_eye(entry) for entry in entries["eyes"])
     except (KeyError, TypeError, ValueError) as error:
         raise BundleError(
             f'{path}: no list "eyes" of {{"center": [x, y, z], "radius": r}}; correct it'

@@ -18,7 +18,7 @@ from bench.cases.bodies import random_body
 from bench.charts.chart import DEFAULT
 from bench.charts.points import charts_of
 from bench.look.cases import DRAWN, LookCase, drawn_case, look_cases
-from bench.look.eyes import Eye, check_eyes, eye_look, eyes_of_body, read_eyes
+from bench.look.eyes import Eye, check_eyes, eye_look, eyes_of_body, marked_eyes, read_eyes
 from bench.look.measure import LookResult, bench_look, eyes_text, records_of, table_of
 from bench.look.picture import draw_looks, face_sheet, look_sheet
 from bench.look.plan import FIELD, LOOKS, Recipe, Variant
@@ -106,6 +106,8 @@ def test_eyes_come_from_a_file_or_from_the_body(tmp_path: Path) -> None:
         path.write_text(json.dumps(wrong))
         with pytest.raises(BundleError, match=r'eyes\.json: no list "eyes"'):
             read_eyes(path)
+    assert marked_eyes("nobody") == ()
+    assert len(marked_eyes("kaykit_rogue")) == 2
     left, right = eyes_of_body(with_eyes(random_body(1), 0.03))
     assert left.radius == pytest.approx(0.03, rel=0.02)
     assert left.center * (-1, 1, 1) == pytest.approx(right.center)
