@@ -34,6 +34,7 @@ from toonset.calib.fit.model_selection import (
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
 from toonset.calib.fit.sheet_prior import Turn
+from toonset.calib.fit.turned_bodies import with_turned_bodies
 from toonset.calib.known import Known, weighed_by_landmarks
 from toonset.calib.landmarks.landmarks import landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress
@@ -209,6 +210,8 @@ class Problem:
             joint, model = with_proportions(self._level(fit.problem, joint), joint, model, widths)
         factor = SIGMA_OF_ANOTHER_BODY if fit.differs else SIGMA_OF_SAME_BODY
         joint = replace(joint, covariance=factor**2 * joint.covariance)
+        if not fit.differs and not self.known.locked - {"fov"}:
+            joint = with_turned_bodies(joint, turn)
         return replace(fit, joint=joint, model=model)
 
     def cut_off(self, whole: SheetFit, turn: Turn) -> tuple[Problem, SheetFit, tuple[CutOff, ...]]:

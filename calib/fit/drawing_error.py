@@ -38,10 +38,17 @@ LEAST_SMOOTH, MOST_SMOOTH = 0.0007, 0.05  # of the height
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of a drawing's error over the figure's height: smooth and white part."""
+    """Standard deviations of a drawing's error.
+
+    Attributes:
+        smooth: part of the outline's error that drifts, over the figure's height.
+        white: the rest, over the figure's height.
+        turned: of a drawing's body in elevation, radians; see `toonset.calib.fit.turned_bodies`.
+    """
 
     smooth: float = 0.008
     white: float = 0.004
+    turned: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

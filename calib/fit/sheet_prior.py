@@ -163,14 +163,28 @@ def yaw_slope(pose: Pose) -> Float[np.ndarray, " 3"]:
     return np.array([along(pose.rotation[1]), along(-pose.rotation[0]), 0.0])
 
 
-def _yaw_tie(
-    poses: Sequence[Pose], turn: Turn, slopes: Float[np.ndarray, "views unknowns"], spread: float
-) -> Tie:
+def off_places(poses: Sequence[Pose], turn: Turn) -> Float[np.ndarray, " views"]:
+    """Return how far views are turned off their places, which turn together; 0 without a place."""
+    placed = np.isfinite(turn.places)
+    if not placed.any():
+        return np.zeros(len(poses))
+    off, mean = _off_places(poses, turn)
+    return np.where(placed, off - mean, 0.0)
+
+
+def _off_places(poses: Sequence[Pose], turn: Turn) -> tuple[Float[np.ndarray, " views"], float]:
     placed = np.isfinite(turn.places)
     yaw = np.array([angles_from_rotation(pose.rotation)[0] for pose in poses])
     off = np.where(placed, yaw - np.where(placed, turn.places, 0.0), 0.0)
     mean = float(np.angle(np.exp(1j * off[placed]).mean()))
-    off = np.where(placed, mean + (off - mean + np.pi) % (2 * np.pi) - np.pi, 0.0)
+    return np.where(placed, mean + (off - mean + np.pi) % (2 * np.pi) - np.pi, 0.0), mean
+
+
+def _yaw_tie(
+    poses: Sequence[Pose], turn: Turn, slopes: Float[np.ndarray, "views unknowns"], spread: float
+) -> Tie:
+    placed = np.isfinite(turn.places)
+    off, mean = _off_places(poses, turn)
     centre = np.diag(placed.astype(float)) - np.outer(placed, placed) / placed.sum()
     weights = (TAIL + 1) / (TAIL + ((off - mean) / spread) ** 2)
     return Tie(off, slopes, centre, np.where(placed, np.minimum(weights, 1.0), 0.0))

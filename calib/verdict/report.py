@@ -43,6 +43,7 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
             "smooth": calibration.noise.smooth,
             "white": calibration.noise.white,
         },
+        "bodies_turn_deg": math.degrees(calibration.noise.turned),
         "drawings_contradiction_of_height": (
             calibration.contradiction if math.isfinite(calibration.contradiction) else None
         ),
