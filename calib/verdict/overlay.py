@@ -1,4 +1,8 @@
-"""The overlay: every drawing with the mannequin's outline on it and what was found, for people."""
+"""The overlay: every drawing with an outline on it and what was found, for people.
+
+The outline is the mannequin's, or without one that of the hull of all other drawings: where they
+let a body be.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,12 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
 from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.calib.result import Calibration, Verdict, ViewCalibration
+from toonset.dataset.silhouettes.hull_rays import Silhouette, deepest
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -19,6 +24,8 @@ CELL_HEIGHT = 360  # pixels of a drawing in the overlay
 CAPTION = 82
 GAP = 14
 COLUMNS = 8
+LEAST_WIDTH = 150  # of a cell: its caption's
+HULL_ROWS = 100  # of rays through a drawing
 FINE = 4  # outlines are traced at this multiple of a pixel
 # distinguishable with colour-blind eyes; the verdict is written out as well
 INK: dict[Verdict, tuple[int, int, int]] = {
@@ -28,6 +35,8 @@ INK: dict[Verdict, tuple[int, int, int]] = {
     "failed": (200, 30, 20),
 }
 
+Body = Bool[np.ndarray, "height width"]  # what is traced on a cell's drawing, FINE times as large
+
 
 def draw_overlay(
     views: Sequence[View], mesh: Mesh | None, calibration: Calibration
@@ -36,10 +45,18 @@ def draw_overlay(
 
     Args:
         views: the drawings.
-        mesh: the mannequin as it was fitted; None: none is traced.
+        mesh: the mannequin as it was fitted; None: the hull is traced.
         calibration: their cameras.
     """
-    cells = [_cell(view, mesh, found) for view, found in zip(views, calibration.views, strict=True)]
+    pairs = list(zip(views, calibration.views, strict=True))
+    if mesh is not None:
+        bodies = [_projected(view, found, mesh) for view, found in pairs]
+    elif len(views) > 1:
+        silhouettes = [Silhouette(view, found.camera) for view, found in pairs]
+        bodies = [_hull(view, silhouettes, i) for i, view in enumerate(views)]
+    else:
+        bodies = [np.zeros((1, 1), dtype=bool)]
+    cells = [_cell(view, found, body) for (view, found), body in zip(pairs, bodies, strict=True)]
     rows = [cells[i : i + COLUMNS] for i in range(0, len(cells), COLUMNS)]
     width = max(sum(c.shape[1] + GAP for c in row) for row in rows) + GAP
     picture = np.full((len(rows) * (CELL_HEIGHT + CAPTION + GAP) + GAP, width, 3), 255, np.uint8)
@@ -51,20 +68,49 @@ def draw_overlay(
     return picture
 
 
-def _cell(
-    view: View, mesh: Mesh | None, found: ViewCalibration
-) -> UInt8[np.ndarray, "height width 3"]:
-    height, width = view.rgba.shape[:2]
-    factor = CELL_HEIGHT / height
-    drawn_wide = max(1, round(width * factor))
-    cell_wide = max(drawn_wide, 150)
-    left = (cell_wide - drawn_wide) // 2
-    cell = np.full((CELL_HEIGHT + CAPTION, cell_wide, 3), 255, np.uint8)
-    cell[:CELL_HEIGHT, left : left + drawn_wide] = _faded(view, (drawn_wide, CELL_HEIGHT))
-    if mesh is not None:
-        pixels = found.camera.project(mesh.vertices)[0] * (drawn_wide / width, factor) + (left, 0)
-        _trace(cell, pixels, mesh, INK[found.verdict])
+def _cell(view: View, found: ViewCalibration, body: Body) -> UInt8[np.ndarray, "height width 3"]:
+    drawn_wide, side = _widths(view)
+    cell = np.full((CELL_HEIGHT + CAPTION, drawn_wide + 2 * side, 3), 255, np.uint8)
+    cell[:CELL_HEIGHT, side : side + drawn_wide] = _faded(view, (drawn_wide, CELL_HEIGHT))
+    _trace(cell, body, INK[found.verdict])
     return _captioned(cell, found)
+
+
+def _widths(view: View) -> tuple[int, int]:
+    """Return the width of a drawing in its cell, and the room at either side."""
+    height, width = view.rgba.shape[:2]
+    drawn_wide = max(1, round(width * CELL_HEIGHT / height))
+    return drawn_wide, max(0, (LEAST_WIDTH - drawn_wide + 1) // 2)
+
+
+def _projected(view: View, found: ViewCalibration, mesh: Mesh) -> Body:
+    """Return the mannequin's silhouette."""
+    drawn_wide, side = _widths(view)
+    height, width = view.rgba.shape[:2]
+    factor = (drawn_wide / width, CELL_HEIGHT / height)
+    pixels = found.camera.project(mesh.vertices)[0] * factor + (side, 0)
+    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
+    size = ((drawn_wide + 2 * side) * FINE, CELL_HEIGHT * FINE)
+    return silhouette_mask(pixels * FINE, faces, size)
+
+
+def _hull(view: View, silhouettes: Sequence[Silhouette], i: int) -> Body:
+    """Return the silhouette of the other drawings' hull, as far as the picture goes."""
+    drawn_wide, side = _widths(view)
+    height, width = view.rgba.shape[:2]
+    step = max(1.0, height / HULL_ROWS)
+    columns, rows = (np.arange(step / 2, length, step) for length in (width, height))
+    nodes = np.stack(np.meshgrid(columns, rows), axis=-1)
+    depth = deepest(silhouettes, i, nodes.reshape(-1, 2)).reshape(nodes.shape[:2])
+    u, v = (
+        ((np.arange(length * FINE, dtype=np.float32) + 0.5) * size / length / FINE / step - 0.5)
+        for length, size in ((drawn_wide, width), (CELL_HEIGHT, height))
+    )
+    x, y = np.meshgrid(u, v)
+    fine = cv2.remap(
+        depth.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    return np.pad(fine > 0, ((0, 0), (side * FINE, side * FINE)))
 
 
 def _faded(view: View, size_wh: tuple[int, int]) -> UInt8[np.ndarray, "height width 3"]:
@@ -76,11 +122,8 @@ def _faded(view: View, size_wh: tuple[int, int]) -> UInt8[np.ndarray, "height wi
     return np.clip(255 - 0.55 * (255 - resized) + 0.5, 0, 255).astype(np.uint8)
 
 
-def _trace(cell: np.ndarray, pixels: np.ndarray, mesh: Mesh, color: tuple[int, int, int]) -> None:
-    size = (cell.shape[1] * FINE, CELL_HEIGHT * FINE)
-    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-    mask = silhouette_mask(pixels * FINE, faces, size).astype(np.uint8)
-    loops, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+def _trace(cell: np.ndarray, body: Body, color: tuple[int, int, int]) -> None:
+    loops, _ = cv2.findContours(body.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     # contour pixels are centres (+0.5 of a fine pixel); OpenCV draws at integer centres (-0.5)
     shift_bits = 4
     fixed = [

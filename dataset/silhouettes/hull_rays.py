@@ -81,9 +81,25 @@ def cut_rays(
         Per silhouette and sample the signed distance over the silhouette's height, positive
         inside; and per outline point the largest minimum over the silhouettes, refined.
     """
+    return _cut(silhouettes, i, silhouettes[i].points)
+
+
+def deepest(
+    silhouettes: Sequence[Silhouette], i: int, pixels: Float[np.ndarray, "points 2"]
+) -> Float[np.ndarray, " points"]:
+    """Return how deep rays of view i come into the hull of the others, over the height.
+
+    Negative: the others have no body there.
+    """
+    return _cut(silhouettes, i, pixels)[1]
+
+
+def _cut(
+    silhouettes: Sequence[Silhouette], i: int, points: Float[np.ndarray, "points 2"]
+) -> tuple[Float[np.ndarray, "views points t"], Float[np.ndarray, " points"]]:
     anchor = middle_of(silhouettes)
     radius = max(silhouette.reach(anchor) for silhouette in silhouettes)
-    camera, points = silhouettes[i].camera, silhouettes[i].points
+    camera = silhouettes[i].camera
     _, (middle,), _ = camera.project(anchor[None])
     origins, directions = camera.rays(points)
     coarse = (float(middle) + np.linspace(-radius, radius, SAMPLES)).astype(np.float32)
