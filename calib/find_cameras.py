@@ -25,7 +25,7 @@ from toonset.calib.corrections.stretched import (
 )
 from toonset.calib.evidence.coherence_state import state_of
 from toonset.calib.fit.model_selection import Rung
-from toonset.calib.fit.sheet_prior import Turn
+from toonset.calib.fit.sheet_prior import Turn, off_places
 from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.pipeline import Problem, SheetFit
@@ -38,6 +38,7 @@ from toonset.calib.verdict.judge import (
     with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
+    with_places_in_mind,
     with_sheet_in_mind,
 )
 from toonset.mesh import Mesh
@@ -144,6 +145,8 @@ def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -
             judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
             for i, v in enumerate(problem.views)
         ]
+        if differs:
+            each = with_places_in_mind(each, off_places(joint.poses, fitted.turn))
         each = with_labels_in_mind(with_elevations_in_mind(each), problem.known.labels)
         each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)

@@ -29,6 +29,7 @@ SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 # 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
 MOST_PULL = np.radians(5.0)
 FAR_FROM_LEVEL = np.radians(12.0)  # four times what the views of a sheet differ in elevation
+FAR_FROM_PLACE = np.radians(12.0)  # four times what artists are off an even turn
 FAR_FROM_LABEL = np.radians(60.0)  # three quarters is neither front nor side
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
@@ -151,6 +152,27 @@ def with_elevations_in_mind(views: Sequence[ViewCalibration]) -> list[ViewCalibr
         if view.verdict == "ok" and away > FAR_FROM_LEVEL
         else view
         for view, away in zip(views, off, strict=True)
+    ]
+
+
+def with_places_in_mind(
+    views: Sequence[ViewCalibration], off: Float[np.ndarray, " views"]
+) -> list[ViewCalibration]:
+    """Return the views; none is ok that stands far off its place in the turn.
+
+    Another body's outline can ask for that; one's own is to be believed.
+
+    Args:
+        views: judged one by one, with a mannequin that is another body.
+        off: how far they are turned off their places, radians; 0 where none is known.
+    """
+    away = np.abs(off - np.median(off))
+    reason = "{:.0f} degrees off the even turn of the others, which another body may feign"
+    return [
+        replace(view, verdict="weak", reason=reason.format(np.degrees(turn)))
+        if view.verdict == "ok" and turn > FAR_FROM_PLACE
+        else view
+        for view, turn in zip(views, away, strict=True)
     ]
 
 

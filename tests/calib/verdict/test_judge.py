@@ -13,6 +13,7 @@ from toonset.calib.verdict.judge import (
     with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
+    with_places_in_mind,
     with_sheet_in_mind,
 )
 from toonset.camera import Camera
@@ -37,6 +38,14 @@ def test_a_view_that_looks_up_where_the_sheet_looks_down_is_not_ok():
     judged = with_elevations_in_mind(views)
     assert verdicts(judged) == ["ok", "ok", "ok", "weak"]
     assert "mirrored" in judged[3].reason
+
+
+def test_a_view_that_leaves_the_even_turn_is_not_ok():
+    views = [seen_from(yaw_deg=y) for y in (23, 90, 181, 270)]
+    judged = with_places_in_mind(views, np.radians([23, 0, 1, 0]))
+    assert verdicts(judged) == ["weak", "ok", "ok", "ok"]
+    assert "23 degrees" in judged[0].reason
+    assert verdicts(with_places_in_mind(views, np.radians([11, -1, 1, 0]))) == ["ok"] * 4
 
 
 def test_a_view_far_from_its_label_is_not_ok_and_no_label_says_nothing():
