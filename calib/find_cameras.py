@@ -32,10 +32,10 @@ from toonset.calib.pipeline import Problem, SheetFit
 from toonset.calib.result import Calibration, CutOff
 from toonset.calib.search.hypotheses import Candidates
 from toonset.calib.search.templates import turns_visibly
+from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
     judge_sheet,
     judge_view,
-    with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
     with_sheet_in_mind,
