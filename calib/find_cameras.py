@@ -40,6 +40,8 @@ from toonset.calib.verdict.judge import (
     with_locks_in_mind,
     with_sheet_in_mind,
 )
+from toonset.calib.verdict.one_character import with_one_character_in_mind
+from toonset.calib.verdict.repeated import with_repeats_in_mind
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -148,6 +150,8 @@ def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -
         each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)
         judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)
+        judged = with_repeats_in_mind(judged, problem.views)
+        judged = with_one_character_in_mind(judged, problem.views)
     verdict, reason = judge_sheet(judged, state)
     return Calibration(
         judged,
