@@ -32,15 +32,17 @@ from toonset.calib.pipeline import Problem, SheetFit
 from toonset.calib.result import Calibration, CutOff
 from toonset.calib.search.hypotheses import Candidates
 from toonset.calib.search.templates import turns_visibly
+from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
     judge_sheet,
     judge_view,
-    with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
     with_places_in_mind,
     with_sheet_in_mind,
 )
+from toonset.calib.verdict.one_character import with_one_character_in_mind
+from toonset.calib.verdict.repeated import with_repeats_in_mind
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -151,6 +153,8 @@ def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -
         each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)
         judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)
+        judged = with_repeats_in_mind(judged, problem.views)
+        judged = with_one_character_in_mind(judged, problem.views)
     verdict, reason = judge_sheet(judged, state)
     return Calibration(
         judged,

@@ -28,7 +28,6 @@ MOST_FACES_CONTRADICT = 0.5
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 # 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
 MOST_PULL = np.radians(5.0)
-FAR_FROM_LEVEL = np.radians(12.0)  # four times what the views of a sheet differ in elevation
 FAR_FROM_PLACE = np.radians(12.0)  # four times what artists are off an even turn
 FAR_FROM_LABEL = np.radians(60.0)  # three quarters is neither front nor side
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
@@ -136,22 +135,6 @@ def with_locks_in_mind(
         if view.verdict == "ok" and turn > least
         else view
         for view, turn in zip(views, pulled, strict=True)
-    ]
-
-
-def with_elevations_in_mind(views: Sequence[ViewCalibration]) -> list[ViewCalibration]:
-    """Return the views; none is ok that looks down far more or less than the sheet does.
-
-    It may be drawn so; more often it is a mirrored drawing that fits in its twin.
-    """
-    elevations = np.array([view.camera.angles[1] for view in views])
-    off = np.abs(elevations - np.median(elevations))
-    typical = f"{np.degrees(np.median(elevations)):.0f} degrees"
-    return [
-        replace(view, verdict="weak", reason=f"the sheet looks down by {typical}: mirrored?")
-        if view.verdict == "ok" and away > FAR_FROM_LEVEL
-        else view
-        for view, away in zip(views, off, strict=True)
     ]
 
 

@@ -22,6 +22,8 @@ from toonset.calib.known import Known
 from toonset.calib.options import Progress
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.verdict.judge import SURE, judge_sheet
+from toonset.calib.verdict.one_character import with_one_character_in_mind
+from toonset.calib.verdict.repeated import with_repeats_in_mind
 from toonset.calib.without_body.placing import Figures, SheetCameras, place
 from toonset.calib.without_body.posterior import (
     Doubts,
@@ -56,6 +58,7 @@ WEAK_APART, FAILED_APART = 0.03, 0.06  # of the height
 FEWEST_TO_CONFIRM = 3  # views
 MOST_AGAINST = 3.0  # nats by which drawings speak against a label
 ASK = "say which view is the front, such as --front 0"
+ONE = "are all of one character, in one pose and at one scale?"
 MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 4, 0.01
 
 
@@ -147,13 +150,13 @@ def _judged(
     doubt = doubts(found.turns, found.posterior, found.chosen)
     against = float(found.log_likelihood.max() - found.log_likelihood[found.chosen])
     sigmas = _sigmas(figures, found)
-    judged = []
+    each = []
     for i, (view, camera) in enumerate(zip(views, placed.cameras, strict=True)):
         verdict, reason = _verdict(found, labels, apart, float(wrong[i]), doubt, against)
         if verdict == "ok" and i == odd:
             verdict, reason = "weak", "disagrees with the other drawings"
         own = cohering.views[i] if cohering else None
-        judged.append(
+        each.append(
             ViewCalibration(
                 view.name,
                 camera,
@@ -168,13 +171,14 @@ def _judged(
                 reason,
             )
         )
+    judged = with_one_character_in_mind(with_repeats_in_mind(each, views), views)
     state = SheetState(True, float("nan"), odd, len(views), placed.elevation)
     verdict, reason = judge_sheet(judged, state)
     reason = "" if verdict == "ok" else reason
     text = _doubts_text(doubt) + (f"; {ASK}" if verdict != "ok" and not any(labels) else "")
     near = placed.cameras[0].k
     return Calibration(
-        tuple(judged),
+        judged,
         ModelChoice(
             SHARED if near else ORTHOGRAPHIC,
             (1 / near if near else float("inf"),) * len(views),
@@ -203,7 +207,7 @@ def _verdict(
         return "weak", "two drawings: nothing confirms their labels, scale and elevation"
     if apart > FAILED_APART:
         off = f"{100 * apart:.1f} % of the height"
-        return "failed", f"the outlines are {off} from being one turning body's"
+        return "failed", f"the outlines are {off} from being one turning body's: {ONE}"
     if wrong > 1 - SURE:
         kinds = {"front or back": doubt.front, "which way round": doubt.way}
         kinds["where the axis lies"] = doubt.spacing
@@ -216,7 +220,7 @@ def _verdict(
     if against > MOST_AGAINST:
         return "weak", "what is drawn speaks for another direction: is a label wrong?"
     if apart > WEAK_APART and views >= TELLING_VIEWS:
-        return "weak", f"the outlines are {100 * apart:.1f} % of the height apart"
+        return "weak", f"the outlines are {100 * apart:.1f} % of the height apart: {ONE}"
     return "ok", ""
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from toonset.calib.evidence.coherence_state import CONFIRMING, TELLING_VIEWS, SheetState
 from toonset.calib.result import Sigmas, ViewCalibration
+from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
     judge_sheet,
-    with_elevations_in_mind,
     with_labels_in_mind,
     with_locks_in_mind,
     with_places_in_mind,
@@ -46,6 +46,13 @@ def test_a_view_that_leaves_the_even_turn_is_not_ok():
     assert verdicts(judged) == ["weak", "ok", "ok", "ok"]
     assert "23 degrees" in judged[0].reason
     assert verdicts(with_places_in_mind(views, np.radians([11, -1, 1, 0]))) == ["ok"] * 4
+
+
+def test_a_sheet_that_looks_up_is_not_ok():
+    judged = with_elevations_in_mind([seen_from(elevation_deg=e) for e in (-7, -8, -9, 8)])
+    assert verdicts(judged) == ["weak"] * 4
+    assert "mirrored" in judged[0].reason
+    assert verdicts(with_elevations_in_mind([seen_from(elevation_deg=-3)])) == ["ok"]
 
 
 def test_a_view_far_from_its_label_is_not_ok_and_no_label_says_nothing():

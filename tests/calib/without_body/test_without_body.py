@@ -173,7 +173,7 @@ def test_drawings_that_are_no_turn_are_never_ok() -> None:
     flat[60:100, 50:60] = (10, 200, 10, 255)
     pole = View(flat, (0, 0, SIDE, SIDE), 0.0, "pole.png")
     labels = parse_labels("front,left,back,right", 4)
-    mixed = calibrate_without_body([one, pole, one, pole], Known(labels=labels))
+    mixed = calibrate_without_body([one, pole, drawing(1.0, 0.1), pole], Known(labels=labels))
     assert mixed.verdict == "failed"
     assert "from being one turning body's" in mixed.views[0].reason
 

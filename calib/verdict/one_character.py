@@ -1,0 +1,87 @@
+"""Do all drawings show one character? Their colours say.
+
+A view of a turn shares much of what it shows with the next one, and with its mirror image. So the
+views hang together: link those whose colours overlap most until all are linked (single linkage);
+where even the last link, the weakest, is none, there are two characters. Nothing needs cameras.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.ndimage import gaussian_filter
+
+from toonset.calib.result import ViewCalibration
+from toonset.palette.colors import oklab_from_rgb
+from toonset.view import View
+
+FEWEST = 3  # views: front and back alone need not share a colour
+BIN, CHROMA = 0.05, 0.025  # OKLab: of lightness; of a and b
+MOST_CHROMA = 0.35
+BLUR = 1.0  # bins: shadows and paper move a colour a little
+OPAQUE = 200  # alpha: fainter are mixed with the paper
+FEWEST_PIXELS = 200  # that lie deeper than the contour's ink; fewer, and ink counts, too
+# Share of colours that two drawings have not in common. The weakest link of 40 sheets of one
+# character has at most 0.45, of nine in ten pairs of characters more than 0.5 (docs/decisions.md)
+MOST_APART = 0.5
+
+
+def with_one_character_in_mind(
+    views: Sequence[ViewCalibration], drawings: Sequence[View]
+) -> tuple[ViewCalibration, ...]:
+    """Return the views; none is ok where the drawings show two characters.
+
+    Args:
+        views: judged one by one.
+        drawings: theirs.
+    """
+    others = other_character(drawings)
+    if not others:
+        return tuple(views)
+    rest = [i for i in range(len(drawings)) if i not in others]
+    doubt = (
+        f"views {_listed(others)} have other colours than views {_listed(rest)}: if they show "
+        "another character, calibrate each by itself"
+    )
+    return tuple(
+        replace(view, verdict="weak", reason=doubt)
+        if view.verdict == "ok"
+        else replace(view, reason=f"{view.reason}; {doubt}")
+        for view in views
+    )
+
+
+def other_character(drawings: Sequence[View]) -> list[int]:
+    """Return the views whose colours are not those of the first one's group; none: all are one."""
+    if len(drawings) < FEWEST:
+        return []
+    colors = [_colors(view) for view in drawings]
+    pairs = np.triu_indices(len(colors), 1)
+    shared = [np.minimum(colors[i], colors[j]).sum() for i, j in zip(*pairs, strict=True)]
+    apart = np.maximum(1 - np.array(shared), 0.0)
+    group = fcluster(linkage(apart, "single"), MOST_APART, "distance")
+    return np.flatnonzero(group != group[0]).tolist()
+
+
+def _colors(view: View) -> Float[np.ndarray, "lightness a b"]:
+    """Return how much of a drawing has which colour, its contour's ink aside; 1 in all."""
+    opaque = view.rgba[..., 3] > OPAQUE
+    padded = np.pad(opaque, 1).astype(np.uint8)
+    depth = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    deep = depth > view.line_width_px + 1
+    if deep.sum() < FEWEST_PIXELS:
+        deep = opaque if opaque.any() else view.mask
+    lab = oklab_from_rgb(view.rgba[deep][:, :3])
+    sides = np.arange(-MOST_CHROMA, MOST_CHROMA + CHROMA / 2, CHROMA)
+    counts, _ = np.histogramdd(lab, [np.arange(0, 1 + 1.5 * BIN, BIN), sides, sides])
+    blurred = gaussian_filter(counts, BLUR, mode="constant")
+    return np.asarray(blurred / blurred.sum())
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers))

@@ -1,0 +1,181 @@
+"""Sheets that are no turnaround: a verdict with the reason, never an exception, never ok."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bench.cases.bodies import random_body
+from toonset.calib.calibrate import calibrate
+from toonset.calib.find_cameras import find_cameras
+from toonset.calib.hints import Hints
+from toonset.calib.result import Calibration
+from toonset.calib.verdict.one_character import other_character
+from toonset.calib.verdict.repeated import repeated_drawings
+from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.split_folder.view_labels import front_label
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
+from toonset.view import View
+
+SEED, VIEWS, CELL = 11, 4, 96
+RING = np.arange(VIEWS) * 2 * np.pi / VIEWS
+
+
+@pytest.fixture(scope="module")
+def made() -> Turnaround:
+    options = SynthOptions(views=VIEWS, cell_px=CELL, outline_px=0, elevation_deg=8)
+    return make_turnaround(random_body(SEED), options, SEED)
+
+
+@pytest.fixture(scope="module")
+def views(made: Turnaround) -> list[View]:
+    found = list(split_picture(made.sheet).views)
+    assert len(found) == VIEWS
+    return found
+
+
+def repainted(view: View) -> View:
+    """Return a drawing in other colours."""
+    rgba = view.rgba.copy()
+    rgba[..., :3] = 255 - rgba[..., [1, 2, 0]]
+    return replace(view, rgba=rgba)
+
+
+def resized(view: View, factor: float) -> View:
+    height, width = view.rgba.shape[:2]
+    picture = Image.fromarray(view.rgba).resize((round(factor * width), round(factor * height)))
+    return replace(view, rgba=np.array(picture), box=(0, 0, *picture.size))
+
+
+def as_jpeg(view: View) -> View:
+    """Return a drawing whose colours have been through a JPEG file."""
+    file = io.BytesIO()
+    Image.fromarray(view.rgba[..., :3]).save(file, "JPEG", quality=80)
+    colors = np.array(Image.open(file))
+    return replace(view, rgba=np.dstack([colors, view.rgba[..., 3]]))
+
+
+def alone(views: Sequence[View], labels: str = front_label(0, VIEWS)) -> Calibration:
+    named = [replace(view, name=f"{i:03d}.png") for i, view in enumerate(views)]
+    return calibrate(named, "none", Hints(labels=labels))
+
+
+def turned_by(found: Calibration) -> np.ndarray:
+    return np.array([view.camera.angles[0] for view in found.views])
+
+
+def off_ring(found: Calibration, ring: np.ndarray = RING) -> float:
+    return float(np.abs((turned_by(found) - ring + np.pi) % (2 * np.pi) - np.pi).max())
+
+
+def test_the_sheet_itself_is_fine(views: list[View]) -> None:
+    """Every refusal below has another cause than the drawings."""
+    found = alone(views)
+    assert found.is_certain
+    assert off_ring(found) < np.radians(5)
+    assert repeated_drawings(views) == []
+    assert other_character(views) == []
+
+
+def test_views_of_two_characters_are_not_ok(views: list[View]) -> None:
+    two = [*views[:2], *map(repainted, views[2:])]
+    found = alone(two)
+    assert all(view.verdict != "ok" for view in found.views)
+    assert "views 2, 3 have other colours than views 0, 1" in found.views[0].reason
+
+
+def test_with_a_mannequin_views_of_two_characters_are_not_ok(
+    made: Turnaround, views: list[View]
+) -> None:
+    assert find_cameras(views, made.mesh).is_certain
+    found = find_cameras([*views[:2], *map(repainted, views[2:])], made.mesh)
+    assert {view.verdict for view in found.views} == {"weak"}
+    assert "other colours" in found.views[0].reason
+
+
+def test_one_drawing_for_all_views_is_no_turn(made: Turnaround, views: list[View]) -> None:
+    labelled = alone([views[0]] * VIEWS, "front,left,back,right")
+    assert (labelled.verdict, {view.verdict for view in labelled.views}) == ("failed", {"failed"})
+    assert "views 0 and 1 are the same drawing: remove one" in labelled.views[0].reason
+    fitted = find_cameras([views[0]] * VIEWS, made.mesh)
+    assert all(view.verdict != "ok" for view in fitted.views)
+    assert "all 4 views are the same drawing" in fitted.views[0].reason
+
+
+def test_a_drawing_that_comes_twice_is_named(views: list[View]) -> None:
+    twice = [*views[:2], resized(as_jpeg(views[1]), 0.9), views[3]]
+    found = alone(twice)
+    assert [view.verdict for view in found.views] == ["weak", "failed", "failed", "weak"]
+    assert {view.reason for view in found.views} == {
+        "views 1 and 2 are the same drawing: remove one of them (--drop)"
+    }
+
+
+def test_with_a_mannequin_a_drawing_may_come_twice(made: Turnaround, views: list[View]) -> None:
+    found = find_cameras([*views[:2], views[1], *views[2:]], made.mesh)
+    assert found.is_certain
+    assert off_ring(found, np.insert(RING, 2, RING[1])) < np.radians(5)
+
+
+def test_a_mirrored_copy_and_plain_silhouettes_are_other_drawings(views: list[View]) -> None:
+    front = views[0]
+    mirrored = replace(front, rgba=np.ascontiguousarray(front.rgba[:, ::-1]))
+    assert repeated_drawings([front, mirrored]) == []
+    plain = replace(front, rgba=front.rgba.copy())
+    plain.rgba[..., :3] = 90
+    assert repeated_drawings([plain, plain]) == []
+    assert repeated_drawings([front, plain, front]) == [(0, 2)]
+
+
+def test_views_at_several_scales_are_not_ok(views: list[View]) -> None:
+    sizes = (0.6, 1.6, 1.0, 1.3)
+    found = alone([resized(view, size) for view, size in zip(views, sizes, strict=True)])
+    assert all(view.verdict != "ok" for view in found.views)
+    assert "at one scale?" in found.views[0].reason
+
+
+def test_views_without_feet_keep_their_directions_or_are_not_ok(views: list[View]) -> None:
+    cropped = [
+        replace(view, rgba=view.rgba[: int(0.85 * len(view.rgba))]) if i % 2 else view
+        for i, view in enumerate(views)
+    ]
+    found = alone(cropped)
+    assert not found.is_certain or off_ring(found) < np.radians(22.5)
+
+
+def test_a_mirrored_sheet_is_the_mirrored_characters(made: Turnaround, views: list[View]) -> None:
+    mirrored = [replace(view, rgba=np.ascontiguousarray(view.rgba[:, ::-1])) for view in views]
+    found = alone(mirrored)
+    assert off_ring(found, -RING) < np.radians(5)
+    fitted = find_cameras(mirrored, made.mesh)  # its bag is on the other side
+    assert all(view.verdict != "ok" for view in fitted.views)
+    assert "is it mirrored" in fitted.views[0].reason
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_too_few_drawings_say_what_is_missing(count: int, views: list[View]) -> None:
+    bare = alone(views[:count], "")
+    assert {view.verdict for view in bare.views} == {"ambiguous"}
+    assert "--front 0" in bare.reason
+    labelled = alone(views[:count], front_label(0, count))
+    assert {view.verdict for view in labelled.views} == {"weak"}
+    assert "nothing confirms" in labelled.views[0].reason
+
+
+def test_landmarks_without_their_mannequin_are_a_mistake(
+    drawn: Path, toonset: Callable[..., Any], tmp_path: Path
+) -> None:
+    points = tmp_path / "points.json"
+    points.write_text("{}")
+    arguments = ("calibrate", drawn / "sheet.png", "--mesh", "none", "--landmarks", points)
+    reason = toonset(*arguments, "-o", tmp_path / "bundle").reason
+    assert "--landmarks needs a mannequin; drop it or --mesh none" in reason
+    assert not (tmp_path / "bundle").exists()
