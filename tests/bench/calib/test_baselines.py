@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import cv2
 import numpy as np
@@ -138,13 +139,15 @@ def test_the_mesh_stands_in_the_figures_box(case: CalibCase) -> None:
         assert camera.scale == pytest.approx(100, rel=0.01)
 
 
-@pytest.mark.parametrize("axis", AROUND)
-def test_the_tracker_turns_a_start_nearer(case: CalibCase, axis: str) -> None:
-    starts = [turned(rotation, axis, 5) for rotation in case.rotations]
-    assert errors_deg(starts, case.rotations) == pytest.approx([5] * len(YAWS))
-    pairs = zip(case.views, starts, strict=True)
-    found = [track(BODY, view, boxed(BODY, view, start)) for view, start in pairs]
-    assert np.mean(errors_deg(found, case.rotations)) < 2.5
+def test_the_tracker_turns_starts_nearer(case: CalibCase) -> None:
+    errors = []  # of all starts: where it ends differs by half a degree between processors
+    for axis, off in product(AROUND, (-5, 5)):
+        starts = [turned(rotation, axis, off) for rotation in case.rotations]
+        assert errors_deg(starts, case.rotations) == pytest.approx([5] * len(YAWS))
+        pairs = zip(case.views, starts, strict=True)
+        found = [track(BODY, view, boxed(BODY, view, start)) for view, start in pairs]
+        errors += errors_deg(found, case.rotations)
+    assert np.mean(errors) < 2.5
 
 
 def test_a_tracker_without_a_figure_gives_no_rotation(case: CalibCase) -> None:
