@@ -1,28 +1,29 @@
 """Bodies that turn from drawing to drawing: told by elevation and roll, taken off yaw."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
 from toonset.calib.fit.drawing_error import Noise
+from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.fit.sheet_prior import Spreads, Turn, yaw_slope
 from toonset.calib.fit.turned_bodies import ROLL, YAW, with_turned_bodies
+from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.camera import angles_from_rotation, rotation_from_angles
 
 VIEWS, SIGMA = 8, np.radians(0.3)
 RING = np.arange(VIEWS) * 2 * np.pi / VIEWS
 TURN = Turn(RING)
+BODY = as_it_is(prepare_surface(random_body(0)))
 LOOSE = Spreads(1.0, 1.0, 1.0, 1.0)  # ties that hold nothing
 
 
 def fit_of(angles) -> JointFit:
     poses = tuple(Pose(rotation_from_angles(*row), np.zeros(2), 100.0) for row in angles.tolist())
     covariance = SIGMA**2 * np.eye(PARAMETERS * len(poses) + 1)
-    nobody = SimpleNamespace()
-    return JointFit(poses, nobody, 0.0, Noise(), LOOSE, 0.0, covariance)
+    return JointFit(poses, BODY, 0.0, Noise(), LOOSE, 0.0, covariance)
 
 
 def sheet(rng, turned_deg, *, elevation_deg=0.7, roll_deg=0.3):
