@@ -147,7 +147,7 @@ def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -
             judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
             for i, v in enumerate(problem.views)
         ]
-        if differs:
+        if differs and not fitted.turn.anchored:  # labels are no even steps
             each = with_places_in_mind(each, off_places(joint.poses, fitted.turn))
         each = with_labels_in_mind(with_elevations_in_mind(each), problem.known.labels)
         each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))

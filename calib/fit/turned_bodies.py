@@ -12,7 +12,8 @@ scatter by more than their own uncertainty, bodies turn,
     tau^2 = min(var elevation - sigma^2, (mean roll^2 - sigma^2) / ROLL^2)
 
 and yaw is off as well, where nothing else shows it. Every angle then moves to what the sheet means,
-by its share of the variance, and the sigmas grow by the rest.
+by its share of the variance, and the sigmas grow by the rest. A view far off its place in the turn
+was meant to be there and is moved little, as the sheet's tie of yaw pulls it little.
 
 Source: shrinkage in a random effects model (DerSimonian and Laird 1986, moments; Gelman et al.,
 Bayesian Data Analysis, chapter 5). The ratios are those of synthetic artists' sheets
@@ -28,7 +29,7 @@ from jaxtyping import Float
 
 from toonset.calib.fit.align import tilt
 from toonset.calib.fit.sheet_adjustment import JointFit
-from toonset.calib.fit.sheet_prior import Spreads, Turn, off_places, yaw_slope
+from toonset.calib.fit.sheet_prior import TAIL, Spreads, Turn, off_places, yaw_slope
 from toonset.calib.outline.pose import PARAMETERS
 from toonset.camera import angles_from_rotation, rotation_from_angles
 
@@ -40,7 +41,7 @@ TIED = 0.3  # least share of a variance that the drawings decide
 
 
 def with_turned_bodies(joint: JointFit, turn: Turn) -> JointFit:
-    """Return the fit with its rotations and their covariance as turned bodies ask for.
+    """Return the fit with its rotations and their covariance as bodies that turn ask for.
 
     Unchanged where elevation or roll scatter no more than they are uncertain.
 
@@ -60,21 +61,22 @@ def with_turned_bodies(joint: JointFit, turn: Turn) -> JointFit:
     off = angles - (0, angles[:, 1].mean(), 0)
     off[:, 0] = off_places(joint.poses, turn)
     scatter, leaning = _beyond(off, variances, joint.spreads)
-    tau = min(scatter, leaning / ROLL**2, MOST**2)
-    if tau <= 0:
+    variance = min(scatter, leaning / ROLL**2, MOST**2)
+    if variance <= 0:
         return joint
-    turned = tau * np.array([YAW**2, 1, ROLL**2])
-    level, upright = max(scatter - tau, LEVEL**2), max(leaning - ROLL**2 * tau, UPRIGHT**2)
+    turned = variance * np.array([YAW**2, 1, ROLL**2])
+    level, upright = max(scatter - variance, LEVEL**2), max(leaning - turned[2], UPRIGHT**2)
     meant = np.array([Spreads().yaw ** 2, level, upright])
-    kept = np.tile(meant / (meant + turned), (views, 1))
-    kept[~np.isfinite(turn.places), 0] = 1
-    angles -= (1 - kept) * off
+    taken = np.tile(turned / (meant + turned), (views, 1))
+    far = (TAIL + 1) / (TAIL + off[:, 0] ** 2 / (meant[0] + turned[0]))
+    taken[:, 0] *= np.where(np.isfinite(turn.places), np.minimum(far, 1), 0)
+    angles -= taken * off
     rotations = [rotation_from_angles(*row) for row in angles.tolist()]
-    poses = [replace(p, rotation=own) for p, own in zip(joint.poses, rotations, strict=True)]
-    for at, by, share in zip(own, slopes, kept, strict=True):
+    poses = [replace(p, rotation=r) for p, r in zip(joint.poses, rotations, strict=True)]
+    for at, by, share in zip(own, slopes, taken, strict=True):
         back = np.linalg.pinv(by)
-        covariance[at, at] += back @ np.diag(share * turned) @ back.T
-    noise = replace(joint.noise, turned=float(np.sqrt(tau)))
+        covariance[at, at] += back @ np.diag((1 - share) * turned) @ back.T
+    noise = replace(joint.noise, turned=float(np.sqrt(variance)))
     return replace(joint, poses=tuple(poses), covariance=covariance, noise=noise)
 
 

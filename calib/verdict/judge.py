@@ -141,16 +141,16 @@ def with_locks_in_mind(
 def with_places_in_mind(
     views: Sequence[ViewCalibration], off: Float[np.ndarray, " views"]
 ) -> list[ViewCalibration]:
-    """Return the views; none is ok that stands far off its place in the turn.
+    """Return the views; none is ok that stands far off its place in the even turn.
 
-    Another body's outline can ask for that; one's own is to be believed.
+    The outline of another body can ask for that; that of one's own is to be believed.
 
     Args:
         views: judged one by one, with a mannequin that is another body.
         off: how far they are turned off their places, radians; 0 where none is known.
     """
     away = np.abs(off - np.median(off))
-    reason = "{:.0f} degrees off the even turn of the others, which another body may feign"
+    reason = "turned {:.0f} degrees off even steps, and the mannequin is another body"
     return [
         replace(view, verdict="weak", reason=reason.format(np.degrees(turn)))
         if view.verdict == "ok" and turn > FAR_FROM_PLACE

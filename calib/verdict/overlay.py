@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.calib.result import Calibration, Verdict, ViewCalibration
-from toonset.dataset.silhouettes.hull_rays import Silhouette, deepest
+from toonset.dataset.silhouettes.hull_rays import Silhouette, depth_in_hull
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -101,7 +101,7 @@ def _hull(view: View, silhouettes: Sequence[Silhouette], i: int) -> Body:
     step = max(1.0, height / HULL_ROWS)
     columns, rows = (np.arange(step / 2, length, step) for length in (width, height))
     nodes = np.stack(np.meshgrid(columns, rows), axis=-1)
-    depth = deepest(silhouettes, i, nodes.reshape(-1, 2)).reshape(nodes.shape[:2])
+    depth = depth_in_hull(silhouettes, i, nodes.reshape(-1, 2)).reshape(nodes.shape[:2])
     u, v = (
         ((np.arange(length * FINE, dtype=np.float32) + 0.5) * size / length / FINE / step - 0.5)
         for length, size in ((drawn_wide, width), (CELL_HEIGHT, height))

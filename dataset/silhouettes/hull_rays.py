@@ -84,7 +84,7 @@ def cut_rays(
     return _cut(silhouettes, i, silhouettes[i].points)
 
 
-def deepest(
+def depth_in_hull(
     silhouettes: Sequence[Silhouette], i: int, pixels: Float[np.ndarray, "points 2"]
 ) -> Float[np.ndarray, " points"]:
     """Return how deep rays of view i come into the hull of the others, over the height.

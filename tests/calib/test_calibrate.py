@@ -20,7 +20,7 @@ from toonset.calib.verdict.overlay import draw_overlay
 from toonset.calib.verdict.report import calibration_dict
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
-from toonset.dataset.silhouettes.hull_rays import Silhouette, deepest
+from toonset.dataset.silhouettes.hull_rays import Silhouette, depth_in_hull
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.synthetic.options import SynthOptions
@@ -192,13 +192,13 @@ def test_without_a_body_the_overlay_shows_the_others_hull(clean):
     own = draw_overlay(views, turnaround.mesh, found).astype(int)
     drawn = (own[..., 2] > own[..., 0] + 60) & (own[..., 2] > own[..., 1] + 30)
     near = cv2.dilate(drawn.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
-    assert near[blue].mean() > 0.7  # a hull of seven views is hardly larger than the body
+    assert near[blue].mean() > 0.7  # a hull of four views is hardly larger than the body
     silhouettes = [Silhouette(v, f.camera) for v, f in zip(views, found.views, strict=True)]
     inside = np.argwhere(cv2.erode(views[0].mask.astype(np.uint8), np.ones((7, 7), np.uint8)))
-    depth = deepest(silhouettes, 0, inside[::40, ::-1] + 0.5)
+    depth = depth_in_hull(silhouettes, 0, inside[::40, ::-1] + 0.5)
     assert (depth > -0.002).all()
     beside = np.array([[-20.0, 10.0], [-20.0, 100.0]])
-    assert (deepest(silhouettes, 0, beside) < 0).all()
+    assert (depth_in_hull(silhouettes, 0, beside) < 0).all()
     alone = dataclasses.replace(found, views=found.views[:1])
     assert draw_overlay(views[:1], None, alone).shape[0] == picture.shape[0]
 

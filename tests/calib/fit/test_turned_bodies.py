@@ -64,6 +64,19 @@ def test_turned_bodies_are_seen_and_their_sigmas_are_true():
     assert np.median(np.abs(scores)) / 0.6745 == pytest.approx(1.0, abs=0.25)
 
 
+def test_a_view_that_was_meant_elsewhere_stays_there():
+    rng = np.random.default_rng(3)
+    moved = []
+    for _ in range(50):
+        _, apparent = sheet(rng, 1.5)
+        apparent[1, 0] += np.radians(25)
+        found = with_turned_bodies(fit_of(apparent), TURN)
+        if found.noise.turned > np.radians(1):
+            moved.append(np.degrees(abs(errors(found, apparent)[1, 0])))
+    assert len(moved) > 30
+    assert np.median(moved) < 4  # as a share of the variance alone it would be 10
+
+
 @pytest.mark.parametrize("scatter", [{"elevation_deg": 6.0, "roll_deg": 0.0}, {"roll_deg": 3.0}])
 def test_cameras_that_differ_in_one_way_only_are_no_turned_bodies(scatter):
     rng = np.random.default_rng(1)
