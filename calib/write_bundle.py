@@ -12,7 +12,7 @@ from toonset.calib.without_body.placing import size_of_figures
 from toonset.dataset.bundle.bundle import WRITTEN, Bundle, bundle_folder, read_bundle
 from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.ink_lines import find_contour
+from toonset.palette.pixels.ink_lines import find_contours
 from toonset.write import check_output
 
 
@@ -44,5 +44,5 @@ def write_bundle(
         if palette is not None:
             pictures = [view.rgba for view in found.drawings]
             names = [view.name for view in found.drawings]
-            write_labelled(place, palette, names, pictures, [find_contour(p) for p in pictures])
+            write_labelled(place, palette, names, pictures, find_contours(pictures))
     return read_bundle(folder)

@@ -120,7 +120,7 @@ def palette(
     from toonset.dataset.bundle.palette_files import write_labelled
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
     from toonset.palette.extract import choose_palette, options_of
-    from toonset.palette.pixels.ink_lines import find_contour
+    from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
     printer = Printer(as_json, quiet, verbose)
@@ -133,7 +133,7 @@ def palette(
     drawn = load_pictures(places)
     for note in drawn.notes:
         printer.say(note)
-    contours = [find_contour(picture) for picture in drawn.pictures]
+    contours = find_contours(drawn.pictures)
     found = choose_palette(drawn.pictures, contours, options, colors, method)
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
         write_labelled(folder, found, drawn.names, drawn.pictures, contours, space)
@@ -204,7 +204,7 @@ def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painte
     from toonset.dataset.bundle.painted import Painted, read_painted
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
     from toonset.palette.extract import choose_palette, paint_maps
-    from toonset.palette.pixels.ink_lines import find_contour
+    from toonset.palette.pixels.ink_lines import find_contours
 
     bundle = bundle_of(places)
     if bundle is not None:
@@ -212,7 +212,7 @@ def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painte
     drawn = load_pictures(places)
     for note in drawn.notes:
         printer.say(note)
-    contours = [find_contour(picture) for picture in drawn.pictures]
+    contours = find_contours(drawn.pictures)
     found = choose_palette(drawn.pictures, contours)
     maps = paint_maps(drawn.pictures, contours, found)
     parts = zip(drawn.names, drawn.pictures, maps, contours, strict=True)

@@ -17,7 +17,8 @@ from toonset.palette.paints.features import find_features
 from toonset.palette.paints.places import with_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
-from toonset.palette.pixels.ink_lines import find_contour
+from toonset.palette.pixels.grain import without_grain
+from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.shadow import find_shadow, find_tones, lit_pictures, shaded
 from toonset.view import View
@@ -74,7 +75,7 @@ def extract_palette(
             that contradict each other.
     """
     pictures = [picture_of(view) for view in views]
-    contours = [find_contour(picture) for picture in pictures]
+    contours = find_contours(pictures)
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     return choose_palette(pictures, contours, options, colors, method)
 
@@ -97,7 +98,7 @@ def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb")
     if space not in get_args(Space):
         raise UsageError(f"--space: {space!r} is none of {', '.join(get_args(Space))}")
     picture = picture_of(view)
-    return paint_maps([picture], [find_contour(picture)], palette, space)[0].labels
+    return paint_maps([picture], find_contours([picture]), palette, space)[0].labels
 
 
 def picture_of(view: View | Picture) -> Picture:
@@ -148,12 +149,13 @@ def choose_palette(
         raise UsageError("--colors is the whole palette; leave --keep and --method away")
     if options.keep and method != "toonset":
         raise UsageError("--keep belongs to --method toonset")
+    if method == "extcolors":
+        return with_places(extcolors_palette(pictures, options), pictures)
+    pictures = without_grain(pictures)
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
     if picked is not None and not names_tones(colors or ""):
         return pick_palette(pictures, picked, lines)
-    if method == "extcolors":
-        return with_places(extcolors_palette(pictures, options), pictures)
     shadow = find_shadow(pictures, contours)
     if shadow is None and picked is not None:
         return pick_palette(pictures, picked, lines)
@@ -221,7 +223,7 @@ def paint_maps(
     pictures: Sequence[Picture], contours: Sequence[Map], palette: Palette, space: Space = "rgb"
 ) -> list[PaintMap]:
     """Return labels and tones of pictures whose drawn lines are known; see `label_image`."""
-    dark = None
+    pictures, dark = without_grain(pictures), None
     if palette.shadow is not None:
         dark = find_tones(pictures, contours, palette.shadow)
         pictures = lit_pictures(pictures, contours, dark, palette.shadow)

@@ -30,7 +30,7 @@ from toonset.errors import ToonsetError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.ink_lines import find_contour
+from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.view import over_white
 
@@ -65,7 +65,7 @@ def try_labels(page: LabelPage, step: Step, seed: int) -> tuple[Tried, bytes]:
         cut = as_cut_out(made)
         pictures = [view.rgba for view, _ in cut.drawings]
         palette = extract_palette(pictures)
-        maps = paint_maps(pictures, [find_contour(p) for p in pictures], palette)
+        maps = paint_maps(pictures, find_contours(pictures), palette)
         found = [one.labels for one in maps]
     except ToonsetError as error:
         return Tried(seed, 0.0, REFUSED, str(error)), b""

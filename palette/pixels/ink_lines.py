@@ -14,11 +14,13 @@ Lines lighter than both sides are not found.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
+
+from toonset.palette.pixels.grain import without_grain
 
 Morphology = Callable[..., np.ndarray]  # cv2.dilate or cv2.erode
 
@@ -69,6 +71,13 @@ def find_contour(
     if dark[rim].mean() > OUTLINED and (cover[rim] >= 128).mean() > SEEN:
         cover[mask & ~_eroded(mask, round(width)) & dark] = 255
     return cover
+
+
+def find_contours(
+    pictures: Sequence[UInt8[np.ndarray, "height width 4"]],
+) -> list[UInt8[np.ndarray, "height width"]]:
+    """Return how far the drawn lines cover every pixel of a sheet's drawings, grain taken off."""
+    return [find_contour(picture) for picture in without_grain(pictures)]
 
 
 def rim_line_px(
