@@ -149,13 +149,12 @@ def choose_palette(
         raise UsageError("--colors is the whole palette; leave --keep and --method away")
     if options.keep and method != "toonset":
         raise UsageError("--keep belongs to --method toonset")
-    if method == "extcolors":
-        return with_places(extcolors_palette(pictures, options), pictures)
-    pictures = without_grain(pictures)
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
     if picked is not None and not names_tones(colors or ""):
         return pick_palette(pictures, picked, lines)
+    if method == "extcolors":
+        return with_places(extcolors_palette(pictures, options), pictures)
     shadow = find_shadow(pictures, contours)
     if shadow is None and picked is not None:
         return pick_palette(pictures, picked, lines)
