@@ -19,7 +19,7 @@ from jaxtyping import UInt8
 
 from toonset.palette.pixels.antialias import OPAQUE
 
-LEAST_LEVELS = 2.0  # of 255: finer grain is less than what the paints' own noise allows for
+LEAST_LEVELS = 2.0  # of 255: finer grain does labels no harm
 LAPLACIANS = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)  # nothing on slopes
 SIGMA_FROM_MEDIAN = 1 / (0.6745 * 6)  # of that mask's magnitude, in normal noise
 SMOOTHNESS = 50.0  # of the field, over the data: a third or three times as much is no better
