@@ -14,10 +14,11 @@ from toonset.palette.formats.registry import names_tones, parse_colors
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
+from toonset.palette.paints.grainy_colors import as_drawn
 from toonset.palette.paints.places import with_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
-from toonset.palette.pixels.grain import without_grain
+from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, without_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.shadow import find_shadow, find_tones, lit_pictures, shaded
@@ -155,17 +156,24 @@ def choose_palette(
         return pick_palette(pictures, picked, lines)
     if method == "extcolors":
         return with_places(extcolors_palette(pictures, options), pictures)
-    shadow = find_shadow(pictures, contours)
-    if shadow is None and picked is not None:
+    smooth = without_grain(pictures)
+    shadow = find_shadow(smooth, contours)
+    if picked is not None and shadow is None:
         return pick_palette(pictures, picked, lines)
-    if shadow is None:
-        return _in_light(pictures, options, lines)
-    dark = find_tones(pictures, contours, shadow)
-    lit = lit_pictures(pictures, contours, dark, shadow)
-    if picked is None:
-        palette = _in_light(lit, options, lines, shadow)
-    else:
+    dark = [np.zeros_like(line) for line in lines]
+    lit: Sequence[Picture] = smooth
+    if shadow is not None:
+        dark = find_tones(smooth, contours, shadow)
+        lit = lit_pictures(smooth, contours, dark, shadow)
+    if picked is not None:
         palette = pick_palette(lit, picked, lines)
+    else:
+        palette = _in_light(lit, options, lines, shadow)
+        if noise_levels(pictures) >= LEAST_LEVELS:
+            apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
+            palette = as_drawn(palette, pictures, lit, apart)
+    if shadow is None:
+        return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
     return with_tones(palette, shadow, lit, paint)
 

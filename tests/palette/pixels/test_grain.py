@@ -81,3 +81,11 @@ def test_lines_are_not_seen_in_grain() -> None:
 
 def test_pictures_without_an_opaque_pixel_have_no_noise() -> None:
     assert noise_levels([np.zeros((9, 9, 4), np.uint8), np.zeros((0, 5, 4), np.uint8)]) == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_paints_are_found_in_grain_with_the_colours_that_they_have(seed: int) -> None:
+    palette = extract_palette([drawn(figure(), 16.0, seed)], contour=False)
+    apart = np.linalg.norm(palette.rgb[:, None].astype(int) - PAINTS, axis=2)
+    assert sorted(apart.argmin(axis=1)) == [0, 1, 2, 3]
+    assert apart.min(axis=1).max() < 5  # of 255: a fifth of a grain, not what lies beside

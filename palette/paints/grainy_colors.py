@@ -1,0 +1,66 @@
+"""A palette's colours as grainy drawings have them.
+
+Which paints there are shows once grain is smoothed off; but smoothing mixes into a paint what lies
+beside it, so that colours darken near lines. Within a paint grain is as often lighter as darker:
+the median of its pixels as drawn is the paint itself. Ink is read from the middles of strokes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from toonset.palette.names import name_of
+from toonset.palette.paints.histogram import count_pixels
+from toonset.palette.paints.line_color import find_ink, rounded
+from toonset.palette.palette import Palette
+from toonset.palette.pixels.labels import UNLABELLED, nearest_labels
+
+LEAST_PX = 50  # of a paint's inside: fewer do not tell its colour
+SQUARE = np.ones((3, 3), np.uint8)
+
+Pictures = Sequence[UInt8[np.ndarray, "_ _ 4"]]
+RGB = tuple[int, int, int]
+
+
+def as_drawn(
+    palette: Palette, drawings: Pictures, smooth: Pictures, apart: Sequence[Bool[np.ndarray, "_ _"]]
+) -> Palette:
+    """Return a palette of smoothed drawings with the colours of the drawings themselves.
+
+    Args:
+        palette: of the smoothed ones.
+        drawings: with their grain.
+        smooth: the same without, in light.
+        apart: what shows no paint in light: lines, shadow.
+    """
+    labels = [nearest_labels(picture, palette.rgb) for picture in smooth]
+    inner = [
+        (cv2.erode(own, SQUARE) == cv2.dilate(own, SQUARE)) & (own != UNLABELLED) & ~off
+        for own, off in zip(labels, apart, strict=True)
+    ]
+    label = np.concatenate([own[where] for own, where in zip(labels, inner, strict=True)])
+    seen = np.concatenate([one[where, :3] for one, where in zip(drawings, inner, strict=True)])
+    new: dict[RGB, RGB] = {}
+    for number, color in enumerate(palette.colors):
+        own = seen[label == number]
+        if len(own) >= LEAST_PX:
+            new[color.rgb] = rounded(np.median(own, axis=0))
+    ink = None if palette.contour is None else find_ink(count_pixels(drawings))
+    if palette.contour is not None and ink is not None:
+        new[palette.contour.rgb] = ink.rgb
+    colors = tuple(
+        replace(color, rgb=rgb, name=name_of(rgb))
+        for color in palette.colors
+        for rgb in [new.get(color.rgb, color.rgb)]
+    )
+    contour = palette.contour
+    if contour is not None:
+        rgb = new.get(contour.rgb, contour.rgb)
+        contour = replace(contour, rgb=rgb, name=name_of(rgb))
+    features = tuple(new.get(rgb, rgb) for rgb in palette.features)
+    return replace(palette, colors=colors, contour=contour, features=features)
