@@ -68,22 +68,23 @@ def planes_files(trained: TrainedField) -> dict[str, bytes]:
 
 
 def packed_plane(
-    values: Float[np.ndarray, "height width channels"], used: np.ndarray
-) -> tuple[UInt8[np.ndarray, "rows width 3"], list[float], list[float]]:
+    values: Float[np.ndarray, "height width channels"], used: np.ndarray, per_tile: int = CHANNELS
+) -> tuple[UInt8[np.ndarray, "rows width per_tile"], list[float], list[float]]:
     """Return a plane's features as bytes, and low and step of every channel.
 
     Args:
         values: features.
         used: (height, width) which texels are ever read; the others become low.
+        per_tile: channels.
     """
     height, width, channels = values.shape
     chosen = values[used] if used.any() else values.reshape(-1, channels)
     low = chosen.min(axis=0)
     step = np.maximum(chosen.max(axis=0) - low, 1e-12) / 255
     codes = np.where(used[..., None], ((values - low) / step + 0.5).clip(0, 255), 0)
-    padded = np.pad(codes.astype(np.uint8), ((0, 0), (0, 0), (0, -channels % CHANNELS)))
-    tiles = padded.reshape(height, width, -1, CHANNELS).transpose(2, 0, 1, 3)
-    return tiles.reshape(-1, width, CHANNELS), low.tolist(), step.tolist()
+    padded = np.pad(codes.astype(np.uint8), ((0, 0), (0, 0), (0, -channels % per_tile)))
+    tiles = padded.reshape(height, width, -1, per_tile).transpose(2, 0, 1, 3)
+    return tiles.reshape(-1, width, per_tile), low.tolist(), step.tolist()
 
 
 def packed_hull(

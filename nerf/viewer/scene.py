@@ -1,0 +1,206 @@
+"""What a page needs of a run: numbers as JSON, and all arrays in one deflated blob.
+
+The field itself goes along, planes and decoder: it is the smallest form that it has, and a page
+reads it once, at the hull's voxels, as `toonset.nerf.render.baked` does.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+
+from toonset.camera import Camera
+from toonset.errors import BundleError
+from toonset.nerf.fields.base import DENSITY_SHIFT
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.fields.triplane import PLANES, TriplaneField
+from toonset.nerf.look.blend import FIELD_VOTE, OWN, SIDE, SIDE_VOTE
+from toonset.nerf.look.drawings import CRUMB, STEP, Drawings, Texture, levels_of
+from toonset.nerf.look.paint_flow import NEIGHBOURS
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.views import baked_of
+from toonset.nerf.run.planes import packed_plane
+from toonset.nerf.run.tensors import rows_near
+from toonset.nerf.viewer.volume import BLOCK, packed_hull
+
+CHANNELS = 4  # of a texel
+EDGE_STEPS = 5.0  # per pixel: how finely distances to an edge are kept
+EFFORT = 9
+
+
+@dataclass(eq=False)
+class Blob:
+    """Arrays one after the other, each from a multiple of four bytes on."""
+
+    parts: list[bytes] = field(default_factory=list)
+    size: int = 0
+
+    def add(self, values: np.ndarray) -> dict[str, Any]:
+        """Append an array; return where it lies."""
+        data = np.ascontiguousarray(values).tobytes()
+        record = {"at": self.size, "type": values.dtype.name, "shape": list(values.shape)}
+        self.parts += [data, b"\0" * (-len(data) % 4)]
+        self.size += len(data) + len(self.parts[-1])
+        return record
+
+    def deflated(self) -> bytes:
+        """Return everything, as `DecompressionStream("deflate")` reads it."""
+        return zlib.compress(b"".join(self.parts), EFFORT)
+
+
+def camera_record(camera: Camera) -> dict[str, Any]:
+    """Return a camera's numbers: see `toonset.camera`."""
+    return {
+        "rotation": camera.rotation.reshape(-1).tolist(),
+        "target": camera.target.tolist(),
+        "scale": camera.scale,
+        "center": camera.center.tolist(),
+        "size": list(camera.size_wh),
+        "k": camera.k,
+        "aspect": camera.pixel_aspect,
+    }
+
+
+def field_record(trained: TrainedField, blob: Blob) -> dict[str, Any]:
+    """Return a trained field.
+
+    Raises:
+        BundleError: it has no planes.
+    """
+    triplane = trained.field
+    if not isinstance(triplane, TriplaneField):
+        raise BundleError(
+            f"run: its field has no planes ({triplane.spec.kind}); train again without --field"
+        )
+    baked: Baked = baked_of(trained)
+    hull = packed_hull(trained)
+    texels, low, step = _planes(triplane, rows_near(triplane, trained.hull).numpy())
+    paints = baked.paints.nan_to_num(-1.0)
+    return {
+        "low": triplane.low.tolist(),
+        "cell": triplane.cell,
+        "shape": list(triplane.shape),
+        "planes": {"texels": blob.add(texels), "axes": PLANES, "low": low, "step": step},
+        "hidden": _layer(triplane.hidden),
+        "out": _layer(triplane.out),
+        "densityShift": DENSITY_SHIFT,
+        "stepsPerCell": trained.step / triplane.cell,
+        "hull": {
+            "low": hull.low.tolist(),
+            "voxel": trained.hull.voxel,
+            "box": hull.box.tolist(),
+            "support": blob.add(hull.support),
+            "leaps": blob.add(hull.leaps),
+            "block": BLOCK,
+        },
+        "step": trained.step,
+        "table": None if baked.labels is None else blob.add(baked.labels.numpy()),
+        "paints": paints.tolist(),
+    }
+
+
+def _planes(
+    triplane: TriplaneField, used: np.ndarray
+) -> tuple[UInt8[np.ndarray, "layers height width 4"], list[list[float]], list[list[float]]]:
+    """Return the planes as layers of a texture, four channels each, padded to one size."""
+    images = [image.detach().numpy() for image in triplane.plane_images()]
+    height, width = (max(image.shape[axis] for image in images) for axis in (0, 1))
+    masks = np.split(used, np.cumsum([image.shape[0] * image.shape[1] for image in images])[:-1])
+    layers, lows, steps = [], [], []
+    for image, mask in zip(images, masks, strict=True):
+        codes, low, step = packed_plane(image, mask.reshape(image.shape[:2]), CHANNELS)
+        tiles = codes.reshape(-1, *image.shape[:2], CHANNELS)
+        room = [(0, 0), (0, height - image.shape[0]), (0, width - image.shape[1]), (0, 0)]
+        layers.append(np.pad(tiles, room, mode="edge"))
+        lows.append(low)
+        steps.append(step)
+    return np.concatenate(layers), lows, steps
+
+
+def _layer(layer: torch.nn.Linear) -> dict[str, Any]:
+    return {
+        "weight": [[float(f"{v:.6g}") for v in row] for row in layer.weight.detach().tolist()],
+        "bias": [float(f"{v:.6g}") for v in layer.bias.detach().tolist()],
+    }
+
+
+def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
+    """Return what the drawn look is made of."""
+    textures = drawings.textures
+    paint, whole, about = _atlases(drawings, textures)
+    shape = drawings.shape
+    pen, outline = (line and asdict(line) for line in (drawings.pen, drawings.outline))
+    return {
+        "cameras": [camera_record(texture.camera) for texture in textures],
+        "paint": blob.add(paint),
+        "whole": blob.add(whole),
+        "about": blob.add(about),
+        "edgeSteps": EDGE_STEPS,
+        "depths": list(drawings.depths),
+        "height": drawings.height,
+        "paints": drawings.paints.tolist(),
+        "pen": pen,
+        "outline": outline,
+        "bent": drawings.bent,
+        "flows": [
+            {
+                "pair": list(flow.pair),
+                "camera": camera_record(flow.camera),
+                "flow": blob.add(flow.flow.astype(np.float16)),
+            }
+            for flow in drawings.flows
+        ],
+        "shape": shape
+        and {
+            "vertices": blob.add(shape.vertices.astype(np.float32)),
+            "faces": blob.add(shape.faces.astype(np.uint16)),
+            "beyond": shape.beyond,
+        },
+        "steps": drawings.steps and asdict(drawings.steps),
+        "shade": drawings.shade and asdict(drawings.shade),
+        "shadow": drawings.painted_shadow and list(drawings.painted_shadow.factor),
+        "slack": STEP,
+        "crumb": CRUMB,
+        "fieldVote": FIELD_VOTE,
+        "sideVote": SIDE_VOTE,
+        "own": OWN,
+        "side": SIDE,
+        "neighbours": NEIGHBOURS,
+    }
+
+
+def _atlases(
+    drawings: Drawings, textures: tuple[Texture, ...]
+) -> tuple[
+    UInt8[np.ndarray, "n h w 4"], UInt8[np.ndarray, "n h w 4"], UInt8[np.ndarray, "n h w 4"]
+]:
+    """Return, a layer per drawing: paint and label; the drawing itself; depth and edges.
+
+    Depth is that of `Texture.far`, in levels of `Drawing`; then pixels to the nearest edge, times
+    EDGE_STEPS; then coverage.
+    """
+    sizes = [texture.labels.shape for texture in textures]
+    height, width = (max(size[axis] for size in sizes) for axis in (0, 1))
+
+    def padded(layer: UInt8[np.ndarray, "h w 4"], mode: Any) -> UInt8[np.ndarray, "height width 4"]:
+        room = [(0, height - layer.shape[0]), (0, width - layer.shape[1]), (0, 0)]
+        return np.pad(layer, room, mode=mode)
+
+    paint, whole, about = [], [], []
+    for texture in textures:
+        paint.append(padded(np.dstack([_bytes(texture.paint), texture.labels]), "edge"))
+        whole.append(padded(_bytes(texture.whole), "constant"))
+        far = np.where(np.isfinite(texture.far), texture.far, np.nan)
+        edge = np.rint(texture.to_edge * EDGE_STEPS).clip(0, 255).astype(np.uint8)
+        layers = [levels_of(far, drawings.depths), edge, _bytes(texture.whole[..., 3])]
+        about.append(padded(np.dstack([*layers, np.zeros_like(edge)]), "constant"))
+    return np.stack(paint), np.stack(whole), np.stack(about)
+
+
+def _bytes(values: Float[np.ndarray, "*shape"]) -> UInt8[np.ndarray, "*shape"]:
+    return (values * 255 + 0.5).clip(0, 255).astype(np.uint8)
