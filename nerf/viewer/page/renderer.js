@@ -1,37 +1,211 @@
-// Draws a scene. (Stub: shows the drawing nearest to the camera.)
+// Draws a scene: any layer, from any camera.
 
-import { angleBetween } from "./camera.js";
-import { arrayOf } from "./scene.js";
+import { DrawnLook } from "./drawn.js";
+import { Field, cameraUniforms } from "./field.js";
+import { Program, freeTarget, makeTarget } from "./gl.js";
+import { DEPTH, MOST_PAINTS, NORMAL, PALETTE, PRESENT, SEEN } from "./layers.js";
+import { project } from "./camera.js";
 
+/** @typedef {import("./types.js").Camera} Camera */
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./types.js").Shot} Shot */
+/** @typedef {import("./gl.js").Target} Target */
 
 /**
  * @param {HTMLCanvasElement} canvas that pictures appear in
  * @param {Scene} scene
  * @param {ArrayBuffer} blob its arrays
+ * @throws {Error} where WebGL2, or pictures of floats, are missing
  */
 export async function createRenderer(canvas, scene, blob) {
-  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-  const whole = arrayOf(blob, scene.drawings.whole);
-  const [, height, width] = scene.drawings.whole.shape;
+  const gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  if (!gl) throw new Error("this browser has no WebGL2");
+  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this browser cannot draw floats");
+  gl.getExtension("OES_texture_float_linear");
+  gl.disable(gl.DITHER);
+  const field = new Field(gl, scene.field, blob);
+  const look = scene.drawings ? new DrawnLook(gl, scene.drawings, blob) : null;
+  const programs = {
+    seen: new Program(gl, SEEN),
+    palette: new Program(gl, PALETTE),
+    normal: new Program(gl, NORMAL),
+    depth: new Program(gl, DEPTH),
+    present: new Program(gl, PRESENT),
+  };
+  while (!field.read(1 << 20));
+
+  /** @type {Record<string, Target>} */
+  let targets = {};
+  let [x, y, width, height] = [0, 0, 0, 0];
+
+  /** @param {Target} target */
+  function bind(target, finer = 1) {
+    const context = /** @type {WebGL2RenderingContext} */ (gl);
+    context.bindFramebuffer(context.FRAMEBUFFER, target.frame);
+    context.viewport(0, 0, target.width, target.height);
+    context.enable(context.SCISSOR_TEST);
+    const [left, top] = [Math.floor(finer * x), Math.floor(finer * y)];
+    context.scissor(left, top, Math.ceil(finer * (x + width)) - left, Math.ceil(finer * (y + height)) - top);
+  }
+
+  /** @param {number[]} size */
+  function sized([wide, high]) {
+    const context = /** @type {WebGL2RenderingContext} */ (gl);
+    if (targets.picture?.width === wide && targets.picture.height === high) return;
+    for (const target of Object.values(targets)) freeTarget(context, target);
+    const { RGBA16F, R32F, RGBA8 } = context;
+    targets = {
+      rays: makeTarget(context, wide, high, [RGBA16F, R32F]),
+      fine: makeTarget(context, 2 * wide, 2 * high, [RGBA16F, R32F]),
+      half: makeTarget(context, Math.ceil(wide / 2), Math.ceil(high / 2), [RGBA16F, R32F], false, true),
+      seen: makeTarget(context, wide, high, [RGBA16F, R32F, RGBA8, RGBA8]),
+      picture: makeTarget(context, wide, high, [RGBA8]),
+    };
+  }
+
+  /**
+   * Draw a picture, its first row first in memory.
+   * @param {Shot} shot
+   * @returns {Target}
+   */
+  function picture(shot) {
+    const context = /** @type {WebGL2RenderingContext} */ (gl);
+    const { camera, layer, still } = shot;
+    sized(camera.size);
+    [x, y, width, height] = [0, 0, ...camera.size];
+    bind(targets.picture);
+    context.clearBufferfv(context.COLOR, 0, [0, 0, 0, 0]);
+    const corners = boxCorners(scene.field.hull).map((corner) => project(camera, corner));
+    [x, y, width, height] = boxOf(corners, camera.size);
+    if (!width || !height) return targets.picture;
+    if (layer === "drawn" && look && !still) {
+      bind(targets.half, 0.5);
+      field.see(camera, 0.5);
+      look.draw(camera, targets.half, bind, targets.picture, shot);
+      return targets.picture;
+    }
+    bind(targets.rays);
+    field.see(camera, 1);
+    if (still) {
+      bind(targets.fine, 2);
+      field.see(camera, 2);
+    }
+    const rays = {
+      rays: targets.rays.textures[0],
+      ray_depths: targets.rays.textures[1],
+      fine: targets.fine.textures[0],
+      fine_depths: targets.fine.textures[1],
+      table: field.table ?? field.leaps,
+      labelled: Boolean(field.table),
+      still,
+    };
+    bind(targets.seen);
+    programs.seen.use(rays).fill();
+    const [seen, depths, labels, fours] = targets.seen.textures;
+    if (layer === "drawn" && look) {
+      look.draw(camera, targets.seen, bind, targets.picture, shot);
+      return targets.picture;
+    }
+    bind(targets.picture);
+    if (layer === "palette" || layer === "labels") {
+      const paints = scene.field.paints;
+      programs.palette
+        .use({
+          ...rays,
+          seen,
+          labels,
+          fours,
+          count: paints.length,
+          paints: padded(paints, 1),
+          shown: padded(shot.colors, 255),
+          indexed: layer === "labels",
+        })
+        .fill();
+    } else if (layer === "normal") {
+      programs.normal.use({ ...cameraUniforms(camera), seen, depths }).fill();
+    } else if (layer === "depth") {
+      const away = corners.map((corner) => corner[2]);
+      programs.depth.use({ seen, depths, range: [Math.min(...away), Math.max(...away)] }).fill();
+    } else {
+      programs.present.use({ picture: seen });
+      copy(seen);
+    }
+    return targets.picture;
+  }
+
+  const same = new Program(
+    gl,
+    "uniform sampler2D picture;\nlayout(location = 0) out vec4 result;\nvoid main() { result = texelFetch(picture, ivec2(gl_FragCoord.xy), 0); }",
+  );
+
+  /** @param {import("./gl.js").Texture} from */
+  function copy(from) {
+    same.use({ picture: from }).fill();
+  }
+
   return {
-    /** @param {Shot} shot */
+    /**
+     * Show a picture on the canvas, which takes its size.
+     * @param {Shot} shot
+     */
     draw(shot) {
-      [canvas.width, canvas.height] = shot.camera.size;
-      const angles = scene.views.map((view) => angleBetween(view.camera, shot.camera));
-      const best = angles.indexOf(Math.min(...angles));
-      const size = width * height * 4;
-      const pixels = new Uint8ClampedArray(whole.slice(best * size, (best + 1) * size));
-      context.putImageData(new ImageData(pixels, width, height), 0, 0);
+      const [wide, high] = shot.camera.size;
+      if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+      const made = picture(shot);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+      gl.disable(gl.SCISSOR_TEST);
+      gl.viewport(0, 0, wide, high);
+      programs.present.use({ picture: made.textures[0] }).fill();
     },
+
     /**
      * @param {Shot} shot
      * @returns {ImageData} straight alpha
      */
     read(shot) {
-      this.draw(shot);
-      return context.getImageData(0, 0, canvas.width, canvas.height);
+      const made = picture(shot);
+      const bytes = new Uint8ClampedArray(made.width * made.height * 4);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, made.frame);
+      gl.readPixels(0, 0, made.width, made.height, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(bytes.buffer));
+      for (let i = 0; i < bytes.length; i += 4) {
+        const alpha = bytes[i + 3];
+        for (let c = i; alpha > 0 && alpha < 255 && c < i + 3; c++) bytes[c] = (bytes[c] * 255) / alpha;
+      }
+      return new ImageData(bytes, made.width, made.height);
     },
   };
+}
+
+/**
+ * @param {number[][]} colors
+ * @param {number} most what counts as 1
+ * @returns {number[]}
+ */
+function padded(colors, most) {
+  const flat = colors.slice(0, MOST_PAINTS).flat();
+  return Array.from({ length: 3 * MOST_PAINTS }, (_, i) => (flat[i] ?? 0) / most);
+}
+
+/**
+ * @param {any} hull
+ * @returns {number[][]} corners of the box that holds all samples, world
+ */
+function boxCorners(hull) {
+  return Array.from({ length: 8 }, (_, i) =>
+    [0, 1, 2].map((axis) => hull.low[axis] + hull.voxel * hull.box[(i >> axis) & 1][axis]),
+  );
+}
+
+/**
+ * @param {number[][]} points u, v
+ * @param {number[]} size
+ * @returns {[number, number, number, number]} left, top, width, height: pixels around the points
+ */
+function boxOf(points, size) {
+  const sides = [0, 1].map((axis) => {
+    const along = points.map((point) => point[axis]);
+    const low = Math.max(0, Math.floor(Math.min(...along)) - 4);
+    return [low, Math.max(0, Math.min(size[axis], Math.ceil(Math.max(...along)) + 4) - low)];
+  });
+  return [sides[0][0], sides[1][0], sides[0][1], sides[1][1]];
 }

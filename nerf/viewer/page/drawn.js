@@ -1,0 +1,589 @@
+// The drawn look: a new view put together from the drawings beside it, its outline drawn anew.
+//
+// The steps are those of nerf/look/blend.py: every place of the surface is looked up in the drawings
+// beside the view; their labels vote; the colour is the mean of those that carry the winner. The
+// outline is where smoothed opacity crosses a level; how far inside a pixel lies is found by jump
+// flooding (Rong and Tan 2006) from places on it that lie between pixels.
+
+import { CAMERA, cameraUniforms } from "./field.js";
+import { Program, freeTarget, makeTarget, makeTexture } from "./gl.js";
+import { MOST_PAINTS, NOWHERE } from "./layers.js";
+import { angleBetween } from "./camera.js";
+import { arrayOf } from "./scene.js";
+
+/** @typedef {import("./types.js").Camera} Camera */
+/** @typedef {import("./gl.js").Target} Target */
+
+const CELL = 4; // pixels of the coarse grid's side
+const TAPS = 4; // drawings that a view is made of: two beside it, two that fill gaps
+
+const LOOK_UP = `${CAMERA}
+uniform Camera camera, views[${TAPS}];
+uniform int layers[${TAPS}];
+uniform ivec2 sizes[${TAPS}];
+uniform highp sampler2DArray paint, about, whole;
+uniform vec2 depth_range;
+uniform float edge_steps;
+uniform sampler2D depths;
+uniform bool still;
+
+float far_of(int tap, ivec2 place) {
+  float level = round(texelFetch(about, ivec3(place, layers[tap]), 0).r * 255.0);
+  return level > 0.0 ? mix(depth_range.x, depth_range.y, (level - 1.0) / 254.0) : -1e8;
+}
+vec4 smooth_at(highp sampler2DArray from, int tap, vec2 place) {
+  vec2 size = vec2(textureSize(from, 0).xy);
+  vec2 kept = clamp(place, vec2(0.0), vec2(sizes[tap]) - 1.0);
+  return textureLod(from, vec3((kept + 0.5) / size, float(layers[tap])), 0.0);
+}
+vec4 cubic_weights(float t) { // OpenCV's cubic, a = -0.75
+  float s = 1.0 - t;
+  vec4 w = vec4(0.0);
+  w.x = ((-0.75 * (t + 1.0) + 3.75) * (t + 1.0) - 6.0) * (t + 1.0) + 3.0;
+  w.y = (1.25 * t - 2.25) * t * t + 1.0;
+  w.z = (1.25 * s - 2.25) * s * s + 1.0;
+  w.w = 1.0 - w.x - w.y - w.z;
+  return w;
+}
+vec4 sharp_at(highp sampler2DArray from, int tap, vec2 place) {
+  if (!still) return smooth_at(from, tap, place);
+  ivec2 first = ivec2(floor(place)) - 1, most = sizes[tap] - 1;
+  vec4 across = cubic_weights(fract(place.x)), down = cubic_weights(fract(place.y)), sum = vec4(0.0);
+  for (int y = 0; y < 4; y++) for (int x = 0; x < 4; x++) {
+    ivec2 at = clamp(first + ivec2(x, y), ivec2(0), most);
+    sum += across[x] * down[y] * texelFetch(from, ivec3(at, layers[tap]), 0);
+  }
+  return clamp(sum, 0.0, 1.0);
+}
+`;
+
+/** Depth without gaps and without mixtures of near and far. */
+const SURFACE = `
+uniform sampler2D depths;
+uniform float middle;
+layout(location = 0) out vec2 result; // depth; whether something is seen
+
+float filled(ivec2 at) {
+  ivec2 most = textureSize(depths, 0) - 1;
+  float own = texelFetch(depths, clamp(at, ivec2(0), most), 0).r;
+  return own;
+}
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  float own = filled(at), low = 1e9, high = -1e9, near = middle, away = 1e9;
+  for (int y = -1; y <= 1; y++) for (int x = -1; x <= 1; x++) {
+    float other = filled(at + ivec2(x, y));
+    if (other <= ${NOWHERE}) continue;
+    low = min(low, other);
+    high = max(high, other);
+    float off = float(x * x + y * y);
+    if (off < away) { away = off; near = other; }
+  }
+  bool seen = own > ${NOWHERE};
+  if (!seen && high < low) {
+    for (int y = -3; y <= 3; y++) for (int x = -3; x <= 3; x++) {
+      float other = filled(at + ivec2(x, y)), off = float(x * x + y * y);
+      if (other > ${NOWHERE} && off < away) { away = off; near = other; }
+    }
+    result = vec2(near, 0.0);
+    return;
+  }
+  float whole = seen ? own : near;
+  float nearer = min(whole, 0.5 * (whole + low)), farther = max(whole, 0.5 * (whole + high));
+  result = vec2(whole - low < high - whole ? nearer : farther, float(seen));
+}`;
+
+/** Where the outline is so near that it matters: the least opacity around, on a coarse grid. */
+const COARSE = `
+uniform sampler2D rays;
+uniform float reach; // of its own pixels
+layout(location = 0) out vec4 result;
+void main() {
+  vec2 texel = 1.0 / vec2(textureSize(rays, 0));
+  vec2 at = gl_FragCoord.xy * float(CELL) * texel;
+  float low = 1.0, high = 0.0;
+  for (int y = -2; y <= 2; y++) for (int x = -2; x <= 2; x++) {
+    float alpha = textureLod(rays, at + 0.5 * reach * vec2(x, y) * texel, 0.0).a;
+    low = min(low, alpha);
+    high = max(high, alpha);
+  }
+  result = vec4(low, high, 0.0, 1.0);
+}`;
+
+/** The same look in one pass, while the figure turns: no votes around, no flooding. */
+const FAST = `${LOOK_UP}
+uniform sampler2D rays, coarse;
+uniform Camera pair;
+uniform sampler2D flow;
+uniform bool flows;
+uniform float slack, sign, share, border, line;
+uniform vec3 ink;
+layout(location = 0) out vec4 result;
+
+float alpha_at(vec2 pixel) {
+  return textureLod(rays, pixel * 0.5 / vec2(textureSize(rays, 0)), 0.0).a;
+}
+void main() {
+  vec2 around = textureLod(coarse, gl_FragCoord.xy / float(2 * CELL) / vec2(textureSize(coarse, 0)), 0.0).rg;
+  result = vec4(0.0);
+  if (around.g < 0.05) return;
+  vec2 pixel = gl_FragCoord.xy;
+  float cover = 1.0, stroke = 0.0;
+  if (around.r < 0.95) {
+    float own = alpha_at(pixel);
+    vec2 slope = vec2(
+      alpha_at(pixel + vec2(1.0, 0.0)) - alpha_at(pixel - vec2(1.0, 0.0)),
+      alpha_at(pixel + vec2(0.0, 1.0)) - alpha_at(pixel - vec2(0.0, 1.0))) * 0.5;
+    cover = clamp((own - border) / max(length(slope), 0.05) + 0.5, 0.0, 1.0);
+    if (cover <= 0.0) return;
+    if (line > 0.0) {
+      float least = own;
+      for (int i = 0; i < 12; i++) {
+        float turn = float(i) * 0.5236;
+        least = min(least, alpha_at(pixel + line * vec2(cos(turn), sin(turn))));
+      }
+      stroke = min(cover, clamp(0.5 + 2.5 * (border - least), 0.0, 1.0));
+    }
+  }
+  if (stroke > 0.99) { result = vec4(ink, 1.0) * cover; return; }
+  ivec2 most = textureSize(depths, 0) - 1;
+  ivec2 at = ivec2(pixel * 0.5);
+  if (texelFetch(rays, at, 0).a < 0.5) {
+    ivec2 best = at;
+    for (int i = 0; i < 8; i++) {
+      ivec2 way = ivec2(i < 3 ? i - 1 : i < 5 ? 2 * i - 7 : i - 6, i < 3 ? -1 : i < 5 ? 0 : 1);
+      ivec2 other = clamp(at + way, ivec2(0), most);
+      if (texelFetch(rays, other, 0).a > texelFetch(rays, best, 0).a) best = other;
+    }
+    at = best;
+  }
+  vec3 point = point_at(camera, pixel, texelFetch(depths, at, 0).r);
+  vec2 apart = vec2(0.0);
+  if (flows) {
+    vec2 place = seen_by(pair, point).xy;
+    apart = sign * textureLod(flow, place / vec2(textureSize(flow, 0)), 0.0).rg;
+  }
+  vec3 color = vec3(0.0);
+  float heaviest = 0.0;
+  for (int tap = 0; tap < ${TAPS}; tap++) {
+    if (layers[tap] < 0 || (tap == 1 && share >= 1.0) || (tap > 1 && heaviest > 0.0)) continue;
+    vec3 seen = seen_by(views[tap], point);
+    vec2 place = seen.xy - 0.5;
+    ivec2 cell = ivec2(round(place));
+    if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, sizes[tap]))) continue;
+    vec4 known = texelFetch(about, ivec3(cell, layers[tap]), 0);
+    if (known.b <= 0.5 || seen.z > far_of(tap, cell) + slack) continue;
+    float edge = known.g * 255.0 / edge_steps / 4.0;
+    float weight = (tap == 0 ? share : tap == 1 ? 1.0 - share : 1.0) * (1.0 - 0.9 * exp(-edge * edge));
+    if (weight <= heaviest) continue;
+    heaviest = weight;
+    vec2 moved = place + (tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0) * apart;
+    color = smooth_at(paint, tap, moved).rgb;
+  }
+  if (heaviest == 0.0) {
+    vec4 seen = texelFetch(rays, at, 0);
+    color = clamp(seen.rgb / max(seen.a, 0.2), 0.0, 1.0);
+  }
+  result = vec4(color * (cover - stroke) + stroke * ink, cover);
+}`;
+
+/** Which of the drawings show a place. */
+const MASKS = `${LOOK_UP}
+uniform float slack;
+layout(location = 0) out vec4 result;
+void main() {
+  vec2 here = texelFetch(depths, ivec2(gl_FragCoord.xy), 0).rg;
+  vec4 shown = vec4(0.0);
+  result = shown;
+  if (here.g < 0.5) return;
+  vec3 point = point_at(camera, gl_FragCoord.xy, here.r);
+  for (int tap = 0; tap < ${TAPS}; tap++) {
+    if (layers[tap] < 0) continue;
+    vec3 seen = seen_by(views[tap], point);
+    vec2 place = seen.xy - 0.5;
+    ivec2 at = ivec2(round(place));
+    if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, sizes[tap]))) continue;
+    float covered = smooth_at(about, tap, place).b;
+    shown[tap] = float(covered > 0.5 && seen.z <= far_of(tap, at) + slack);
+  }
+  result = shown;
+}`;
+
+/** What the drawings say of every pixel, and how much that counts. */
+const CANDIDATES = `${LOOK_UP}
+uniform sampler2D masks, field, labels;
+uniform Camera pair;
+uniform sampler2D flow;
+uniform bool flows;
+uniform float sign, share, part;
+uniform vec3 tones[${MOST_PAINTS}];
+uniform int count;
+layout(location = 0) out vec4 said;    // labels of three candidates, and the field's, of 255
+layout(location = 1) out vec4 weights; // of these
+layout(location = 2) out vec4 first;   // colour; whether a drawing shows the pixel
+layout(location = 3) out vec4 second;
+layout(location = 4) out vec4 third;
+layout(location = 5) out vec4 own;     // the nearest drawing itself, premultiplied
+
+vec4 feathered(ivec2 at, vec4 mask) {
+  ivec2 most = textureSize(masks, 0) - 1;
+  vec4 sum = vec4(0.0);
+  float total = 0.0;
+  for (int y = -2; y <= 2; y++) for (int x = -2; x <= 2; x++) {
+    float weight = exp(-0.5 * float(x * x + y * y));
+    sum += weight * texelFetch(masks, clamp(at + ivec2(x, y), ivec2(0), most), 0);
+    total += weight;
+  }
+  return (clamp(2.0 * sum / total - 1.0, 0.0, 1.0) + 0.02) * mask;
+}
+float trust(int tap, vec2 place) {
+  float edge = smooth_at(about, tap, place).g * 255.0 / edge_steps / 4.0;
+  return 1.0 - 0.9 * exp(-edge * edge);
+}
+int label_at(int tap, vec2 place) {
+  ivec2 at = clamp(ivec2(round(place)), ivec2(0), sizes[tap] - 1);
+  return int(round(texelFetch(paint, ivec3(at, layers[tap]), 0).a * 255.0));
+}
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  vec2 here = texelFetch(depths, at, 0).rg;
+  vec3 point = point_at(camera, gl_FragCoord.xy, here.r);
+  vec2 places[${TAPS}];
+  for (int tap = 0; tap < ${TAPS}; tap++) places[tap] = seen_by(views[tap], point).xy - 0.5;
+  own = part > 0.0 ? sharp_at(whole, 0, places[0]) : vec4(0.0);
+  if (part > 0.0 && (any(lessThan(places[0], vec2(-0.5))) || any(greaterThan(places[0], vec2(sizes[0]) - 0.5)))) own = vec4(0.0);
+  said = weights = first = second = third = vec4(0.0);
+  vec4 mask = texelFetch(masks, at, 0);
+  if (here.g < 0.5) return;
+  vec2 apart = vec2(0.0);
+  if (flows) {
+    vec2 place = seen_by(pair, point).xy;
+    apart = sign * textureLod(flow, place / vec2(textureSize(flow, 0)), 0.0).rg;
+  }
+  vec4 soft = feathered(at, mask);
+  vec2 moved = places[0] - (1.0 - share) * apart;
+  first = vec4(sharp_at(paint, 0, moved).rgb, 1.0);
+  said.x = float(label_at(0, moved)) / 255.0;
+  weights.x = share * trust(0, moved) * soft.x;
+  if (share < 1.0) {
+    moved = places[1] + share * apart;
+    second = vec4(sharp_at(paint, 1, moved).rgb, 1.0);
+    said.y = float(label_at(1, moved)) / 255.0;
+    weights.y = (1.0 - share) * trust(1, moved) * soft.y;
+  }
+  bool covered = mask.x > 0.5 || (mask.y > 0.5 && share < 1.0);
+  for (int tap = 2; tap < ${TAPS} && !covered; tap++) {
+    if (mask[tap] < 0.5) continue;
+    third = vec4(sharp_at(paint, tap, places[tap]).rgb, 1.0);
+    said.z = float(label_at(tap, places[tap])) / 255.0;
+    weights.z = SIDE_VOTE;
+    covered = true;
+  }
+  vec4 seen = texelFetch(field, at, 0);
+  if (!covered) {
+    vec3 straight = clamp(seen.rgb / max(seen.a, 0.2), 0.0, 1.0);
+    int best = 0;
+    float least = 1e9;
+    for (int i = 0; i < count; i++) {
+      vec3 off = straight - tones[i];
+      if (dot(off, off) < least) { least = dot(off, off); best = i; }
+    }
+    third = vec4(straight, 1.0);
+    said.z = float(best) / 255.0;
+    weights.z = OWN_VOTE;
+  }
+  float label = texelFetch(labels, at, 0).r;
+  said.w = label;
+  weights.w = label < 0.999 ? FIELD_VOTE * seen.a : 0.0;
+  first.a = float(covered);
+}`;
+
+/** The label that most speaks for around every pixel, and the mean colour of what carries it. */
+const VOTE = `
+uniform sampler2D said, weights, first, second, third;
+layout(location = 0) out vec4 result; // colour, label of 255
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy), most = textureSize(said, 0) - 1;
+  float votes[${MOST_PAINTS}];
+  for (int i = 0; i < ${MOST_PAINTS}; i++) votes[i] = 0.0;
+  for (int y = -2; y <= 2; y++) for (int x = -2; x <= 2; x++) {
+    ivec2 place = clamp(at + ivec2(x, y), ivec2(0), most);
+    vec4 w = exp(-float(x * x + y * y) / 1.28) * texelFetch(weights, place, 0);
+    ivec4 l = ivec4(round(texelFetch(said, place, 0) * 255.0));
+    if (w.x > 0.0) votes[l.x] += w.x;
+    if (w.y > 0.0) votes[l.y] += w.y;
+    if (w.z > 0.0) votes[l.z] += w.z;
+    if (w.w > 0.0) votes[l.w] += w.w;
+  }
+  int best = 0;
+  for (int i = 1; i < ${MOST_PAINTS}; i++) if (votes[i] > votes[best]) best = i;
+  vec3 w = texelFetch(weights, at, 0).rgb;
+  ivec3 l = ivec3(round(texelFetch(said, at, 0).rgb * 255.0));
+  vec3 kept = w * vec3(equal(l, ivec3(best)));
+  if (kept.x + kept.y + kept.z < 1e-4) kept += 1e-4 * w;
+  float total = max(kept.x + kept.y + kept.z, 1e-9);
+  vec3 color = kept.x * texelFetch(first, at, 0).rgb + kept.y * texelFetch(second, at, 0).rgb + kept.z * texelFetch(third, at, 0).rgb;
+  result = vec4(color / total, float(best) / 255.0);
+}`;
+
+/** Opacity smoothed, and the nearest place on the outline for pixels beside it. */
+const RIM = `
+uniform sampler2D field, own;
+uniform float border, part;
+layout(location = 0) out vec4 result; // place on the outline, in pixels; cover; unused
+
+float alpha_at(ivec2 at) {
+  ivec2 place = clamp(at, ivec2(0), textureSize(field, 0) - 1);
+  float alpha = texelFetch(field, place, 0).a;
+  return part > 0.0 ? mix(alpha, texelFetch(own, place, 0).a, part) : alpha;
+}
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  float sum = 0.0, total = 0.0;
+  vec2 slope = vec2(0.0);
+  for (int y = -2; y <= 2; y++) for (int x = -2; x <= 2; x++) {
+    vec2 off = vec2(x, y);
+    float weight = exp(-dot(off, off) / (2.0 * SPREAD)), alpha = alpha_at(at + ivec2(x, y));
+    sum += weight * alpha;
+    slope += weight * alpha * off / SPREAD;
+    total += weight;
+  }
+  float level = sum / total - border;
+  slope /= total;
+  float size = max(length(slope), 1e-4), inside = level / size;
+  bool beside = abs(inside) < 1.0 && length(slope) > 0.02;
+  vec2 place = vec2(at) + 0.5 - slope / size * inside;
+  result = vec4(beside ? place : vec2(-1e4), clamp(inside + 0.5, 0.0, 1.0), level);
+}`;
+
+/** One round of jump flooding. */
+const FLOOD = `
+uniform sampler2D places;
+uniform int reach;
+layout(location = 0) out vec4 result;
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy), most = textureSize(places, 0) - 1;
+  result = texelFetch(places, at, 0);
+  float least = distance(result.xy, gl_FragCoord.xy);
+  for (int y = -1; y <= 1; y++) for (int x = -1; x <= 1; x++) {
+    vec2 other = texelFetch(places, clamp(at + reach * ivec2(x, y), ivec2(0), most), 0).xy;
+    float away = distance(other, gl_FragCoord.xy);
+    if (away < least) { least = away; result.xy = other; }
+  }
+}`;
+
+/** Everything over each other. */
+const COMPOSE = `
+uniform sampler2D places, voted, field, own;
+uniform float line, part;
+uniform vec3 ink;
+uniform bool plain; // the drawing's own line is shown, too
+layout(location = 0) out vec4 result;
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy), most = textureSize(voted, 0) - 1;
+  vec4 rim = texelFetch(places, at, 0);
+  float cover = rim.z, stroke = 0.0;
+  if (line > 0.0) stroke = min(cover, clamp(line + 0.5 - distance(rim.xy, gl_FragCoord.xy), 0.0, 1.0));
+  vec3 color = texelFetch(voted, at, 0).rgb;
+  if (cover > 0.0 && texelFetch(field, at, 0).a <= 0.5) {
+    float least = 1e9;
+    for (int y = -3; y <= 3; y++) for (int x = -3; x <= 3; x++) {
+      ivec2 place = clamp(at + ivec2(x, y), ivec2(0), most);
+      float off = float(x * x + y * y);
+      if (off < least && texelFetch(field, place, 0).a > 0.5) { least = off; color = texelFetch(voted, place, 0).rgb; }
+    }
+  }
+  result = vec4(color * (cover - stroke) + stroke * ink, cover);
+  if (part > 0.0 && plain) {
+    vec4 drawing = texelFetch(own, at, 0);
+    result = mix(result, vec4(min(drawing.rgb, drawing.aaa), drawing.a), part);
+  }
+}`;
+
+/**
+ * The two drawings beside a view, and the first one's share: see `flanking` in nerf/look/blend.py.
+ * @param {Camera[]} cameras
+ * @param {Camera} camera
+ * @param {number} neighbours radians: drawings farther apart show too little in common
+ * @returns {[number, number, number]}
+ */
+export function flanking(cameras, camera, neighbours) {
+  const forward = camera.rotation.slice(6);
+  const theirs = cameras.map((one) => one.rotation.slice(6));
+  const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a.reduce((sum, v, i) => sum + v * b[i], 0);
+  const angles = cameras.map((one) => angleBetween(one, camera));
+  const first = angles.indexOf(Math.min(...angles));
+  const start = theirs[first];
+  let [second, least, along, whole] = [first, Infinity, 0, 1];
+  theirs.forEach((one, i) => {
+    const turn = one.map((v, j) => v - dot(one, start) * start[j]);
+    const size = Math.hypot(...turn);
+    const angle = Math.atan2(size, dot(one, start));
+    const unit = turn.map((v) => v / Math.max(size, 1e-12));
+    const towards = Math.atan2(dot(unit, forward), dot(start, forward));
+    if (towards > 1e-9 && angle > 1e-9 && angle < neighbours && angles[i] < least) {
+      [second, least, along, whole] = [i, angles[i], towards, angle];
+    }
+  });
+  if (second === first) return [first, first, 1];
+  return [first, second, 1 - Math.min(1, along / whole)];
+}
+
+/** The drawings of a sheet, ready to be put together. */
+export class DrawnLook {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {any} record
+   * @param {ArrayBuffer} blob
+   */
+  constructor(gl, record, blob) {
+    this.gl = gl;
+    this.record = record;
+    const layers = (/** @type {any} */ one, /** @type {boolean} */ smooth) => {
+      const [count, height, width] = one.shape;
+      return makeTexture(gl, gl.TEXTURE_2D_ARRAY, gl.RGBA8, [width, height, count], arrayOf(blob, one), smooth);
+    };
+    this.paint = layers(record.paint, true);
+    this.whole = layers(record.whole, true);
+    this.about = layers(record.about, true);
+    this.flows = record.flows.map((/** @type {any} */ one) => {
+      const [height, width] = one.flow.shape;
+      const flow = makeTexture(gl, gl.TEXTURE_2D, gl.RG16F, [width, height], arrayOf(blob, one.flow), true);
+      return { pair: one.pair, camera: one.camera, flow };
+    });
+    const votes = `#define SIDE_VOTE ${record.sideVote}\n#define OWN_VOTE 0.3\n#define FIELD_VOTE ${record.fieldVote}\n`;
+    this.none = makeTexture(gl, gl.TEXTURE_2D, gl.RGBA8, [1, 1], null, false);
+    this.surface = new Program(gl, SURFACE);
+    this.masks = new Program(gl, MASKS);
+    this.candidates = new Program(gl, votes + CANDIDATES);
+    this.vote = new Program(gl, VOTE);
+    this.rim = new Program(gl, `#define SPREAD 0.62\n${RIM}`);
+    this.flood = new Program(gl, FLOOD);
+    this.compose = new Program(gl, COMPOSE);
+    this.coarse = new Program(gl, `#define CELL ${CELL}\n${COARSE}`);
+    this.fast = new Program(gl, `#define CELL ${CELL}\n${FAST}`);
+    /** @type {Record<string, Target> | null} */
+    this.targets = null;
+  }
+
+  /**
+   * @param {number} width
+   * @param {number} height
+   */
+  sized(width, height) {
+    const { gl } = this;
+    if (this.targets && (this.targets.surface.width !== width || this.targets.surface.height !== height)) {
+      for (const target of Object.values(this.targets)) freeTarget(gl, target);
+      this.targets = null;
+    }
+    if (this.targets) return this.targets;
+    const make = (/** @type {number[]} */ ...formats) => makeTarget(gl, width, height, formats);
+    const bytes = gl.RGBA8;
+    this.targets = {
+      surface: make(gl.RG32F),
+      masks: make(bytes),
+      candidates: make(bytes, gl.RGBA16F, bytes, bytes, bytes, bytes),
+      vote: make(bytes),
+      rim: make(gl.RGBA32F),
+      flood: make(gl.RGBA32F),
+      coarse: makeTarget(gl, Math.ceil(width / 2 / CELL), Math.ceil(height / 2 / CELL), [bytes], false, true),
+    };
+    return this.targets;
+  }
+
+  /**
+   * Draw a view into a target.
+   * @param {Camera} camera
+   * @param {Target} seen colour, depth and label of the field: see `SEEN`
+   * @param {(target: Target, finer?: number) => void} bind
+   * @param {Target} into
+   * @param {{ink: number[] | null, still: boolean}} style
+   */
+  draw(camera, seen, bind, into, style) {
+    const { record } = this;
+    const [field, depths, labels] = seen.textures;
+    const targets = this.sized(into.width, into.height);
+    const { cameras } = record;
+    const [first, second, share] = flanking(cameras, camera, record.neighbours);
+    const turns = cameras.map((/** @type {Camera} */ one) => angleBetween(one, camera));
+    const others = cameras
+      .map((/** @type {Camera} */ _, /** @type {number} */ i) => i)
+      .filter((/** @type {number} */ i) => i !== first && i !== second && turns[i] < record.side)
+      .sort((/** @type {number} */ a, /** @type {number} */ b) => turns[a] - turns[b]);
+    const taps = [first, second, others[0] ?? -1, others[1] ?? -1];
+    const eased = Math.max(0, 1 - turns[first] / record.own);
+    const part = eased * eased * (3 - 2 * eased);
+    const paired = this.flows.find(
+      (/** @type {any} */ one) => one.pair.includes(first) && one.pair.includes(second) && first !== second,
+    );
+    const smallest = Math.min(...cameras.map((/** @type {Camera} */ c) => c.scale));
+    const bent = record.bent && !record.shape ? 0.5 + Math.min(1, camera.scale / smallest) * 0.2 : 0.5;
+    const border = bent + part * (0.5 - bent);
+    const line = record.pen ? (record.pen.width_px * camera.scale) / cameras[first].scale : 0;
+    const ink = (style.ink ?? record.pen?.rgb ?? [0, 0, 0]).map((/** @type {number} */ v) => v / 255);
+    /** @type {Record<string, any>} */
+    const common = {
+      ...cameraUniforms(camera),
+      layers: taps,
+      sizes: taps.flatMap((i) => cameras[Math.max(i, 0)].size),
+      paint: this.paint,
+      whole: this.whole,
+      about: this.about,
+      depth_range: record.depths,
+      depths: targets.surface.textures[0],
+      still: style.still,
+      edge_steps: record.edgeSteps,
+      slack: record.slack * record.height,
+      ...(paired ? cameraUniforms(paired.camera, "pair") : {}),
+      flow: (paired ?? this.flows[0])?.flow ?? this.none,
+      flows: Boolean(paired),
+      sign: paired && paired.pair[0] === first ? 1 : -1,
+      share,
+      border,
+      part,
+      ink,
+    };
+    taps.forEach((i, tap) => Object.assign(common, cameraUniforms(cameras[Math.max(i, 0)], `views[${tap}]`)));
+
+    if (!style.still) {
+      bind(targets.coarse, 1 / (2 * CELL));
+      this.coarse.use({ rays: field, reach: line / 2 + 2 + CELL / 2 }).fill();
+      bind(into);
+      const coarse = targets.coarse.textures[0];
+      this.fast.use({ ...common, rays: field, depths, coarse, line }).fill();
+      return;
+    }
+    bind(targets.surface);
+    this.surface.use({ depths, middle: (record.depths[0] + record.depths[1]) / 2 }).fill();
+    bind(targets.masks);
+    this.masks.use(common).fill();
+    bind(targets.candidates);
+    this.candidates
+      .use({
+        ...common,
+        masks: targets.masks.textures[0],
+        field,
+        labels,
+        tones: record.paints.flat().map((/** @type {number} */ v) => v / 255),
+        count: record.paints.length,
+      })
+      .fill();
+    const [said, weights, one, two, three, own] = targets.candidates.textures;
+    bind(targets.vote);
+    this.vote.use({ said, weights, first: one, second: two, third: three }).fill();
+
+    bind(targets.rim);
+    this.rim.use({ field, own, border, part }).fill();
+    let [from, to] = [targets.rim, targets.flood];
+    for (let reach = 2 ** Math.ceil(Math.log2(line + 2)) / 2; line > 0 && reach >= 1; reach /= 2) {
+      bind(to);
+      this.flood.use({ places: from.textures[0], reach }).fill();
+      [from, to] = [to, from];
+    }
+    bind(into);
+    const plain = JSON.stringify(record.pen) === JSON.stringify(record.outline) && !style.ink;
+    this.compose
+      .use({ places: from.textures[0], voted: targets.vote.textures[0], field, own, line, part, ink, plain })
+      .fill();
+  }
+}
