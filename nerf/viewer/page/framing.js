@@ -9,7 +9,7 @@ import { FARTHEST, STEEPEST, ZOOMS, clamp } from "./state.js";
 /** @typedef {Pick<State, "yaw" | "elevation" | "zoom" | "pan">} Pose */
 
 const FILLED = 0.94; // of the stage, by a drawing
-export const CAMERAS_ZOOM = 0.36; // where the cameras round the figure are to be seen
+export const CAMERAS_ZOOM = 0.46; // where the cameras round the figure are to be seen
 export const RADIAN = Math.PI / 180;
 
 /**

@@ -11,8 +11,8 @@ import { snap } from "./timeline.js";
 /** @typedef {import("./state.js").State} State */
 
 const AWAY = 1.9; // from the figure's middle, in its reaches
-const LENGTH = 0.36; // of a pyramid
-const WIDTH = 0.17; // half of its base's longer side
+const LENGTH = 0.42; // of a pyramid
+const WIDTH = 0.2; // half of its base's longer side
 const NEAREST = 0.15; // depth, in distances of the camera: what is nearer is left out
 const ARC_STEPS = 8;
 

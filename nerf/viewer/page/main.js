@@ -20,7 +20,7 @@ import { showVerdict } from "./verdict.js";
 
 /** @typedef {import("./types.js").Shot} Shot */
 
-const NEEDS_3D = ["layers", "recolor", "saving"];
+const NEEDS_3D = ["layers", "recolor", "open_palette", "saving"];
 const ZOOM_STEP = 1.25;
 
 const scene = readScene();
@@ -82,7 +82,7 @@ function turnPictures() {
     ? `This browser cannot draw the figure in 3D (WebGL 2): ${pictures.length} fixed pictures turn instead, without layers, recolouring and saving.`
     : "This browser cannot draw the figure in 3D (WebGL 2), and the page holds no pictures of it.";
   note.hidden = false;
-  for (const id of NEEDS_3D) part(id, HTMLFieldSetElement).disabled = true;
+  for (const id of NEEDS_3D) part(id, HTMLElement).toggleAttribute("disabled", true);
   view.classList.add("blank");
   stage.use(createTurnPictures(poster, scene, pictures), () => {}, () => {});
 }

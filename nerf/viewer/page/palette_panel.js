@@ -85,7 +85,7 @@ function swatchRow(name, share) {
 /** @param {number} share @returns {HTMLElement} */
 function stripe(share) {
   const made = element("span");
-  made.style.flexGrow = String(Math.max(share, 0.005));
+  made.style.flexGrow = String(Math.max(100 * share, 0.5));
   return made;
 }
 
