@@ -14,7 +14,7 @@ const WHEEL = 0.0015; // per pixel of a wheel's turn
 const LINE = 16; // pixels, where a wheel counts lines
 const SLOWER = 0.006; // per millisecond: how inertia ends
 const STOPPED = 0.01; // degrees per millisecond
-const STALE = 60; // milliseconds without movement: then there is no swing left
+const STALE = 80; // milliseconds without movement: then there is no swing left
 
 /**
  * @param {HTMLElement} stage that is dragged

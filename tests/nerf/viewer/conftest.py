@@ -21,15 +21,11 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture
-def open_page(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Open]:
+def open_page(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     """Return a function that opens a page; nothing on the console, no request is let pass."""
     opened: list[Viewer] = []
 
-    def open_one(
-        hash: str = "", scene: dict[str, Any] | None = None, **options: Any
-    ) -> Viewer:
+    def open_one(hash: str = "", scene: dict[str, Any] | None = None, **options: Any) -> Viewer:
         path = write_page(tmp_path, monkeypatch, **(scene or {}))
         context = browser.new_context(
             **{"viewport": {"width": 1000, "height": 800}, "reduced_motion": "reduce", **options}
@@ -41,8 +37,10 @@ def open_page(
         viewer.page.on("pageerror", lambda error: viewer.noise.append(str(error)))
         viewer.page.on(
             "request",
-            lambda request: request.url.startswith(("data:", "blob:", path.as_uri()))
-            or viewer.noise.append(request.url),
+            lambda request: (
+                request.url.startswith(("data:", "blob:", path.as_uri()))
+                or viewer.noise.append(request.url)
+            ),
         )
         viewer.page.goto(path.as_uri() + hash)
         started = "#poster[hidden], #fallback:not([hidden])"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-import zlib
+from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -31,7 +31,7 @@ import { project } from "./camera.js";
 export async function createRenderer(canvas, scene) {
   if (!scene.field) throw new Error("no WebGL 2");
   globalThis.shots = [];
-  const context = canvas.getContext("2d");
+  const context = canvas.getContext("2d", { willReadFrequently: true });
   const css = (rgb) => `rgb(${rgb.join(" ")})`;
   return {
     draw(shot) {
@@ -45,7 +45,8 @@ export async function createRenderer(canvas, scene) {
       context.ellipse(u, v, shot.camera.scale * 0.3, shot.camera.scale * 0.8, 0, 0, 7);
       context.fill();
       context.stroke();
-      const [x, y, z] = project(shot.camera, scene.figure.target.map((t, i) => t + (i === 2 ? 0.3 : 0)));
+      const front = scene.figure.target.map((t, i) => t + [0, 0, 0.3][i]);
+      const [x, y, z] = project(shot.camera, front);
       context.fillStyle = css(shot.colors[1]);
       if (z < 0) context.fillRect(x - 4, y - 4, 8, 8);
     },
@@ -163,13 +164,14 @@ class Viewer:
     def drop(self, name: str, data: bytes) -> str:
         """Drop a file on the page; return what the page says."""
         self.page.evaluate(
-            """([name, bytes]) => {
+            """([name, base64]) => {
+              const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
               document.getElementById("message").textContent = "";
               const dataTransfer = new DataTransfer();
-              dataTransfer.items.add(new File([new Uint8Array(bytes)], name));
+              dataTransfer.items.add(new File([bytes], name));
               document.body.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true }));
             }""",
-            [name, list(data)],
+            [name, b64encode(data).decode()],
         )
         self.page.wait_for_selector("#message:not(:empty)")
         return self.page.locator("#message").inner_text()

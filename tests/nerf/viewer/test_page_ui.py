@@ -115,18 +115,30 @@ def test_fingers_turn_zoom_and_move(open_page: Open) -> None:
     assert viewer.state["pan"][1] > 0.02
 
 
-@pytest.mark.parametrize("reduced", [True, False])
-def test_a_swing_ends_by_itself_and_is_left_out_on_wish(open_page: Open, reduced: bool) -> None:
-    viewer = open_page(reduced_motion="reduce" if reduced else "no-preference")
-    viewer.drag(80, 0, pause_ms=0)
-    let_go = viewer.state["yaw"]
+def test_a_swing_ends_by_itself(open_page: Open) -> None:
+    viewer = open_page(reduced_motion="no-preference")
+    for _ in range(9):  # a slow machine lets go too late for a swing
+        viewer.drag(80, 0, pause_ms=0)
+        let_go = viewer.state["yaw"]
+        viewer.page.wait_for_timeout(50)
+        if viewer.state["yaw"] < let_go:
+            break
+    else:
+        pytest.fail("the figure stops where it is let go")
     viewer.page.wait_for_timeout(1500)
-    rested = viewer.state["yaw"]
-    assert (rested == let_go) == reduced
-    count = len(viewer.shots)
+    rested, count = viewer.state["yaw"], len(viewer.shots)
     viewer.page.wait_for_timeout(300)
     assert viewer.state["yaw"] == rested
     assert len(viewer.shots) == count
+
+
+def test_there_is_no_swing_where_less_motion_is_wished_for(open_page: Open) -> None:
+    viewer = open_page(reduced_motion="reduce")
+    for _ in range(3):
+        viewer.drag(80, 0, pause_ms=0)
+        let_go = viewer.state["yaw"]
+        viewer.page.wait_for_timeout(100)
+        assert viewer.state["yaw"] == let_go
 
 
 def test_the_canvas_has_the_screens_pixels_up_to_two_for_one(open_page: Open) -> None:
@@ -259,12 +271,12 @@ def test_broken_palettes_are_refused_in_one_line(open_page: Open) -> None:
 def test_the_timeline_tells_verdicts_in_words(open_page: Open) -> None:
     viewer = open_page()
     buttons = viewer.page.locator("#drawings button")
-    assert buttons.all_inner_texts() == [
-        "000.png\n0° ± 4.0°\n✓\nok",
-        "001.png\n50° ± 24.0°\n~\nweak",
-        "002.png\n180° ± 44.0°\n?\nambiguous",
-        "∅\n003.png\n-90°\n✕\nfailed",
-    ] or [text.split() for text in buttons.all_inner_texts()]
+    assert [text.split() for text in buttons.all_inner_texts()] == [
+        ["000.png", "0°", "±", "4.0°", "✓", "ok"],
+        ["001.png", "50°", "±", "24.0°", "~", "weak"],
+        ["002.png", "180°", "±", "44.0°", "?", "ambiguous"],
+        ["∅", "003.png", "-90°", "✕", "failed"],
+    ]
     buttons.nth(1).focus()
     assert viewer.page.locator("#reason").inner_text() == "Drawing 2: why it is weak"
     buttons.nth(3).click()  # it shows no figure: there is nothing to compare
@@ -299,9 +311,10 @@ def test_a_drawings_camera_is_the_stages(open_page: Open) -> None:
 def overlay_pixel(viewer: Viewer, u: float, v: float) -> list[int]:
     return viewer.page.evaluate(
         """([u, v]) => {
-          const canvas = document.getElementById("overlay");
-          const data = canvas.getContext("2d").getImageData(u * canvas.width, v * canvas.height, 1, 1).data;
-          return [...data];
+          const overlay = document.getElementById("overlay");
+          const copy = new OffscreenCanvas(1, 1).getContext("2d");
+          copy.drawImage(overlay, -Math.floor(u * overlay.width), -Math.floor(v * overlay.height));
+          return [...copy.getImageData(0, 0, 1, 1).data];
         }""",
         [u, v],
     )
@@ -533,30 +546,29 @@ HOSTILE = (
 )
 
 
-@pytest.mark.parametrize("width", [360, 800])
-def test_hostile_names_are_text(open_page: Open, width: int) -> None:
+@pytest.mark.parametrize("title", [HOSTILE[i] for i in (0, 2, 5, 6)], ids=range(4))
+def test_hostile_names_are_text(open_page: Open, title: str) -> None:
     scene, _ = figure_scene()
-    for text in HOSTILE:
-        views = [{**view, "name": text, "reason": text} for view in scene["views"]]
-        palette = [{**paint, "name": text} for paint in scene["palette"]]
-        verdict = {"state": text, "reasons": [text, text]}
-        hostile = {"title": text, "views": views, "palette": palette, "verdict": verdict}
-        viewer = open_page(scene=hostile, viewport={"width": width, "height": 800})
-        page = viewer.page
-        page.locator("#drawings button").nth(1).click()
-        said = viewer.drop(text.replace("/", "") + ".hex", b"no")
-        assert len(said) < 200
-        assert page.locator("h1").text_content() == text
-        assert page.locator("#swatches .name").first.text_content() == text
-        assert page.locator("#drawings .name").first.text_content() == text
+    verdict = {"state": title, "reasons": list(HOSTILE)}
+    views = [{**scene["views"][0], "name": text, "reason": text} for text in HOSTILE]
+    palette = [{**scene["palette"][0], "name": text} for text in HOSTILE]
+    hostile = {"title": title, "verdict": verdict, "views": views, "palette": palette, "pen": None}
+    viewer = open_page(scene=hostile, viewport={"width": 360, "height": 800})
+    page = viewer.page
+    assert page.locator("h1").text_content() == title
+    for names in ("#swatches .name", "#drawings .name", "#verdict li"):
+        assert page.locator(names).all_text_contents() == list(HOSTILE)
+    for i, text in enumerate(HOSTILE):
+        page.locator("#drawings button").nth(i).click()
         assert page.locator("#reason bdi").text_content() == text
-        assert page.evaluate("globalThis.pwned") is None
-        assert page.locator("img, script").count() == 5  # the poster and the page's own
+        assert len(viewer.drop(f"{text}.hex", b"no")) < 200
+    assert page.evaluate("globalThis.pwned") is None
+    assert page.locator("img, script").count() == 5  # the poster and the page's own
+    for width in (360, 800):
+        page.set_viewport_size({"width": width, "height": 800})
         assert page.evaluate("document.documentElement.scrollWidth") == width
-        stage = page.locator("#stage").bounding_box()
-        assert stage is not None
-        assert stage["y"] < 420, text[:40]
-        page.context.close()
+    heights = "[...document.querySelectorAll('h1, li, button, #reason')].map(e => e.clientHeight)"
+    assert max(page.evaluate(heights)) < 200
 
 
 def test_the_page_reads_from_right_to_left_too(open_page: Open) -> None:
