@@ -21,7 +21,7 @@ export function createCompare(scene, store, pictures) {
   const [stage, tools] = [part("stage", HTMLElement), part("compare", HTMLElement)];
   const overlay = part("overlay", HTMLCanvasElement);
   const [split, onion] = [part("split", HTMLElement), part("onion", HTMLInputElement)];
-  const under = [part("view", HTMLElement), part("poster", HTMLElement)];
+  const under = [part("view", HTMLElement), part("pictures", HTMLElement)];
   const group = radioGroup("comparison", NAMES, (value) => store.set({ comparison: /** @type {Comparison} */ (value) }));
   part("comparisons", HTMLElement).append(...group.parts);
 

@@ -3,7 +3,7 @@
 import { turntableCamera } from "./camera.js";
 import { createCompare } from "./compare.js";
 import { drawingPictures } from "./drawing_pictures.js";
-import { part } from "./elements.js";
+import { part, say } from "./elements.js";
 import { createFrusta } from "./frusta.js";
 import { createLayers } from "./layers.js";
 import { createLink } from "./link.js";
@@ -38,24 +38,38 @@ const orbit = createOrbit(view, scene, store);
 part("closer", HTMLElement).addEventListener("click", () => orbit.zoom(ZOOM_STEP));
 part("farther", HTMLElement).addEventListener("click", () => orbit.zoom(1 / ZOOM_STEP));
 part("home", HTMLElement).addEventListener("click", orbit.home);
+addEventListener("pointerdown", ({ target }) => target !== part("message", HTMLElement) && say(""));
+
+
+const pictures = readTurn();
+const turnPictures = createTurnPictures(poster, scene, pictures);
+stage.use(turnPictures, () => {}, () => {}); // until the renderer is ready, too
 
 const blob = await readBlob().catch(() => null);
 const drawings = drawingPictures(scene, blob);
 createTimeline(scene, store, drawings);
 createCompare(scene, store, drawings);
 createFrusta(scene, store);
-try {
-  if (!blob) throw new Error("the page's data cannot be read");
-  await draw(await createRenderer(view, scene, blob));
-} catch (error) {
-  turnPictures();
-}
 
-/** @param {Awaited<ReturnType<typeof createRenderer>>} renderer */
-async function draw(renderer) {
-  stage.use(renderer, () => (poster.hidden = true), turnPictures);
-  view.addEventListener("webglcontextlost", turnPictures);
-  createSave(scene, store, renderer, stage.ask);
+/** @type {Awaited<ReturnType<typeof createRenderer>>} */
+let renderer;
+createSave(scene, store, () => renderer, stage.ask);
+view.addEventListener("webglcontextrestored", start);
+view.addEventListener("webglcontextlost", (event) => {
+  event.preventDefault(); // so that it may be restored
+  fallBack();
+});
+await start();
+
+async function start() {
+  try {
+    if (!blob) throw new Error("the page's data cannot be read");
+    renderer = await createRenderer(view, scene, blob);
+  } catch {
+    return fallBack();
+  }
+  allow3d(true);
+  stage.use(renderer, () => (poster.hidden = true), fallBack);
   const filled = (/** @type {Partial<Shot>} */ shot) => ({
     camera: turntableCamera(scene.figure, 0, 0, [400, 400]),
     layer: scene.layers[0],
@@ -64,25 +78,25 @@ async function draw(renderer) {
     still: true,
     ...shot,
   });
-  Object.assign(globalThis, {
-    toonset: {
-      scene,
-      store,
-      draw: (/** @type {Partial<Shot>} */ shot) => renderer.draw(filled(shot)),
-      read: (/** @type {Partial<Shot>} */ shot) => renderer.read(filled(shot)),
-    },
-  });
+  const draw = (/** @type {Partial<Shot>} */ shot) => renderer.draw(filled(shot));
+  const read = (/** @type {Partial<Shot>} */ shot) => renderer.read(filled(shot));
+  Object.assign(globalThis, { toonset: { scene, store, draw, read } });
 }
 
-/** The browser cannot draw in 3D, or no longer: fixed pictures turn instead. */
-function turnPictures() {
-  const pictures = readTurn();
+/** The browser cannot draw in 3D, or no longer: the fixed pictures turn instead. */
+function fallBack() {
+  allow3d(false);
+  poster.hidden = !pictures.length;
+  stage.use(turnPictures, () => {}, () => {});
+}
+
+/** @param {boolean} can */
+function allow3d(can) {
   const note = part("fallback", HTMLElement);
+  note.hidden = can;
   note.textContent = pictures.length
     ? `This browser cannot draw the figure in 3D (WebGL 2): ${pictures.length} fixed pictures turn instead, without layers, recolouring and saving.`
     : "This browser cannot draw the figure in 3D (WebGL 2), and the page holds no pictures of it.";
-  note.hidden = false;
-  for (const id of NEEDS_3D) part(id, HTMLElement).toggleAttribute("disabled", true);
-  view.classList.add("blank");
-  stage.use(createTurnPictures(poster, scene, pictures), () => {}, () => {});
+  for (const id of NEEDS_3D) part(id, HTMLElement).toggleAttribute("disabled", !can);
+  view.classList.toggle("blank", !can);
 }

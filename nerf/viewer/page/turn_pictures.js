@@ -12,10 +12,10 @@ import { offsetOf } from "./framing.js";
  * @param {string[]} pictures data URLs, the front first
  */
 export function createTurnPictures(image, scene, pictures) {
-  image.hidden = !pictures.length;
   return {
     /** @param {Shot} shot */
     draw({ camera }) {
+      if (!pictures.length) return;
       const [x, , z] = camera.rotation.slice(6);
       const step = (2 * Math.PI) / pictures.length;
       const i = Math.round(Math.atan2(-x, -z) / step + pictures.length) % pictures.length;
@@ -23,7 +23,7 @@ export function createTurnPictures(image, scene, pictures) {
       const factor = camera.scale / shown.scale;
       const target = offsetOf(camera, shown.target);
       const [moveX, moveY] = target.map((v, axis) => ((v - shown.center[axis]) / camera.size[axis]) * 100);
-      if (pictures[i] && image.src !== pictures[i]) image.src = pictures[i];
+      if (image.src !== pictures[i]) image.src = pictures[i];
       image.style.transform = `translate(${moveX}%, ${moveY}%) scale(${factor})`;
     },
   };
