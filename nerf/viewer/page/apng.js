@@ -2,7 +2,7 @@
 // Source: W3C, "Portable Network Graphics (PNG) Specification (Third Edition)", 11.3.6.
 
 const PNG_SIGNATURE = 8; // bytes
-const RATE = 1000; // parts of a second that durations are counted in
+const APNG_RATE = 1000; // parts of a second that durations are counted in
 
 /**
  * @param {ArrayBuffer[]} pictures PNG files of one size
@@ -17,7 +17,7 @@ export function animatedPng(pictures, duration) {
     const control = new DataView(new ArrayBuffer(26));
     [sequence++, header.getUint32(0), header.getUint32(4), 0, 0].forEach((v, at) => control.setUint32(4 * at, v));
     control.setUint16(20, duration);
-    control.setUint16(22, RATE);
+    control.setUint16(22, APNG_RATE);
     const data = pngChunks(picture, "IDAT").map((part) =>
       i ? pngChunk("fdAT", new Uint8Array([...uint32(sequence++), ...part])) : pngChunk("IDAT", part),
     );
@@ -56,12 +56,12 @@ function pngChunk(name, content) {
   made.set(uint32(content.length));
   made.set([...name].map((letter) => letter.charCodeAt(0)), 4);
   made.set(content, 8);
-  made.set(uint32(checksum(made.subarray(4, -4))), 8 + content.length);
+  made.set(uint32(crc32(made.subarray(4, -4))), 8 + content.length);
   return made;
 }
 
 /** @param {Uint8Array} bytes @returns {number} CRC-32 */
-function checksum(bytes) {
+function crc32(bytes) {
   let crc = 0xffffffff;
   for (const byte of bytes) {
     crc ^= byte;

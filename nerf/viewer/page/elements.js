@@ -1,6 +1,6 @@
 // Parts of the page: finding them and making new ones. Text goes in as text, never as HTML.
 
-const SVG = "http://www.w3.org/2000/svg";
+const SVG_NAMES = "http://www.w3.org/2000/svg";
 
 /**
  * @template {Element} T
@@ -35,7 +35,7 @@ export function element(tag, attributes = {}, ...children) {
  * @returns {SVGElementTagNameMap[K]}
  */
 export function svgElement(tag, attributes = {}) {
-  const made = document.createElementNS(SVG, tag);
+  const made = document.createElementNS(SVG_NAMES, tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
   return made;
 }

@@ -10,10 +10,10 @@ import { snap } from "./timeline.js";
 /** @typedef {import("./types.js").ViewRecord} ViewRecord */
 /** @typedef {import("./state.js").State} State */
 
-const AWAY = 1.9; // from the figure's middle, in its reaches
-const LENGTH = 0.42; // of a pyramid
-const WIDTH = 0.2; // half of its base's longer side
-const NEAREST = 0.15; // depth, in distances of the camera: what is nearer is left out
+const FRUSTUM_AWAY = 1.9; // from the figure's middle, in its reaches
+const FRUSTUM_LENGTH = 0.42; // of a pyramid
+const FRUSTUM_WIDTH = 0.2; // half of its base's longer side
+const NEAREST_DEPTH = 0.15; // depth, in distances of the camera: what is nearer is left out
 const ARC_STEPS = 8;
 
 /**
@@ -79,16 +79,16 @@ function frustumLines(scene, view, i) {
   const { target, reach } = scene.figure;
   const { rotation, size } = view.camera;
   const longer = Math.max(...size);
-  const [w, h] = size.map((v) => ((v / longer) * WIDTH) * reach);
+  const [w, h] = size.map((v) => ((v / longer) * FRUSTUM_WIDTH) * reach);
   /** @type {(axes: number[], right: number, down: number, forward: number) => number[]} */
   const point = (axes, right, down, forward) =>
     target.map((v, axis) => v + right * axes[axis] + down * axes[axis + 3] + forward * axes[axis + 6]);
-  const eye = point(rotation, 0, 0, -AWAY * reach);
-  const base = [[-w, -h], [w, -h], [w, h], [-w, h]].map(([x, y]) => point(rotation, x, y, (LENGTH - AWAY) * reach));
+  const eye = point(rotation, 0, 0, -FRUSTUM_AWAY * reach);
+  const base = [[-w, -h], [w, -h], [w, h], [-w, h]].map(([x, y]) => point(rotation, x, y, (FRUSTUM_LENGTH - FRUSTUM_AWAY) * reach));
   const sides = base.map((corner) => [eye, corner]);
   const spread = view.sigma ? Math.min(180, view.sigma.yaw) : 0;
   const steps = Array.from({ length: ARC_STEPS + 1 }, (_, step) => (step / ARC_STEPS) * 2 - 1);
-  const away = -(AWAY + 0.06 + (i % 3) * 0.03) * reach;
+  const away = -(FRUSTUM_AWAY + 0.06 + (i % 3) * 0.03) * reach;
   const arc = steps.map((t) =>
     point(rotationFromAngles((view.yaw + t * spread) * RADIAN, view.elevation * RADIAN), 0, 0, away),
   );
@@ -103,7 +103,7 @@ function frustumLines(scene, view, i) {
 function drawnPath(camera, lines) {
   const seen = lines.map((line) => line.map((point) => project(camera, point)));
   const eye = seen[0][0];
-  if (seen.flat().some(([, , z]) => 1 + camera.k * z < NEAREST)) return { path: "", eye };
+  if (seen.flat().some(([, , z]) => 1 + camera.k * z < NEAREST_DEPTH)) return { path: "", eye };
   const path = seen.map((line) => "M" + line.map(([u, v]) => `${u.toFixed(1)} ${v.toFixed(1)}`).join("L")).join("");
   return { path, eye };
 }

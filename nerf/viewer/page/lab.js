@@ -1,8 +1,8 @@
 // CIE L*a*b* (D50) to sRGB. Source: W3C, CSS Color Module Level 4, sections 9 to 11.
 
 export const LAB_WHITE = 100;
-const KAPPA = 24389 / 27;
-const EPSILON = 216 / 24389;
+const LAB_KAPPA = 24389 / 27;
+const LAB_EPSILON = 216 / 24389;
 const WHITE_D50 = [0.3457 / 0.3585, 1, (1 - 0.3457 - 0.3585) / 0.3585];
 const D65_FROM_D50 = [
   [0.955473421488075, -0.02309845494876471, 0.06325924320057072],
@@ -24,14 +24,14 @@ const LINEAR_FROM_D65 = [
 export function rgbFromLab(lightness, a, b) {
   const y = (lightness + 16) / 116;
   const roots = [y + a / 500, y, y - b / 200];
-  const xyz = roots.map((root, i) => WHITE_D50[i] * (root ** 3 > EPSILON ? root ** 3 : (116 * root - 16) / KAPPA));
-  return times(LINEAR_FROM_D65, times(D65_FROM_D50, xyz)).map((linear) => {
+  const xyz = roots.map((root, i) => WHITE_D50[i] * (root ** 3 > LAB_EPSILON ? root ** 3 : (116 * root - 16) / LAB_KAPPA));
+  return matrixTimes(LINEAR_FROM_D65, matrixTimes(D65_FROM_D50, xyz)).map((linear) => {
     const v = Math.min(1, Math.max(0, linear));
     return Math.round(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055));
   });
 }
 
 /** @param {number[][]} matrix @param {number[]} vector @returns {number[]} */
-function times(matrix, vector) {
+function matrixTimes(matrix, vector) {
   return matrix.map((row) => row.reduce((sum, v, i) => sum + v * vector[i], 0));
 }

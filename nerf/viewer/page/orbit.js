@@ -6,12 +6,12 @@ import { limited, poseOf } from "./framing.js";
 /** @typedef {import("./state.js").Store} Store */
 /** @typedef {import("./framing.js").Pose} Pose */
 
-const SPAN = 220; // degrees that a drag over the stage's shorter side turns
+const DRAG_TURN = 220; // degrees that a drag over the stage's shorter side turns
 const KEY_TURN = 5; // degrees
 const KEY_PAN = 0.05; // of the stage's shorter side
 const KEY_ZOOM = 1.15;
 const WHEEL = 0.0015; // per pixel of a wheel's turn
-const LINE = 16; // pixels, where a wheel counts lines
+const WHEEL_LINE = 16; // pixels, where a wheel counts lines
 const SLOWER = 0.006; // per millisecond: how inertia ends
 const STOPPED = 0.01; // degrees per millisecond
 const STALE = 80; // milliseconds without movement: then there is no swing left
@@ -103,8 +103,8 @@ export function createOrbit(stage, scene, store) {
     else if (event.shiftKey) pan(x, y);
     else {
       const time = Math.max(1, event.timeStamp - movedAt);
-      speed = [(-x * SPAN) / time, (y * SPAN) / time];
-      turn(-x * SPAN, y * SPAN);
+      speed = [(-x * DRAG_TURN) / time, (y * DRAG_TURN) / time];
+      turn(-x * DRAG_TURN, y * DRAG_TURN);
     }
     movedAt = event.timeStamp;
   }
@@ -145,7 +145,7 @@ export function createOrbit(stage, scene, store) {
   function wheel(event) {
     event.preventDefault();
     stop();
-    const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? LINE : 1;
+    const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? WHEEL_LINE : 1;
     zoom(Math.exp(-event.deltaY * lines * WHEEL), place(event));
   }
 

@@ -4,10 +4,10 @@
 import { rgbOf } from "./colors.js";
 import { LAB_WHITE, rgbFromLab } from "./lab.js";
 
-const LARGEST = 1 << 20; // bytes
+const LARGEST_FILE = 1 << 20; // bytes
 const ASE_COLOR = 1;
 /** @type {Record<string, number>} colour model and how many numbers it has */
-const MODELS = { RGB: 3, LAB: 3, CMYK: 4, Gray: 1 };
+const ASE_MODELS = { RGB: 3, LAB: 3, CMYK: 4, Gray: 1 };
 
 /** A file that is no palette; the message is for the reader. */
 export class PaletteFileError extends Error {}
@@ -17,7 +17,7 @@ export class PaletteFileError extends Error {}
  * @returns {Promise<{colors: number[][], inks: boolean}>} sRGB, 0 to 255; whether from inks (CMYK)
  */
 export async function readPaletteFile(file) {
-  if (file.size > LARGEST) throw new PaletteFileError("is larger than a palette can be");
+  if (file.size > LARGEST_FILE) throw new PaletteFileError("is larger than a palette can be");
   const bytes = await file.arrayBuffer();
   const ending = file.name.toLowerCase().split(".").pop();
   const read = { gpl: readGpl, hex: readHexList, ase: readAse }[ending ?? ""];
@@ -89,7 +89,7 @@ function aseColor(block) {
   if (start + 4 > block.byteLength) throw new PaletteFileError("is cut off in a colour");
   const letters = [0, 1, 2, 3].map((i) => String.fromCharCode(block.getUint8(start + i)));
   const model = letters.join("").trim();
-  const count = Object.hasOwn(MODELS, model) ? MODELS[model] : 0;
+  const count = Object.hasOwn(ASE_MODELS, model) ? ASE_MODELS[model] : 0;
   if (!count) throw new PaletteFileError("has a colour that is not RGB, CMYK, Gray or LAB");
   if (start + 4 + 4 * count > block.byteLength) throw new PaletteFileError("is cut off in a colour");
   const numbers = Array.from({ length: count }, (_, i) => block.getFloat32(start + 4 + 4 * i));

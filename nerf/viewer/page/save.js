@@ -9,10 +9,10 @@ import { animatedWebp } from "./webp.js";
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./types.js").Shot} Shot */
 
-const FRAMES = 24;
+const TURN_FRAMES = 24;
 const FRAME_TIME = 100; // milliseconds
 const FRAME_SIZE = 480; // pixels
-const QUALITY = 0.9;
+const FILE_QUALITY = 0.9;
 
 /**
  * @param {Scene} scene
@@ -42,19 +42,19 @@ export function createSave(scene, store, renderer, redraw) {
     const files = [];
     const size = [FRAME_SIZE, FRAME_SIZE];
     const state = { ...store.state, snapped: -1, cameras: false, zoom: 1, pan: [0, 0], size };
-    for (let i = 0; i < FRAMES && running; i++) {
+    for (let i = 0; i < TURN_FRAMES && running; i++) {
       progress.value = i;
-      const shot = shotOf(scene, { ...state, yaw: state.yaw + (360 * i) / FRAMES });
+      const shot = shotOf(scene, { ...state, yaw: state.yaw + (360 * i) / TURN_FRAMES });
       files.push(await encoded(renderer().read(shot), "image/webp"));
       redraw();
       await new Promise((resolve) => setTimeout(resolve)); // input comes in between
     }
-    if (files.length < FRAMES) return say("The turntable was stopped.");
+    if (files.length < TURN_FRAMES) return say("The turntable was stopped.");
     const pictures = await Promise.all(files.map((file) => file.arrayBuffer()));
     const webp = files[0].type === "image/webp"; // else PNG, as browsers do that write no WebP
     const file = webp ? animatedWebp(pictures, FRAME_SIZE, FRAME_SIZE, FRAME_TIME) : animatedPng(pictures, FRAME_TIME);
     download(file, `${fileName(scene.title)}-turn.${webp ? "webp" : "png"}`);
-    say(`Saved a turn of ${FRAMES} pictures.`);
+    say(`Saved a turn of ${TURN_FRAMES} pictures.`);
   }
 
   /** @param {() => Promise<void>} work */
@@ -86,7 +86,7 @@ async function encoded(pixels, type) {
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [pixels.width, pixels.height];
   canvas.getContext("2d")?.putImageData(pixels, 0, 0);
-  const file = await new Promise((/** @type {(file: Blob | null) => void} */ done) => canvas.toBlob(done, type, QUALITY));
+  const file = await new Promise((/** @type {(file: Blob | null) => void} */ done) => canvas.toBlob(done, type, FILE_QUALITY));
   if (!file) throw new Error("the picture is too large; choose a smaller size");
   return file;
 }

@@ -1,8 +1,8 @@
 // Still WebP pictures to one animation: a RIFF file of VP8X, ANIM and a frame (ANMF) each.
 // Source: Google, "WebP Container Specification".
 
-const ALPHA = 0x10;
-const ANIMATION = 0x02;
+const HAS_ALPHA = 0x10;
+const IS_ANIMATED = 0x02;
 const NO_BLENDING = 0x02; // a frame replaces the one before it
 const PICTURE_CHUNKS = ["ALPH", "VP8 ", "VP8L"];
 
@@ -17,11 +17,11 @@ export function animatedWebp(pictures, width, height, duration) {
   const size = [...uint24(width - 1), ...uint24(height - 1)];
   const frames = pictures.map((picture) => {
     const head = [...uint24(0), ...uint24(0), ...size, ...uint24(duration), NO_BLENDING];
-    return chunk("ANMF", [new Uint8Array(head), ...pictureChunks(picture)]);
+    return riffChunk("ANMF", [new Uint8Array(head), ...pictureChunks(picture)]);
   });
-  const head = chunk("VP8X", [new Uint8Array([ALPHA | ANIMATION, 0, 0, 0, ...size])]);
-  const parts = [latin("WEBP"), ...head, ...chunk("ANIM", [new Uint8Array(6)]), ...frames.flat()];
-  return new Blob(chunk("RIFF", parts), { type: "image/webp" });
+  const head = riffChunk("VP8X", [new Uint8Array([HAS_ALPHA | IS_ANIMATED, 0, 0, 0, ...size])]);
+  const parts = [riffLetters("WEBP"), ...head, ...riffChunk("ANIM", [new Uint8Array(6)]), ...frames.flat()];
+  return new Blob(riffChunk("RIFF", parts), { type: "image/webp" });
 }
 
 /** @param {ArrayBuffer} file @returns {Uint8Array<ArrayBuffer>[]} its chunks that hold pixels, padded */
@@ -43,14 +43,14 @@ function pictureChunks(file) {
  * @param {Uint8Array<ArrayBuffer>[]} parts
  * @returns {Uint8Array<ArrayBuffer>[]}
  */
-function chunk(name, parts) {
+function riffChunk(name, parts) {
   const length = parts.reduce((sum, bytes) => sum + bytes.length, 0);
   const size = new Uint8Array([length & 255, (length >> 8) & 255, (length >> 16) & 255, length >>> 24]);
-  return [latin(name), size, ...parts, new Uint8Array(length % 2)];
+  return [riffLetters(name), size, ...parts, new Uint8Array(length % 2)];
 }
 
 /** @param {string} text @returns {Uint8Array<ArrayBuffer>} */
-function latin(text) {
+function riffLetters(text) {
   return Uint8Array.from(text, (letter) => letter.charCodeAt(0));
 }
 
