@@ -15,7 +15,9 @@ export function animatedPng(pictures, duration) {
   const frames = pictures.flatMap((picture, i) => {
     const header = new DataView(pngChunks(picture, "IHDR")[0].slice().buffer);
     const control = new DataView(new ArrayBuffer(26));
-    [sequence++, header.getUint32(0), header.getUint32(4), 0, 0].forEach((v, at) => control.setUint32(4 * at, v));
+    [sequence++, header.getUint32(0), header.getUint32(4), 0, 0].forEach((v, at) =>
+      control.setUint32(4 * at, v),
+    );
     control.setUint16(20, duration);
     control.setUint16(22, APNG_RATE);
     const data = pngChunks(picture, "IDAT").map((part) =>
@@ -54,7 +56,10 @@ function pngChunks(file, name) {
 function pngChunk(name, content) {
   const made = new Uint8Array(12 + content.length);
   made.set(uint32(content.length));
-  made.set([...name].map((letter) => letter.charCodeAt(0)), 4);
+  made.set(
+    [...name].map((letter) => letter.charCodeAt(0)),
+    4,
+  );
   made.set(content, 8);
   made.set(uint32(crc32(made.subarray(4, -4))), 8 + content.length);
   return made;

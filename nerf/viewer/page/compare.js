@@ -7,10 +7,24 @@ import { COMPARISONS, clamp } from "./state.js";
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./state.js").Comparison} Comparison */
 
-const COMPARISON_NAMES = { slider: "Slider", beside: "Side by side", onion: "Onion skin", difference: "Difference" };
+const COMPARISON_NAMES = {
+  slider: "Slider",
+  beside: "Side by side",
+  onion: "Onion skin",
+  difference: "Difference",
+};
 
 /** @type {Record<string, number>} what keys add to the slider, percent */
-const KEY_STEPS = { ArrowLeft: -2, ArrowDown: -2, ArrowRight: 2, ArrowUp: 2, PageDown: -10, PageUp: 10, Home: -100, End: 100 };
+const KEY_STEPS = {
+  ArrowLeft: -2,
+  ArrowDown: -2,
+  ArrowRight: 2,
+  ArrowUp: 2,
+  PageDown: -10,
+  PageUp: 10,
+  Home: -100,
+  End: 100,
+};
 
 /**
  * @param {import("./types.js").Scene} scene
@@ -22,7 +36,9 @@ export function createCompare(scene, store, pictures) {
   const overlay = part("overlay", HTMLCanvasElement);
   const [split, onion] = [part("split", HTMLElement), part("onion", HTMLInputElement)];
   const under = [part("view", HTMLElement), part("pictures", HTMLElement)];
-  const group = radioGroup("comparison", COMPARISON_NAMES, (value) => store.set({ comparison: /** @type {Comparison} */ (value) }));
+  const group = radioGroup("comparison", COMPARISON_NAMES, (value) =>
+    store.set({ comparison: /** @type {Comparison} */ (value) }),
+  );
   part("comparisons", HTMLElement).append(...group.parts);
 
   /** @param {State} state */

@@ -25,7 +25,9 @@ export function createFrusta(scene, store) {
   const toggle = part("cameras", HTMLButtonElement);
   const lines = scene.views.map((view, i) => frustumLines(scene, view, i));
   const marks = scene.views.map((view, i) => {
-    const paths = layers.map((layer) => layer.appendChild(svgElement("path", { "data-verdict": view.verdict })));
+    const paths = layers.map((layer) =>
+      layer.appendChild(svgElement("path", { "data-verdict": view.verdict })),
+    );
     const label = layers[1].appendChild(svgElement("text", { "data-verdict": view.verdict }));
     const target = layers[1].appendChild(svgElement("circle", { r: "16" }));
     label.textContent = String(i + 1);
@@ -51,7 +53,10 @@ export function createFrusta(scene, store) {
       paths[1 - front].setAttribute("d", "");
       target.setAttribute("r", String(16 * unit));
       label.setAttribute("font-size", String(12 * unit));
-      for (const [mark, moved] of /** @type {const} */ ([[target, 0], [label, 16 * unit]])) {
+      for (const [mark, moved] of /** @type {const} */ ([
+        [target, 0],
+        [label, 16 * unit],
+      ])) {
         mark.setAttribute("transform", `translate(${eye[0]} ${eye[1] - moved})`);
         mark.toggleAttribute("hidden", !path);
       }
@@ -79,12 +84,17 @@ function frustumLines(scene, view, i) {
   const { target, reach } = scene.figure;
   const { rotation, size } = view.camera;
   const longer = Math.max(...size);
-  const [w, h] = size.map((v) => ((v / longer) * FRUSTUM_WIDTH) * reach);
+  const [w, h] = size.map((v) => (v / longer) * FRUSTUM_WIDTH * reach);
   /** @type {(axes: number[], right: number, down: number, forward: number) => number[]} */
   const point = (axes, right, down, forward) =>
     target.map((v, axis) => v + right * axes[axis] + down * axes[axis + 3] + forward * axes[axis + 6]);
   const eye = point(rotation, 0, 0, -FRUSTUM_AWAY * reach);
-  const base = [[-w, -h], [w, -h], [w, h], [-w, h]].map(([x, y]) => point(rotation, x, y, (FRUSTUM_LENGTH - FRUSTUM_AWAY) * reach));
+  const base = [
+    [-w, -h],
+    [w, -h],
+    [w, h],
+    [-w, h],
+  ].map(([x, y]) => point(rotation, x, y, (FRUSTUM_LENGTH - FRUSTUM_AWAY) * reach));
   const sides = base.map((corner) => [eye, corner]);
   const spread = view.sigma ? Math.min(180, view.sigma.yaw) : 0;
   const steps = Array.from({ length: ARC_STEPS + 1 }, (_, step) => (step / ARC_STEPS) * 2 - 1);
@@ -104,6 +114,8 @@ function drawnPath(camera, lines) {
   const seen = lines.map((line) => line.map((point) => project(camera, point)));
   const eye = seen[0][0];
   if (seen.flat().some(([, , z]) => 1 + camera.k * z < NEAREST_DEPTH)) return { path: "", eye };
-  const path = seen.map((line) => "M" + line.map(([u, v]) => `${u.toFixed(1)} ${v.toFixed(1)}`).join("L")).join("");
+  const path = seen
+    .map((line) => "M" + line.map(([u, v]) => `${u.toFixed(1)} ${v.toFixed(1)}`).join("L"))
+    .join("");
   return { path, eye };
 }

@@ -24,7 +24,9 @@ const LINEAR_FROM_D65 = [
 export function rgbFromLab(lightness, a, b) {
   const y = (lightness + 16) / 116;
   const roots = [y + a / 500, y, y - b / 200];
-  const xyz = roots.map((root, i) => WHITE_D50[i] * (root ** 3 > LAB_EPSILON ? root ** 3 : (116 * root - 16) / LAB_KAPPA));
+  const xyz = roots.map(
+    (root, i) => WHITE_D50[i] * (root ** 3 > LAB_EPSILON ? root ** 3 : (116 * root - 16) / LAB_KAPPA),
+  );
   return matrixTimes(LINEAR_FROM_D65, matrixTimes(D65_FROM_D50, xyz)).map((linear) => {
     const v = Math.min(1, Math.max(0, linear));
     return Math.round(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055));

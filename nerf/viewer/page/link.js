@@ -78,7 +78,8 @@ export function createLink(scene, store, whenRead) {
     const hash = hashOf(scene, store.state);
     const address = location.href.split("#")[0];
     try {
-      if (hash !== location.hash.slice(1)) history.replaceState(null, "", hash ? `${address}#${hash}` : address);
+      if (hash !== location.hash.slice(1))
+        history.replaceState(null, "", hash ? `${address}#${hash}` : address);
     } catch {
       // some places where pages are embedded have no history
     }

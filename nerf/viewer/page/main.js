@@ -40,10 +40,13 @@ part("farther", HTMLElement).addEventListener("click", () => orbit.zoom(1 / ZOOM
 part("home", HTMLElement).addEventListener("click", orbit.home);
 addEventListener("pointerdown", ({ target }) => target !== part("message", HTMLElement) && say(""));
 
-
 const pictures = readTurn();
 const turnPictures = createTurnPictures(poster, scene, pictures);
-stage.use(turnPictures, () => {}, () => {}); // until the renderer is ready, too
+stage.use(
+  turnPictures,
+  () => {},
+  () => {},
+); // until the renderer is ready, too
 
 const blob = await readBlob().catch(() => null);
 const drawings = drawingPictures(scene, blob);
@@ -87,16 +90,21 @@ async function start() {
 function fallBack() {
   allow3d(false);
   poster.hidden = !pictures.length;
-  stage.use(turnPictures, () => {}, () => {});
+  stage.use(
+    turnPictures,
+    () => {},
+    () => {},
+  );
 }
 
 /** @param {boolean} can */
 function allow3d(can) {
   const note = part("fallback", HTMLElement);
   note.hidden = can;
-  note.textContent = pictures.length
-    ? `This browser cannot draw the figure in 3D (WebGL 2): ${pictures.length} fixed pictures turn instead, without layers, recolouring and saving.`
-    : "This browser cannot draw the figure in 3D (WebGL 2), and the page holds no pictures of it.";
+  const instead = pictures.length
+    ? `${pictures.length} fixed pictures turn instead, without layers, recolouring and saving.`
+    : "the page holds no pictures of it to show instead.";
+  note.textContent = `This browser cannot draw the figure in 3D (WebGL 2): ${instead}`;
   for (const id of NEEDS_3D) part(id, HTMLElement).toggleAttribute("disabled", !can);
   view.classList.toggle("blank", !can);
 }

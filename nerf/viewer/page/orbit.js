@@ -151,7 +151,8 @@ export function createOrbit(stage, scene, store) {
 
   stage.addEventListener("pointerdown", down);
   stage.addEventListener("pointermove", drag);
-  for (const end of ["pointerup", "pointercancel"]) stage.addEventListener(end, (event) => up(/** @type {PointerEvent} */ (event)));
+  for (const end of ["pointerup", "pointercancel"])
+    stage.addEventListener(end, (event) => up(/** @type {PointerEvent} */ (event)));
   stage.addEventListener("keydown", key);
   stage.addEventListener("wheel", wheel, { passive: false });
   stage.addEventListener("dblclick", home);

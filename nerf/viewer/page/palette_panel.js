@@ -27,7 +27,10 @@ export function createPalettePanel(scene, store) {
   }
 
   rows.forEach((row, i) =>
-    row.onColor((rgb) => store.set({ colors: store.state.colors.map((old, j) => (i === j ? rgb : old)) }), undo.keep),
+    row.onColor(
+      (rgb) => store.set({ colors: store.state.colors.map((old, j) => (i === j ? rgb : old)) }),
+      undo.keep,
+    ),
   );
   inkRow?.onColor((ink) => store.set({ ink }), undo.keep);
   part("swatches", HTMLElement).append(...[...rows, ...(inkRow ? [inkRow] : [])].map((row) => row.item));
@@ -47,7 +50,9 @@ export function createPalettePanel(scene, store) {
       const { colors, inks } = await readPaletteFile(file);
       store.set({ colors: store.state.colors.map((old, i) => colors[i] ?? old) });
       undo.keep();
-      say(`${name}: ${countWords(colors.length, rows.length)}${inks ? " CMYK colours are approximate." : ""}`);
+      say(
+        `${name}: ${countWords(colors.length, rows.length)}${inks ? " CMYK colours are approximate." : ""}`,
+      );
     } catch (error) {
       if (!(error instanceof PaletteFileError)) throw error;
       say(`${name}: ${error.message}.`);
@@ -67,7 +72,14 @@ export function createPalettePanel(scene, store) {
 function swatchRow(name, share) {
   const input = element("input", { type: "color" });
   const code = element("code");
-  const label = element("label", {}, input, element("bdi", { class: "name" }, name), code, element("span", { class: "share" }, share));
+  const label = element(
+    "label",
+    {},
+    input,
+    element("bdi", { class: "name" }, name),
+    code,
+    element("span", { class: "share" }, share),
+  );
   return {
     item: element("li", {}, label),
     /** @param {number[]} rgb */

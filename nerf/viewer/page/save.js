@@ -52,7 +52,9 @@ export function createSave(scene, store, renderer, redraw) {
     if (files.length < TURN_FRAMES) return say("The turntable was stopped.");
     const pictures = await Promise.all(files.map((file) => file.arrayBuffer()));
     const webp = files[0].type === "image/webp"; // else PNG, as browsers do that write no WebP
-    const file = webp ? animatedWebp(pictures, FRAME_SIZE, FRAME_SIZE, FRAME_TIME) : animatedPng(pictures, FRAME_TIME);
+    const file = webp
+      ? animatedWebp(pictures, FRAME_SIZE, FRAME_SIZE, FRAME_TIME)
+      : animatedPng(pictures, FRAME_TIME);
     download(file, `${fileName(scene.title)}-turn.${webp ? "webp" : "png"}`);
     say(`Saved a turn of ${TURN_FRAMES} pictures.`);
   }
@@ -86,7 +88,9 @@ async function encoded(pixels, type) {
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [pixels.width, pixels.height];
   canvas.getContext("2d")?.putImageData(pixels, 0, 0);
-  const file = await new Promise((/** @type {(file: Blob | null) => void} */ done) => canvas.toBlob(done, type, FILE_QUALITY));
+  const file = await new Promise((/** @type {(file: Blob | null) => void} */ done) =>
+    canvas.toBlob(done, type, FILE_QUALITY),
+  );
   if (!file) throw new Error("the picture is too large; choose a smaller size");
   return file;
 }
@@ -102,5 +106,10 @@ function download(file, name) {
 
 /** @param {string} title @returns {string} */
 function fileName(title) {
-  return title.replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "").slice(0, 40) || "figure";
+  return (
+    title
+      .replace(/[^\p{L}\p{N}]+/gu, "-")
+      .replace(/^-|-$/g, "")
+      .slice(0, 40) || "figure"
+  );
 }

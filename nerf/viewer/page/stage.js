@@ -13,7 +13,16 @@ import { wrapped } from "./state.js";
 
 const REST = 150; // milliseconds without a change
 const DENSEST = 2; // canvas pixels per CSS pixel
-const SIDES = ["front", "front left", "left side", "back left", "back", "back right", "right side", "front right"];
+const SIDES = [
+  "front",
+  "front left",
+  "left side",
+  "back left",
+  "back",
+  "back right",
+  "right side",
+  "front right",
+];
 
 /**
  * @param {Scene} scene
@@ -101,7 +110,19 @@ export function createStage(canvas, scene, store) {
  */
 function looksOther(state, old) {
   /** @type {(keyof State)[]} */
-  const seen = ["yaw", "elevation", "zoom", "pan", "layer", "colors", "ink", "snapped", "comparison", "cameras", "size"];
+  const seen = [
+    "yaw",
+    "elevation",
+    "zoom",
+    "pan",
+    "layer",
+    "colors",
+    "ink",
+    "snapped",
+    "comparison",
+    "cameras",
+    "size",
+  ];
   return seen.some((name) => state[name] !== old[name]);
 }
 
@@ -114,7 +135,8 @@ function labelOf(scene, state) {
   const pose = poseOf(scene, state);
   const drawing = state.snapped < 0 ? "" : `, camera of drawing ${state.snapped + 1}`;
   const [yaw, elevation] = [Math.round(wrapped(pose.yaw)), Math.round(pose.elevation)];
-  return `The figure, ${sideOf(pose.yaw)}, yaw ${yaw}°, elevation ${elevation}°${drawing}, layer ${LAYER_NAMES[state.layer]}`;
+  const angles = `yaw ${yaw}°, elevation ${elevation}°`;
+  return `The figure, ${sideOf(pose.yaw)}, ${angles}${drawing}, layer ${LAYER_NAMES[state.layer]}`;
 }
 
 /**

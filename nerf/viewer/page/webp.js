@@ -28,7 +28,7 @@ export function animatedWebp(pictures, width, height, duration) {
 function pictureChunks(file) {
   const data = new DataView(file);
   const found = [];
-  for (let at = 12; at + 8 <= file.byteLength; ) {
+  for (let at = 12; at + 8 <= file.byteLength;) {
     const name = String.fromCharCode(...new Uint8Array(file, at, 4));
     const length = data.getUint32(at + 4, true);
     const padded = Math.min(8 + length + (length % 2), file.byteLength - at);

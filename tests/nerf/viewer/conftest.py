@@ -31,7 +31,7 @@ def open_page(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
             **{"viewport": {"width": 1000, "height": 800}, "reduced_motion": "reduce", **options}
         )
         viewer = Viewer(context.new_page())
-        viewer.page.set_default_timeout(5000)
+        viewer.page.set_default_timeout(20_000)
         opened.append(viewer)
         viewer.page.on("console", lambda message: viewer.noise.append(message.text))
         viewer.page.on("pageerror", lambda error: viewer.noise.append(str(error)))
