@@ -7,7 +7,7 @@
 
 import { CAMERA, cameraUniforms } from "./field.js";
 import { Program, freeTarget, makeTarget, makeTexture } from "./gl.js";
-import { MOST_PAINTS, NOWHERE } from "./layers.js";
+import { MOST_PAINTS, NOWHERE } from "./field_layers.js";
 import { angleBetween } from "./camera.js";
 import { arrayOf } from "./scene.js";
 

@@ -3,7 +3,7 @@
 import { DrawnLook } from "./drawn.js";
 import { Field, cameraUniforms } from "./field.js";
 import { Program, freeTarget, makeTarget } from "./gl.js";
-import { DEPTH, MOST_PAINTS, NORMAL, PALETTE, PRESENT, SEEN } from "./layers.js";
+import { DEPTH, MOST_PAINTS, NORMAL, PALETTE, PRESENT, SEEN } from "./field_layers.js";
 import { project } from "./camera.js";
 
 /** @typedef {import("./types.js").Camera} Camera */

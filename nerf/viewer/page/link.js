@@ -1,0 +1,113 @@
+// The page's address holds what it shows; anything else in there is passed over.
+
+import { hexOf, rgbOf } from "./colors.js";
+import { comparisonOf } from "./compare.js";
+import { copyText, part } from "./elements.js";
+import { limited } from "./framing.js";
+import { sameColor, startState, wrapped } from "./state.js";
+
+/** @typedef {import("./types.js").Scene} Scene */
+/** @typedef {import("./state.js").State} State */
+
+const CALM = 250; // milliseconds after the last change
+
+/**
+ * @param {Scene} scene
+ * @param {State} state
+ * @returns {string} without "#"; empty at the start
+ */
+export function hashOf(scene, state) {
+  const start = startState(scene);
+  const short = (/** @type {number} */ v, digits = 2) => String(Number(v.toFixed(digits)));
+  const colors = state.colors.map((rgb) => hexOf(rgb).slice(1)).join(",");
+  /** @type {[string, string, boolean][]} name, value, whether it differs from the start */
+  const entries = [
+    ["yaw", short(wrapped(state.yaw)), state.yaw !== 0],
+    ["elevation", short(state.elevation), state.elevation !== 0],
+    ["zoom", short(state.zoom, 3), state.zoom !== 1],
+    ["pan", state.pan.map((v) => short(v, 3)).join(","), state.pan.some((v) => v !== 0)],
+    ["layer", state.layer, state.layer !== start.layer],
+    ["colors", colors, state.colors.some((rgb, i) => !sameColor(rgb, start.colors[i]))],
+    ["ink", state.ink ? hexOf(state.ink).slice(1) : "", !sameColor(state.ink, start.ink)],
+    ["view", String(state.snapped + 1), state.snapped >= 0],
+    ["compare", state.comparison, state.snapped >= 0 && state.comparison !== start.comparison],
+    ["cameras", "1", state.cameras],
+  ];
+  const kept = entries.filter(([, , differs]) => differs);
+  return kept.map(([name, value]) => `${name}=${value}`).join("&");
+}
+
+/**
+ * @param {Scene} scene
+ * @param {string} hash with or without "#"
+ * @returns {Partial<State>} all that a link says; what it leaves out or garbles is as at the start
+ */
+export function stateOfHash(scene, hash) {
+  const { size, split, onion, ...start } = startState(scene);
+  const words = new URLSearchParams(hash.replace(/^#/, ""));
+  const pan = (words.get("pan") ?? "").split(",").map((word) => numberOf(word, NaN));
+  const view = numberOf(words.get("view"), 0);
+  const colors = (words.get("colors") ?? "").split(",").map(rgbOf);
+  return {
+    ...start,
+    ...limited({
+      yaw: wrapped(numberOf(words.get("yaw"), 0)),
+      elevation: numberOf(words.get("elevation"), 0),
+      zoom: numberOf(words.get("zoom"), 1),
+      pan: pan.length === 2 && pan.every(Number.isFinite) ? pan : start.pan,
+    }),
+    layer: scene.layers.find((layer) => layer === words.get("layer")) ?? start.layer,
+    colors: colors.length === start.colors.length && colors.every(isColor) ? colors : start.colors,
+    ink: start.ink && (rgbOf(words.get("ink") ?? "") ?? start.ink),
+    snapped: (scene.views[view - 1]?.drawing ?? -1) >= 0 ? view - 1 : -1,
+    comparison: comparisonOf(words.get("compare")) ?? start.comparison,
+    cameras: words.get("cameras") === "1",
+  };
+}
+
+/**
+ * @param {Scene} scene
+ * @param {import("./state.js").Store} store
+ * @param {() => void} whenRead the state came from a link
+ */
+export function createLink(scene, store, whenRead) {
+  let timer = 0;
+
+  function write() {
+    clearTimeout(timer);
+    const hash = hashOf(scene, store.state);
+    const address = location.href.split("#")[0];
+    try {
+      if (hash !== location.hash.slice(1))
+        history.replaceState(null, "", hash ? `${address}#${hash}` : address);
+    } catch {
+      // some places where pages are embedded have no history
+    }
+  }
+
+  function read() {
+    store.set(stateOfHash(scene, location.hash));
+    whenRead();
+  }
+
+  addEventListener("hashchange", read);
+  part("copy_link", HTMLElement).addEventListener("click", () => {
+    write();
+    copyText(`${location.href.split("#")[0]}#${hashOf(scene, store.state)}`, "The link is copied.");
+  });
+  if (location.hash) read();
+  store.listen(() => {
+    clearTimeout(timer);
+    timer = setTimeout(write, CALM);
+  });
+}
+
+/** @param {number[] | null} rgb @returns {rgb is number[]} */
+function isColor(rgb) {
+  return rgb !== null;
+}
+
+/** @param {string | null} word @param {number} otherwise @returns {number} */
+function numberOf(word, otherwise) {
+  return word && /^-?\d{1,6}(\.\d{1,9})?$/.test(word) ? Number(word) : otherwise;
+}

@@ -1,0 +1,115 @@
+// Pictures to keep: the stage as PNG, and a turning figure.
+
+import { animatedPng } from "./apng.js";
+import { resized } from "./camera.js";
+import { part, say } from "./elements.js";
+import { shotOf } from "./stage.js";
+import { animatedWebp } from "./webp.js";
+
+/** @typedef {import("./types.js").Scene} Scene */
+/** @typedef {import("./types.js").Shot} Shot */
+
+const TURN_FRAMES = 24;
+const FRAME_TIME = 100; // milliseconds
+const FRAME_SIZE = 480; // pixels
+const FILE_QUALITY = 0.9;
+
+/**
+ * @param {Scene} scene
+ * @param {import("./state.js").Store} store
+ * @param {() => {read: (shot: Shot) => ImageData}} renderer that draws now
+ * @param {() => void} redraw the stage, after its canvas was used
+ */
+export function createSave(scene, store, renderer, redraw) {
+  const [button, progress] = [part("save_turn", HTMLButtonElement), part("progress", HTMLProgressElement)];
+  let running = false;
+
+  async function savePng() {
+    const shot = shotOf(scene, { ...store.state, cameras: false, comparison: "slider" });
+    const css = part("stage", HTMLElement).clientWidth / shot.camera.size[0];
+    const factor = Number(part("factor", HTMLSelectElement).value) * css;
+    const camera = resized(shot.camera, factor);
+    const file = await encoded(renderer().read({ ...shot, camera }), "image/png");
+    download(file, `${fileName(scene.title)}.png`);
+    say(`Saved ${camera.size.join(" × ")} pixels.`);
+  }
+
+  async function saveTurn() {
+    running = true;
+    button.textContent = "Stop";
+    progress.hidden = false;
+    /** @type {Blob[]} */
+    const files = [];
+    const size = [FRAME_SIZE, FRAME_SIZE];
+    const state = { ...store.state, snapped: -1, cameras: false, zoom: 1, pan: [0, 0], size };
+    for (let i = 0; i < TURN_FRAMES && running; i++) {
+      progress.value = i;
+      const shot = shotOf(scene, { ...state, yaw: state.yaw + (360 * i) / TURN_FRAMES });
+      files.push(await encoded(renderer().read(shot), "image/webp"));
+      redraw();
+      await new Promise((resolve) => setTimeout(resolve)); // input comes in between
+    }
+    if (files.length < TURN_FRAMES) return say("The turntable was stopped.");
+    const pictures = await Promise.all(files.map((file) => file.arrayBuffer()));
+    const webp = files[0].type === "image/webp"; // else PNG, as browsers do that write no WebP
+    const file = webp
+      ? animatedWebp(pictures, FRAME_SIZE, FRAME_SIZE, FRAME_TIME)
+      : animatedPng(pictures, FRAME_TIME);
+    download(file, `${fileName(scene.title)}-turn.${webp ? "webp" : "png"}`);
+    say(`Saved a turn of ${TURN_FRAMES} pictures.`);
+  }
+
+  /** @param {() => Promise<void>} work */
+  async function guarded(work) {
+    try {
+      await work();
+    } catch (error) {
+      say(`Could not save: ${error instanceof Error ? error.message : error}`);
+    }
+    redraw();
+  }
+
+  part("save_png", HTMLElement).addEventListener("click", () => guarded(savePng));
+  button.addEventListener("click", async () => {
+    if (running) return void (running = false);
+    await guarded(saveTurn);
+    running = false;
+    progress.hidden = true;
+    button.textContent = "Save turntable";
+  });
+}
+
+/**
+ * @param {ImageData} pixels
+ * @param {string} type
+ * @returns {Promise<Blob>} of that type, or PNG
+ */
+async function encoded(pixels, type) {
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [pixels.width, pixels.height];
+  canvas.getContext("2d")?.putImageData(pixels, 0, 0);
+  const file = await new Promise((/** @type {(file: Blob | null) => void} */ done) =>
+    canvas.toBlob(done, type, FILE_QUALITY),
+  );
+  if (!file) throw new Error("the picture is too large; choose a smaller size");
+  return file;
+}
+
+/** @param {Blob} file @param {string} name */
+function download(file, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(file);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** @param {string} title @returns {string} */
+function fileName(title) {
+  return (
+    title
+      .replace(/[^\p{L}\p{N}]+/gu, "-")
+      .replace(/^-|-$/g, "")
+      .slice(0, 40) || "figure"
+  );
+}

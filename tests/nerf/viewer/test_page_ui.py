@@ -1,0 +1,605 @@
+"""The page's controls, used as a reader uses them."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from tests.nerf.viewer.conftest import Open
+from tests.nerf.viewer.page_under_test import COLORS, PEN, SIZE_WH, Viewer, figure_scene
+from toonset.palette.formats.ase import read_ase, to_ase
+from toonset.palette.formats.gpl import to_gpl
+from toonset.palette.formats.hex import to_hex
+from toonset.palette.palette import Palette, PaletteColor
+
+NEW = ((10, 20, 30), (40, 50, 60), (70, 80, 90))
+POSE = ("yaw", "elevation", "zoom", "pan")
+START = {"yaw": 0, "elevation": 0, "zoom": 1, "pan": [0, 0]}
+
+
+def pose(viewer: Viewer) -> dict[str, Any]:
+    return {name: viewer.state[name] for name in POSE}
+
+
+# Turning
+
+
+def test_a_drag_turns_the_figure_with_the_pointer(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.drag(60, 40)
+    assert viewer.state["yaw"] < -10  # its front goes to the right
+    assert viewer.state["elevation"] > 10  # and down
+    viewer.drag(0, 2000)
+    assert viewer.state["elevation"] == 85
+
+
+def test_it_is_drawn_roughly_while_it_moves_and_well_at_rest(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.rest()
+    viewer.page.evaluate("shots.length = 0")
+    viewer.drag(60, 0, pause_ms=20)
+    viewer.rest()
+    stills = [shot["still"] for shot in viewer.shots]
+    assert stills == [False] * (len(stills) - 1) + [True]
+    assert len(stills) > 1
+    viewer.rest()
+    assert len(viewer.shots) == len(stills)  # a page at rest draws nothing
+
+
+def test_keys_turn_move_zoom_and_reset(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.page.locator("#view").focus()
+    for key in ("ArrowLeft", "ArrowDown", "ArrowDown", "Shift+ArrowRight", "+"):
+        viewer.page.keyboard.press(key)
+    assert viewer.state["yaw"] == 5
+    assert viewer.state["elevation"] == 10
+    assert viewer.state["zoom"] > 1
+    assert viewer.state["pan"][0] > 0
+    viewer.rest()
+    label = viewer.page.locator("#view").get_attribute("aria-label")
+    assert label is not None
+    assert "yaw 5°, elevation 10°" in label
+    viewer.page.keyboard.press("-")
+    assert viewer.state["zoom"] == pytest.approx(1)
+    viewer.page.keyboard.press("Home")
+    assert pose(viewer) == START
+
+
+def test_the_wheel_zooms_about_the_pointer(open_page: Open) -> None:
+    viewer = open_page()
+    x, y = viewer.middle()
+    viewer.page.mouse.move(x + 100, y)
+    before = viewer.shots[-1]["camera"]
+    viewer.page.mouse.wheel(0, -300)
+    viewer.rest()
+    after = viewer.shots[-1]["camera"]
+    assert after["scale"] > before["scale"]
+    under = before["center"][0] + 100  # the pixel under the pointer, as is the point it shows
+    offsets = [(under - camera["center"][0]) / camera["scale"] for camera in (before, after)]
+    assert offsets[0] == pytest.approx(offsets[1], abs=0.01)
+    viewer.page.mouse.dblclick(x, y)
+    assert pose(viewer) == START
+
+
+def test_shift_and_drag_moves_the_figure(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.page.keyboard.down("Shift")
+    viewer.drag(50, 0)
+    assert viewer.state["yaw"] == 0
+    assert viewer.state["pan"][0] > 0.05
+
+
+def test_fingers_turn_zoom_and_move(open_page: Open) -> None:
+    viewer = open_page(has_touch=True, viewport={"width": 360, "height": 740})
+    session = viewer.page.context.new_cdp_session(viewer.page)
+    x, y = viewer.middle()
+
+    def touch(kind: str, *places: tuple[float, float]) -> None:
+        points = [{"x": u, "y": v, "id": i} for i, (u, v) in enumerate(places)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", (x, y))
+    touch("touchMove", (x + 40, y))
+    touch("touchEnd")
+    assert viewer.state["yaw"] < -10
+    yaw = viewer.state["yaw"]
+    touch("touchStart", (x - 30, y), (x + 30, y))
+    touch("touchMove", (x - 50, y + 20), (x + 70, y + 20))
+    touch("touchEnd")
+    assert viewer.state["yaw"] == yaw
+    assert viewer.state["zoom"] == pytest.approx(2, rel=0.05)
+    assert viewer.state["pan"][1] > 0.02
+
+
+def test_a_swing_ends_by_itself(open_page: Open) -> None:
+    viewer = open_page(reduced_motion="no-preference")
+    for _ in range(9):  # a slow machine lets go too late for a swing
+        viewer.drag(80, 0, pause_ms=0)
+        let_go = viewer.state["yaw"]
+        viewer.page.wait_for_timeout(50)
+        if viewer.state["yaw"] < let_go:
+            break
+    else:
+        pytest.fail("the figure stops where it is let go")
+    viewer.page.wait_for_timeout(1500)
+    rested, count = viewer.state["yaw"], len(viewer.shots)
+    viewer.page.wait_for_timeout(300)
+    assert viewer.state["yaw"] == rested
+    assert len(viewer.shots) == count
+
+
+def test_there_is_no_swing_where_less_motion_is_wished_for(open_page: Open) -> None:
+    viewer = open_page(reduced_motion="reduce")
+    for _ in range(3):
+        viewer.drag(80, 0, pause_ms=0)
+        let_go = viewer.state["yaw"]
+        viewer.page.wait_for_timeout(100)
+        assert viewer.state["yaw"] == let_go
+
+
+def test_the_canvas_has_the_screens_pixels_up_to_two_for_one(open_page: Open) -> None:
+    for density, expected in ((1, 1), (2, 2), (3, 2)):
+        viewer = open_page(device_scale_factor=density)
+        width = viewer.page.evaluate("document.getElementById('stage').clientWidth")
+        assert viewer.shots[-1]["camera"]["size"][0] == expected * width
+    viewer.page.set_viewport_size({"width": 500, "height": 700})
+    viewer.rest()
+    assert viewer.shots[-1]["camera"]["size"][0] < 1000
+
+
+# Layers and colours
+
+
+def test_layers_are_a_radio_group(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.page.get_by_role("radio", name="Normals").check()
+    viewer.rest()
+    assert viewer.shots[-1]["layer"] == "normal"
+    viewer.page.keyboard.press("ArrowRight")
+    assert viewer.state["layer"] == "depth"
+
+
+def test_a_recoloured_paint_shows_at_once_and_is_undone(open_page: Open) -> None:
+    viewer = open_page()
+    page = viewer.page
+    page.get_by_label("red").fill("#00ff00")
+    page.get_by_label("Lines").fill("#0000ff")
+    viewer.rest()
+    assert viewer.pixel(0.5, 0.6) == [0, 255, 0, 255]
+    assert viewer.shots[-1]["ink"] == [0, 0, 255]
+    page.get_by_role("button", name="Undo").click()
+    assert viewer.state["ink"] == PEN
+    assert viewer.state["colors"][0] == [0, 255, 0]
+    page.keyboard.press("Control+z")
+    assert viewer.state["colors"] == list(COLORS)
+    assert page.get_by_role("button", name="Undo").is_disabled()
+    page.get_by_role("button", name="Redo").click()
+    page.keyboard.press("Control+Shift+Z")
+    assert viewer.state["ink"] == [0, 0, 255]
+    page.get_by_role("button", name="Reset", exact=True).click()
+    assert (viewer.state["colors"], viewer.state["ink"]) == (list(COLORS), PEN)
+    page.get_by_role("button", name="Undo").click()
+    assert viewer.state["colors"][0] == [0, 255, 0]
+
+
+def ase(*colors: tuple[str, tuple[float, ...]], tail: bytes = b"") -> bytes:
+    """Return an Adobe Swatch Exchange file in one group."""
+    blocks = [struct.pack(">HIH", 0xC001, 6, 2) + "g\0".encode("utf-16-be")]
+    for model, parts in colors:
+        name = "née\0".encode("utf-16-be")
+        content = struct.pack(">H", len(name) // 2) + name + model.ljust(4).encode()
+        content += struct.pack(f">{len(parts)}fH", *parts, 2)
+        blocks.append(struct.pack(">HI", 1, len(content)) + content)
+    blocks.append(struct.pack(">HI", 0xC002, 0))
+    return b"ASEF" + struct.pack(">HHI", 1, 0, len(blocks)) + b"".join(blocks) + tail
+
+
+def made_palette() -> Palette:
+    colors = (PaletteColor(rgb, 1 / 3, name) for rgb, name in zip(NEW, "abc", strict=True))
+    return Palette(tuple(colors), "made up", (), ())
+
+
+def test_a_dropped_palette_replaces_the_colours(open_page: Open) -> None:
+    viewer = open_page()
+    palette = made_palette()
+    files = {"a.gpl": to_gpl(palette).encode(), "a.HEX": to_hex(palette).encode()}
+    for name, data in {**files, "a.ase": to_ase(palette)}.items():
+        viewer.page.get_by_role("button", name="Reset", exact=True).click()
+        assert viewer.drop(name, data) == f"{name}: 3 colours taken."
+        assert viewer.state["colors"] == [list(rgb) for rgb in NEW], name
+    viewer.page.get_by_role("button", name="Undo").click()
+    assert viewer.state["colors"] == list(COLORS)
+
+
+def test_a_palette_of_another_length_says_so(open_page: Open) -> None:
+    viewer = open_page()
+    said = viewer.drop("a.hex", b"#123456\r\n\r\n; no more\r\n")
+    assert said == "a.hex: 1 colour for 3 paints; the other paints keep theirs."
+    assert viewer.state["colors"] == [[0x12, 0x34, 0x56], *COLORS[1:]]
+    said = viewer.drop("a.hex", b"fff\n" * 5)
+    assert said == "a.hex: 5 colours for 3 paints; the rest is not used."
+    assert viewer.state["colors"] == [[255, 255, 255]] * 3
+
+
+def test_swatches_of_every_model_are_read(open_page: Open) -> None:
+    viewer = open_page()
+    data = ase(("LAB", (0.6, 40.0, -30.0)), ("Gray", (0.5,)), ("RGB", (1.0, 0.5, 0.0)))
+    viewer.drop("a.ase", data)
+    assert viewer.state["colors"] == [list(color.rgb) for color in read_ase(data, "a.ase")]
+    said = viewer.drop("a.ase", ase(("CMYK", (0.0, 1.0, 0.5, 0.2))))
+    assert said.endswith("CMYK colours are approximate.")
+    assert viewer.state["colors"][0] == [204, 0, 102]
+
+
+BROKEN = {
+    "no.gpl": b"red green blue\n",
+    "line.gpl": b"GIMP Palette\n1 2 300 x\n",
+    "empty.gpl": b"GIMP Palette\n#\n",
+    "line.hex": b"123456\nred\n",
+    "empty.hex": b"",
+    "zero.hex": b"\0\1\2",
+    "no.ase": b"RIFF",
+    "cut.ase": ase(("RGB", (1.0, 0.0, 0.0)))[:-20],
+    "long.ase": b"ASEF" + struct.pack(">HHIHI", 1, 0, 1, 1, 0xFFFFFFFF),
+    "name.ase": b"ASEF" + struct.pack(">HHIHIHH", 1, 0, 1, 1, 4, 0xFFFF, 0),
+    "model.ase": ase(("HSB", (1.0, 0.0, 0.0))),
+    "proto.ase": ase(("__pr", (1.0, 0.0, 0.0))),
+    "nan.ase": ase(("RGB", (float("nan"), 0.0, 0.0))),
+    "many.ase": b"ASEF" + struct.pack(">HHI", 1, 0, 0xFFFFFFFF),
+    "large.hex": b"123456\n" * 200_000,
+    "other.png": b"\x89PNG",
+}
+
+
+def test_broken_palettes_are_refused_in_one_line(open_page: Open) -> None:
+    viewer = open_page()
+    for name, data in BROKEN.items():
+        said = viewer.drop(name, data)
+        assert said.startswith(f"{name}: "), name
+        assert "\n" not in said
+        assert "taken" not in said
+        assert viewer.state["colors"] == list(COLORS), name
+
+
+# Drawings
+
+
+def test_the_timeline_tells_verdicts_in_words(open_page: Open) -> None:
+    viewer = open_page()
+    buttons = viewer.page.locator("#drawings button")
+    assert [text.split() for text in buttons.all_inner_texts()] == [
+        ["000.png", "0°", "±", "4.0°", "✓", "ok"],
+        ["001.png", "50°", "±", "24.0°", "~", "weak"],
+        ["002.png", "180°", "±", "44.0°", "?", "ambiguous"],
+        ["∅", "003.png", "-90°", "✕", "failed"],
+    ]
+    buttons.nth(1).focus()
+    assert viewer.page.locator("#reason").inner_text() == "Drawing 2: why it is weak"
+    buttons.nth(3).click()  # it shows no figure: there is nothing to compare
+    assert viewer.state["snapped"] == -1
+    assert viewer.page.locator("#reason").inner_text() == "Drawing 4: why it is failed"
+    assert "no drawing shows the left side" in viewer.page.locator("#verdict").inner_text()
+
+
+def test_a_drawings_camera_is_the_stages(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.page.locator("#drawings button").nth(1).click()
+    viewer.rest()
+    camera, drawn = viewer.shots[-1]["camera"], figure_scene()[0]["views"][1]["camera"]
+    factor = camera["scale"] / drawn["scale"]
+    assert camera["rotation"] == drawn["rotation"]
+    for axis in (0, 1):  # the drawing lies in the stage's middle, and the figure in the drawing
+        left = (camera["size"][axis] - SIZE_WH[axis] * factor) / 2
+        assert camera["center"][axis] == pytest.approx(left + drawn["center"][axis] * factor)
+    assert SIZE_WH[1] * factor == pytest.approx(0.94 * camera["size"][1])
+    viewer.page.locator("#view").focus()
+    viewer.page.keyboard.press("ArrowLeft")
+    viewer.rest()
+    freed = viewer.shots[-1]["camera"]
+    assert viewer.state["yaw"] == pytest.approx(55)
+    assert viewer.state["elevation"] == pytest.approx(5)
+    assert freed["scale"] == pytest.approx(camera["scale"])  # nothing jumps
+    assert freed["center"] == pytest.approx(camera["center"])
+    assert viewer.page.locator("#compare").is_hidden()
+    assert viewer.page.locator("#overlay").is_hidden()
+
+
+def overlay_pixel(viewer: Viewer, u: float, v: float) -> list[int]:
+    return viewer.page.evaluate(
+        """([u, v]) => {
+          const overlay = document.getElementById("overlay");
+          const copy = new OffscreenCanvas(1, 1).getContext("2d");
+          copy.drawImage(overlay, -Math.floor(u * overlay.width), -Math.floor(v * overlay.height));
+          return [...copy.getImageData(0, 0, 1, 1).data];
+        }""",
+        [u, v],
+    )
+
+
+def test_a_drawing_is_compared_in_four_ways(open_page: Open) -> None:
+    viewer = open_page()
+    page = viewer.page
+    page.locator("#drawings button").nth(0).click()
+    slider = page.get_by_role("slider", name="Drawing on the left")
+    slider.focus()
+    for key in ("ArrowLeft", "PageDown", "ArrowRight", "ArrowRight"):
+        page.keyboard.press(key)
+    assert slider.get_attribute("aria-valuenow") == "42"
+    assert slider.get_attribute("aria-valuetext") == "42 % drawing"
+    page.keyboard.press("End")
+    assert viewer.state["split"] == 1
+    page.keyboard.press("Home")
+    assert viewer.state["split"] == 0
+    viewer.set(split=0.5)
+    x, y = viewer.middle()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 100, y, steps=3)
+    page.mouse.up()
+    assert 0 < viewer.state["split"] < 0.5
+    assert viewer.state["snapped"] == 0
+    assert overlay_pixel(viewer, 0.5, 0.5)[3] == 128
+    assert overlay_pixel(viewer, 0.5, 0.5)[0] == pytest.approx(199, abs=2)  # 100 of 128
+
+    page.get_by_role("radio", name="Side by side").check()
+    viewer.rest()
+    width = viewer.shots[-1]["camera"]["size"][0]
+    assert viewer.shots[-1]["camera"]["center"][0] == pytest.approx(0.75 * width, abs=2)
+    assert overlay_pixel(viewer, 0.25, 0.5)[3] == 128
+    assert overlay_pixel(viewer, 0.75, 0.5)[3] == 0
+
+    page.get_by_role("radio", name="Onion skin").check()
+    page.get_by_role("slider", name="Drawing", exact=True).fill("30")
+    assert page.locator("#overlay").evaluate("e => e.style.opacity") == "0.3"
+
+    page.get_by_role("radio", name="Difference").check()
+    blend = "e => getComputedStyle(e).mixBlendMode"
+    assert page.locator("#overlay").evaluate(blend) == "difference"
+    page.get_by_role("button", name="Done").click()
+    assert page.locator("#overlay").is_hidden()
+    assert viewer.state["snapped"] == -1
+
+
+def test_cameras_stand_round_the_figure(open_page: Open) -> None:
+    viewer = open_page("#yaw=20&elevation=30")
+    page = viewer.page
+    assert page.locator("#frusta_front").is_hidden()
+    page.get_by_role("button", name="Cameras").click()
+    paths = "[...document.querySelectorAll('.frusta path')].filter(p => p.getAttribute('d'))"
+    assert page.evaluate(f"{paths}.length") == 4
+    outside = """paths => { const stage = document.getElementById("stage").getBoundingClientRect();
+      return paths.map(p => p.getBoundingClientRect()).filter(b => b.left < stage.left
+        || b.right > stage.right || b.top < stage.top || b.bottom > stage.bottom).length; }"""
+    assert page.evaluate(f"({outside})({paths})") == 0
+    page.locator("#frusta_front circle").nth(1).click()
+    assert viewer.state["snapped"] == 1
+    assert page.locator("#frusta_front").is_hidden()
+
+
+# Links
+
+
+def test_a_link_holds_what_is_shown(open_page: Open) -> None:
+    viewer = open_page()
+    assert viewer.page.evaluate("location.hash") == ""
+    shown = {
+        "yaw": -42.5,
+        "elevation": 12.25,
+        "zoom": 1.5,
+        "pan": [0.125, -0.25],
+        "layer": "depth",
+        "colors": [list(rgb) for rgb in NEW],
+        "ink": [1, 2, 3],
+        "cameras": True,
+    }
+    viewer.set(**shown)
+    viewer.rest()
+    other = open_page(viewer.page.evaluate("location.hash"))
+    assert {name: other.state[name] for name in shown} == shown
+    assert other.page.get_by_label("Lines").input_value() == "#010203"
+    assert other.page.get_by_role("radio", name="Depth").is_checked()
+    viewer.set(snapped=1, comparison="onion")
+    viewer.rest()
+    other.page.evaluate("hash => (location.hash = hash)", viewer.page.evaluate("location.hash"))
+    other.rest()
+    assert (other.state["snapped"], other.state["comparison"]) == (1, "onion")
+    assert other.page.locator("#overlay").is_visible()
+    other.page.get_by_role("button", name="Copy link").click()
+    other.page.wait_for_selector("#message:not(:empty)")
+
+
+GARBAGE = (
+    "#",
+    "#%",
+    "#%E0%A4%A",
+    "#yaw=NaN&elevation=Infinity&zoom=-&pan=1&pan=2",
+    "#yaw=1e9&zoom=0x10&pan=a,b&pan=,",
+    "#layer=constructor&colors=red,blue,green&ink=zzz&view=99&compare=__proto__",
+    "#colors=ff0000&view=4&view=-1&cameras=true",
+    "#" + "a=1&" * 20_000,
+    "#<img src=x onerror=alert(1)>",
+)
+
+
+def test_garbage_in_a_link_is_passed_over(open_page: Open) -> None:
+    viewer = open_page()
+    start = viewer.state
+    for hash in GARBAGE:
+        viewer.page.evaluate("hash => { location.hash = hash; }", hash)
+        viewer.page.wait_for_timeout(30)
+        assert viewer.state == start, hash[:80]
+    far = open_page("#zoom=9999&elevation=-400&pan=99,-99&yaw=725").state
+    assert (far["zoom"], far["elevation"], far["pan"], far["yaw"]) == (12, -85, [3, -3], 5)
+
+
+# Saving
+
+
+def test_a_picture_is_saved_with_alpha_at_each_size(open_page: Open, tmp_path: Path) -> None:
+    viewer = open_page(device_scale_factor=2)
+    width = viewer.page.evaluate("document.getElementById('stage').clientWidth")
+    for factor in (1, 2, 4):
+        viewer.page.locator("#factor").select_option(str(factor))
+        with viewer.page.expect_download() as download:
+            viewer.page.get_by_role("button", name="Save PNG").click()
+        assert download.value.suggested_filename == "A-figure.png"
+        download.value.save_as(tmp_path / "a.png")
+        with Image.open(tmp_path / "a.png") as picture:
+            assert picture.width == factor * width
+            assert picture.getpixel((0, 0)) == (0, 0, 0, 0)
+            middle = (picture.width // 2, int(picture.height * 0.6))
+            assert picture.getpixel(middle) == (*COLORS[0], 255)
+
+
+@pytest.mark.parametrize("kind", ["WEBP", "PNG"])
+def test_a_turning_picture_is_saved(open_page: Open, tmp_path: Path, kind: str) -> None:
+    viewer = open_page()
+    if kind == "PNG":  # as browsers do that write no WebP
+        viewer.page.evaluate(
+            """() => {
+              const { toBlob } = HTMLCanvasElement.prototype;
+              HTMLCanvasElement.prototype.toBlob = function (done) { toBlob.call(this, done); };
+            }"""
+        )
+    with viewer.page.expect_download() as download:
+        viewer.page.get_by_role("button", name="Save turntable").click()
+    download.value.save_as(tmp_path / "turn")
+    with Image.open(tmp_path / "turn") as picture:
+        assert (picture.format, picture.size) == (kind, (480, 480))
+        assert picture.n_frames == 24  # type: ignore[attr-defined]
+        frames = []
+        for i in range(24):
+            picture.seek(i)
+            frames.append(picture.convert("RGBA"))
+        assert picture.info["loop"] == 0
+        assert picture.info["duration"] == 100
+    assert frames[0].getpixel((0, 0))[3] == 0  # type: ignore[index]
+    spots = [frame.getpixel((240, 240)) for frame in (frames[0], frames[12])]
+    for spot, color in zip(spots, (COLORS[1], COLORS[0]), strict=True):  # front and back
+        assert spot == pytest.approx([*color, 255], abs=6)
+    viewer.rest()
+    assert viewer.page.get_by_role("button", name="Save turntable").is_visible()
+
+
+# What may go wrong
+
+
+def test_without_3d_fixed_pictures_turn(open_page: Open) -> None:
+    viewer = open_page("#yaw=90", scene={"field": None})
+    page = viewer.page
+    assert "8 fixed pictures" in page.locator("#fallback").inner_text()
+    sources = "JSON.parse(document.getElementById('turn').textContent)"
+    shown = f"{sources}.indexOf(document.getElementById('poster').src)"
+    viewer.rest()
+    assert page.evaluate(shown) == 2
+    viewer.drag(-60, 0)
+    viewer.rest()
+    assert page.evaluate(shown) > 2
+    page.locator("#view").focus()
+    page.keyboard.press("Home")
+    viewer.rest()
+    assert page.evaluate(shown) == 0
+    assert page.get_by_role("radio", name="Normals").is_disabled()
+    assert page.get_by_label("red").is_disabled()
+    assert page.get_by_role("button", name="Save PNG").is_disabled()
+    page.locator("#drawings button").nth(1).click()
+    viewer.rest()
+    assert page.locator("#overlay").is_visible()
+    assert page.evaluate(shown) == 1
+    page.get_by_role("button", name="Copy hex list").click()
+    page.wait_for_selector("#message:not(:empty)")
+
+
+def test_a_renderer_that_fails_later_is_replaced(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.page.evaluate("globalThis.breaks = true")
+    viewer.drag(40, 0)
+    viewer.page.wait_for_selector("#fallback:not([hidden])")
+    assert viewer.page.locator("#poster").is_visible()
+
+
+def test_a_lost_context_is_replaced(open_page: Open) -> None:
+    viewer = open_page()
+    tell = "name => document.getElementById('view').dispatchEvent(new Event(name))"
+    viewer.page.evaluate(tell, "webglcontextlost")
+    assert viewer.page.locator("#fallback").is_visible()
+    assert viewer.page.locator("#poster").is_visible()
+    viewer.page.evaluate(tell, "webglcontextrestored")
+    viewer.page.wait_for_selector("#poster[hidden]", state="attached")
+    assert viewer.page.locator("#fallback").is_hidden()
+    viewer.page.get_by_label("red").fill("#00ff00")
+    viewer.rest()
+    assert viewer.shots[-1]["colors"][0] == [0, 255, 0]
+
+
+def test_a_scene_with_little_in_it_works(open_page: Open) -> None:
+    little = {
+        "views": [],
+        "drawings": None,
+        "palette": [],
+        "pen": None,
+        "verdict": None,
+        "layers": ["rgb"],
+    }
+    viewer = open_page("#view=1&colors=&ink=ffffff", scene={**little, "field": None})
+    for name in ("#timeline", "#paints", "#verdict", "#compare", "#cameras"):
+        assert viewer.page.locator(name).is_hidden(), name
+
+
+HOSTILE = (
+    "</script><script>globalThis.pwned = 1</script>",
+    "\"'><img src=x onerror=globalThis.pwned=1>",
+    "\u202eright to left\u2067",
+    "\x1b[31mred\x1b[0m",
+    "{{script}}",
+    "x" * 10_000,
+    "long words " * 1000,
+)
+
+
+@pytest.mark.parametrize("title", [HOSTILE[i] for i in (0, 2, 5, 6)], ids=range(4))
+def test_hostile_names_are_text(open_page: Open, title: str) -> None:
+    scene, _ = figure_scene()
+    verdict = {"state": title, "reasons": list(HOSTILE)}
+    views = [{**scene["views"][0], "name": text, "reason": text} for text in HOSTILE]
+    palette = [{**scene["palette"][0], "name": text} for text in HOSTILE]
+    hostile = {"title": title, "verdict": verdict, "views": views, "palette": palette, "pen": None}
+    viewer = open_page(scene=hostile, viewport={"width": 360, "height": 800})
+    page = viewer.page
+    assert page.locator("h1").text_content() == title
+    for names in ("#swatches .name", "#drawings .name", "#verdict li"):
+        assert page.locator(names).all_text_contents() == list(HOSTILE)
+    for i, text in enumerate(HOSTILE):
+        page.locator("#drawings button").nth(i).click()
+        assert page.locator("#reason bdi").text_content() == text
+        assert len(viewer.drop(f"{text}.hex", b"no")) < 200
+    assert page.evaluate("globalThis.pwned") is None
+    assert page.locator("img, script").count() == 5  # the poster and the page's own
+    for width in (360, 800):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+    heights = "[...document.querySelectorAll('h1, li, button, #reason')].map(e => e.clientHeight)"
+    assert max(page.evaluate(heights)) < 200
+
+
+def test_the_page_reads_from_right_to_left_too(open_page: Open) -> None:
+    viewer = open_page(viewport={"width": 360, "height": 740})
+    viewer.page.evaluate("document.documentElement.dir = 'rtl'")
+    assert viewer.page.evaluate("document.documentElement.scrollWidth") == 360
+    title, pegs = (viewer.page.locator(name).bounding_box() for name in ("h1", ".pegs"))
+    assert title is not None
+    assert pegs is not None
+    assert title["x"] < pegs["x"]
+
+
+def test_what_is_touched_is_large_enough(open_page: Open) -> None:
+    viewer = open_page("#view=1&compare=onion", viewport={"width": 360, "height": 740})
+    small = """[...document.querySelectorAll("button, select, input, [role=slider]")]
+      .map((e) => [e.id || e.name || e.textContent, e.getBoundingClientRect()])
+      .filter(([, box]) => box.width && Math.min(box.width, box.height) < 24)
+      .map(([name]) => name)"""
+    assert viewer.page.evaluate(small) == []
