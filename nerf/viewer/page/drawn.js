@@ -6,8 +6,9 @@
 // flooding (Rong and Tan 2006) from places on it that lie between pixels.
 
 import { CAMERA, cameraUniforms } from "./field.js";
-import { Program, freeTarget, makeTarget, makeTexture } from "./gl.js";
-import { MOST_PAINTS, NOWHERE } from "./field_layers.js";
+import { crumbsOf } from "./crumbs.js";
+import { Program, bytesOf, freeTarget, makeTarget, makeTexture } from "./gl.js";
+import { MOST_PAINTS, NOWHERE, padded } from "./field_layers.js";
 import { angleBetween } from "./camera.js";
 import { arrayOf } from "./scene.js";
 
@@ -15,6 +16,9 @@ import { arrayOf } from "./scene.js";
 /** @typedef {import("./gl.js").Target} Target */
 
 const CELL = 4; // pixels of the coarse grid's side
+const CRUMB = 30; // area of parts and holes that are noise, in a figure of CRUMB_AT px
+const HOLE = 80; // of holes between bent drawings
+const CRUMB_AT = 260;
 const TAPS = 4; // drawings that a view is made of: two beside it, two that fill gaps
 
 const LOOK_UP = `${CAMERA}
@@ -117,7 +121,8 @@ uniform Camera pair;
 uniform sampler2D flow;
 uniform bool flows;
 uniform float slack, sign, share, border, line;
-uniform vec3 ink;
+uniform vec3 ink, old_paints[${MOST_PAINTS}], new_paints[${MOST_PAINTS}];
+uniform bool changed;
 layout(location = 0) out vec4 result;
 
 float alpha_at(vec2 pixel) {
@@ -179,6 +184,10 @@ void main() {
     heaviest = weight;
     vec2 moved = place + (tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0) * apart;
     color = smooth_at(paint, tap, moved).rgb;
+    if (changed) {
+      int label = int(round(texelFetch(paint, ivec3(clamp(ivec2(round(moved)), ivec2(0), sizes[tap] - 1), layers[tap]), 0).a * 255.0));
+      color = clamp(color + new_paints[label] - old_paints[label], 0.0, 1.0);
+    }
   }
   if (heaviest == 0.0) {
     vec4 seen = texelFetch(rays, at, 0);
@@ -326,16 +335,76 @@ void main() {
   result = vec4(color / total, float(best) / 255.0);
 }`;
 
+/**
+ * Other colours: see palette/pixels/recolor.py. A pixel is a mixture of two tones that lie around
+ * it; what is no shade of any stays.
+ */
+const RECOLOR = `
+uniform sampler2D voted;
+uniform int count;
+uniform vec3 old_paints[${MOST_PAINTS}], new_paints[${MOST_PAINTS}], shadow;
+layout(location = 0) out vec4 result;
+
+vec3 oklab(vec3 c) {
+  vec3 x = mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
+  vec3 l = mat3(0.4122, 0.2119, 0.0883, 0.5363, 0.6807, 0.2817, 0.0514, 0.1074, 0.6300) * x;
+  l = pow(max(l, 0.0), vec3(1.0 / 3.0));
+  return mat3(0.2105, 1.9780, 0.0259, 0.7936, -2.4286, 0.7828, -0.0041, 0.4506, -0.8087) * l;
+}
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy), most = textureSize(voted, 0) - 1;
+  result = texelFetch(voted, at, 0);
+  vec3 c = result.rgb;
+  float seen[${MOST_PAINTS}];
+  for (int i = 0; i < ${MOST_PAINTS}; i++) seen[i] = 0.0;
+  bool moves = false;
+  for (int y = -3; y <= 3; y++) for (int x = -3; x <= 3; x++) {
+    int label = int(round(texelFetch(voted, clamp(at + ivec2(x, y), ivec2(0), most), 0).a * 255.0));
+    seen[label] += max(abs(x), abs(y)) <= 1 ? 4.0 : 1.0;
+    moves = moves || new_paints[label] != old_paints[label];
+  }
+  if (!moves) return;
+  vec3 whole = vec3(0.0), change = vec3(0.0);
+  float least = 1e9;
+  for (int i = 0; i < count; i++) {
+    if (seen[i] == 0.0) continue;
+    for (int tone = 0; tone < 2; tone++) {
+      vec3 a = old_paints[i] * (tone == 0 ? vec3(1.0) : shadow), to = new_paints[i] * (tone == 0 ? vec3(1.0) : shadow);
+      for (int j = i; j < count; j++) {
+        if (seen[j] == 0.0) continue;
+        for (int other = 0; other < 2; other++) {
+          vec3 b = old_paints[j] * (other == 0 ? vec3(1.0) : shadow);
+          vec3 way = b - a;
+          float t = clamp(dot(c - a, way) / max(dot(way, way), 1e-5), 0.0, 1.0);
+          vec3 off = c - a - t * way;
+          if (dot(off, off) >= least) continue;
+          least = dot(off, off);
+          whole = a + t * way;
+          change = mix(to, new_paints[j] * (other == 0 ? vec3(1.0) : shadow), t) - whole;
+        }
+      }
+    }
+  }
+  float level = 0.015;
+  float shade = clamp(dot(c + level, whole + level) / dot(whole + level, whole + level), 0.0, 1.25);
+  vec3 like = clamp(shade * (whole + level) - level, 0.0, 1.0);
+  float kept = clamp(2.0 - distance(oklab(c), oklab(like)) / 0.06, 0.0, 1.0);
+  result.rgb = clamp(c + kept * shade * change, 0.0, 1.0);
+}`;
+
 /** Opacity smoothed, and the nearest place on the outline for pixels beside it. */
 const RIM = `
-uniform sampler2D field, own;
+uniform sampler2D field, own, crumbs;
 uniform float border, part;
-layout(location = 0) out vec4 result; // place on the outline, in pixels; cover; unused
+uniform bool crumby;
+layout(location = 0) out vec4 result; // place on the outline, in pixels; cover; opacity over the level
 
 float alpha_at(ivec2 at) {
   ivec2 place = clamp(at, ivec2(0), textureSize(field, 0) - 1);
   float alpha = texelFetch(field, place, 0).a;
-  return part > 0.0 ? mix(alpha, texelFetch(own, place, 0).a, part) : alpha;
+  if (part > 0.0) alpha = mix(alpha, texelFetch(own, place, 0).a, part);
+  float change = crumby ? texelFetch(crumbs, place, 0).r : 0.0;
+  return change > 0.75 ? 1.0 : change > 0.25 ? 0.0 : alpha;
 }
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
@@ -355,6 +424,12 @@ void main() {
   vec2 place = vec2(at) + 0.5 - slope / size * inside;
   result = vec4(beside ? place : vec2(-1e4), clamp(inside + 0.5, 0.0, 1.0), level);
 }`;
+
+/** Inside of the outline or not, to be looked at for crumbs. */
+const INSIDE = `
+uniform sampler2D places;
+layout(location = 0) out vec4 result;
+void main() { result = vec4(float(texelFetch(places, ivec2(gl_FragCoord.xy), 0).a >= 0.0)); }`;
 
 /** One round of jump flooding. */
 const FLOOD = `
@@ -387,7 +462,7 @@ void main() {
   vec3 color = texelFetch(voted, at, 0).rgb;
   if (cover > 0.0 && texelFetch(field, at, 0).a <= 0.5) {
     float least = 1e9;
-    for (int y = -3; y <= 3; y++) for (int x = -3; x <= 3; x++) {
+    for (int y = -8; y <= 8; y++) for (int x = -8; x <= 8; x++) {
       ivec2 place = clamp(at + ivec2(x, y), ivec2(0), most);
       float off = float(x * x + y * y);
       if (off < least && texelFetch(field, place, 0).a > 0.5) { least = off; color = texelFetch(voted, place, 0).rgb; }
@@ -457,6 +532,8 @@ export class DrawnLook {
     this.masks = new Program(gl, MASKS);
     this.candidates = new Program(gl, votes + CANDIDATES);
     this.vote = new Program(gl, VOTE);
+    this.recolor = new Program(gl, RECOLOR);
+    this.inside = new Program(gl, INSIDE);
     this.rim = new Program(gl, `#define SPREAD 0.62\n${RIM}`);
     this.flood = new Program(gl, FLOOD);
     this.compose = new Program(gl, COMPOSE);
@@ -484,8 +561,10 @@ export class DrawnLook {
       masks: make(bytes),
       candidates: make(bytes, gl.RGBA16F, bytes, bytes, bytes, bytes),
       vote: make(bytes),
+      recolor: make(bytes),
       rim: make(gl.RGBA32F),
       flood: make(gl.RGBA32F),
+      inside: make(bytes),
       coarse: makeTarget(gl, Math.ceil(width / 2 / CELL), Math.ceil(height / 2 / CELL), [bytes], false, true),
     };
     return this.targets;
@@ -497,7 +576,9 @@ export class DrawnLook {
    * @param {Target} seen colour, depth and label of the field: see `SEEN`
    * @param {(target: Target, finer?: number) => void} bind
    * @param {Target} into
-   * @param {{ink: number[] | null, still: boolean}} style
+   * @param {{colors: number[][], ink: number[] | null, still: boolean}} style
+   * @returns {(() => Promise<(() => void) | null>) | null} looks for crumbs, and returns what draws
+   *   the view again without them; null where there are none
    */
   draw(camera, seen, bind, into, style) {
     const { record } = this;
@@ -521,6 +602,9 @@ export class DrawnLook {
     const border = bent + part * (0.5 - bent);
     const line = record.pen ? (record.pen.width_px * camera.scale) / cameras[first].scale : 0;
     const ink = (style.ink ?? record.pen?.rgb ?? [0, 0, 0]).map((/** @type {number} */ v) => v / 255);
+    const paints = record.paints.slice(0, MOST_PAINTS);
+    const shown = paints.map((/** @type {number[]} */ paint, /** @type {number} */ i) => style.colors[i] ?? paint);
+    const changed = JSON.stringify(shown) !== JSON.stringify(paints);
     /** @type {Record<string, any>} */
     const common = {
       ...cameraUniforms(camera),
@@ -542,6 +626,12 @@ export class DrawnLook {
       border,
       part,
       ink,
+      tones: padded(paints),
+      old_paints: padded(paints),
+      new_paints: padded(shown),
+      count: paints.length,
+      shadow: record.shadow ?? [1, 1, 1],
+      changed,
     };
     taps.forEach((i, tap) => Object.assign(common, cameraUniforms(cameras[Math.max(i, 0)], `views[${tap}]`)));
 
@@ -551,7 +641,7 @@ export class DrawnLook {
       bind(into);
       const coarse = targets.coarse.textures[0];
       this.fast.use({ ...common, rays: field, depths, coarse, line }).fill();
-      return;
+      return null;
     }
     bind(targets.surface);
     this.surface.use({ depths, middle: (record.depths[0] + record.depths[1]) / 2 }).fill();
@@ -564,26 +654,47 @@ export class DrawnLook {
         masks: targets.masks.textures[0],
         field,
         labels,
-        tones: record.paints.flat().map((/** @type {number} */ v) => v / 255),
-        count: record.paints.length,
       })
       .fill();
     const [said, weights, one, two, three, own] = targets.candidates.textures;
     bind(targets.vote);
     this.vote.use({ said, weights, first: one, second: two, third: three }).fill();
 
-    bind(targets.rim);
-    this.rim.use({ field, own, border, part }).fill();
-    let [from, to] = [targets.rim, targets.flood];
-    for (let reach = 2 ** Math.ceil(Math.log2(line + 2)) / 2; line > 0 && reach >= 1; reach /= 2) {
-      bind(to);
-      this.flood.use({ places: from.textures[0], reach }).fill();
-      [from, to] = [to, from];
+    let voted = targets.vote.textures[0];
+    if (changed) {
+      bind(targets.recolor);
+      this.recolor.use({ ...common, voted }).fill();
+      voted = targets.recolor.textures[0];
     }
-    bind(into);
-    const plain = JSON.stringify(record.pen) === JSON.stringify(record.outline) && !style.ink;
-    this.compose
-      .use({ places: from.textures[0], voted: targets.vote.textures[0], field, own, line, part, ink, plain })
-      .fill();
+    const plain = part > 0 && !changed && !style.ink && JSON.stringify(record.pen) === JSON.stringify(record.outline);
+    /** @param {import("./gl.js").Texture | null} crumbs */
+    const finish = (crumbs) => {
+      bind(targets.rim);
+      this.rim.use({ ...common, field, own, crumbs: crumbs ?? this.none, crumby: Boolean(crumbs) }).fill();
+      let [from, to] = [targets.rim, targets.flood];
+      for (let reach = 2 ** Math.ceil(Math.log2(line + 2)) / 2; line > 0 && reach >= 1; reach /= 2) {
+        bind(to);
+        this.flood.use({ places: from.textures[0], reach }).fill();
+        [from, to] = [to, from];
+      }
+      bind(into);
+      this.compose.use({ ...common, places: from.textures[0], voted, field, own, line, plain }).fill();
+    };
+    finish(null);
+    bind(targets.inside);
+    this.inside.use({ places: targets.rim.textures[0] }).fill();
+    const area = ((record.height * camera.scale) / CRUMB_AT) ** 2;
+    const hole = record.bent && !record.shape ? HOLE : CRUMB;
+    const { gl } = this;
+    return async () => {
+      const mask = await bytesOf(gl, targets.inside);
+      const crumbs = crumbsOf(mask, into.width, into.height, CRUMB * area, hole * area);
+      if (!crumbs) return null;
+      return () => {
+        const texture = makeTexture(gl, gl.TEXTURE_2D, gl.R8, [into.width, into.height], crumbs, false);
+        finish(texture);
+        gl.deleteTexture(texture.texture);
+      };
+    };
   }
 }

@@ -186,3 +186,12 @@ void main() {
   ivec2 at = ivec2(gl_FragCoord.xy), size = textureSize(picture, 0);
   result = texelFetch(picture, ivec2(at.x, size.y - 1 - at.y), 0);
 }`;
+
+/**
+ * @param {number[][]} colors 0 to 255
+ * @returns {number[]} of a uniform array
+ */
+export function padded(colors) {
+  const flat = colors.slice(0, MOST_PAINTS).flat();
+  return Array.from({ length: 3 * MOST_PAINTS }, (_, i) => (flat[i] ?? 0) / 255);
+}

@@ -5,6 +5,7 @@
 /** @typedef {{frame: WebGLFramebuffer, textures: Texture[], width: number, height: number}} Target */
 /** @typedef {number | boolean | number[] | Float32Array | Texture} Value of a uniform */
 
+const SAMPLERS = [0x8b5e, 0x8dc1, 0x8b5f]; // SAMPLER_2D, SAMPLER_2D_ARRAY, SAMPLER_3D
 const HEAD = `#version 300 es
 precision highp float;
 precision highp int;
@@ -52,7 +53,7 @@ export class Program {
     for (let i = 0; i < count; i++) {
       const info = /** @type {WebGLActiveInfo} */ (gl.getActiveUniform(this.program, i));
       const place = /** @type {WebGLUniformLocation} */ (gl.getUniformLocation(this.program, info.name));
-      const sampled = [gl.SAMPLER_2D, gl.SAMPLER_2D_ARRAY, gl.SAMPLER_3D].includes(info.type);
+      const sampled = SAMPLERS.includes(info.type);
       this.uniforms.set(info.name.replace(/\[0\]$/, ""), { place, type: info.type, unit: sampled ? unit++ : -1 });
     }
   }
@@ -184,4 +185,29 @@ export function makeTarget(gl, width, height, formats, solid = false, smooth = f
 export function freeTarget(gl, target) {
   for (const { texture } of target.textures) gl.deleteTexture(texture);
   gl.deleteFramebuffer(target.frame);
+}
+
+/**
+ * Read a target's first texture, which holds bytes, without holding up what is being drawn.
+ * @param {GL} gl
+ * @param {Target} target
+ * @returns {Promise<Uint8Array>} RGBA, the first row first
+ */
+export async function bytesOf(gl, target) {
+  const bytes = new Uint8Array(target.width * target.height * 4);
+  const buffer = gl.createBuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
+  gl.bufferData(gl.PIXEL_PACK_BUFFER, bytes.length, gl.STREAM_READ);
+  gl.readPixels(0, 0, target.width, target.height, gl.RGBA, gl.UNSIGNED_BYTE, 0);
+  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+  const fence = /** @type {WebGLSync} */ (gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0));
+  gl.flush();
+  while (gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED) await new Promise((later) => setTimeout(later, 2));
+  gl.deleteSync(fence);
+  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
+  gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, bytes);
+  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+  gl.deleteBuffer(buffer);
+  return bytes;
 }

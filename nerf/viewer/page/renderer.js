@@ -2,8 +2,8 @@
 
 import { DrawnLook } from "./drawn.js";
 import { Field, cameraUniforms } from "./field.js";
-import { Program, freeTarget, makeTarget } from "./gl.js";
-import { DEPTH, MOST_PAINTS, NORMAL, PALETTE, PRESENT, SEEN } from "./field_layers.js";
+import { Program, bytesOf, freeTarget, makeTarget } from "./gl.js";
+import { DEPTH, NORMAL, PALETTE, PRESENT, SEEN, padded } from "./field_layers.js";
 import { project } from "./camera.js";
 
 /** @typedef {import("./types.js").Camera} Camera */
@@ -18,7 +18,7 @@ import { project } from "./camera.js";
  * @throws {Error} where WebGL2, or pictures of floats, are missing
  */
 export async function createRenderer(canvas, scene, blob) {
-  const gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  const gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: true });
   if (!gl) throw new Error("this browser has no WebGL2");
   if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this browser cannot draw floats");
   gl.getExtension("OES_texture_float_linear");
@@ -37,6 +37,9 @@ export async function createRenderer(canvas, scene, blob) {
   /** @type {Record<string, Target>} */
   let targets = {};
   let [x, y, width, height] = [0, 0, 0, 0];
+  /** @type {ReturnType<DrawnLook["draw"]>} */
+  let crumbs = null; // of the last picture
+  let pictures = 0;
 
   /** @param {Target} target */
   function bind(target, finer = 1) {
@@ -71,6 +74,8 @@ export async function createRenderer(canvas, scene, blob) {
   function picture(shot) {
     const context = /** @type {WebGL2RenderingContext} */ (gl);
     const { camera, layer, still } = shot;
+    crumbs = null;
+    pictures++;
     sized(camera.size);
     [x, y, width, height] = [0, 0, ...camera.size];
     bind(targets.picture);
@@ -103,7 +108,7 @@ export async function createRenderer(canvas, scene, blob) {
     programs.seen.use(rays).fill();
     const [seen, depths, labels, fours] = targets.seen.textures;
     if (layer === "drawn" && look) {
-      look.draw(camera, targets.seen, bind, targets.picture, shot);
+      crumbs = look.draw(camera, targets.seen, bind, targets.picture, shot);
       return targets.picture;
     }
     bind(targets.picture);
@@ -116,8 +121,8 @@ export async function createRenderer(canvas, scene, blob) {
           labels,
           fours,
           count: paints.length,
-          paints: padded(paints, 1),
-          shown: padded(shot.colors, 255),
+          paints: padded(paints.map((/** @type {number[]} */ one) => one.map((v) => 255 * v))),
+          shown: padded(shot.colors),
           indexed: layer === "labels",
         })
         .fill();
@@ -143,6 +148,27 @@ export async function createRenderer(canvas, scene, blob) {
     same.use({ picture: from }).fill();
   }
 
+  /** @param {Target} made */
+  function present(made) {
+    const context = /** @type {WebGL2RenderingContext} */ (gl);
+    context.bindFramebuffer(context.FRAMEBUFFER, null);
+    context.disable(context.SCISSOR_TEST);
+    context.viewport(0, 0, made.width, made.height);
+    programs.present.use({ picture: made.textures[0] }).fill();
+  }
+
+  /**
+   * Draw the last picture again without crumbs.
+   * @returns {Promise<boolean>} whether it has changed, and no other was drawn meanwhile
+   */
+  async function withoutCrumbs() {
+    const [own, look_for] = [pictures, crumbs];
+    const again = look_for && (await look_for());
+    if (!again || own !== pictures) return false;
+    again();
+    return true;
+  }
+
   return {
     /**
      * Show a picture on the canvas, which takes its size.
@@ -152,21 +178,20 @@ export async function createRenderer(canvas, scene, blob) {
       const [wide, high] = shot.camera.size;
       if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
       const made = picture(shot);
-      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-      gl.disable(gl.SCISSOR_TEST);
-      gl.viewport(0, 0, wide, high);
-      programs.present.use({ picture: made.textures[0] }).fill();
+      present(made);
+      withoutCrumbs().then((changed) => changed && present(made));
     },
 
     /**
      * @param {Shot} shot
-     * @returns {ImageData} straight alpha
+     * @returns {Promise<ImageData>} straight alpha
      */
-    read(shot) {
+    async read(shot) {
       const made = picture(shot);
-      const bytes = new Uint8ClampedArray(made.width * made.height * 4);
-      gl.bindFramebuffer(gl.FRAMEBUFFER, made.frame);
-      gl.readPixels(0, 0, made.width, made.height, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(bytes.buffer));
+      const own = pictures;
+      await withoutCrumbs();
+      if (own !== pictures) return this.read(shot); // another picture came between
+      const bytes = new Uint8ClampedArray(await bytesOf(gl, made));
       for (let i = 0; i < bytes.length; i += 4) {
         const alpha = bytes[i + 3];
         for (let c = i; alpha > 0 && alpha < 255 && c < i + 3; c++) bytes[c] = (bytes[c] * 255) / alpha;
@@ -174,16 +199,6 @@ export async function createRenderer(canvas, scene, blob) {
       return new ImageData(bytes, made.width, made.height);
     },
   };
-}
-
-/**
- * @param {number[][]} colors
- * @param {number} most what counts as 1
- * @returns {number[]}
- */
-function padded(colors, most) {
-  const flat = colors.slice(0, MOST_PAINTS).flat();
-  return Array.from({ length: 3 * MOST_PAINTS }, (_, i) => (flat[i] ?? 0) / most);
 }
 
 /**

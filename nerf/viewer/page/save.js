@@ -17,7 +17,7 @@ const FILE_QUALITY = 0.9;
 /**
  * @param {Scene} scene
  * @param {import("./state.js").Store} store
- * @param {() => {read: (shot: Shot) => ImageData}} renderer that draws now
+ * @param {() => {read: (shot: Shot) => Promise<ImageData>}} renderer that draws now
  * @param {() => void} redraw the stage, after its canvas was used
  */
 export function createSave(scene, store, renderer, redraw) {
@@ -29,7 +29,7 @@ export function createSave(scene, store, renderer, redraw) {
     const css = part("stage", HTMLElement).clientWidth / shot.camera.size[0];
     const factor = Number(part("factor", HTMLSelectElement).value) * css;
     const camera = resized(shot.camera, factor);
-    const file = await encoded(renderer().read({ ...shot, camera }), "image/png");
+    const file = await encoded(await renderer().read({ ...shot, camera }), "image/png");
     download(file, `${fileName(scene.title)}.png`);
     say(`Saved ${camera.size.join(" × ")} pixels.`);
   }
@@ -45,7 +45,7 @@ export function createSave(scene, store, renderer, redraw) {
     for (let i = 0; i < TURN_FRAMES && running; i++) {
       progress.value = i;
       const shot = shotOf(scene, { ...state, yaw: state.yaw + (360 * i) / TURN_FRAMES });
-      files.push(await encoded(renderer().read(shot), "image/webp"));
+      files.push(await encoded(await renderer().read(shot), "image/webp"));
       redraw();
       await new Promise((resolve) => setTimeout(resolve)); // input comes in between
     }
