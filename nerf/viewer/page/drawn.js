@@ -15,7 +15,7 @@ import { arrayOf } from "./scene.js";
 /** @typedef {import("./types.js").Camera} Camera */
 /** @typedef {import("./gl.js").Target} Target */
 
-const CELL = 4; // pixels of the coarse grid's side
+const CELL = 8; // pixels of the coarse grid's side
 const CRUMB = 30; // area of parts and holes that are noise, in a figure of CRUMB_AT px
 const HOLE = 80; // of holes between bent drawings
 const CRUMB_AT = 260;
@@ -100,14 +100,14 @@ void main() {
 /** Where the outline is so near that it matters: the least opacity around, on a coarse grid. */
 const COARSE = `
 uniform sampler2D rays;
-uniform float reach; // of its own pixels
+uniform float reach, fine;
 layout(location = 0) out vec4 result;
 void main() {
   vec2 texel = 1.0 / vec2(textureSize(rays, 0));
-  vec2 at = gl_FragCoord.xy * float(CELL) * texel;
+  vec2 at = gl_FragCoord.xy * float(CELL) * fine * texel;
   float low = 1.0, high = 0.0;
   for (int y = -2; y <= 2; y++) for (int x = -2; x <= 2; x++) {
-    float alpha = textureLod(rays, at + 0.5 * reach * vec2(x, y) * texel, 0.0).a;
+    float alpha = textureLod(rays, at + 0.5 * reach * fine * vec2(x, y) * texel, 0.0).a;
     low = min(low, alpha);
     high = max(high, alpha);
   }
@@ -121,15 +121,34 @@ uniform Camera pair;
 uniform sampler2D flow;
 uniform bool flows;
 uniform float slack, sign, share, border, line;
+uniform float fine; // pixels of the rays per pixel
+uniform bool shaped, shaded;
+uniform vec2 reaches; // of inner lines onto the near and the far side; 0: none
+uniform float least_step, shade_level;
+uniform vec3 shade_slope, shade_factor;
 uniform vec3 ink, old_paints[${MOST_PAINTS}], new_paints[${MOST_PAINTS}];
 uniform bool changed;
 layout(location = 0) out vec4 result;
 
 float alpha_at(vec2 pixel) {
-  return textureLod(rays, pixel * 0.5 / vec2(textureSize(rays, 0)), 0.0).a;
+  return textureLod(rays, pixel * fine / vec2(textureSize(rays, 0)), 0.0).a;
+}
+float inner_line(ivec2 at) {
+  ivec2 most = textureSize(depths, 0) - 1;
+  float own = texelFetch(depths, at, 0).r, line = 0.0;
+  for (int i = 0; i < 16; i++) {
+    float turn = float(i >> 1) * 0.7854, reach = (i & 1) == 0 ? reaches.x : reaches.y;
+    ivec2 way = ivec2(round(max(reach, 1.0) * vec2(cos(turn), sin(turn))));
+    float other = texelFetch(depths, clamp(at + way, ivec2(0), most), 0).r;
+    float back = texelFetch(depths, clamp(at - way, ivec2(0), most), 0).r;
+    if (other <= ${NOWHERE} || back <= ${NOWHERE}) continue;
+    float step_off = ((i & 1) == 0 ? other - own : own - other) - abs(own - back);
+    if (step_off > least_step) line = max(line, min(reach, 1.0));
+  }
+  return line;
 }
 void main() {
-  vec2 around = textureLod(coarse, gl_FragCoord.xy / float(2 * CELL) / vec2(textureSize(coarse, 0)), 0.0).rg;
+  vec2 around = textureLod(coarse, gl_FragCoord.xy / float(CELL) / vec2(textureSize(coarse, 0)), 0.0).rg;
   result = vec4(0.0);
   if (around.g < 0.05) return;
   vec2 pixel = gl_FragCoord.xy;
@@ -152,7 +171,7 @@ void main() {
   }
   if (stroke > 0.99) { result = vec4(ink, 1.0) * cover; return; }
   ivec2 most = textureSize(depths, 0) - 1;
-  ivec2 at = ivec2(pixel * 0.5);
+  ivec2 at = ivec2(pixel * fine);
   if (texelFetch(rays, at, 0).a < 0.5) {
     ivec2 best = at;
     for (int i = 0; i < 8; i++) {
@@ -189,10 +208,12 @@ void main() {
       color = clamp(color + new_paints[label] - old_paints[label], 0.0, 1.0);
     }
   }
+  vec4 seen = texelFetch(rays, at, 0);
   if (heaviest == 0.0) {
-    vec4 seen = texelFetch(rays, at, 0);
-    color = clamp(seen.rgb / max(seen.a, 0.2), 0.0, 1.0);
+    color = shaped ? smooth_at(paint, 0, seen_by(views[0], point).xy - 0.5).rgb : clamp(seen.rgb / max(seen.a, 0.2), 0.0, 1.0);
   }
+  if (shaded && dot(seen.rgb * 2.0 - 1.0, shade_slope) + shade_level > 0.0) color *= shade_factor;
+  if (reaches.x + reaches.y > 0.0) stroke = max(stroke, min(cover, inner_line(at)));
   result = vec4(color * (cover - stroke) + stroke * ink, cover);
 }`;
 
@@ -449,9 +470,10 @@ void main() {
 
 /** Everything over each other. */
 const COMPOSE = `
-uniform sampler2D places, voted, field, own;
+uniform sampler2D places, voted, field, own, style;
 uniform float line, part;
 uniform vec3 ink;
+uniform bool styled;
 uniform bool plain; // the drawing's own line is shown, too
 layout(location = 0) out vec4 result;
 void main() {
@@ -467,6 +489,11 @@ void main() {
       float off = float(x * x + y * y);
       if (off < least && texelFetch(field, place, 0).a > 0.5) { least = off; color = texelFetch(voted, place, 0).rgb; }
     }
+  }
+  if (styled) {
+    vec4 own_style = texelFetch(style, at, 0);
+    color *= own_style.rgb;
+    if (line > 0.0) stroke = max(stroke, min(own_style.a, cover));
   }
   result = vec4(color * (cover - stroke) + stroke * ink, cover);
   if (part > 0.0 && plain) {
@@ -565,9 +592,38 @@ export class DrawnLook {
       rim: make(gl.RGBA32F),
       flood: make(gl.RGBA32F),
       inside: make(bytes),
-      coarse: makeTarget(gl, Math.ceil(width / 2 / CELL), Math.ceil(height / 2 / CELL), [bytes], false, true),
+      coarse: makeTarget(gl, Math.ceil(width / CELL), Math.ceil(height / CELL), [bytes], false, true),
     };
     return this.targets;
+  }
+
+  /**
+   * @param {Camera} camera
+   * @returns {number} pixels of a view per pixel of the drawings, for inner lines; 0: there are none
+   */
+  lineScale(camera) {
+    const { cameras, pen, outline, neighbours } = this.record;
+    if (!pen || !outline) return 0;
+    const [first] = flanking(cameras, camera, neighbours);
+    return (camera.scale / cameras[first].scale) * (pen.width_px / Math.max(outline.width_px, 1e-6));
+  }
+
+  /**
+   * @param {number} line width of the outline, pixels; 0: there is none
+   * @returns {Record<string, any>} what the quick look needs of a shape's style
+   */
+  styleOf(line) {
+    const { shape, shade, steps, outline, height } = this.record;
+    const scale = outline ? line / Math.max(outline.width_px, 1e-6) : 0;
+    return {
+      shaped: Boolean(shape),
+      shaded: Boolean(shape && shade),
+      shade_slope: shade?.slope ?? [0, 0, 0],
+      shade_level: shade?.level ?? 0,
+      shade_factor: shade?.factor ?? [1, 1, 1],
+      reaches: shape && steps ? [steps.near_px * scale, steps.far_px * scale] : [0, 0],
+      least_step: steps ? steps.least * height : 0,
+    };
   }
 
   /**
@@ -577,10 +633,11 @@ export class DrawnLook {
    * @param {(target: Target, finer?: number) => void} bind
    * @param {Target} into
    * @param {{colors: number[][], ink: number[] | null, still: boolean}} style
+   * @param {import("./gl.js").Texture | null} [lines] tone, and lines, of a shape
    * @returns {(() => Promise<(() => void) | null>) | null} looks for crumbs, and returns what draws
    *   the view again without them; null where there are none
    */
-  draw(camera, seen, bind, into, style) {
+  draw(camera, seen, bind, into, style, lines = null) {
     const { record } = this;
     const [field, depths, labels] = seen.textures;
     const targets = this.sized(into.width, into.height);
@@ -636,11 +693,12 @@ export class DrawnLook {
     taps.forEach((i, tap) => Object.assign(common, cameraUniforms(cameras[Math.max(i, 0)], `views[${tap}]`)));
 
     if (!style.still) {
-      bind(targets.coarse, 1 / (2 * CELL));
-      this.coarse.use({ rays: field, reach: line / 2 + 2 + CELL / 2 }).fill();
+      const fine = seen.width / into.width > 0.75 ? 1 : 0.5;
+      bind(targets.coarse, 1 / CELL);
+      this.coarse.use({ rays: field, reach: line + 4 + CELL / 2, fine }).fill();
       bind(into);
       const coarse = targets.coarse.textures[0];
-      this.fast.use({ ...common, rays: field, depths, coarse, line }).fill();
+      this.fast.use({ ...common, rays: field, depths, coarse, line, fine, ...this.styleOf(line) }).fill();
       return null;
     }
     bind(targets.surface);
@@ -678,7 +736,7 @@ export class DrawnLook {
         [from, to] = [to, from];
       }
       bind(into);
-      this.compose.use({ ...common, places: from.textures[0], voted, field, own, line, plain }).fill();
+      this.compose.use({ ...common, places: from.textures[0], voted, field, own, line, plain, style: lines ?? this.none, styled: Boolean(lines) }).fill();
     };
     finish(null);
     bind(targets.inside);

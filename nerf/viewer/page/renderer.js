@@ -4,6 +4,7 @@ import { DrawnLook } from "./drawn.js";
 import { Field, cameraUniforms } from "./field.js";
 import { Program, bytesOf, freeTarget, makeTarget } from "./gl.js";
 import { DEPTH, NORMAL, PALETTE, PRESENT, SEEN, padded } from "./field_layers.js";
+import { Shape } from "./shape.js";
 import { project } from "./camera.js";
 
 /** @typedef {import("./types.js").Camera} Camera */
@@ -25,6 +26,7 @@ export async function createRenderer(canvas, scene, blob) {
   gl.disable(gl.DITHER);
   const field = new Field(gl, scene.field, blob);
   const look = scene.drawings ? new DrawnLook(gl, scene.drawings, blob) : null;
+  const shape = scene.drawings?.shape ? new Shape(gl, scene.drawings, blob) : null;
   const programs = {
     seen: new Program(gl, SEEN),
     palette: new Program(gl, PALETTE),
@@ -83,6 +85,12 @@ export async function createRenderer(canvas, scene, blob) {
     const corners = boxCorners(scene.field.hull).map((corner) => project(camera, corner));
     [x, y, width, height] = boxOf(corners, camera.size);
     if (!width || !height) return targets.picture;
+    if (layer === "drawn" && shape && !still) {
+      const { depth, normal } = shape.see(camera, false, bind);
+      const { frame } = targets.half;
+      look?.draw(camera, { frame, textures: [normal, depth], width: camera.size[0], height: camera.size[1] }, bind, targets.picture, shot);
+      return targets.picture;
+    }
     if (layer === "drawn" && look && !still) {
       bind(targets.half, 0.5);
       field.see(camera, 0.5);
@@ -108,7 +116,8 @@ export async function createRenderer(canvas, scene, blob) {
     programs.seen.use(rays).fill();
     const [seen, depths, labels, fours] = targets.seen.textures;
     if (layer === "drawn" && look) {
-      crumbs = look.draw(camera, targets.seen, bind, targets.picture, shot);
+      const lines = shape?.cover(camera, rays, targets.seen, bind, look.lineScale(camera)) ?? null;
+      crumbs = look.draw(camera, targets.seen, bind, targets.picture, shot, lines);
       return targets.picture;
     }
     bind(targets.picture);
