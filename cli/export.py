@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -32,10 +33,10 @@ def export(
     bundle: Annotated[
         Path, typer.Argument(metavar="BUNDLE", help="A bundle, or a folder with transforms.json.")
     ],
+    to: Annotated[Format, typer.Option("--to", help="Format.")],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],
-    to: Annotated[Format, typer.Option("--to", help="Format.")] = Format.colmap,
     mesh: Annotated[
         Path | None, typer.Option("--mesh", help="The mannequin (default: the bundle's own).")
     ] = None,
@@ -145,4 +146,4 @@ def _summary(to: Format, job: Job, views: Sequence[ExportView], error_px: float)
     elif job.points is not None:
         several = int((job.points.seen.sum(axis=0) > 1).sum())
         lines.append(f"{len(job.points.xyz)} points, {several} of them seen by several views")
-    return [*lines, target.hint] if target.hint else lines
+    return [*lines, target.hint.format(out=shlex.quote(str(job.out)))] if target.hint else lines

@@ -288,7 +288,7 @@ def test_options_of_colmap_are_refused_elsewhere(toonset, tmp_path: Path) -> Non
 
 def test_centre_is_offered_where_it_matters(toonset, tmp_path: Path) -> None:
     bundle = bundle_of(views_all_round(3), egg(), tmp_path / "bundle")
-    plain = toonset("export", bundle, "-o", tmp_path / "plain")
+    plain = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "plain")
     assert "principal points up to 3.7 px off" in plain.err
-    done = toonset("export", bundle, "-o", tmp_path / "centred", "--centre")
+    done = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "centred", "--centre")
     assert "principal points" not in done.err
