@@ -79,11 +79,11 @@ def export(
     from toonset.dataset.exporters.pinhole import centred
 
     printer, target = Printer(as_json, quiet), TARGETS[to]
-    check_output(out, [bundle, mesh], target.written, force=force)
     views = read_views(bundle)
+    body = mannequin_of(transforms_file(bundle).parent, mesh)
+    check_output(out, [bundle, mesh], target.written, force=force)
     if centre:
         views = tuple(centred(view) for view in views)
-    body = mannequin_of(transforms_file(bundle).parent, mesh)
     points = None
     if target.wants_points:
         printer.progress("colouring points")

@@ -64,12 +64,12 @@ def mesh(
     from toonset.nerf.surface.texture import FACES, textured_surface_of
     from toonset.nerf.surface.textured_files import check_textured_files, textured_files
 
+    trained = recolored(read_field(run), recolor or [])
     if texture:
         check_textured_files(out, outline=outline, force=force)
     else:
         check_mesh_files(out, force=force)
     use_threads(threads)
-    trained = recolored(read_field(run), recolor or [])
     printer.progress("finding the surface")
     values: dict[str, Any] = {}
     if texture:

@@ -118,13 +118,14 @@ def palette(
     into a folder of their own.
     """
     from toonset.dataset.bundle.palette_files import write_labelled
-    from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
+    from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
     from toonset.palette.extract import choose_palette, options_of
     from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
     printer = Printer(as_json, quiet, verbose)
     places = inputs or [BUNDLE]
+    check_pictures(places)
     bundle = bundle_of(places)
     target = out or bundle or OUT
     if target != bundle:
@@ -179,11 +180,13 @@ def recolor(
     count; of other pictures the palette is found first.
     """
     from toonset.dataset.images.picture import encode_png
+    from toonset.dataset.split_folder.pictures import check_pictures
     from toonset.palette.recolor import changed_colors, recolored_drawing
     from toonset.write import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
     places = inputs or [BUNDLE]
+    check_pictures(places)
     read = [Path(os.path.abspath(place)) for place in places]
     folders = [place if place.is_dir() else place.parent for place in read]
     pictures = [folder / name for folder in folders for name in ("images", *FOLDERS)]

@@ -116,6 +116,7 @@ def render(
         raise typer.BadParameter("--elevation and --size belong to --turntable")
 
     from toonset.nerf.kernels.threads import use_threads
+    from toonset.nerf.render.animation import check_mp4
     from toonset.nerf.render.files import rendered_files
     from toonset.nerf.render.layers import default_layer
     from toonset.nerf.render.recolor import recolored, repainted, with_pen
@@ -123,8 +124,9 @@ def render(
     from toonset.write import new_folder, write_bytes
 
     together = _formats(formats, gif, turning=views is not None)
+    if "mp4" in together:
+        check_mp4()
     use_threads(threads)
-    check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
     wanted = layers or [default_layer(trained) if views else "rgb"]
@@ -132,6 +134,7 @@ def render(
     trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
     trained = with_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
+    check_output(out, [run, cameras], WRITTEN, force=force)
     files = rendered_files(
         trained, named, wanted, together, printer.progress, printer.say, as_drawn=as_drawn
     )

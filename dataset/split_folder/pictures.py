@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.bundle.transforms_read import NAMES, picture_paths
+from toonset.dataset.bundle.transforms_read import NAMES, picture_paths, transforms_file
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.places import is_split_folder, sheet_places
 from toonset.dataset.split_folder.read import read_split
-from toonset.errors import BundleError, SheetError
+from toonset.errors import BundleError, PictureError, SheetError
+from toonset.read import check_there
 
 Picture = UInt8[np.ndarray, "height width 4"]
 
@@ -46,6 +47,19 @@ def bundle_of(places: Sequence[Path]) -> Path | None:
     if len(places) > 1:
         raise BundleError(f"{bundles[0]}: a bundle stands alone; name one bundle, or only pictures")
     return places[0].parent if places[0].suffix.lower() == ".json" else places[0]
+
+
+def check_pictures(places: Sequence[Path]) -> None:
+    """Refuse places that are not there, before any work.
+
+    Raises:
+        BundleError: no such bundle, or one beside something else.
+        PictureError: no such picture.
+    """
+    if bundle_of(places) is not None:
+        transforms_file(places[0])
+    else:
+        check_there(places, "picture", PictureError)
 
 
 def load_pictures(places: Sequence[Path]) -> Pictures:
