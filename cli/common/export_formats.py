@@ -85,9 +85,9 @@ TARGETS = {
         "nerfstudio:write_transforms",
         (*BESIDE, "transforms.json", "sparse_pc.ply"),
         takes=("points",),
-        hint="to keep the world, and to train and evaluate on all views: ns-train nerfacto "
-        "nerfstudio-data --data {out} --orientation-method none --center-method none "
-        "--auto-scale-poses False --eval-mode all",
+        hint="to keep world and cameras, and to train and evaluate on all views: ns-train nerfacto "
+        "--pipeline.model.camera-optimizer.mode off nerfstudio-data --data {out} "
+        "--orientation-method none --center-method none --auto-scale-poses False --eval-mode all",
     ),
     Format.instant_ngp: Target(
         "nerfstudio:write_transforms", (*BESIDE, "transforms.json"), fixed={"instant_ngp": True}

@@ -5,7 +5,7 @@
     toonset export BUNDLE --to colmap --layout old -o b
     /tmp/ns/bin/python tests/consumers/check_nerfstudio.py a b
 
-A folder of `--to nerfstudio` is parsed with the very flags that its export printed, which a.txt
+A folder of `--to nerfstudio` is parsed with the very line that its export printed, which a.txt
 holds; all views must be there to train on and to evaluate.
 
 Projects 1,000 points per view through the cameras that the parser returns (float32). Measured with
@@ -44,15 +44,16 @@ def parser_of(folder: Path) -> Any:
             **AS_IT_IS,
         )
     else:
-        module = import_module(f"{PARSERS}.nerfstudio_dataparser")
-        config = import_module("tyro").cli(module.NerfstudioDataParserConfig, args=printed(folder))
+        methods = import_module("nerfstudio.configs.method_configs").AnnotatedBaseConfigUnion
+        config = import_module("tyro").cli(methods, args=printed(folder))
+        config = config.pipeline.datamanager.dataparser
     return config.setup()
 
 
 def printed(folder: Path) -> list[str]:
-    """Return the flags of the nerfstudio line that the export of a folder has printed."""
+    """Return the arguments of the nerfstudio line that the export of a folder has printed."""
     line = next(line for line in folder.with_suffix(".txt").open() if "ns-train " in line)
-    return shlex.split(line.partition(" nerfstudio-data ")[2])
+    return shlex.split(line.partition("ns-train ")[2])
 
 
 def projected(cameras: Any, index: int, points: np.ndarray) -> np.ndarray:

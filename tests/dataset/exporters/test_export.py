@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -277,6 +278,22 @@ def test_every_format_is_written_whole_and_replaced_only_by_force(
     (out / "mine.txt").write_text("keep")
     refused = toonset("export", bundle, "--to", to, "-o", out, "--force").reason
     assert "holds 'mine.txt'" in refused
+
+
+def test_the_nerfstudio_line_has_pictures_to_evaluate_on(toonset, tmp_path: Path) -> None:
+    """By nerfstudio's usual fraction of 0.9, eight views are all trained on."""
+    bundle, out = bundle_of(views_all_round(3), egg(), tmp_path / "bundle"), tmp_path / "a b"
+    said = toonset("export", bundle, "--to", "nerfstudio", "-o", out).err.splitlines()[-1]
+    words = shlex.split(said.partition(": ")[2])
+    assert words[:2] == ["ns-train", "nerfacto"]
+    parser = words[words.index("nerfstudio-data") :]
+    assert dict(zip(parser[1::2], parser[2::2], strict=True)) == {
+        "--data": str(out),
+        "--orientation-method": "none",
+        "--center-method": "none",
+        "--auto-scale-poses": "False",
+        "--eval-mode": "all",
+    }
 
 
 def test_options_of_colmap_are_refused_elsewhere(toonset, tmp_path: Path) -> None:
