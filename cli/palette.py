@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -136,6 +137,7 @@ def palette(
         printer.say(note)
     contours = find_contours(drawn.pictures)
     found = choose_palette(drawn.pictures, contours, options, colors, method)
+    found = replace(found, title=found.title or drawn.title)
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
         write_labelled(folder, found, drawn.names, drawn.pictures, contours, space)
     _report(found, target, printer, in_bundle=target == bundle)
@@ -192,7 +194,7 @@ def recolor(
     pictures = [folder / name for folder in folders for name in ("images", *FOLDERS)]
     check_output(out, [*places, *pictures], ("*.png",), force=force)
     found, drawings = _painted(places, printer)
-    colors = changed_colors(found.rgb, changes)
+    colors = changed_colors(found.rgb, changes, [color.name for color in found.colors])
     with new_folder(out, force=force) as folder:
         for one in drawings:
             new = recolored_drawing(one.picture, one.paint, one.contour, found, colors)
