@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from enum import StrEnum
 from functools import cache
@@ -221,4 +222,5 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
         printer.say(view_line(view))
     verdict = f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else "")
     (printer.say if found.is_certain else printer.doubt)(verdict)
-    printer.say(f"look at {out / 'overlay.png'}; next: toonset palette {out}")
+    after = shlex.join(["toonset", "palette", str(out)])
+    printer.say(f"look at {out / 'overlay.png'}; next: {after}")

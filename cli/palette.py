@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -149,7 +150,7 @@ def _report(found: Palette, target: Path, printer: Printer, *, in_bundle: bool) 
 
     for warning in found.warnings:
         printer.say(warning)
-    after = f"; next: toonset train {target}" if in_bundle else ""
+    after = f"; next: {shlex.join(['toonset', 'train', str(target)])}" if in_bundle else ""
     lines = palette_lines(found, verbose=printer.verbose)
     text = "\n".join([*lines, f"{target}: look at palette.png{after}"])
     printer.result({"out": target, **to_json(found)}, text)
