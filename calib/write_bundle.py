@@ -10,9 +10,10 @@ from toonset.calib.verdict.overlay import draw_overlay
 from toonset.calib.verdict.report import calibration_dict
 from toonset.calib.without_body.placing import size_of_figures
 from toonset.dataset.bundle.bundle import WRITTEN, Bundle, bundle_folder, read_bundle
-from toonset.dataset.bundle.palette_files import write_labelled
+from toonset.dataset.bundle.palette_files import palette_title, write_labelled
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contours
+from toonset.view import SHEET
 from toonset.write import check_output
 
 
@@ -44,5 +45,7 @@ def write_bundle(
         if palette is not None:
             pictures = [view.rgba for view in found.drawings]
             names = [view.name for view in found.drawings]
-            write_labelled(place, palette, names, pictures, find_contours(pictures))
+            sheets = (file["name"] for file in report.get("inputs", ()) if file["role"] == SHEET)
+            titled = replace(palette, title=palette.title or palette_title(sheets, folder))
+            write_labelled(place, titled, names, pictures, find_contours(pictures))
     return read_bundle(folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from enum import StrEnum
 from functools import cache
@@ -139,11 +140,13 @@ def calibrate(
     from toonset.calib.verdict.report import calibration_dict
     from toonset.calib.write_bundle import write_bundle
     from toonset.dataset.bundle.bundle import WRITTEN
+    from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.mesh.load import load_mesh
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
     from toonset.dataset.split_folder.view_labels import front_label
-    from toonset.errors import UsageError
+    from toonset.errors import LandmarkError, PictureError, SheetError, UsageError
+    from toonset.read import check_there
 
     lock = tuple(lock.value for lock in locked or ())
     hints = Hints(labels, landmarks, landmarks_only, init, lock)
@@ -152,11 +155,16 @@ def calibrate(
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
     Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet, verbose)
+    check_there(sheets, "picture", PictureError)
+    check_there([landmarks], "landmark", LandmarkError)
+    check_there([boxes], "boxes", SheetError)
+    if init is not None:
+        transforms_file(init)
     given = None if str(mesh) == NO_BODY else mesh
+    body: Mesh | Literal["none"] | None = NO_BODY if mesh is not None else None
+    if given is not None:
+        body = load_mesh(given)
     check_output(out, [*sheets, given, landmarks, init, boxes], WRITTEN, force=force)
-    body: Mesh | Literal["none"] | None = None
-    if mesh is not None:
-        body = NO_BODY if str(mesh) == NO_BODY else load_mesh(mesh)
     sheet = split_sheet(
         sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
     )
@@ -214,4 +222,5 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
         printer.say(view_line(view))
     verdict = f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else "")
     (printer.say if found.is_certain else printer.doubt)(verdict)
-    printer.say(f"look at {out / 'overlay.png'}; next: toonset palette {out}")
+    after = shlex.join(["toonset", "palette", str(out)])
+    printer.say(f"look at {out / 'overlay.png'}; next: {after}")

@@ -37,8 +37,9 @@ def consistency(
 
     printer = Printer(as_json, quiet)
     folder = out or (bundle if bundle.is_dir() else bundle.parent) / "consistency"
+    scene = read_scene(bundle)
     check_output(folder, [bundle], WRITTEN, force=force)
-    found = consistency_of(read_scene(bundle))
+    found = consistency_of(scene)
     report = found.to_json()
     with new_folder(folder, force=force) as place:
         write_json(place / "consistency.json", report)

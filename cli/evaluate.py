@@ -75,10 +75,10 @@ def evaluate(
     from toonset.nerf.score.metrics_view import load_judges
 
     printer = Printer(as_json, quiet)
-    if out is not None:
-        check_output(out, [run, test, bundle], WRITTEN, force=force)
     trained, held_out = read_field(run), read_scene(test)
     seen, why_unseen = _training_scene(run, bundle)
+    if out is not None:
+        check_output(out, [run, test, bundle], WRITTEN, force=force)
     if seen is not None and _same_pictures(held_out, seen):
         printer.say(f"{test}: holds pictures that the run was trained on; they are not held out")
     judges = load_judges()
@@ -137,11 +137,12 @@ def _same_pictures(held_out: Scene, seen: Scene) -> bool:
 
 
 def _text(result: dict[str, Any]) -> str:
-    lines = ["held-out views", *_table(result)]
-    if result["training"] is not None:
-        lines += ["", "training views", *_table(result["training"])]
-    reasons = [f"{name}: {reason}" for name, reason in result["absent"].items()]
-    return "\n".join([*lines, *([""] if reasons else []), *reasons])
+    """Return the tables for people; the last line is what counts, the held-out views' mean."""
+    lines = [f"{name}: {reason}" for name, reason in result["absent"].items()]
+    for name, section in (("training", result["training"]), ("held-out", result)):
+        if section is not None:
+            lines += [*([""] if lines else []), f"{name} views", *_table(section)]
+    return "\n".join(lines)
 
 
 def _table(section: dict[str, Any]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -32,10 +33,10 @@ def export(
     bundle: Annotated[
         Path, typer.Argument(metavar="BUNDLE", help="A bundle, or a folder with transforms.json.")
     ],
+    to: Annotated[Format, typer.Option("--to", help="Format.")],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],
-    to: Annotated[Format, typer.Option("--to", help="Format.")] = Format.colmap,
     mesh: Annotated[
         Path | None, typer.Option("--mesh", help="The mannequin (default: the bundle's own).")
     ] = None,
@@ -78,11 +79,11 @@ def export(
     from toonset.dataset.exporters.pinhole import centred
 
     printer, target = Printer(as_json, quiet), TARGETS[to]
-    check_output(out, [bundle, mesh], target.written, force=force)
     views = read_views(bundle)
+    body = mannequin_of(transforms_file(bundle).parent, mesh)
+    check_output(out, [bundle, mesh], target.written, force=force)
     if centre:
         views = tuple(centred(view) for view in views)
-    body = mannequin_of(transforms_file(bundle).parent, mesh)
     points = None
     if target.wants_points:
         printer.progress("colouring points")
@@ -145,4 +146,4 @@ def _summary(to: Format, job: Job, views: Sequence[ExportView], error_px: float)
     elif job.points is not None:
         several = int((job.points.seen.sum(axis=0) > 1).sum())
         lines.append(f"{len(job.points.xyz)} points, {several} of them seen by several views")
-    return [*lines, target.hint] if target.hint else lines
+    return [*lines, target.hint.format(out=shlex.quote(str(job.out)))] if target.hint else lines

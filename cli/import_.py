@@ -58,9 +58,9 @@ def import_(
     from toonset.dataset.importers.to_bundle import write_imported
 
     printer = Printer(as_json, quiet)
-    check_output(out, [path, images, masks, mesh], WRITTEN, force=force)
     imported = read_import(path, images, masks)
     body = mannequin_of(path.parent if path.is_file() else path, mesh)
+    check_output(out, [path, images, masks, mesh], WRITTEN, force=force)
     report = write_imported(out, imported, body, z_up=up == "z", force=force)
     printer.say(_summary(imported, report, has_mannequin=body is not None))
     values = {"bundle": out, "format": imported.program, "views": list(report.views)}

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.nerf.options import FACES
 
 
 def mesh(
@@ -19,14 +20,13 @@ def mesh(
         ),
     ],
     faces: Annotated[
-        int | None,
+        int,
         typer.Option(
             "--faces",
             min=100,
-            help="Triangles at most, if they can close it (default: as fine as the run; "
-            "8000 with --texture).",
+            help="Triangles at most, if they can close it; 1000000: as fine as the run.",
         ),
-    ] = None,
+    ] = FACES,
     texture: Annotated[
         bool, typer.Option("--texture", help="Paint it as the drawings are: .glb, .obj.")
     ] = False,
@@ -46,8 +46,9 @@ def mesh(
 ) -> None:
     """Turn a trained run into a closed mesh in palette colours, with crisp borders.
 
-    It lies in the mannequin's frame: +Y up, the character faces +Z. An OBJ comes with a material
-    and the palette as a picture, NAME.mtl and NAME.png.
+    It lies in the mannequin's frame: +Y up, the character faces +Z. Blender turns GLB and OBJ
+    upright; its importer does not turn a PLY, which is written +Y up, too: rotate it by 90 degrees
+    about X there. An OBJ comes with a material and the palette as a picture, NAME.mtl and NAME.png.
 
     With --texture the picture holds the drawn look: every patch is painted by the one drawing that
     shows it best, without contour lines. --outline puts an inverted hull round it, in the sheet's
@@ -61,30 +62,32 @@ def mesh(
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
-    from toonset.nerf.surface.texture import FACES, textured_surface_of
+    from toonset.nerf.surface.texture import textured_surface_of
     from toonset.nerf.surface.textured_files import check_textured_files, textured_files
 
+    trained = recolored(read_field(run), recolor or [])
     if texture:
         check_textured_files(out, outline=outline, force=force)
     else:
         check_mesh_files(out, force=force)
     use_threads(threads)
-    trained = recolored(read_field(run), recolor or [])
-    printer.progress("finding the surface")
+
+    def progress(step: str, done: float) -> None:
+        printer.progress(f"{step} {done:.0%}")
+
     values: dict[str, Any] = {}
     if texture:
-        faces = faces or FACES
-        textured = textured_surface_of(trained, faces, outline=outline)
+        textured = textured_surface_of(trained, faces, progress, outline=outline)
         surface, files = textured.surface, textured_files(textured, out)
         by_field = float((textured.source < 0).mean())
         values = {"texture": list(textured.atlas.size_wh), "by_field": by_field}
     else:
-        surface = surface_of(trained, faces)
+        surface = surface_of(trained, faces, progress)
         files = mesh_files(surface, out)
     write_mesh_files(files, out)
     sizes = {name: len(data) for name, data in files.items()}
     count = len(surface.faces)
-    fewest = " (fewer would open it)" if faces is not None and count > faces else ""
+    fewest = " (fewer would open it)" if count > faces else ""
     drawn = ""
     if texture:
         width, height = values["texture"]

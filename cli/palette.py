@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shlex
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -118,13 +120,14 @@ def palette(
     into a folder of their own.
     """
     from toonset.dataset.bundle.palette_files import write_labelled
-    from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
+    from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
     from toonset.palette.extract import choose_palette, options_of
     from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
     printer = Printer(as_json, quiet, verbose)
     places = inputs or [BUNDLE]
+    check_pictures(places)
     bundle = bundle_of(places)
     target = out or bundle or OUT
     if target != bundle:
@@ -135,6 +138,7 @@ def palette(
         printer.say(note)
     contours = find_contours(drawn.pictures)
     found = choose_palette(drawn.pictures, contours, options, colors, method)
+    found = replace(found, title=found.title or drawn.title)
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
         write_labelled(folder, found, drawn.names, drawn.pictures, contours, space)
     _report(found, target, printer, in_bundle=target == bundle)
@@ -146,7 +150,7 @@ def _report(found: Palette, target: Path, printer: Printer, *, in_bundle: bool) 
 
     for warning in found.warnings:
         printer.say(warning)
-    after = f"; next: toonset train {target}" if in_bundle else ""
+    after = f"; next: {shlex.join(['toonset', 'train', str(target)])}" if in_bundle else ""
     lines = palette_lines(found, verbose=printer.verbose)
     text = "\n".join([*lines, f"{target}: look at palette.png{after}"])
     printer.result({"out": target, **to_json(found)}, text)
@@ -179,17 +183,19 @@ def recolor(
     count; of other pictures the palette is found first.
     """
     from toonset.dataset.images.picture import encode_png
+    from toonset.dataset.split_folder.pictures import check_pictures
     from toonset.palette.recolor import changed_colors, recolored_drawing
     from toonset.write import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
     places = inputs or [BUNDLE]
+    check_pictures(places)
     read = [Path(os.path.abspath(place)) for place in places]
     folders = [place if place.is_dir() else place.parent for place in read]
     pictures = [folder / name for folder in folders for name in ("images", *FOLDERS)]
     check_output(out, [*places, *pictures], ("*.png",), force=force)
     found, drawings = _painted(places, printer)
-    colors = changed_colors(found.rgb, changes)
+    colors = changed_colors(found.rgb, changes, [color.name for color in found.colors])
     with new_folder(out, force=force) as folder:
         for one in drawings:
             new = recolored_drawing(one.picture, one.paint, one.contour, found, colors)

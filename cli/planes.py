@@ -31,8 +31,9 @@ def planes(
     from toonset.nerf.run.planes import planes_files
     from toonset.write import new_folder, write_bytes
 
+    trained = read_field(run)
     check_output(out, [run], WRITTEN, force=force)
-    files = planes_files(read_field(run))
+    files = planes_files(trained)
     with new_folder(out, force=force) as folder:
         for name, data in files.items():
             write_bytes(folder / name, data)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
-from toonset.nerf.options import LAYERS
+from toonset.nerf.options import FORMATS, LAYERS, Layer
+from toonset.suggest import did_you_mean
 from toonset.write import check_output
 
 if TYPE_CHECKING:
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 
 DEPTH_FILE = "depth.json"
 WRITTEN = ("*.png", "turntable.*", "sprites.json", DEPTH_FILE)
+
+
+def _like(incomplete: str) -> list[str]:
+    """Return the lists of formats that one may become."""
+    done, comma, last = incomplete.rpartition(",")
+    return [f"{done}{comma}{name}" for name in FORMATS if name.startswith(last)]
 
 
 def render(
@@ -41,9 +48,9 @@ def render(
     size: Annotated[
         int | None, typer.Option("--size", min=8, max=4096, help="Side in px of a turntable view.")
     ] = None,
-    layers: Annotated[
-        list[str] | None,
-        typer.Option("--layer", help=f"{', '.join(LAYERS)}; repeatable (see above)."),
+    shown: Annotated[
+        list[Layer] | None,
+        typer.Option("--layer", metavar=f"<{'|'.join(LAYERS)}>", help="What is shown; repeatable."),
     ] = None,
     recolor: Annotated[
         list[str] | None,
@@ -76,7 +83,10 @@ def render(
     formats: Annotated[
         str | None,
         typer.Option(
-            "--format", help="Of all views together: gif, webp, mp4, sprites; comma-separated."
+            "--format",
+            metavar=f"<{'|'.join(FORMATS)}>,...",
+            help="Of all views together.",
+            autocompletion=_like,
         ),
     ] = None,
     gif: Annotated[
@@ -100,11 +110,13 @@ def render(
     """
     printer = Printer(as_json, quiet)
     repaint = bool(recolor or palette)
+    layers = None if shown is None else [layer.value for layer in shown]
     _check_arguments(cameras, views, layers, repaint=repaint)
     if cameras is not None and (elevation is not None or size is not None):
         raise typer.BadParameter("--elevation and --size belong to --turntable")
 
     from toonset.nerf.kernels.threads import use_threads
+    from toonset.nerf.render.animation import check_mp4
     from toonset.nerf.render.files import rendered_files
     from toonset.nerf.render.layers import default_layer
     from toonset.nerf.render.recolor import recolored, repainted, with_pen
@@ -112,8 +124,9 @@ def render(
     from toonset.write import new_folder, write_bytes
 
     together = _formats(formats, gif, turning=views is not None)
+    if "mp4" in together:
+        check_mp4()
     use_threads(threads)
-    check_output(out, [run, cameras], WRITTEN, force=force)
     trained = recolored(read_field(run), recolor or [])
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
     wanted = layers or [default_layer(trained) if views else "rgb"]
@@ -121,6 +134,7 @@ def render(
     trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
     trained = with_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
+    check_output(out, [run, cameras], WRITTEN, force=force)
     files = rendered_files(
         trained, named, wanted, together, printer.progress, printer.say, as_drawn=as_drawn
     )
@@ -146,13 +160,12 @@ def _report(
 
 def _formats(given: str | None, gif: bool | None, *, turning: bool) -> tuple[str, ...]:
     """Return the names of the files that hold all views."""
-    from toonset.nerf.render.files import FORMATS
-
     names = tuple(dict.fromkeys(word.strip() for word in given.split(","))) if given else ()
     for name in names:
         if name not in FORMATS:
-            known = ", ".join(FORMATS)
-            raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--format")
+            near = did_you_mean(name, FORMATS)
+            said = f"{name!r} is none of {', '.join(FORMATS)}" + (f"; {near}" if near else "")
+            raise typer.BadParameter(said, param_hint="--format")
     wanted = gif if gif is not None else turning and not names
     return names if "gif" in names or not wanted else ("gif", *names)
 
@@ -191,10 +204,6 @@ def _check_arguments(
         raise typer.BadParameter("give either --cameras transforms.json or --turntable N")
     if layers is None:
         return
-    for layer in layers:
-        if layer not in LAYERS:
-            names = ", ".join(LAYERS)
-            raise typer.BadParameter(f"{layer!r} is none of {names}", param_hint="--layer")
     if len(set(layers)) < len(layers):
         raise typer.BadParameter("names a layer twice", param_hint="--layer")
     if repaint and not {"drawn", "palette", "labels"} & set(layers):

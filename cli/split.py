@@ -61,9 +61,13 @@ def split(
     from toonset.dataset.split_folder.load import split_sheet
     from toonset.dataset.split_folder.overlay import draw_sheet
     from toonset.dataset.split_folder.write import write_split
+    from toonset.errors import PictureError, SheetError
+    from toonset.read import check_there
 
     Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet)
+    check_there(sheets, "picture", PictureError)
+    check_there([boxes], "boxes", SheetError)
     check_output(out, [*sheets, boxes], WRITTEN, force=force)
     sheet = split_sheet(
         sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels

@@ -104,8 +104,8 @@ def synth(
     from toonset.dataset.synthetic.turnaround import make_turnaround
 
     printer = Printer(as_json, quiet)
-    check_output(out, [mesh], WRITTEN, force=force)
     body = load_mesh(mesh)
+    check_output(out, [mesh], WRITTEN, force=force)
     made = make_turnaround(body, options, seed, _landmarks(mesh))
     test = None
     if options.artist != ArtistOptions():

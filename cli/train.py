@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -20,8 +19,9 @@ from toonset.cli.common.output import (
 )
 from toonset.cli.common.train_place import Place
 from toonset.cli.common.train_run import Request, run
+from toonset.nerf.options import DeviceName, FieldName, PresetName
+from toonset.nerf.options import preset as preset_options
 
-INKS = ("paint", "redraw")
 WHILE_PANEL = "While it runs"
 MOST_BUDGET_S = 1e9
 
@@ -56,14 +56,13 @@ def train(
         ),
     ] = None,
     preset: Annotated[
-        str,
+        PresetName,
         typer.Option(
-            "--preset",
-            help="fast; or paper: the plain method, along whole rays, 2,000 steps, minutes.",
+            "--preset", help="paper: the plain method, along whole rays, 2,000 steps, minutes."
         ),
     ] = "fast",
     field: Annotated[
-        str | None,
+        FieldName | None,
         typer.Option(
             "--field",
             help="auto (default): planes as coarse as the drawings allow; triplane: one cell per "
@@ -71,7 +70,7 @@ def train(
         ),
     ] = None,
     ink: Annotated[
-        str,
+        Literal["paint", "redraw"],
         typer.Option(
             "--ink",
             help="paint: contour lines are trained as colour; redraw: they are taken off and drawn "
@@ -105,7 +104,9 @@ def train(
     no_palette: Annotated[
         bool, typer.Option("--no-palette", help="Colours only: no palette, no labels.")
     ] = False,
-    device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
+    device: Annotated[
+        DeviceName, typer.Option("--device", help="auto: a GPU where there is one.")
+    ] = "auto",
     threads: Annotated[
         str, typer.Option("--threads", help="CPU threads, or auto: as many as make it faster here.")
     ] = AUTO,
@@ -151,13 +152,6 @@ def train(
     was cut short, and with --strict when the run is weak; the files are written then too. Ctrl-C
     finishes the step, keeps what there is in RUN.unfinished and says how to go on.
     """
-    from toonset.nerf.options import DEVICES, FIELDS, PRESETS
-    from toonset.nerf.options import preset as preset_options
-
-    _check_choice(device, DEVICES, "--device")
-    _check_choice(preset, PRESETS, "--preset")
-    _check_choice(field or FIELDS[0], FIELDS, "--field")
-    _check_choice(ink, INKS, "--ink")
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
     switches = {"fair": as_carved, "register": as_placed, "turn": as_turned}
     switches |= {"unbend": as_bent, "symmetric": one_sided, "mannequin": no_mannequin}
@@ -178,12 +172,6 @@ def train(
     code = run(request, Printer(as_json, quiet, verbose))
     if code:
         raise typer.Exit(code)
-
-
-def _check_choice(value: str, choices: Sequence[str], option: str) -> None:
-    """Refuse a value that is none of an option's choices."""
-    if value not in choices:
-        raise typer.BadParameter(f"{value!r} is none of {', '.join(choices)}", param_hint=option)
 
 
 def _test_of(root: Path) -> Path | None:

@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 from typing import Any, Literal, get_args
 
 from toonset.errors import UsageError
 
-# What can be seen of a rendering.
-LAYERS = ("drawn", "rgb", "palette", "depth", "labels", "alpha", "ink", "normal", "normal-camera")
+
+class Layer(StrEnum):
+    """What can be seen of a rendering."""
+
+    drawn = "drawn"
+    rgb = "rgb"
+    palette = "palette"
+    depth = "depth"
+    labels = "labels"
+    alpha = "alpha"
+    ink = "ink"
+    normal = "normal"
+    normal_camera = "normal-camera"
+
+
+LAYERS = tuple(layer.value for layer in Layer)
 FieldName = Literal["auto", "triplane", "mlp", "voxel", "hull"]
 FIELDS: tuple[FieldName, ...] = get_args(FieldName)
-DEVICES = ("auto", "cpu", "cuda")
-PRESETS = ("fast", "paper")
+DeviceName = Literal["auto", "cpu", "cuda"]
+DEVICES: tuple[DeviceName, ...] = get_args(DeviceName)
+PresetName = Literal["fast", "paper"]
+PRESETS: tuple[PresetName, ...] = get_args(PresetName)
+FORMATS = ("gif", "webp", "mp4", "sprites")  # of all views of a turn together
 LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
 LEAST |= {"smoothness": 0, "palette_weight": 0}
+FACES = 8000  # of a mesh at most: docs/decisions.md
 USUAL_STEPS, STEPS_ON_SHAPE = 600, 300  # by default: without the mannequin's shape, and with it
 PAPER_STEPS = 2000
 

@@ -10,7 +10,12 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError, UsageError
-from toonset.palette.formats.registry import names_tones, parse_colors
+from toonset.palette.formats.registry import (
+    names_tones,
+    palette_title,
+    parse_colors,
+    parse_named_colors,
+)
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
@@ -67,8 +72,9 @@ def extract_palette(
         keep: colours to keep however small they are: "#aabbcc,...".
         contour: count drawn lines to their colour; without, only what is painted with it.
         features: keep eyes, mouths and buttons under that share, too; None: on shaded sheets.
-        colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file. Where the
-            file has tones in shadow, a sheet's shadow is taken off; else name both tones.
+        colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file, whose title
+            and names are kept. Where the file has tones in shadow, a sheet's shadow is taken off;
+            else name both tones.
         method: "toonset", or "extcolors", the paper's tool.
 
     Raises:
@@ -143,7 +149,27 @@ def choose_palette(
     method: str = "toonset",
 ) -> Palette:
     """Return the palette of pictures whose drawn lines are known; see `extract_palette`."""
-    options = options or PaletteOptions()
+    found = _chosen(pictures, contours, options or PaletteOptions(), colors, method)
+    return found if colors is None else _as_given(found, colors)
+
+
+def _as_given(found: Palette, given: str) -> Palette:
+    """Return a palette with the title and the names that its file has; others stay."""
+    names = {color.rgb: color.name for color in parse_named_colors(given) if color.name}
+    colors = tuple(replace(one, name=names.get(one.rgb, one.name)) for one in found.colors)
+    ink = found.contour
+    if ink is not None:
+        ink = replace(ink, name=names.get(ink.rgb, ink.name))
+    return replace(found, colors=colors, contour=ink, title=palette_title(given))
+
+
+def _chosen(
+    pictures: Sequence[Picture],
+    contours: Sequence[Map],
+    options: PaletteOptions,
+    colors: str | None,
+    method: str,
+) -> Palette:
     if method not in METHODS:
         raise UsageError(f"--method: {method!r} is none of {', '.join(METHODS)}")
     if colors is not None and (options.keep or method != "toonset"):

@@ -137,6 +137,7 @@ class Palette:
         evidence: of the number of colours; None where it was not chosen by us.
         shadow: of a sheet that is shaded in two tones; None of a flat one.
         features: those of the colours that are under the rule, but kept: eyes, mouths, buttons.
+        title: what programs show as the palette's name; "": none was given yet.
     """
 
     colors: tuple[PaletteColor, ...]
@@ -147,6 +148,7 @@ class Palette:
     evidence: Evidence | None = None
     shadow: Shadow | None = None
     features: tuple[tuple[int, int, int], ...] = ()
+    title: str = ""
 
     def __post_init__(self) -> None:
         """Refuse palettes that cannot label anything.

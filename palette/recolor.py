@@ -20,20 +20,22 @@ Map = UInt8[np.ndarray, "height width"]
 Colors = UInt8[np.ndarray, "colors 3"]
 
 
-def changed_colors(colors: Colors, changes: Sequence[str]) -> Colors:
+def changed_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] = ()) -> Colors:
     """Return a palette's colours with some replaced; all changes happen at once.
 
     Args:
         colors: of the palette.
         changes: "OLD=NEW", hex colours; OLD must be one of the palette, or the name that `toonset
             palette` gives one of them and no other.
+        names: of the colours, where they have others than their plain ones.
 
     Raises:
         PaletteError: no such colour, one that is replaced twice, or text that is no such pair.
     """
     old: list[RGB] = [(r, g, b) for r, g, b in colors.tolist()]
-    called = Counter(name_of(color) for color in old)
-    names = {name_of(color): color for color in old if called[name_of(color)] == 1}
+    plain = [name_of(color) for color in old]
+    shown = list(names) or plain
+    called = _unique(plain, old) | _unique([name.lower() for name in shown], old)
     new = colors.copy()
     replaced: set[RGB] = set()
     for change in changes:
@@ -41,15 +43,22 @@ def changed_colors(colors: Colors, changes: Sequence[str]) -> Colors:
         if len(words) != 2:
             raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
         source, where = words[0].strip().lower(), f"--recolor {change!r}"
-        known = names.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
+        known = called.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
         if known is None or known not in old:
-            has = ", ".join(f"{hex_of(color)} ({name_of(color)})" for color in old)
+            pairs = zip(old, shown, strict=True)
+            has = ", ".join(f"{hex_of(color)} ({name})" for color, name in pairs)
             raise PaletteError(f"{where}: the palette has {has}; choose one of them")
         if known in replaced:
             raise PaletteError(f"{where}: {hex_of(known)} is replaced twice; drop one")
         replaced.add(known)
         new[old.index(known)] = rgb_of_typed(words[1].strip(), where)
     return new
+
+
+def _unique(names: Sequence[str], colors: Sequence[RGB]) -> dict[str, RGB]:
+    """Return which colour is meant by every name that only one of them has."""
+    count = Counter(names)
+    return {name: color for name, color in zip(names, colors, strict=True) if count[name] == 1}
 
 
 def recolored_drawing(

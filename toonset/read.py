@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,26 @@ MAX_DEPTH = 64  # camera files nest eight deep
 LARGEST_INT = 2**63  # beyond, other programs' integers end
 MAX_DIGITS = 400  # as a float's longest; Python itself refuses 4300
 BOM = b"\xef\xbb\xbf"
+
+
+def check_there(paths: Iterable[Path | None], thing: str, error_type: type[ToonsetError]) -> None:
+    """Refuse files that are not there, before any work; what else is wrong their reader says.
+
+    Args:
+        paths: the files or folders; None: not given.
+        thing: what they are, for the message, as of `read_whole`.
+        error_type: the error to raise.
+
+    Raises:
+        ToonsetError: as `error_type`: a file is not there.
+    """
+    for path in paths:
+        try:
+            _ = path and path.stat()
+        except FileNotFoundError as error:
+            raise error_type(_missing(path, thing)) from error
+        except (OSError, ValueError):
+            continue
 
 
 def read_whole(
@@ -73,7 +94,7 @@ def read_whole(
             )
         return path.read_bytes()
     except FileNotFoundError as error:
-        raise error_type(f"{path}: no such file; check the name of the {thing}") from error
+        raise error_type(_missing(path, thing)) from error
     except OSError as error:
         reason = error.strerror or str(error)
         raise error_type(f"{path}: cannot be read ({reason}); check its permissions") from error
@@ -118,6 +139,10 @@ def parse_json(data: bytes, where: str, error_type: type[ToonsetError]) -> Any:
         reason = " ".join(str(error).split())
         raise error_type(f"{where}: is no valid JSON ({reason}); write it again") from error
     return value
+
+
+def _missing(path: Path | None, thing: str) -> str:
+    return f"{path}: no such file; check the name of the {thing}"
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

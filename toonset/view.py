@@ -101,6 +101,9 @@ def over_white(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "
     return values[..., :3] * values[..., 3:] + 1 - values[..., 3:]
 
 
+SHEET = "sheet"  # the role of a file that holds drawings, side by side or one
+
+
 @dataclass(frozen=True)
 class InputFile:
     """A file that a result depends on.

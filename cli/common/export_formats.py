@@ -53,7 +53,7 @@ class Target:
         takes: what of a job it takes besides folder, views, mesh and force.
         fixed: arguments that make it this format.
         is_exact: whether it holds orthographic cameras.
-        hint: what a person should know before the next step.
+        hint: what a person should know before the next step, or type for it; {out} is the folder.
     """
 
     writer: str
@@ -85,8 +85,9 @@ TARGETS = {
         "nerfstudio:write_transforms",
         (*BESIDE, "transforms.json", "sparse_pc.ply"),
         takes=("points",),
-        hint="to keep the world as it is: ns-train METHOD nerfstudio-data --data FOLDER "
-        "--orientation-method none --center-method none --auto-scale-poses False",
+        hint="to keep world and cameras, and to train and evaluate on all views: ns-train nerfacto "
+        "--pipeline.model.camera-optimizer.mode off nerfstudio-data --data {out} "
+        "--orientation-method none --center-method none --auto-scale-poses False --eval-mode all",
     ),
     Format.instant_ngp: Target(
         "nerfstudio:write_transforms", (*BESIDE, "transforms.json"), fixed={"instant_ngp": True}
@@ -101,7 +102,7 @@ TARGETS = {
         "blender:write_blender_script",
         (*BESIDE, "import_cameras.py"),
         is_exact=True,
-        hint="run it: blender --python import_cameras.py",
+        hint="run it: blender --python {out}/import_cameras.py",
     ),
     Format.gltf: Target("gltf:write_gltf", (*BESIDE, "scene.glb"), is_exact=True),
     Format.opencv: Target("opencv:write_opencv", (*BESIDE, "cameras.yml")),

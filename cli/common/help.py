@@ -1,4 +1,7 @@
-"""Help in plain text: under panels as the verbs name them, without the 0.3 s that rich costs."""
+"""Help in plain text: under panels as the verbs name them, without the 0.3 s that rich costs.
+
+Also what a mistyped choice was meant to be.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,10 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from toonset.errors import UsageError
+from toonset.suggest import did_you_mean
 
 NOTHING_ASKED = 2  # exit code, as of any wrong use
+HELP = "help"  # the word, for people who do not try -h
 
 
 class Verb(TyperCommand):
@@ -22,6 +27,14 @@ class Verb(TyperCommand):
             return super().invoke(ctx)
         except UsageError as error:
             raise typer.BadParameter(str(error), ctx=ctx) from error
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; a value that is no choice is told the choice most like it."""
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            error.message += _meant(error)
+            raise
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write every parameter under its panel; a panel comes where its first parameter does."""
@@ -46,10 +59,12 @@ class Verbs(TyperGroup):
     """The program's help: every verb with the whole first paragraph of its own."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Show the help where nothing is asked for."""
-        if not args:
+        """Show the help where nothing is asked for; `help VERB` is `VERB --help`."""
+        if not args and not ctx.resilient_parsing:  # shells complete so
             print(ctx.get_help(), file=sys.stderr)
             raise typer.Exit(NOTHING_ASKED)
+        if args[:1] == [HELP]:
+            args = [*args[1:], "--help"]
         return super().parse_args(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -60,3 +75,13 @@ class Verbs(TyperGroup):
         ]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
+
+
+def _meant(error: Any) -> str:
+    """Return what to say after a refused value of an option with choices."""
+    choices = error.param.type_descriptor.choices if error.param is not None else None
+    if choices is None or error.__cause__ is None:
+        return ""
+    given = str(error.__cause__.errors()[0]["input"])
+    near = did_you_mean(given, map(str, choices))
+    return f" D{near[1:]}" if near else ""

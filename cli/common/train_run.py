@@ -74,11 +74,11 @@ def run(request: Request, printer: Printer) -> int:
     from toonset.nerf.training import train
 
     place = request.place
+    scene = read_scene(request.bundle)
+    test = None if request.test is None else read_scene(request.test)
     place.check([request.bundle, request.test], resume=request.resume)
     checkpoint = place.checkpoint() if request.resume else None
     options = _options(request, checkpoint)
-    scene = read_scene(request.bundle)
-    test = None if request.test is None else read_scene(request.test)
     if checkpoint is None:
         place.clear()
     keep_freed_memory()

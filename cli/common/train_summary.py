@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ def summary(run: Path, metrics: dict[str, Any], verbose: bool = False) -> str:
     fit, seconds = metrics["train"], sum(metrics["seconds"].values())
     counts = metrics["counts"]
     size = f", {counts['rays']} rays, {counts['parameters']} parameters" if verbose else ""
+    after = ["toonset", "render", str(run), "--turntable", "36", "-o", "turntable"]
     held_out = [f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []
     return "\n".join(
         [
@@ -22,7 +24,7 @@ def summary(run: Path, metrics: dict[str, Any], verbose: bool = False) -> str:
             f"fit to the drawings{_set_right(metrics['drawings'])}: {_figures(fit)}",
             *held_out,
             _verdict(metrics["verdict"], verbose=verbose),
-            f"{run}: look at preview.png; next: toonset render {run} --turntable 36",
+            f"{run}: look at preview.png; next: {shlex.join(after)}",
         ]
     )
 

@@ -11,7 +11,7 @@ contours/000.png ..  per picture: grey PNG, how far drawn lines cover each pixel
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from jaxtyping import UInt8
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.palette.extract import paint_maps
 from toonset.palette.formats.registry import encode_palette
+from toonset.palette.names import clean_name
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
 from toonset.palette.swatch_image import draw_swatches
@@ -30,6 +31,17 @@ PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
 COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs
 
 Maps = Sequence[tuple[str, UInt8[np.ndarray, "_ _"]]]
+
+
+def palette_title(sheets: Iterable[str], folder: Path) -> str:
+    """Return what a palette is called: the sheet's name if there is one sheet, else the folder's.
+
+    Args:
+        sheets: file names of the sheets that the drawings come from, if they are known.
+        folder: where the drawings lie.
+    """
+    names = list(dict.fromkeys(sheets))
+    return clean_name(Path(names[0]).stem if len(names) == 1 else folder.resolve().name)
 
 
 def write_labelled(

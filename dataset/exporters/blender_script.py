@@ -3,7 +3,8 @@
 SCRIPT = r'''"""Cameras, mannequin and drawings of a character, for Blender 3.6 or later.
 
 Written by toonset @VERSION@. Run it with `blender --python import_cameras.py`, or open it in the
-Scripting tab and press Run. It makes one collection; frame 1, 2, ... shows view 1, 2, ...
+Scripting tab and press Run. It makes a scene of its own and shows it: the start-up cube, light and
+camera stay in theirs. Frame 1, 2, ... shows view 1, 2, ...
 """
 
 import json
@@ -103,12 +104,21 @@ def add_mannequin(collection):
     collection.objects.link(body)
 
 
+def add_sun(collection):
+    """Light the mannequin from above, in front and one side; drawings need no light."""
+    sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
+    sun.rotation_euler = (0.8, 0.0, 0.5)
+    collection.objects.link(sun)
+
+
 def main():
-    """Build the collection and set up scene and timeline."""
-    scene = bpy.context.scene
+    """Make and show a scene with mannequin, drawings, cameras and timeline."""
+    scene = bpy.data.scenes.new("toonset")
+    bpy.context.window.scene = scene
     collection = bpy.data.collections.new("toonset")
     scene.collection.children.link(collection)
     add_mannequin(collection)
+    add_sun(collection)
     scene.render.resolution_x, scene.render.resolution_y = WINDOW
     scene.render.resolution_percentage = 100
     scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1.0

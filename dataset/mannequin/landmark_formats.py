@@ -8,12 +8,12 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from toonset.errors import LandmarkError
 from toonset.read import read_whole
+from toonset.suggest import did_you_mean
 
 SCHEMA = "toonset-landmarks/1"
 KEYS = ("schema", "units", "pixels", "points", "views")
@@ -66,9 +66,8 @@ def read_landmark_file(path: Path) -> LandmarkFile:
 
 def closest(word: str, choices: Sequence[str]) -> str:
     """Return advice: the choice most like `word`, or the list of choices."""
-    near = get_close_matches(word, choices, n=1)
     listed = ", ".join(choices[:20]) + (", ..." if len(choices) > 20 else "")
-    return f"did you mean {near[0]!r}?" if near else f"choose one of: {listed}"
+    return did_you_mean(word, choices) or f"choose one of: {listed}"
 
 
 def _from_csv(path: Path, text: str) -> LandmarkFile:

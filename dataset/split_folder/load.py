@@ -26,7 +26,7 @@ from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
 from toonset.errors import PictureError, SheetError, UsageError
 from toonset.read import read_whole
-from toonset.view import InputFile, Origin, View
+from toonset.view import SHEET, InputFile, Origin, View
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Paths = str | Path | Sequence[str | Path]
@@ -192,7 +192,7 @@ def _of_sheet(path: Path, options: SheetOptions) -> Sheet:
     except SheetError as error:
         raise SheetError(f"{path}: {error}") from error
     split = split_of_sheet(path.name, data, (width, height), found)
-    files = (InputFile("sheet", path.name, split.sources[0].sha256),)
+    files = (InputFile(SHEET, path.name, split.sources[0].sha256),)
     notes = _uneven_cells(path, (width, height), options.grid)
     return Sheet(split, len(split.views), (picture,), files, notes=notes)
 

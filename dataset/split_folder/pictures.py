@@ -9,12 +9,17 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.bundle.transforms_read import NAMES, picture_paths
+from toonset.dataset.bundle.bundle import CALIBRATION
+from toonset.dataset.bundle.calibration_file import read_calibration
+from toonset.dataset.bundle.palette_files import palette_title
+from toonset.dataset.bundle.transforms_read import NAMES, picture_paths, transforms_file
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.places import is_split_folder, sheet_places
 from toonset.dataset.split_folder.read import read_split
-from toonset.errors import BundleError, SheetError
+from toonset.errors import BundleError, PictureError, SheetError
+from toonset.read import check_there
+from toonset.view import SHEET
 
 Picture = UInt8[np.ndarray, "height width 4"]
 
@@ -27,11 +32,13 @@ class Pictures:
         names: file name of each picture's label map.
         pictures: the character on transparent ground.
         notes: what a person should know of the files.
+        title: what to call the character: its sheet's name, or the folder's.
     """
 
     names: tuple[str, ...]
     pictures: tuple[Picture, ...]
     notes: tuple[str, ...]
+    title: str
 
 
 def bundle_of(places: Sequence[Path]) -> Path | None:
@@ -48,6 +55,19 @@ def bundle_of(places: Sequence[Path]) -> Path | None:
     return places[0].parent if places[0].suffix.lower() == ".json" else places[0]
 
 
+def check_pictures(places: Sequence[Path]) -> None:
+    """Refuse places that are not there, before any work.
+
+    Raises:
+        BundleError: no such bundle, or one beside something else.
+        PictureError: no such picture.
+    """
+    if bundle_of(places) is not None:
+        transforms_file(places[0])
+    else:
+        check_there(places, "picture", PictureError)
+
+
 def load_pictures(places: Sequence[Path]) -> Pictures:
     """Return the pictures that files and folders mean.
 
@@ -62,8 +82,9 @@ def load_pictures(places: Sequence[Path]) -> Pictures:
         names = tuple(f"{path.stem}.png" for path in paths)
         if len(set(names)) < len(names):
             raise BundleError(f"{places[0]}: two pictures have the same file name; rename one")
-        return Pictures(names, tuple(_loaded(path, notes) for path in paths), tuple(notes))
-    pictures: list[Picture] = []
+        pictures = [_loaded(path, notes) for path in paths]
+        return Pictures(names, tuple(pictures), tuple(notes), _bundle_title(places[0]))
+    pictures, sheets = [], []
     found, skipped = sheet_places([_inner(place) for place in places])
     notes += skipped
     for place in found:
@@ -71,10 +92,22 @@ def load_pictures(places: Sequence[Path]) -> Pictures:
             split, changed = read_split(place)
             notes += changed
             pictures += [view.rgba for view in split.views]
+            sheets += [source.name for source in split.sources]
         else:
             pictures.append(_loaded(place, notes))
+            sheets.append(place.name)
     names = tuple(f"{number:03d}.png" for number in range(len(pictures)))
-    return Pictures(names, tuple(pictures), tuple(notes))
+    folder = places[0] if places[0].is_dir() else places[0].parent
+    return Pictures(names, tuple(pictures), tuple(notes), palette_title(sheets, folder))
+
+
+def _bundle_title(place: Path) -> str:
+    root = transforms_file(place).parent
+    try:
+        inputs = read_calibration(root / CALIBRATION).inputs
+    except BundleError:  # of other programs there is none; `toonset check` tells of a broken one
+        inputs = []
+    return palette_title((file.name for file in inputs if file.role == SHEET), root)
 
 
 def _is_meant_as_bundle(place: Path) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from itertools import product
 
@@ -10,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.errors import SheetError
+from toonset.suggest import did_you_mean
 
 Label = tuple[float, ...]  # possible yaws in radians; empty where nothing is said
 
@@ -97,8 +97,8 @@ def _label(entry: str) -> Label:
     except ValueError:
         yaw = math.nan
     if not math.isfinite(yaw):
-        near = difflib.get_close_matches(entry, [name for name in NAMES if len(name) > 1], 1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
+        near = did_you_mean(entry, (name for name in NAMES if len(name) > 1))
+        hint = f"{near} " if near else ""
         raise SheetError(
             f"--views: {entry!r} is no direction; {hint}use front, 3q, side, back, left, right, "
             '3q-left, back-right ..., a yaw in degrees, or "?"'

@@ -22,7 +22,7 @@ GIF_COLORS = 256
 GIF_EXACT = 96  # of them: flat colours stay as they are, mixed ones share the others
 LOSSLESS_EFFORT = 60  # of 100: more takes three times as long for 2 %
 MP4_QUALITY = 16  # x264's constant rate factor: flat colours keep no visible blocks
-INSTALL_AV = "MP4 needs PyAV, which is missing here; install it: pip install av"
+INSTALL_AV = "pip install av"
 
 Pictures = Sequence[UInt8[np.ndarray, "height width 4"]]
 
@@ -96,10 +96,7 @@ def encode_mp4(pictures: Pictures) -> bytes:
         SetupError: PyAV is not installed.
     """
     check_one_size(pictures, "turntable.mp4")
-    try:
-        av = importlib.import_module("av")  # an extra, so type checkers may not find it
-    except ImportError as error:
-        raise SetupError(INSTALL_AV) from error
+    av = check_mp4()
     frames = [_even(_flat(picture)) for picture in pictures]
     rate = Fraction(1000, duration_ms(len(frames)))
     buffer = io.BytesIO()
@@ -112,6 +109,19 @@ def encode_mp4(pictures: Pictures) -> bytes:
             file.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
         file.mux(stream.encode())
     return buffer.getvalue()
+
+
+def check_mp4() -> Any:
+    """Return PyAV, which writes MP4; it can be asked for before any work.
+
+    Raises:
+        SetupError: it is not installed.
+    """
+    try:
+        return importlib.import_module("av")  # an extra, so type checkers may not find it
+    except ImportError as error:
+        said = f"MP4 needs PyAV, which is missing here; install it: {INSTALL_AV}"
+        raise SetupError(said) from error
 
 
 def check_one_size(pictures: Pictures, name: str) -> None:

@@ -15,7 +15,6 @@ from toonset.nerf.render.depth_levels import DepthLevels
 from toonset.nerf.render.sprite_sheet import feet, sprite_json, sprite_sheet
 from toonset.nerf.render.views import render
 
-FORMATS = ("gif", "webp", "mp4", "sprites")
 ANIMATIONS = {"gif": encode_gif, "webp": encode_webp, "mp4": encode_mp4}
 SPRITES = "sprites"
 UNSEEN = 0.05  # of a view in the drawn look: worth a word
@@ -38,7 +37,7 @@ def rendered_files(
         trained: what is rendered.
         named: cameras with the names of their pictures, without ending.
         layers: names out of LAYERS; several are written as NAME-LAYER.png.
-        formats: names out of FORMATS: files of all views of the first layer.
+        formats: names out of `nerf.options.FORMATS`: files of all views of the first layer.
         progress: told which view is rendered.
         say: told which view shows most that is in no drawing.
         as_drawn: bend pictures as the drawings were.
@@ -75,7 +74,7 @@ def turntable_files(
     """Return turntable.gif, .webp, .mp4 and sprites.png with sprites.json, by name.
 
     Args:
-        formats: names out of FORMATS.
+        formats: names out of `nerf.options.FORMATS`.
         pictures: one per camera, in the order of the turn.
         trained: what they show.
         cameras: that saw them.

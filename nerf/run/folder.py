@@ -136,6 +136,9 @@ def read_field(folder: str | Path) -> TrainedField:
     config_file, model_file = folder / CONFIG, folder / MODEL
     for file in (config_file, model_file):
         if not file.is_file():
+            inside = sorted(folder.glob(f"*/{CONFIG}"))  # of a bundle
+            if inside:
+                raise BundleError(f"{folder}: is no run; did you mean {inside[0].parent}?")
             raise BundleError(f"{file}: does not exist; `toonset train` writes run folders")
     record = _record(config_file)
     trained = _empty(record)

@@ -12,11 +12,13 @@ borders "Simplifying surfaces with color and texture", 1998; link condition: Dey
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float, Int
 
 BORDER_WEIGHT = 4.0  # of a border's planes against faces' planes
+STEPS_BETWEEN = 1000  # of two reports of how far it is
 LEAST_TURN = 0.2  # cosine between a face's normal before and after
 SINGULAR = 1e-6  # of the matrix' scale to the third: then ends and middle are tried instead
 
@@ -31,6 +33,7 @@ def decimated(
     faces: Int[np.ndarray, "f 3"],
     labels: Int[np.ndarray, " f"],
     wanted: int,
+    progress: Callable[[float], None] = lambda done: None,
 ) -> Triangles:
     """Return a closed surface with at most `wanted` faces, or as few as keep it closed.
 
@@ -40,12 +43,13 @@ def decimated(
             single face stay.
         labels: of every face; faces keep theirs.
         wanted: number of faces to stop at.
+        progress: told which share of the faces that go is gone.
     """
     scale = float(np.ptp(vertices, axis=0).max())
     middle = vertices.mean(axis=0)
     unit = (vertices - middle) / scale  # one unit for all thresholds
     net = _Net(unit, faces, _quadrics(unit, faces, labels))
-    net.collapse(wanted)
+    net.collapse(wanted, progress)
     kept = np.array([f for f, corners in enumerate(net.faces) if corners], dtype=np.int64)
     corners = np.array([net.faces[f] for f in kept], dtype=np.int64).reshape(-1, 3)
     used, index = np.unique(corners, return_inverse=True)
@@ -105,19 +109,21 @@ class _Net:
         self.changes = [0] * len(self.places)
         self.heap: list[tuple[float, int, int, int, Point]] = []
 
-    def collapse(self, wanted: int) -> None:
+    def collapse(self, wanted: int, progress: Callable[[float], None]) -> None:
         """Collapse edges until `wanted` faces are left, or none may collapse."""
         for vertex in range(len(self.places)):
             for other in self.neighbours(vertex):
                 if vertex < other:
                     self._offer(vertex, other)
-        left = len(self.faces)
+        left = whole = len(self.faces)
         while left > wanted and self.heap:
             _, a, b, changes, place = heapq.heappop(self.heap)
             if changes != self.changes[a] + self.changes[b] or not self._allowed(a, b, place):
                 continue
             self._merge(a, b, place)
             left -= 2
+            if left % STEPS_BETWEEN < 2:
+                progress((whole - left) / (whole - wanted))
             for other in self.neighbours(a):
                 self._offer(a, other)
 

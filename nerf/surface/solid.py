@@ -18,6 +18,7 @@ Source: Kutulakos and Seitz, "A theory of shape by space carving", 2000, with op
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,30 +57,38 @@ class Solid:
 
 
 @torch.no_grad()
-def solid_of(trained: TrainedField) -> Solid:
+def solid_of(trained: TrainedField, progress: Callable[[float], None] = lambda done: None) -> Solid:
     """Return what is solid of a trained field: no cavities, no specks.
+
+    Args:
+        trained: the field.
+        progress: told which share is done.
 
     Raises:
         BundleError: nothing is.
     """
     hull = trained.hull
-    stopped = _stopped(trained)
+    stopped = _stopped(trained, progress)
     support = hull.support.numpy() * (SOLID_FROM / LEVEL)
     grown = _grown(stopped >= SOLID_FROM, support >= SOLID_FROM)
     values = np.pad(np.minimum(support, grown), 1)
     return Solid(hull.low - hull.voxel / 2, hull.voxel, _whole(values))
 
 
-def _stopped(trained: TrainedField) -> Float[np.ndarray, "x y z"]:
+def _stopped(
+    trained: TrainedField, progress: Callable[[float], None]
+) -> Float[np.ndarray, "x y z"]:
     """Return the smallest s_d of all directions at the hull's voxels, smoothed; 0 far from it."""
     hull = trained.hull
     near = hull.near.reshape(-1).nonzero()[:, 0]
     points = hull.centres()[near]
+    progress(0.0)
     depth = _optical_depth(trained, near, points)
     least = torch.ones(len(points))
     for number in range(DIRECTIONS // 2):
         angle = 2 * math.pi * number / DIRECTIONS
         least = torch.minimum(least, _both_ways(depth, hull, points, angle))
+        progress((number + 1) / (DIRECTIONS // 2))
     table = torch.zeros(hull.support.numel())
     table[near] = least
     return ndimage.gaussian_filter(table.view(hull.support.shape).numpy(), SMOOTHING)

@@ -6,6 +6,9 @@ colours are equally likely. Neighbours share the cuts, so the surface stays clos
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from jaxtyping import Float, Int
 from scipy import ndimage
@@ -13,6 +16,7 @@ from skimage.measure import marching_cubes
 
 from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.options import FACES
 from toonset.nerf.surface.color import label_probabilities
 from toonset.nerf.surface.cut import cut
 from toonset.nerf.surface.decimate import decimated
@@ -24,12 +28,17 @@ FEWEST = 100  # triangles that show any figure
 FINER = 4  # times as many faces as wanted are enough to choose from
 
 
-def surface_of(trained: TrainedField, faces: int | None = None) -> Surface:
+def surface_of(
+    trained: TrainedField,
+    faces: int | None = FACES,
+    progress: Callable[[str, float], None] = lambda step, done: None,
+) -> Surface:
     """Return the surface of a trained field.
 
     Args:
         trained: a field with palette.
         faces: at most so many triangles; None: all, a few per voxel of the hull's surface.
+        progress: told what is done now, and which share of it.
 
     Raises:
         BundleError: the field shows nothing.
@@ -38,7 +47,7 @@ def surface_of(trained: TrainedField, faces: int | None = None) -> Surface:
     """
     if faces is not None and faces < FEWEST:
         raise UsageError(f"faces: {faces}; {FEWEST} or more are needed to close a figure")
-    solid = solid_of(trained)
+    solid = solid_of(trained, partial(progress, "finding the surface"))
     vertices, corners = _triangles(solid)
     rounds = ROUNDS
     if faces is not None and len(corners) > 4 * FINER * faces:
@@ -47,7 +56,8 @@ def surface_of(trained: TrainedField, faces: int | None = None) -> Surface:
     chances = label_probabilities(trained, vertices, corners, rounds)
     vertices, corners, labels = cut(vertices, corners, chances)
     if faces is not None and len(corners) > faces:
-        vertices, corners, labels = decimated(vertices, corners, labels, faces)
+        fewer = partial(progress, "merging triangles")
+        vertices, corners, labels = decimated(vertices, corners, labels, faces, fewer)
     assert trained.palette is not None  # label_probabilities has refused a run without palette
     return Surface(vertices, corners, labels, trained.palette)
 

@@ -6,7 +6,7 @@ drawing shows it. Beside a seam the next drawing's colour is mixed in where it h
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -16,6 +16,7 @@ from toonset.dataset.mesh.rasterize import depth_map
 from toonset.errors import BundleError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.look.drawings import Drawings, Places, taken
+from toonset.nerf.options import FACES
 from toonset.nerf.surface.choose import chosen, merits
 from toonset.nerf.surface.files import Surface
 from toonset.nerf.surface.paint import Paint, paint_of
@@ -30,7 +31,6 @@ from toonset.nerf.surface.unwrap import (
     unwrap,
 )
 
-FACES = 8000
 FINE = 2.0  # texels per pixel of the drawings
 LEAST_SHARE = 0.01  # of a drawing in a texel, to be asked
 OWN_SHARE = 0.1  # of the drawing that paints a face, at least
@@ -40,13 +40,18 @@ NO_OUTLINE = "run: its drawings have no outline; leave --outline out"
 
 
 def textured_surface_of(
-    trained: TrainedField, faces: int = FACES, *, outline: bool = False
+    trained: TrainedField,
+    faces: int | None = FACES,
+    progress: Callable[[str, float], None] = lambda step, done: None,
+    *,
+    outline: bool = False,
 ) -> TexturedSurface:
     """Return the surface of a trained field, painted as its drawings are.
 
     Args:
         trained: a field with palette and drawings.
-        faces: at most so many triangles.
+        faces: at most so many triangles; None: all.
+        progress: told what is done now, and which share of it.
         outline: with the pen that draws the sheet's outlines; for GLB files only.
 
     Raises:
@@ -61,7 +66,9 @@ def textured_surface_of(
     if outline and drawings.pen is None:
         raise BundleError(NO_OUTLINE)
     check_xatlas()
-    return painted(surface_of(trained, faces), drawings, outline=outline)
+    surface = surface_of(trained, faces, progress)
+    progress("painting", 0.0)
+    return painted(surface, drawings, outline=outline)
 
 
 def painted(surface: Surface, drawings: Drawings, *, outline: bool = False) -> TexturedSurface:

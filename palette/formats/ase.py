@@ -46,6 +46,12 @@ def read_ase(data: bytes, where: str) -> list[NamedColor]:
     return [_color(content, f"{where}: swatch {i}") for i, content in enumerate(colors, start=1)]
 
 
+def ase_title(data: bytes) -> str:
+    """Return the name of an .ase's first group; "" if it has none."""
+    blocks = _blocks(data, struct.unpack_from(">I", data, 8)[0], "palette")
+    return next((_name(content)[0] for kind, content in blocks if kind == GROUP), "")
+
+
 def to_ase(palette: Palette, title: str = "toonset") -> bytes:
     """Return the palette as one group of RGB colours, tones too."""
     blocks = [
@@ -79,20 +85,23 @@ def _blocks(data: bytes, announced: int, where: str) -> Iterator[tuple[int, byte
 
 
 def _color(content: bytes, where: str) -> NamedColor:
-    units = int.from_bytes(content[:2], "big")
-    name = content[2 : 2 + 2 * units].decode("utf-16-be", errors="replace").split("\0")[0]
-    rest = content[2 + 2 * units :]
+    name, rest = _name(content)
     model = rest[:4].decode("latin-1").strip().lower()
-    where = f"{where} {clean_name(name)!r}"
+    where = f"{where} {name!r}"
     count = FLOATS.get(model)
     if count is None or len(rest) < 4 + 4 * count:
         raise PaletteError(
             f"{where}: has the colour model {model!r} in {len(content)} bytes; RGB, Lab or Gray is "
             "needed; export it again"
         )
-    return NamedColor(
-        _rgb(model, struct.unpack_from(f">{count}f", rest, 4), where), clean_name(name)
-    )
+    return NamedColor(_rgb(model, struct.unpack_from(f">{count}f", rest, 4), where), name)
+
+
+def _name(content: bytes) -> tuple[str, bytes]:
+    """Return the name that a block begins with, and what follows it."""
+    end = 2 + 2 * int.from_bytes(content[:2], "big")
+    text = content[2:end].decode("utf-16-be", errors="replace")
+    return clean_name(text.split("\0")[0]), content[end:]
 
 
 def _rgb(model: str, parts: tuple[float, ...], where: str) -> RGB:

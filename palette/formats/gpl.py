@@ -44,6 +44,13 @@ def read_gpl(data: bytes, where: str) -> list[NamedColor]:
     ]
 
 
+def gpl_title(data: bytes) -> str:
+    """Return the name that a .gpl states; "" if it does not."""
+    lines = lines_of(data, "palette")
+    named = (line.partition(":")[2] for line in lines if line.lower().startswith("name:"))
+    return clean_name(next(named, ""))
+
+
 def to_gpl(palette: Palette, title: str = "toonset") -> str:
     """Return the palette as .gpl text, tones too; shares stand in palette.json."""
     rows = [

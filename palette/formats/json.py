@@ -33,11 +33,19 @@ def read_json(data: bytes, where: str) -> list[NamedColor]:
     ]
 
 
+def json_title(data: bytes) -> str:
+    """Return what an object calls itself, as toonset and Lospec write it; "" if it does not."""
+    content = parse_json(data, "palette", PaletteError)
+    said = [content.get(key) for key in ("title", "name")] if isinstance(content, dict) else []
+    return next((clean_name(text) for text in said if isinstance(text, str)), "")
+
+
 def to_json(palette: Palette) -> dict[str, Any]:
     """Return the content of palette.json."""
     contour, evidence = palette.contour, palette.evidence
     return {
         "schema": f"{NAME}/{VERSION}",
+        **({"title": palette.title} if palette.title else {}),
         "colors": [
             {
                 **_record(color.rgb, color.share, color.name),

@@ -45,6 +45,19 @@ def read_kpl(data: bytes, where: str) -> list[NamedColor]:
         PaletteError: not a .kpl, damaged, too large, or a colour space other than sRGB (also
             linear), Lab and grey.
     """
+    root = _root(data, where)
+    version = root.get("version", "")
+    groups = [root, *root.findall("Group")]
+    entries = [entry for group in groups for entry in _rows(group)]
+    return [_color(entry, version, where) for entry in entries]
+
+
+def kpl_title(data: bytes) -> str:
+    """Return the palette's name in Krita; "" if it has none."""
+    return clean_name(_root(data, "palette").get("name", ""))
+
+
+def _root(data: bytes, where: str) -> ElementTree.Element:
     try:
         root = ElementTree.fromstring(_colorset(data, where))
     except ElementTree.ParseError as error:
@@ -53,10 +66,7 @@ def read_kpl(data: bytes, where: str) -> list[NamedColor]:
         ) from error
     if root.tag.lower() != "colorset":
         raise PaletteError(f"{where}: {COLORSET} holds no palette; export it from Krita again")
-    version = root.get("version", "")
-    groups = [root, *root.findall("Group")]
-    entries = [entry for group in groups for entry in _rows(group)]
-    return [_color(entry, version, where) for entry in entries]
+    return root
 
 
 def _colorset(data: bytes, where: str) -> str:

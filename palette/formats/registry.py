@@ -13,12 +13,12 @@ from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
 from toonset.palette.formats.aco import read_aco
-from toonset.palette.formats.ase import read_ase, to_ase
-from toonset.palette.formats.gpl import read_gpl, to_gpl
+from toonset.palette.formats.ase import ase_title, read_ase, to_ase
+from toonset.palette.formats.gpl import gpl_title, read_gpl, to_gpl
 from toonset.palette.formats.hex import is_color, read_hex, rgb_of_typed, to_hex
-from toonset.palette.formats.json import read_json, to_json
+from toonset.palette.formats.json import json_title, read_json, to_json
 from toonset.palette.formats.kpl import MAX_BYTES as MAX_KPL_BYTES
-from toonset.palette.formats.kpl import read_kpl
+from toonset.palette.formats.kpl import kpl_title, read_kpl
 from toonset.palette.formats.pal import read_pal
 from toonset.palette.formats.text import without_mark
 from toonset.palette.formats.tones import paints_of
@@ -26,6 +26,7 @@ from toonset.palette.names import NamedColor
 from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.read import describe, read_whole
 
+UNTITLED = "toonset"
 SHOWN = 80  # characters of what was typed, in messages
 
 
@@ -39,6 +40,7 @@ class Format:
         read: the colours of a file's bytes; the second argument names the file in messages.
         write: the bytes of a palette with a title; None where toonset does not write it.
         max_bytes: a longer file is refused; thousands of colours fit.
+        title: the palette's own name in a file's bytes; None where the format has none.
     """
 
     extensions: tuple[str, ...]
@@ -46,6 +48,7 @@ class Format:
     read: Callable[[bytes, str], list[NamedColor]]
     write: Callable[[Palette, str], bytes] | None = None
     max_bytes: int = 2**20
+    title: Callable[[bytes], str] | None = None
 
 
 def _json_bytes(palette: Palette, _: str) -> bytes:
@@ -53,12 +56,18 @@ def _json_bytes(palette: Palette, _: str) -> bytes:
 
 
 FORMATS = (
-    Format((".gpl",), (b"GIMP Palette",), read_gpl, lambda palette, t: to_gpl(palette, t).encode()),
-    Format((".ase",), (b"ASEF",), read_ase, to_ase),
+    Format(
+        (".gpl",),
+        (b"GIMP Palette",),
+        read_gpl,
+        lambda palette, title: to_gpl(palette, title).encode(),
+        title=gpl_title,
+    ),
+    Format((".ase",), (b"ASEF",), read_ase, to_ase, title=ase_title),
     Format((".aco",), (b"\0\1", b"\0\2"), read_aco),
     Format((".pal",), (b"JASC-PAL", b"RIFF"), read_pal),
-    Format((".kpl",), (b"PK\3\4",), read_kpl, max_bytes=MAX_KPL_BYTES),
-    Format((".json",), (b"[", b"{"), read_json, _json_bytes),
+    Format((".kpl",), (b"PK\3\4",), read_kpl, max_bytes=MAX_KPL_BYTES, title=kpl_title),
+    Format((".json",), (b"[", b"{"), read_json, _json_bytes, title=json_title),
     Format((".hex", ".txt"), (), read_hex, lambda palette, _: to_hex(palette).encode()),
 )
 EXTENSIONS = tuple(extension for kind in FORMATS for extension in kind.extensions)
@@ -113,24 +122,38 @@ def names_tones(text_or_path: str) -> bool:
     return len(paints_of(swatches)) < len(swatches)
 
 
-def encode_palette(palette: Palette, extension: str, title: str = "toonset") -> bytes:
+def palette_title(text_or_path: str) -> str:
+    """Return what a palette file calls itself; "" where it does not, and of typed colours."""
+    path = Path(text_or_path)
+    if path.suffix.lower() not in EXTENSIONS:
+        return ""
+    data, kind = _whole(path)
+    return "" if kind.title is None else kind.title(data)
+
+
+def encode_palette(palette: Palette, extension: str) -> bytes:
     """Return the palette as a file of the format that the extension names, always the same bytes.
 
     Args:
         palette: the colours.
         extension: one of WRITTEN, such as ".ase".
-        title: what programs show as the palette's name, where the format has one.
 
     Raises:
         PaletteError: a format that is not written.
     """
     for kind in FORMATS:
         if extension.lower() in kind.extensions and kind.write is not None:
-            return kind.write(palette, title)
+            return kind.write(palette, palette.title or UNTITLED)
     raise PaletteError(f"{extension}: is not written; one of {', '.join(WRITTEN)} is needed")
 
 
 def _read(path: Path) -> list[NamedColor]:
+    data, kind = _whole(path)
+    return kind.read(data, str(path))
+
+
+def _whole(path: Path) -> tuple[bytes, Format]:
+    """Return a palette file's bytes, and which format they have."""
     data = without_mark(read_whole(path, "palette", PaletteError, LONGEST))
     kinds = [
         kind for kind in FORMATS if kind.magic and data.lstrip(b" \t\r\n").startswith(kind.magic)
@@ -147,7 +170,7 @@ def _read(path: Path) -> list[NamedColor]:
             f"{path}: {len(data) / 2**20:.1f} MB, at most {kinds[0].max_bytes / 2**20:.0f} MB is "
             "read of this format; make the palette smaller"
         )
-    return kinds[0].read(data, str(path))
+    return data, kinds[0]
 
 
 def _exists(path: Path) -> bool:

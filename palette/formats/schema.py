@@ -119,6 +119,7 @@ class PaletteRecord(Record):
     evidence: EvidenceRecord | None = None
     shadow: ShadowRecord | None = None
     features: list[Hex] = []
+    title: Name = ""
 
 
 def read_palette_json(path: Path) -> Palette:
@@ -158,6 +159,7 @@ def palette_of(content: Any, where: str) -> Palette:
         else Evidence(evidence.colors, evidence.one_less, evidence.one_more),
         None if record.shadow is None else _shadow(record.shadow),
         tuple(rgb_of_hex(one, "hex") for one in record.features),
+        record.title,
     )
 
 

@@ -106,6 +106,26 @@ def test_broken_pictures_of_a_bundle(
 
 
 @pytest.mark.parametrize(
+    ("verb", "arguments"),
+    [
+        ("render", ["--turntable", "1", "-o", "o"]),
+        ("mesh", ["-o", "o.glb"]),
+        ("planes", ["-o", "o"]),
+        ("evaluate", ["--test", "bundle"]),
+    ],
+)
+def test_a_bundle_for_a_run(
+    verb, arguments, bundle: Path, run: Path, toonset, snapshot, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    run.rename(bundle / "run")
+    before = snapshot(tmp_path)
+    said = toonset(verb, "bundle", *arguments).reason
+    assert said == "bundle: is no run; did you mean bundle/run?"
+    assert snapshot(tmp_path) == before
+
+
+@pytest.mark.parametrize(
     ("name", "data", "words"),
     [
         ("config.json", None, "config.json: does not exist; `toonset train` writes run folders"),

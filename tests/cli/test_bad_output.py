@@ -44,6 +44,45 @@ def test_an_output_that_cannot_be(
     assert snapshot(tmp_path) == before
 
 
+@pytest.mark.parametrize(
+    ("verb", "words"),
+    [
+        (["calibrate", "none.png"], "none.png: no such file; check the name of the picture"),
+        (["calibrate", "a.png", "--mesh", "no.obj"], "no.obj: no such file"),
+        (["calibrate", "a.png", "--landmarks", "no.csv"], "no.csv: no such file"),
+        (["calibrate", "a.png", "--boxes", "no.csv"], "no.csv: no such file"),
+        (["calibrate", "a.png", "--init", "none"], "none: does not exist"),
+        (["split", "none.png"], "none.png: no such file"),
+        (["palette", "none.png"], "none.png: no such file"),
+        (["recolor", "none", "--recolor", "red=#fff"], "none: does not exist"),
+        (["train", "none"], "none: does not exist"),
+        (["render", "none", "--turntable", "2"], "none/config.json: does not exist"),
+        (["evaluate", "none", "--test", "none"], "none/config.json: does not exist"),
+        (["planes", "none"], "none/config.json: does not exist"),
+        (["consistency", "none"], "none: does not exist"),
+        (["export", "none", "--to", "gltf"], "none: does not exist"),
+        (["import", "none"], "none: does not exist"),
+        (["synth", "none.obj"], "none.obj: no such file"),
+    ],
+)
+def test_an_input_that_is_not_there_is_told_before_an_output_that_is(
+    verb, words, toonset, drawn: Path, snapshot, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(drawn / "single.png", "a.png")
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "old.txt").write_text("old")
+    before = snapshot(tmp_path)
+    assert toonset(*verb, "-o", "taken").reason.startswith(words)
+    assert snapshot(tmp_path) == before
+
+
+def test_a_missing_run_is_told_before_a_mesh_that_is_there(toonset, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "body.glb").write_bytes(b"old")
+    assert "none/config.json: does not" in toonset("mesh", "none", "-o", "body.glb").reason
+
+
 @pytest.mark.skipif(not ROOT_ON_LINUX, reason="mounting a small or read-only disk needs root")
 @pytest.mark.parametrize(
     ("options", "words"),

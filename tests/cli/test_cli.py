@@ -70,6 +70,16 @@ def test_no_arguments_show_the_help_and_a_wrong_verb_the_right_one(shell):
 
 
 @pytest.mark.parametrize(
+    ("asked", "shown"), [(["help"], ["-h"]), (["help", "train"], ["train", "-h"])]
+)
+def test_help_is_also_a_word(asked, shown, toonset):
+    said = toonset(*asked)
+    assert (said.code, said.err) == (0, "")
+    assert said == toonset(*shown)
+    assert "Did you mean 'train'?" in toonset("help", "trian").reason
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["calibrate"], ["Missing argument 'SHEET'"]),
@@ -85,12 +95,22 @@ def test_no_arguments_show_the_help_and_a_wrong_verb_the_right_one(shell):
         (["train", "--budget", "inf"], ["--budget", "less than"]),
         (["train", "--budget", "nan"], ["--budget", "less than"]),
         (["train", "--seed", "9" * 20], ["--seed", "less than"]),
-        (["train", "--device", "tpu"], ["tpu", "auto, cpu, cuda"]),
+        (["train", "--device", "tpu"], ["tpu", "'auto', 'cpu', 'cuda'"]),
         (["render", "run"], ["Missing option '-o'"]),
         (["render", "run", "-o", "x"], ["either --cameras", "--turntable"]),
         (["render", "run", "-o", "x", "--turntable", "0"], ["--turntable", "1"]),
         (["render", "run", "-o", "x", "--turntable", "2", "--layer", "z"], ["'z'", "palette"]),
+        (["render", "run", "-o", "x", "--turntable", "2", "--format", "gfi"], ["mean 'gif'?"]),
         (["evaluate", "run"], ["Missing option '--test'"]),
+        (["export", "b", "-o", "x"], ["Missing option '--to'. Choose from: colmap", "opencv-xml"]),
+        (["export", "b", "-o", "x", "--to", "blendr"], ["Did you mean 'blender'?"]),
+        (["render", "r", "-o", "x", "--turntable", "2", "--layer", "palete"], ["mean 'palette'?"]),
+        (["train", "--preset", "papre"], ["mean 'paper'?"]),
+        (["train", "--field", "triplan"], ["mean 'triplane'?"]),
+        (["train", "--ink", "redrw"], ["mean 'redraw'?"]),
+        (["export", "b", "-o", "x", "--to", "colmap", "--layout", "odl"], ["mean 'old'?"]),
+        (["palette", "--method", "extcolor"], ["mean 'extcolors'?"]),
+        (["calibrate", "a.png", "--lock", "elevatoin"], ["mean 'elevation'?"]),
     ],
 )
 def test_usage_mistakes_name_the_argument(
@@ -202,7 +222,7 @@ def test_the_bundle_keeps_the_mannequin_and_export_finds_it(
 ):
     given, kept = load_mesh(drawn / "mannequin.obj"), load_mesh(bundle / "mannequin.obj")
     assert np.allclose(kept.vertices, given.vertices)  # the drawings' own needs no bending
-    done = toonset("export", bundle, "-o", tmp_path / "colmap", "--json")
+    done = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "colmap", "--json")
     assert (done.code, done.json["points"] > 1000) == (0, True)
 
 
@@ -212,7 +232,7 @@ def test_export_does_without_a_kept_mannequin_that_the_drawings_do_not_show(
     mesh = load_mesh(bundle / "mannequin.obj")
     away = replace(mesh, vertices=mesh.vertices + np.array([50.0, 0, 0]))
     (bundle / "mannequin.obj").write_bytes(save_obj(away))
-    done = toonset("export", bundle, "-o", tmp_path / "colmap", "--json")
+    done = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "colmap", "--json")
     assert (done.code, done.json["points"] > 1000) == (0, True)
     assert "visual hull" in (tmp_path / "colmap" / "toonset.json").read_text()
 

@@ -208,7 +208,7 @@ def test_folders_of_pictures_and_of_split_are_read(tmp_path: Path) -> None:
             "001.png",
         ]
     read = [(tmp_path / name / "palette.json").read_bytes() for name in ("plain", "split")]
-    assert read[0] == read[1]
+    assert read[0].replace(b'"title": "views"', b'"title": "sheet"') == read[1]  # the split knows
 
 
 def test_a_left_out_colour_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -221,6 +221,56 @@ def test_a_left_out_colour_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFix
     palette([tmp_path / "a.png"], keep="#fadc32", out=tmp_path / "with")
     content = json.loads((tmp_path / "with" / "palette.json").read_text())
     assert "#fadc32" in [color["hex"] for color in content["colors"]]
+
+
+STUDIO = "GIMP Palette\nName: Studio\n#\n200 30 40\tHair base\n20 60 180\tCoat\n9 9 9\tUntitled\n"
+
+
+def test_names_and_title_of_a_given_palette_are_kept(tmp_path: Path) -> None:
+    bundle = make_bundle(tmp_path / "b")
+    (tmp_path / "n.gpl").write_text(STUDIO)
+    palette([bundle], colors=str(tmp_path / "n.gpl"))
+    written = json.loads((bundle / "palette.json").read_text())
+    assert written["title"] == "Studio"
+    assert [color["name"] for color in written["colors"]] == ["Hair base", "Coat", "black"]
+    lines = (bundle / "palette.gpl").read_text().splitlines()
+    assert lines[1] == "Name: Studio"
+    assert [line.partition("\t")[2] for line in lines[4:]] == ["Hair base", "Coat", "black"]
+    ase = (bundle / "palette.ase").read_bytes()
+    assert all(name.encode("utf-16-be") in ase for name in ("Studio", "Hair base", "Coat"))
+    for end in ("json", "ase", "gpl"):  # and again, from what was written
+        again = tmp_path / end
+        palette([bundle], colors=str(bundle / f"palette.{end}"), out=again)
+        assert json.loads((again / "palette.json").read_text()) == written
+    recolor(["hair base=#00ff00"], [bundle], tmp_path / "green")
+    recolor(["red=#00ff00"], [bundle], tmp_path / "too")
+    new = load_rgba(tmp_path / "green" / "000.png")
+    assert ((new == (0, 255, 0, 255)).all(axis=2) == (figure()[..., :3] == RED).all(axis=2)).all()
+    assert np.array_equal(load_rgba(tmp_path / "too" / "000.png"), new)
+    with pytest.raises(ToonsetError, match=r"#c81e28 \(Hair base\), #143cb4 \(Coat\)"):
+        recolor(["hat=#00ff00"], [bundle], tmp_path / "no")
+
+
+def test_a_palette_is_called_as_its_sheet_or_folder(tmp_path: Path, toonset) -> None:
+    bundle = make_bundle(tmp_path / "knight")
+    palette([bundle])
+    assert "Name: knight\n" in (bundle / "palette.gpl").read_text()
+    for name in ("girl.png", "back.png"):
+        write_bytes(tmp_path / "sheets" / name, encode_png(figure()))
+    girl, both = tmp_path / "sheets" / "girl.png", tmp_path / "sheets"
+    for given, title in ((girl, "girl"), (both, "sheets")):
+        out = tmp_path / f"colours of {title}"
+        palette([given], out=out)
+        assert f"Name: {title}\n" in (out / "palette.gpl").read_text()
+        palette([given], out=out, force=True, colors="#c81e28,#143cb4")
+        assert json.loads((out / "palette.json").read_text())["title"] == title
+    split([girl], out=tmp_path / "views")
+    palette([tmp_path / "views"], out=tmp_path / "split")
+    assert "Name: girl\n" in (tmp_path / "split" / "palette.gpl").read_text()
+    made = toonset("calibrate", girl, "--mesh", "none", "-o", tmp_path / "b", "-q")
+    assert made.code in (0, 3)  # one view is never sure
+    palette([tmp_path / "b"])
+    assert "Name: girl\n" in (tmp_path / "b" / "palette.gpl").read_text()
 
 
 def test_the_papers_tool_can_be_asked(tmp_path: Path) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from toonset.dataset.images.picture import load_rgba
+from toonset.nerf.render.animation import INSTALL_AV
 
 QUICK = ("--steps", 20, "--threads", 1, "--device", "cpu", "-q")
 
@@ -102,6 +104,16 @@ def test_a_run_made_before_says_how_to_get_the_layer(lined: Path, toonset, tmp_p
     assert "no drawn look; train again" in toonset(*turn, "--layer", "drawn").reason
     assert not (tmp_path / "turn").exists()
     assert toonset(*turn).code == 0  # the field's colour, as before
+
+
+def test_a_film_without_its_codec_is_refused_before_any_work(
+    toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    film = ("--turntable", 8, "--format", "webp,mp4", "-o", tmp_path / "film")
+    assert toonset("render", tmp_path / "no run is read", *film).reason.endswith(INSTALL_AV)
+    for page in ("README.md", "docs/guide_training.md"):
+        assert INSTALL_AV in (Path(__file__).parents[2] / page).read_text(encoding="utf-8")
 
 
 def test_what_no_drawing_shows_is_said(lined: Path, toonset, tmp_path: Path) -> None:

@@ -1,8 +1,12 @@
 """Check `--to nerfstudio`, `blender-synthetic` and `colmap` with nerfstudio's own data parsers.
 
     uv venv --python 3.10 /tmp/ns && uv pip install --python /tmp/ns/bin/python nerfstudio
-    toonset export BUNDLE --to nerfstudio -o a && toonset export BUNDLE --layout old -o b
+    toonset export BUNDLE --to nerfstudio -o a 2> a.txt
+    toonset export BUNDLE --to colmap --layout old -o b
     /tmp/ns/bin/python tests/consumers/check_nerfstudio.py a b
+
+A folder of `--to nerfstudio` is parsed with the very line that its export printed, which a.txt
+holds; all views must be there to train on and to evaluate.
 
 Projects 1,000 points per view through the cameras that the parser returns (float32). Measured with
 nerfstudio 1.1.5, torch 2.15 (3 bundles, 22 views, and COLMAP in both layouts, binary and text):
@@ -11,6 +15,7 @@ at most 0.00003 px for pinholes and 0.0006 px for far pinholes.
 
 from __future__ import annotations
 
+import shlex
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -23,8 +28,8 @@ PARSERS = "nerfstudio.data.dataparsers"
 AS_IT_IS = {"orientation_method": "none", "center_method": "none", "auto_scale_poses": False}
 
 
-def parsed(folder: Path) -> Any:
-    """Return what the parser of the folder's format makes of it."""
+def parser_of(folder: Path) -> Any:
+    """Return the parser of the folder's format."""
     if (folder / "transforms_train.json").is_file():
         module = import_module(f"{PARSERS}.blender_dataparser")
         config = module.BlenderDataParserConfig(data=folder)
@@ -39,9 +44,16 @@ def parsed(folder: Path) -> Any:
             **AS_IT_IS,
         )
     else:
-        module = import_module(f"{PARSERS}.nerfstudio_dataparser")
-        config = module.NerfstudioDataParserConfig(data=folder, eval_mode="all", **AS_IT_IS)
-    return config.setup().get_dataparser_outputs("train")
+        methods = import_module("nerfstudio.configs.method_configs").AnnotatedBaseConfigUnion
+        config = import_module("tyro").cli(methods, args=printed(folder))
+        config = config.pipeline.datamanager.dataparser
+    return config.setup()
+
+
+def printed(folder: Path) -> list[str]:
+    """Return the arguments of the nerfstudio line that the export of a folder has printed."""
+    line = next(line for line in folder.with_suffix(".txt").open() if "ns-train " in line)
+    return shlex.split(line.partition("ns-train ")[2])
 
 
 def projected(cameras: Any, index: int, points: np.ndarray) -> np.ndarray:
@@ -55,8 +67,10 @@ def projected(cameras: Any, index: int, points: np.ndarray) -> np.ndarray:
 
 def check(folder: Path) -> bool:
     """Compare every view of a folder; all must be there."""
-    outputs, views, off = parsed(folder), read_views(folder), []
+    parser, views, off = parser_of(folder), read_views(folder), []
+    outputs = parser.get_dataparser_outputs("train")
     assert len(outputs.image_filenames) == len(views)
+    assert parser.get_dataparser_outputs("val").image_filenames
     for index, file in enumerate(outputs.image_filenames):
         view = views[Path(file).name]
         points = points_around(view)

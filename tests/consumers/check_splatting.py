@@ -1,7 +1,7 @@
 """Check `--layout old --centre` with the COLMAP reader of 3D Gaussian splatting.
 
     uv venv --python 3.11 /tmp/gs && uv pip install --python /tmp/gs/bin/python gaussian-splatting
-    toonset export BUNDLE --layout old --centre -o a
+    toonset export BUNDLE --to colmap --layout old --centre -o a
     /tmp/gs/bin/python tests/consumers/check_splatting.py a
 
 The reader keeps fields of view only, so the principal point is where the middle of the picture is.

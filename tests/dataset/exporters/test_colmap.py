@@ -280,15 +280,19 @@ def test_export_writes_what_pycolmap_reads(toonset, tmp_path: Path) -> None:
     bundle = bundle_of(frames, tmp_path / "bundle")
     (tmp_path / "m.obj").write_bytes(save_obj(mesh))
     out = tmp_path / "out"
-    bare = toonset("export", bundle, "-o", out, "--json")
+    bare = toonset("export", bundle, "--to", "colmap", "-o", out, "--json")
     assert bare.code == 0, bare
     assert bare.json["points"] > 1000
     assert "visual hull" in json.loads((out / "toonset.json").read_text())["points_are"]
     assert f"at most {bare.json['pinhole_error_px']:.2f} px off" in bare.err
-    again = toonset("export", bundle, "-o", out, "--mesh", tmp_path / "m.obj", "--text")
+    again = toonset(
+        "export", bundle, "--to", "colmap", "-o", out, "--mesh", tmp_path / "m.obj", "--text"
+    )
     assert "exists already" in again.reason
     full = toonset(
-        *("export", bundle, "-o", out, "--mesh", tmp_path / "m.obj", "--text"), "--force", "--json"
+        *("export", bundle, "--to", "colmap", "-o", out, "--mesh", tmp_path / "m.obj", "--text"),
+        "--force",
+        "--json",
     )
     model = pycolmap.Reconstruction(out / "sparse" / "0")
     assert model.num_points3D() == full.json["points"] > 100
@@ -304,8 +308,10 @@ def test_export_refuses_a_mannequin_that_is_not_there(toonset, tmp_path: Path) -
     moved = replace(far_off, vertices=far_off.vertices + np.array([50.0, 0, 0]))
     (tmp_path / "m.obj").write_bytes(save_obj(moved))
     out = tmp_path / "out"
-    outcome = toonset("export", bundle, "-o", out, "--mesh", tmp_path / "m.obj", "-q")
+    outcome = toonset(
+        "export", bundle, "--to", "colmap", "-o", out, "--mesh", tmp_path / "m.obj", "-q"
+    )
     assert "give the mannequin of the calibration" in outcome.reason
     assert not out.exists()
     shutil.rmtree(bundle)
-    assert "does not exist" in toonset("export", bundle, "-o", out).reason
+    assert "does not exist" in toonset("export", bundle, "--to", "colmap", "-o", out).reason

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -279,6 +280,22 @@ def test_every_format_is_written_whole_and_replaced_only_by_force(
     assert "holds 'mine.txt'" in refused
 
 
+def test_the_nerfstudio_line_has_pictures_to_evaluate_on(toonset, tmp_path: Path) -> None:
+    """By nerfstudio's usual fraction of 0.9, eight views are all trained on."""
+    bundle, out = bundle_of(views_all_round(3), egg(), tmp_path / "bundle"), tmp_path / "a b"
+    said = toonset("export", bundle, "--to", "nerfstudio", "-o", out).err.splitlines()[-1]
+    words = shlex.split(said.partition(": ")[2])
+    assert words[:2] == ["ns-train", "nerfacto"]
+    parser = words[words.index("nerfstudio-data") :]
+    assert dict(zip(parser[1::2], parser[2::2], strict=True)) == {
+        "--data": str(out),
+        "--orientation-method": "none",
+        "--center-method": "none",
+        "--auto-scale-poses": "False",
+        "--eval-mode": "all",
+    }
+
+
 def test_options_of_colmap_are_refused_elsewhere(toonset, tmp_path: Path) -> None:
     for option in (["--text"], ["--centre"], ["--layout", "old"]):
         done = toonset("export", tmp_path, "--to", "gltf", "-o", tmp_path / "out", *option)
@@ -288,7 +305,7 @@ def test_options_of_colmap_are_refused_elsewhere(toonset, tmp_path: Path) -> Non
 
 def test_centre_is_offered_where_it_matters(toonset, tmp_path: Path) -> None:
     bundle = bundle_of(views_all_round(3), egg(), tmp_path / "bundle")
-    plain = toonset("export", bundle, "-o", tmp_path / "plain")
+    plain = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "plain")
     assert "principal points up to 3.7 px off" in plain.err
-    done = toonset("export", bundle, "-o", tmp_path / "centred", "--centre")
+    done = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "centred", "--centre")
     assert "principal points" not in done.err

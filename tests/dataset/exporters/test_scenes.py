@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import runpy
 import struct
+import sys
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -160,3 +163,18 @@ def test_blender_script_holds_every_view(tmp_path: Path, k: float) -> None:
         near, far = record["clip"]
         assert near < -local[:, 2].max() < -local[:, 2].min() < far
         assert (tmp_path / "out" / record["picture"]).is_file()
+
+
+def test_blender_script_shows_a_scene_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Blender starts with a cube where the character stands; it must not be in the picture."""
+    write_blender_script(tmp_path / "out", views_all_round(2), egg())
+    blender = MagicMock()
+    started_with, own = blender.context.scene, blender.data.scenes.new.return_value
+    monkeypatch.setitem(sys.modules, "bpy", blender)
+    monkeypatch.setitem(sys.modules, "mathutils", MagicMock())
+    runpy.run_path(str(tmp_path / "out" / "import_cameras.py"))
+    assert blender.context.window.scene is own
+    own.collection.children.link.assert_called_once_with(blender.data.collections.new.return_value)
+    assert started_with.mock_calls == []

@@ -219,4 +219,4 @@ def test_an_imported_bundle_is_a_bundle(toonset, colmap: Path, tmp_path: Path) -
 def test_an_imported_bundle_trains(toonset, colmap: Path, tmp_path: Path) -> None:
     assert toonset("import", colmap, "-o", tmp_path / "b").code == 0
     few = ("--steps", 2, "--threads", 1, "--device", "cpu", "-q")
-    assert toonset("train", tmp_path / "b", *few).code == 3  # weak: two steps
+    assert toonset("train", tmp_path / "b", *few, "--strict").code == 3  # weak: two steps

@@ -81,7 +81,7 @@ def ball(density: float = 40.0, extra: str = "") -> TrainedField:
 
 @pytest.fixture(scope="module")
 def surface() -> Surface:
-    return surface_of(ball())
+    return surface_of(ball(), None)
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
@@ -128,10 +128,20 @@ def test_fewer_faces_keep_the_shape(wanted: int) -> None:
     )
 
 
+def test_shares_of_the_work_rise_to_its_end() -> None:
+    told: dict[str, list[float]] = {}
+    surface_of(ball(), 600, lambda step, done: told.setdefault(step, []).append(done))
+    assert list(told) == ["finding the surface", "merging triangles"]
+    for shares in told.values():
+        assert len(shares) > 1
+        assert shares == sorted(shares)
+        assert 0 <= shares[0] < shares[-1] <= 1
+
+
 def test_specks_and_cavities_go() -> None:
-    plain = surface_of(ball())
+    plain = surface_of(ball(), None)
     for extra in ("speck", "hollow"):
-        found = surface_of(ball(extra=extra))
+        found = surface_of(ball(extra=extra), None)
         assert volume(found.vertices, found.faces) == pytest.approx(
             volume(plain.vertices, plain.faces), rel=1e-3
         )
@@ -147,7 +157,7 @@ def test_what_rays_pass_is_air() -> None:
             return torch.where(points_world[:, 0] > 0, 0.0, density), rgb
 
     half = TrainedField(Half(40.0), trained.hull, VOXEL, 60, Nearest(3), PALETTE, 0.0, 50)
-    found = surface_of(half)
+    found = surface_of(half, None)
     assert closed(found.faces)
     assert found.vertices[:, 0].min() < -0.9
     assert found.vertices[:, 0].max() < 0.4  # half of it, and the growth that outlines need

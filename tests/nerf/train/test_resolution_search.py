@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from bench.cases.cases import train_cases
-from tests.cli.test_train_summary import metrics
+from tests.cli.common.test_train_summary import metrics
 from toonset.cli.common.train_summary import summary
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.options import TrainOptions

@@ -1,0 +1,80 @@
+"""What shells are told when a user presses the tab key: no shell is needed, only its protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from toonset.cli.main import VERBS
+
+SHELLS = ("bash", "zsh", "fish")
+
+
+def ask(shell: str, line: str, toonset: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> str:
+    """Return what a shell is given for a line that ends where the cursor is."""
+    monkeypatch.setenv("_TOONSET_COMPLETE", f"complete_{shell}")
+    if shell == "bash":
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(len(line.split()) - (not line.endswith(" "))))
+    else:
+        monkeypatch.setenv("_TYPER_COMPLETE_ARGS", line)
+        monkeypatch.setenv("_TYPER_COMPLETE_FISH_ACTION", "get-args")
+    done = toonset()
+    assert (done.code, done.err) == (0, "")
+    return done.out
+
+
+@pytest.fixture(params=SHELLS)
+def completed(
+    request: pytest.FixtureRequest, toonset: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> Callable[[str], set[str]]:
+    """Return the words that a shell offers for a line."""
+
+    def words(line: str) -> set[str]:
+        said = ask(request.param, line, toonset, monkeypatch)
+        if request.param == "zsh":  # _arguments '*: :(("word":"help" and more))'
+            said = said.removeprefix("_arguments '*: :((").removesuffix("))'\n").replace('"', "")
+        end = {"bash": None, "zsh": ":", "fish": "\t"}[request.param]
+        return {row.split(end)[0] if end else row for row in said.splitlines()}
+
+    return words
+
+
+def test_verbs_are_completed(completed: Callable[[str], set[str]]) -> None:
+    assert set(VERBS) <= completed("toonset ")
+    assert completed("toonset ca") == {"calibrate"}
+    assert completed("toonset help tr") == {"train"}
+
+
+def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
+    assert {"--mesh", "--views", "--force"} <= completed("toonset calibrate sheet.png --")
+    assert completed("toonset train --as-") == {
+        f"--as-{w}d" for w in ("place", "turne", "carve")
+    } | {"--as-bent"}
+
+
+@pytest.mark.parametrize(
+    ("line", "choices"),
+    [
+        ("export bundle --to b", {"blender", "blender-synthetic"}),
+        ("export bundle --to colmap --layout ", {"new", "old"}),
+        ("render run --layer normal", {"normal", "normal-camera"}),
+        ("render run --format webp,s", {"webp,sprites"}),
+        ("train --field tri", {"triplane"}),
+        ("train --preset ", {"fast", "paper"}),
+        ("train --ink r", {"redraw"}),
+        ("train --device c", {"cpu", "cuda"}),
+        ("palette --method e", {"extcolors"}),
+        ("palette --space ", {"rgb", "oklab"}),
+        ("calibrate sheet.png --lock e", {"elevation"}),
+        ("import folder --up ", {"y", "z"}),
+        ("mannequin --pose r", {"relaxed"}),
+        ("synth mesh.glb --condition a", {"artist"}),
+    ],
+)
+def test_choices_are_completed(
+    line: str, choices: set[str], completed: Callable[[str], set[str]]
+) -> None:
+    assert completed(f"toonset {line}") == choices

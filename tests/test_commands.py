@@ -1,0 +1,216 @@
+"""Commands run as they stand: those of the documents, in their order, and those that verbs print.
+
+A document has a folder of its own with the drawings that it speaks of, and nothing else: its
+commands must not stand in each other's way. Exit code 3 is fine: written, but look.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.test_documents import DOCUMENTS, text_of
+from toonset.cli.main import VERBS
+
+ROOT = Path(__file__).resolve().parents[1]
+PLACEHOLDER = re.compile(r"\.\.\.|(?<![\w#-])[A-Z]{3,}(?![\w-])")  # of a command's form, not of one
+ELSEWHERE = {  # commands that do not run here, and where they do
+    "./run demo": "tests/test_run.py has its steps, the README the same commands",
+    "./run test": "would run this test",
+    "./run lint": "every change runs it: .ci/run",
+    "./run bench": "minutes to hours; tests/test_documents.py checks verbs and options",
+    "python -m bench": "as ./run bench",
+    "pip install": "needs a package index",
+    "uv pip": "needs a package index",
+    "printf": "as uv pip",
+}
+SLOW = ("README.md", "docs/guide_training.md")  # they train for minutes
+
+Toonset = Callable[..., Any]
+
+
+def commands(document: str) -> list[str]:
+    """Return the commands of a document, each once: lines of its blocks, and those within text.
+
+    Within text "`toonset VERB`" alone is the verb's name, but for verbs that need no more.
+    """
+    found = []
+    for block, words in re.findall(
+        r"^```sh\n(.*?)^```|`((?:toonset|\./run|python -m|pip|uv) [^`]+)`",
+        text_of(document),
+        re.MULTILINE | re.DOTALL,
+    ):
+        lines = block.replace("\\\n", " ").splitlines() or [" ".join(words.split())]
+        plain = [shlex.join(shlex.split(line, comments=True)) for line in lines]
+        found += [line for line in plain if line and (block or len(line.split()) > 2)]
+    return list(dict.fromkeys(found))
+
+
+def arguments(command: str) -> list[str] | None:
+    """Return what follows `toonset` or `./run` in a command of toonset's; None of another's."""
+    words = shlex.split(command)
+    return words[1:] if words[0] in {"toonset", "./run"} else None
+
+
+def is_form(command: str) -> bool:
+    """Return whether a command says where one must put something in."""
+    return bool(PLACEHOLDER.search(command))
+
+
+def runs_here(command: str) -> bool:
+    return not is_form(command) and not any(command.startswith(words) for words in ELSEWHERE)
+
+
+# ---- what the documents presuppose
+
+
+@pytest.fixture(scope="module")
+def drawings(tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path:
+    """Return a folder with every file that the documents speak of, the README's example first."""
+    folder = tmp_path_factory.mktemp("drawings")
+    shutil.copytree(ROOT / "examples", folder / "examples")
+    sheet, mesh = folder / "examples" / "sheet.png", folder / "examples" / "mannequin.obj"
+    shutil.copy(sheet, folder / "sheet.png")
+    for name in ("mannequin.obj", "m.obj"):
+        shutil.copy(mesh, folder / name)
+    made = ("calibrate", sheet, "--mesh", mesh, "-o", folder / "bundle", "-q")
+    assert toonset(*made).code == 0
+    shutil.copytree(folder / "bundle", folder / "other")
+    shutil.copytree(folder / "bundle", folder / "held_out")
+    for to in ("nerfstudio", "colmap"):
+        place = folder / {"nerfstudio": "folder", "colmap": "colmap_folder"}[to]
+        assert toonset("export", folder / "bundle", "--to", to, "-o", place, "-q").code == 0
+    assert toonset("palette", folder / "bundle", "-q").code == 0
+    for name in ("dark.ase", "my.ase"):
+        shutil.copy(folder / "bundle" / "palette.ase", folder / name)
+    _six_figures(folder)
+    _clicks(folder)
+    _glb(folder)
+    return folder
+
+
+def _six_figures(folder: Path) -> None:
+    """Write a sheet of six figures, a strip of eight, single views and the boxes of the sheet."""
+    from PIL import Image
+
+    cells = []
+    for number in range(6):
+        cell = np.full((120, 80, 3), (244, 240, 232), np.uint8)
+        cell[10:110, 20:60] = (40 + 30 * number, 60, 160)
+        cells.append(cell)
+    (folder / "six").mkdir()
+    Image.fromarray(np.concatenate(cells, axis=1)).save(folder / "six" / "sheet.png")
+    strip = Image.open(folder / "sheet.png")
+    strip.save(folder / "strip.png")
+    for number, name in enumerate(("front.png", "side.png")):
+        Image.fromarray(cells[number]).save(folder / name)
+    rows = [f"{80 * number + 15},5,50,110" for number in range(6)]
+    (folder / "boxes.csv").write_text("\n".join(["x,y,width,height", *rows, ""]))
+
+
+def _clicks(folder: Path) -> None:
+    """Write points of the mannequin where the example's cameras see them."""
+    from toonset.dataset.bundle.transforms_read import read_cameras
+    from toonset.dataset.mannequin.landmark_formats import SCHEMA
+    from toonset.dataset.mesh.load import load_mesh
+
+    vertices = load_mesh(folder / "bundle" / "mannequin.obj").vertices
+    points = vertices[np.linspace(0, len(vertices) - 1, 9).astype(int)]
+    names = [f"p{number}" for number in range(len(points))]
+    views = {
+        str(number): dict(zip(names, camera.project(points)[0].tolist(), strict=True))
+        for number, (_, camera) in enumerate(read_cameras(folder / "bundle"))
+    }
+    content = {"schema": SCHEMA, "pixels": "view", "views": views}
+    content["points"] = dict(zip(names, points.tolist(), strict=True))
+    (folder / "points.json").write_text(json.dumps(content))
+
+
+def _glb(folder: Path) -> None:
+    import trimesh
+
+    shape = trimesh.creation.capsule(0.5, 1.0)
+    shape.export(folder / "mesh.glb")
+
+
+GIVEN = {  # what lies in a document's folder before its first command
+    "README.md": "examples sheet.png strip.png folder held_out mesh.glb",
+    "docs/architecture.md": "sheet.png m.obj",
+    "docs/formats.md": "bundle sheet.png views",
+    "docs/guide_cameras.md": "sheet.png mannequin.obj m.obj points.json other colmap_folder",
+    "docs/guide_palette.md": "bundle sheet.png my.ase",
+    "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",
+    "docs/guide_training.md": "bundle held_out other dark.ase",
+}
+
+
+@pytest.fixture
+def given(
+    request: pytest.FixtureRequest,
+    drawings: Path,
+    toonset: Toonset,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Path:
+    """Return a document's folder, as the current one."""
+    monkeypatch.chdir(tmp_path)
+    for name in GIVEN.get(request.param, "").split():
+        if name == "views":
+            assert toonset("split", "sheet.png", "-q").code == 0
+            continue
+        copy = shutil.copytree if (drawings / name).is_dir() else shutil.copy
+        copy(drawings / name, tmp_path / Path(name).name)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("document", "given"),
+    [
+        pytest.param(name, name, marks=pytest.mark.slow if name in SLOW else (), id=name)
+        for name in DOCUMENTS
+    ],
+    indirect=["given"],
+)
+def test_commands_of_a_document_run_as_they_stand(
+    document: str, given: Path, toonset: Toonset
+) -> None:
+    for command in filter(runs_here, commands(document)):
+        words = arguments(command)
+        assert words is not None, command
+        done = toonset(*words)
+        assert done.code in (0, 3), (command, done)
+
+
+def test_no_command_is_left_out_silently() -> None:
+    shown = [command for name in DOCUMENTS for command in commands(name)]
+    known = [c for c in shown if not is_form(c) and (w := arguments(c)) and w[0] in VERBS]
+    assert len(known) > 60
+    others = [c for c in shown if c not in known and runs_here(c)]
+    assert others == []
+
+
+@pytest.mark.slow
+def test_what_verbs_say_comes_next_runs_as_printed(
+    drawn: Path, toonset: Toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(drawn / "sheet.png", "a sheet.png")
+    shutil.copy(drawn / "mannequin.obj", "m.obj")
+    command = "toonset calibrate 'a sheet.png' --mesh m.obj -o 'the bundle'"
+    typed = []
+    while command:
+        done = toonset(*shlex.split(command)[1:])
+        assert done.code == 0, (command, done)
+        typed.append(shlex.split(command)[1])
+        found = re.search(r"; next: (toonset .*)$", done.err + done.out, re.MULTILINE)
+        command = found[1] if found else ""
+    assert typed == ["calibrate", "palette", "train", "render"]
+    assert (tmp_path / "turntable" / "turntable.gif").is_file()
