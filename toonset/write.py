@@ -110,6 +110,22 @@ def check_output(
             raise OutputError(f"{out}: holds {what}, --force would delete it; choose another -o")
 
 
+def check_new_file(path: Path, *, force: bool = False) -> None:
+    """Refuse, before any work, a file that must not be written or replaced.
+
+    Raises:
+        OutputError: `path` is a folder, or a file and `force` is off, or its parent is no folder.
+    """
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, a file is needed; choose another -o")
+    if path.exists() and not force:
+        raise OutputError(
+            f"{path}: exists already; pass --force to replace it, or choose another -o"
+        )
+    if path.parent.exists() and not path.parent.is_dir():
+        raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
+
+
 def check_new_folder(path: Path, *, force: bool = False) -> None:
     """Refuse, before any work, an output folder that `new_folder` would refuse.
 

@@ -7,15 +7,17 @@ reads it once, at the hull's voxels, as `toonset.nerf.render.baked` does.
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.errors import BundleError
+from toonset.mesh import Mesh
 from toonset.nerf.fields.base import DENSITY_SHIFT
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
@@ -155,12 +157,7 @@ def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
             }
             for flow in drawings.flows
         ],
-        "shape": shape
-        and {
-            "vertices": blob.add(shape.vertices.astype(np.float32)),
-            "faces": blob.add(shape.faces.astype(np.uint16)),
-            "beyond": shape.beyond,
-        },
+        "shape": shape and _surface(shape.vertices, shape.faces, shape.beyond, blob),
         "steps": drawings.steps and asdict(drawings.steps),
         "shade": drawings.shade and asdict(drawings.shade),
         "shadow": drawings.painted_shadow and list(drawings.painted_shadow.factor),
@@ -174,6 +171,51 @@ def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
     }
 
 
+def plain_drawings_record(
+    cameras: Sequence[Camera],
+    pictures: Sequence[UInt8[np.ndarray, "_ _ 4"]],
+    mesh: Mesh,
+    blob: Blob,
+) -> dict[str, Any]:
+    """Return drawings and a body beside them, before anything is trained."""
+    sizes = [picture.shape[:2] for picture in pictures]
+    whole = [_premultiplied(picture) for picture in pictures]
+    return {
+        "cameras": [camera_record(camera) for camera in cameras],
+        "whole": blob.add(np.stack([_padded(one, _largest(sizes), "constant") for one in whole])),
+        "shape": _surface(mesh.vertices, mesh.faces, 0.0, blob),
+        "steps": None,
+        "shade": None,
+    }
+
+
+def _surface(
+    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"], beyond: float, blob: Blob
+) -> dict[str, Any]:
+    return {
+        "vertices": blob.add(vertices.astype(np.float32)),
+        "faces": blob.add(faces.astype(np.uint32)),
+        "beyond": beyond,
+    }
+
+
+def _premultiplied(picture: UInt8[np.ndarray, "h w 4"]) -> UInt8[np.ndarray, "h w 4"]:
+    whole = picture / np.float32(255)
+    whole[..., :3] *= whole[..., 3:]
+    return _bytes(whole)
+
+
+def _largest(sizes: Sequence[tuple[int, ...]]) -> tuple[int, int]:
+    return max(size[0] for size in sizes), max(size[1] for size in sizes)
+
+
+def _padded(
+    layer: UInt8[np.ndarray, "h w 4"], size: tuple[int, int], mode: Any
+) -> UInt8[np.ndarray, "height width 4"]:
+    room = [(0, size[0] - layer.shape[0]), (0, size[1] - layer.shape[1]), (0, 0)]
+    return np.pad(layer, room, mode=mode)
+
+
 def _atlases(
     drawings: Drawings, textures: tuple[Texture, ...]
 ) -> tuple[
@@ -184,21 +226,15 @@ def _atlases(
     Depth is that of `Texture.far`, in levels of `Drawing`; then pixels to the nearest edge, times
     EDGE_STEPS; then coverage.
     """
-    sizes = [texture.labels.shape for texture in textures]
-    height, width = (max(size[axis] for size in sizes) for axis in (0, 1))
-
-    def padded(layer: UInt8[np.ndarray, "h w 4"], mode: Any) -> UInt8[np.ndarray, "height width 4"]:
-        room = [(0, height - layer.shape[0]), (0, width - layer.shape[1]), (0, 0)]
-        return np.pad(layer, room, mode=mode)
-
+    size = _largest([texture.labels.shape for texture in textures])
     paint, whole, about = [], [], []
     for texture in textures:
-        paint.append(padded(np.dstack([_bytes(texture.paint), texture.labels]), "edge"))
-        whole.append(padded(_bytes(texture.whole), "constant"))
+        paint.append(_padded(np.dstack([_bytes(texture.paint), texture.labels]), size, "edge"))
+        whole.append(_padded(_bytes(texture.whole), size, "constant"))
         far = np.where(np.isfinite(texture.far), texture.far, np.nan)
         edge = np.rint(texture.to_edge * EDGE_STEPS).clip(0, 255).astype(np.uint8)
         layers = [levels_of(far, drawings.depths), edge, _bytes(texture.whole[..., 3])]
-        about.append(padded(np.dstack([*layers, np.zeros_like(edge)]), "constant"))
+        about.append(_padded(np.dstack([*layers, np.zeros_like(edge)]), size, "constant"))
     return np.stack(paint), np.stack(whole), np.stack(about)
 
 

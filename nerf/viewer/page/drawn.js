@@ -15,7 +15,7 @@ import { arrayOf } from "./scene.js";
 /** @typedef {import("./types.js").Camera} Camera */
 /** @typedef {import("./gl.js").Target} Target */
 
-const CELL = 8; // pixels of the coarse grid's side
+const CELL = 4; // pixels of the coarse grid's side
 const CRUMB = 30; // area of parts and holes that are noise, in a figure of CRUMB_AT px
 const HOLE = 80; // of holes between bent drawings
 const CRUMB_AT = 260;
@@ -190,7 +190,7 @@ void main() {
   vec3 color = vec3(0.0);
   float heaviest = 0.0;
   for (int tap = 0; tap < ${TAPS}; tap++) {
-    if (layers[tap] < 0 || (tap == 1 && share >= 1.0) || (tap > 1 && heaviest > 0.0)) continue;
+    if (layers[tap] < 0 || (tap == 1 && heaviest >= 1.0 - share) || (tap > 1 && heaviest > 0.0)) continue;
     vec3 seen = seen_by(views[tap], point);
     vec2 place = seen.xy - 0.5;
     ivec2 cell = ivec2(round(place));

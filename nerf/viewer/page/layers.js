@@ -12,6 +12,7 @@ export const LAYER_NAMES = {
   normal: "Normals",
   depth: "Depth",
   labels: "Labels",
+  mannequin: "Body",
 };
 
 /**

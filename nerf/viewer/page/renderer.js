@@ -24,8 +24,8 @@ export async function createRenderer(canvas, scene, blob) {
   if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this browser cannot draw floats");
   gl.getExtension("OES_texture_float_linear");
   gl.disable(gl.DITHER);
-  const field = new Field(gl, scene.field, blob);
-  const look = scene.drawings ? new DrawnLook(gl, scene.drawings, blob) : null;
+  const field = scene.field ? new Field(gl, scene.field, blob) : null;
+  const look = field && scene.drawings ? new DrawnLook(gl, scene.drawings, blob) : null;
   const shape = scene.drawings?.shape ? new Shape(gl, scene.drawings, blob) : null;
   const programs = {
     seen: new Program(gl, SEEN),
@@ -34,7 +34,7 @@ export async function createRenderer(canvas, scene, blob) {
     depth: new Program(gl, DEPTH),
     present: new Program(gl, PRESENT),
   };
-  while (!field.read(1 << 20));
+  while (field && !field.read(1 << 20));
 
   /** @type {Record<string, Target>} */
   let targets = {};
@@ -82,9 +82,14 @@ export async function createRenderer(canvas, scene, blob) {
     [x, y, width, height] = [0, 0, ...camera.size];
     bind(targets.picture);
     context.clearBufferfv(context.COLOR, 0, [0, 0, 0, 0]);
-    const corners = boxCorners(scene.field.hull).map((corner) => project(camera, corner));
+    const box = field ? boxCorners(scene.field.hull) : (shape?.corners() ?? []);
+    const corners = box.map((corner) => project(camera, corner));
     [x, y, width, height] = boxOf(corners, camera.size);
     if (!width || !height) return targets.picture;
+    if (!field) {
+      shape?.body(camera, still, bind, targets.picture);
+      return targets.picture;
+    }
     if (layer === "drawn" && shape && !still) {
       const { depth, normal } = shape.see(camera, false, bind);
       const { frame } = targets.half;

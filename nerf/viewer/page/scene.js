@@ -2,7 +2,7 @@
 
 /** @typedef {import("./types.js").ArrayRecord} ArrayRecord */
 
-const TYPES = { uint8: Uint8Array, uint16: Uint16Array, float16: Uint16Array, float32: Float32Array };
+const TYPES = { uint8: Uint8Array, uint32: Uint32Array, float16: Uint16Array, float32: Float32Array };
 
 /** @returns {import("./types.js").Scene} */
 export function readScene() {
@@ -26,7 +26,7 @@ export async function readBlob() {
 /**
  * @param {ArrayBuffer} blob
  * @param {ArrayRecord} record
- * @returns {Uint8Array | Uint16Array | Float32Array} half floats as their 16 bits
+ * @returns {Uint8Array | Uint16Array | Uint32Array | Float32Array} half floats as their 16 bits
  */
 export function arrayOf(blob, record) {
   const Type = TYPES[/** @type {keyof TYPES} */ (record.type)];

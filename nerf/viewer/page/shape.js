@@ -149,6 +149,24 @@ void main() {
   result = vec4(tone, line);
 }`;
 
+/** A plain body in the light, for bundles without a field. */
+const LIT = `
+uniform sampler2D fine_surface, normals;
+uniform int finer;
+layout(location = 0) out vec4 result;
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  result = vec4(0.0);
+  for (int y = 0; y < finer; y++) for (int x = 0; x < finer; x++) {
+    ivec2 place = finer * at + ivec2(x, y);
+    if (texelFetch(fine_surface, place, 0).r <= ${NOWHERE}) continue;
+    vec3 n = texelFetch(normals, place, 0).rgb * 2.0 - 1.0;
+    float light = 0.55 + 0.45 * clamp(dot(n, normalize(vec3(-0.4, -0.6, -0.7))), 0.0, 1.0);
+    result += vec4(light * vec3(0.62, 0.70, 0.80), 1.0);
+  }
+  result /= float(finer * finer);
+}`;
+
 /** Normals smoothed along one axis. */
 const SMOOTH = `
 uniform sampler2D normals;
@@ -181,13 +199,14 @@ export class Shape {
     this.gl = gl;
     this.record = record;
     const vertices = /** @type {Float32Array} */ (arrayOf(blob, record.shape.vertices));
-    const faces = /** @type {Uint16Array} */ (arrayOf(blob, record.shape.faces));
+    const faces = /** @type {Uint32Array} */ (arrayOf(blob, record.shape.faces));
     this.triangles = new Program(gl, SURFACES, TRIANGLES);
     this.covered = new Program(gl, COVERED);
     this.steps = new Program(gl, STEPS);
     this.distances = new Program(gl, DISTANCES);
     this.smooth = new Program(gl, SMOOTH);
     this.style = new Program(gl, STYLE);
+    this.lit = new Program(gl, LIT);
     this.count = faces.length;
     this.range = rangeOf(vertices);
     this.lines = gl.createVertexArray();
@@ -257,12 +276,31 @@ export class Shape {
     const { beyond } = this.record.shape;
     for (const by of beyond > 0 ? [0, beyond] : [0]) {
       this.triangles.use({ ...cameraUniforms(camera), size, range, beyond: by, still });
-      gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_SHORT, 0);
+      gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
     }
     gl.bindVertexArray(null);
     gl.disable(gl.DEPTH_TEST);
     const [depth, normal] = this.targets.surface.textures;
     return { finer, depth, normal };
+  }
+
+  /**
+   * Draw a plain body.
+   * @param {Camera} camera
+   * @param {boolean} still
+   * @param {(target: Target, finer?: number) => void} bind
+   * @param {Target} into
+   */
+  body(camera, still, bind, into) {
+    const { finer, depth, normal } = this.see(camera, still, bind);
+    bind(into);
+    this.lit.use({ fine_surface: depth, normals: normal, finer }).fill();
+  }
+
+  /** @returns {number[][]} corners of a box that holds it, world */
+  corners() {
+    const { middle, radius } = this.range;
+    return Array.from({ length: 8 }, (_, i) => middle.map((v, axis) => v + ((i >> axis) & 1 ? radius : -radius)));
   }
 
   /**
@@ -333,7 +371,7 @@ function rangeOf(vertices) {
 
 /**
  * @param {Float32Array} vertices
- * @param {Uint16Array} faces
+ * @param {Uint32Array} faces
  * @returns {Float32Array} unit normals, means of the faces around weighted with their areas
  */
 function normalsOf(vertices, faces) {

@@ -1,5 +1,6 @@
 // The stage: draws when something has changed, roughly while it moves and well once it rests.
 
+import { resized } from "./camera.js";
 import { part } from "./elements.js";
 import { poseOf, shownCamera } from "./framing.js";
 import { LAYER_NAMES } from "./layers.js";
@@ -12,6 +13,10 @@ import { wrapped } from "./state.js";
 /** @typedef {{draw: (shot: Shot) => void}} Painter */
 
 const REST = 150; // milliseconds without a change
+const SLOW = 36; // milliseconds from one moving picture to the next: more is not smooth
+const QUICK = 20; // less leaves room for larger ones
+const SIZES = [1, 0.84, 0.7, 0.6, 0.5, 0.4]; // of moving pictures, to those at rest
+const ROUNDS = 20; // quick pictures in a row before larger ones are tried
 const DENSEST = 2; // canvas pixels per CSS pixel
 const SIDES = [
   "front",
@@ -48,18 +53,31 @@ export function createStage(canvas, scene, store) {
   /** @type {(error: unknown) => void} */
   let failed = () => {};
   let [frame, timer, still] = [0, 0, true];
+  let [coarse, quick, last] = [0, 0, 0]; // of SIZES; quick pictures in a row; when the last one began
 
-  function paint() {
+  /** @param {number} now milliseconds */
+  function paint(now) {
     frame = 0;
     if (!painter) return;
+    if (!still) suit(now - last);
+    last = now;
+    const shot = shotOf(scene, store.state);
     try {
-      painter.draw({ ...shotOf(scene, store.state), still });
+      painter.draw(still ? shot : { ...shot, camera: resized(shot.camera, SIZES[coarse]), still });
     } catch (error) {
       painter = null;
       failed(error);
       return;
     }
     drawn();
+  }
+
+  /** @param {number} took milliseconds since the last picture: moving ones become as large as may be */
+  function suit(took) {
+    if (took > 4 * REST) return; // it has rested
+    quick = took < QUICK ? quick + 1 : 0;
+    if (took > SLOW) coarse = Math.min(SIZES.length - 1, coarse + 1);
+    if (quick === ROUNDS) [coarse, quick] = [Math.max(0, coarse - 1), 0];
   }
 
   function ask() {

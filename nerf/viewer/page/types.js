@@ -12,7 +12,7 @@
  * @property {number} aspect fy / fx
  */
 
-/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "labels"} Layer */
+/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "labels" | "mannequin"} Layer */
 
 /** @typedef {{at: number, type: string, shape: number[]}} ArrayRecord where an array lies in the blob */
 
@@ -39,7 +39,7 @@
  * @property {Paint[]} palette
  * @property {{rgb: number[], width_px: number} | null} pen that draws the outline
  * @property {ViewRecord[]} views
- * @property {any} field the trained field, see `scene.py`
+ * @property {any} field the trained field, see `scene.py`; null: nothing is trained yet
  * @property {any} drawings what the drawn look is made of, or null
  */
 
