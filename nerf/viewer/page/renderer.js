@@ -102,11 +102,12 @@ export async function createRenderer(canvas, scene, blob) {
       look.draw(camera, targets.half, bind, targets.picture, shot);
       return targets.picture;
     }
+    const tile = still && layer !== "drawn" ? field.approach(camera) : 0;
     bind(targets.rays);
-    field.see(camera, 1);
+    field.see(camera, 1, tile);
     if (still) {
       bind(targets.fine, 2);
-      field.see(camera, 2);
+      field.see(camera, 2, tile);
     }
     const rays = {
       rays: targets.rays.textures[0],
