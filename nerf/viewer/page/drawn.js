@@ -19,6 +19,7 @@ const CELL = 4; // pixels of the coarse grid's side
 const CRUMB = 30; // area of parts and holes that are noise, in a figure of CRUMB_AT px
 const HOLE = 80; // of holes between bent drawings
 const CRUMB_AT = 260;
+const SLIVER = 0.03; // of the height: places so near to paint have it, too
 const TAPS = 4; // drawings that a view is made of: two beside it, two that fill gaps
 
 const LOOK_UP = `${CAMERA}
@@ -413,6 +414,29 @@ void main() {
   result.rgb = clamp(c + kept * shade * change, 0.0, 1.0);
 }`;
 
+/** Slivers that no drawing shows go on with the paint beside them, if it is of the same surface. */
+const SLIVERS = `
+uniform sampler2D voted, first, depths;
+uniform float reach, apart;
+layout(location = 0) out vec4 result;
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy), most = textureSize(voted, 0) - 1;
+  result = texelFetch(voted, at, 0);
+  vec2 here = texelFetch(depths, at, 0).rg;
+  if (here.g < 0.5 || texelFetch(first, at, 0).a > 0.5) return;
+  float least = 1e9, stride = max(1.0, reach / 16.0);
+  ivec2 best = at;
+  for (int y = -16; y <= 16; y++) for (int x = -16; x <= 16; x++) {
+    vec2 off = stride * vec2(x, y);
+    ivec2 place = at + ivec2(round(off));
+    if (any(lessThan(place, ivec2(0))) || any(greaterThan(place, most))) continue;
+    if (length(off) >= least || length(off) > reach || texelFetch(first, place, 0).a < 0.5) continue;
+    least = length(off);
+    best = place;
+  }
+  if (least < 1e8 && abs(texelFetch(depths, best, 0).r - here.r) <= apart) result = texelFetch(voted, best, 0);
+}`;
+
 /** Opacity smoothed, and the nearest place on the outline for pixels beside it. */
 const RIM = `
 uniform sampler2D field, own, crumbs;
@@ -470,7 +494,7 @@ void main() {
 
 /** Everything over each other. */
 const COMPOSE = `
-uniform sampler2D places, voted, field, own, style;
+uniform sampler2D places, voted, before, field, own, style; // before: 'voted' in the old colours
 uniform float line, part;
 uniform vec3 ink;
 uniform bool styled;
@@ -498,6 +522,9 @@ void main() {
   result = vec4(color * (cover - stroke) + stroke * ink, cover);
   if (part > 0.0 && plain) {
     vec4 drawing = texelFetch(own, at, 0);
+    vec3 old = texelFetch(before, at, 0).rgb;
+    float like = clamp(1.0 - 2.0 * distance(drawing.rgb / max(drawing.a, 0.01), old), 0.0, 1.0);
+    drawing.rgb += like * drawing.a * (texelFetch(voted, at, 0).rgb - old);
     result = mix(result, vec4(min(drawing.rgb, drawing.aaa), drawing.a), part);
   }
 }`;
@@ -561,6 +588,7 @@ export class DrawnLook {
     this.vote = new Program(gl, VOTE);
     this.recolor = new Program(gl, RECOLOR);
     this.inside = new Program(gl, INSIDE);
+    this.slivers = new Program(gl, SLIVERS);
     this.rim = new Program(gl, `#define SPREAD 0.62\n${RIM}`);
     this.flood = new Program(gl, FLOOD);
     this.compose = new Program(gl, COMPOSE);
@@ -589,6 +617,7 @@ export class DrawnLook {
       candidates: make(bytes, gl.RGBA16F, bytes, bytes, bytes, bytes),
       vote: make(bytes),
       recolor: make(bytes),
+      slivers: make(bytes),
       rim: make(gl.RGBA32F),
       flood: make(gl.RGBA32F),
       inside: make(bytes),
@@ -719,12 +748,19 @@ export class DrawnLook {
     this.vote.use({ said, weights, first: one, second: two, third: three }).fill();
 
     let voted = targets.vote.textures[0];
+    if (record.shape) {
+      bind(targets.slivers);
+      const reach = SLIVER * record.height * camera.scale;
+      this.slivers.use({ ...common, voted, first: one, reach, apart: record.slack * record.height }).fill();
+      voted = targets.slivers.textures[0];
+    }
+    const before = voted;
     if (changed) {
       bind(targets.recolor);
       this.recolor.use({ ...common, voted }).fill();
       voted = targets.recolor.textures[0];
     }
-    const plain = part > 0 && !changed && !style.ink && JSON.stringify(record.pen) === JSON.stringify(record.outline);
+    const plain = part > 0 && !style.ink && JSON.stringify(record.pen) === JSON.stringify(record.outline);
     /** @param {import("./gl.js").Texture | null} crumbs */
     const finish = (crumbs) => {
       bind(targets.rim);
@@ -736,7 +772,7 @@ export class DrawnLook {
         [from, to] = [to, from];
       }
       bind(into);
-      this.compose.use({ ...common, places: from.textures[0], voted, field, own, line, plain, style: lines ?? this.none, styled: Boolean(lines) }).fill();
+      this.compose.use({ ...common, places: from.textures[0], voted, before, field, own, line, plain, style: lines ?? this.none, styled: Boolean(lines) }).fill();
     };
     finish(null);
     bind(targets.inside);

@@ -1,0 +1,206 @@
+"""What the page draws, beside what `toonset render` does: layers, the drawn look, other colours."""
+
+from __future__ import annotations
+
+import json
+import math
+from base64 import b64decode
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page
+
+from tests.nerf.bodies import Hand, body, sheet
+from tests.nerf.ellipsoids import QUICK
+from tests.nerf.viewer.page_under_test import chromium
+from toonset.camera import Camera
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.render.depth_levels import LEVELS, DepthLevels
+from toonset.nerf.render.recolor import recolored
+from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.views import render
+from toonset.nerf.train.labelling import labelled
+from toonset.nerf.training import train
+from toonset.nerf.viewer.build import run_scene
+from toonset.nerf.viewer.page import page_html
+from toonset.nerf.viewer.scene import camera_record
+from toonset.palette.names import hex_of
+from toonset.palette.pixels.labels import UNLABELLED
+
+SIDE = 160
+LEAST_DB = {"drawn": 30.0}  # else 33
+SIGHTS = ((0.0, 0.0), (70.0, 20.0), (200.0, -15.0))  # yaw, elevation, degrees
+READ = """async shot => {
+  const { data } = await toonset.read(shot);
+  let text = "";
+  for (let i = 0; i < data.length; i += 1024)
+    text += String.fromCharCode(...data.subarray(i, i + 1024));
+  return btoa(text);
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def fields() -> dict[str, TrainedField]:
+    """Return a field, and one whose surface is that of the character's own body."""
+    scene = labelled(sheet(body(), Hand()))[0]
+    shaded = replace(labelled(sheet(body(), Hand(shadow=0.7)))[0], mannequin=body())
+    return {"field": train(scene, QUICK).field, "body": train(shaded, QUICK).field}
+
+
+@pytest.fixture(scope="module")
+def pages(
+    browser: Browser, fields: dict[str, TrainedField], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[dict[str, tuple[TrainedField, Page]]]:
+    found = {}
+    for name, trained in fields.items():
+        scene, blob = run_scene(trained, name, {"verdict": None, "palette": [], "views": []})
+        file = tmp_path_factory.mktemp("page") / "page.html"
+        file.write_text(page_html(scene, blob, []), encoding="utf-8")
+        page = browser.new_page(viewport={"width": 500, "height": 600})
+        page.goto(file.as_uri())
+        page.wait_for_selector("#poster[hidden]", state="attached", timeout=60_000)
+        found[name] = (trained, page)
+    yield found
+    for _, page in found.values():
+        page.close()
+
+
+def camera_at(trained: TrainedField, yaw: float, elevation: float) -> Camera:
+    start = turntable(trained, 36, size=SIDE)[0]
+    return Camera.looking_at(
+        start.target,
+        math.radians(yaw),
+        math.radians(elevation),
+        0.9 * start.scale,
+        (SIDE, SIDE),
+        k=start.k,
+    )
+
+
+def shown(page: Page, trained: TrainedField, camera: Camera, layer: str, **more: Any) -> np.ndarray:
+    """Return the page's picture over white."""
+    assert trained.palette is not None
+    shot = {"camera": camera_record(camera), "layer": layer, "colors": trained.palette.tolist()}
+    data = b64decode(page.evaluate(READ, json.loads(json.dumps(shot | more))))
+    return over_white(np.frombuffer(data, np.uint8).reshape(SIDE, SIDE, 4))
+
+
+def rendered(trained: TrainedField, camera: Camera, layer: str) -> np.ndarray:
+    """Return what `toonset render` draws, over white; depth as grey of the hull's extent."""
+    view = render(trained, camera)
+    if layer == "depth":
+        scale = DepthLevels.of(trained.hull, [camera])
+        near = 1 - (view.depth - scale.nearest) / (scale.unit * (LEVELS - 1))
+        grey = np.rint(255 * np.nan_to_num(near))
+        return over_white(np.dstack([grey, grey, grey, 255.0 * np.isfinite(view.depth)]))
+    picture = view.picture(layer)
+    if layer == "labels":
+        assert trained.palette is not None
+        there = picture != UNLABELLED
+        colors = trained.palette[np.where(there, picture, 0)]
+        return over_white(np.dstack([colors, 255 * there]))
+    return over_white(picture)
+
+
+def over_white(rgba: np.ndarray) -> np.ndarray:
+    alpha = rgba[..., 3:].astype(float) / 255
+    return rgba[..., :3] * alpha + 255 * (1 - alpha)
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    return 10 * math.log10(255**2 / max(float(np.mean((a - b) ** 2)), 1e-9))
+
+
+@pytest.mark.parametrize("layer", ["drawn", "rgb", "palette", "normal", "depth", "labels"])
+@pytest.mark.parametrize("name", ["field", "body"])
+def test_a_layer_is_what_render_draws(
+    pages: dict[str, tuple[TrainedField, Page]], name: str, layer: str
+) -> None:
+    trained, page = pages[name]
+    for yaw, elevation in SIGHTS:
+        camera = camera_at(trained, yaw, elevation)
+        found = psnr(shown(page, trained, camera, layer), rendered(trained, camera, layer))
+        assert found >= LEAST_DB.get(layer, 33.0), (yaw, elevation, found)
+
+
+@pytest.mark.parametrize("layer", ["drawn", "palette"])
+def test_another_colour_changes_only_that_paint(
+    pages: dict[str, tuple[TrainedField, Page]], layer: str
+) -> None:
+    trained, page = pages["field"]
+    assert trained.palette is not None
+    colors = trained.palette.tolist()
+    new = [40, 220, 60]
+    changed = recolored(trained, [f"{hex_of(tuple(colors[0]))}={hex_of((40, 220, 60))}"])
+    camera = camera_at(trained, 40.0, 5.0)
+    before = shown(page, trained, camera, layer)
+    after = shown(page, trained, camera, layer, colors=[new, *colors[1:]])
+    moved = np.abs(after - before).max(axis=-1) > 2
+    view = render(trained, camera)
+    labels = view.labels if layer == "palette" else view.drawn.palette_labels(len(colors))
+    assert labels is not None
+    own = labels == 0
+    assert moved[own].mean() > 0.9
+    far = ~np.asarray(
+        np.lib.stride_tricks.sliding_window_view(np.pad(own, 3), (7, 7)).any(axis=(2, 3))
+    )
+    assert not moved[far].any()
+    assert psnr(after, rendered(changed, camera, layer)) >= LEAST_DB.get(layer, 33.0)
+
+
+def test_moving_pictures_are_alike(pages: dict[str, tuple[TrainedField, Page]]) -> None:
+    for trained, page in pages.values():
+        camera = camera_at(trained, 110.0, 10.0)
+        still, moving = (
+            shown(page, trained, camera, "drawn", still=still) for still in (True, False)
+        )
+        assert psnr(still, moving) > 22
+
+
+def test_memory_stays_as_it_is_while_it_turns(pages: dict[str, tuple[TrainedField, Page]]) -> None:
+    trained, page = pages["field"]
+    session = page.context.new_cdp_session(page)
+    camera = camera_record(camera_at(trained, 0.0, 0.0))
+
+    def used() -> int:
+        session.send("HeapProfiler.collectGarbage")
+        return int(page.evaluate("performance.memory.usedJSHeapSize"))
+
+    draw = (
+        "([n, camera]) => { for (let i = 0; i < n; i++) toonset.draw({ camera, still: false }); }"
+    )
+    page.evaluate(draw, [20, camera])
+    before = used()
+    page.evaluate(draw, [200, camera])
+    assert used() < before + 1_000_000
+
+
+def test_the_page_says_what_it_may_load(pages: dict[str, tuple[TrainedField, Page]]) -> None:
+    _, page = pages["field"]
+    policy = page.get_attribute("meta[http-equiv]", "content")
+    assert policy is not None
+    assert policy.startswith("default-src 'none'")
+    assert "unsafe" not in policy
+
+
+def test_top_level_names_are_unique() -> None:
+    folder = Path(__file__).parents[3] / "nerf" / "viewer" / "page"
+    names = [
+        line.removeprefix("export ").removeprefix("async ").split()[1].split("(")[0]
+        for file in folder.glob("*.js")
+        for line in file.read_text(encoding="utf-8").splitlines()
+        if line.removeprefix("export ")
+        .removeprefix("async ")
+        .startswith(("const ", "let ", "function ", "class "))
+    ]
+    assert sorted(names) == sorted(set(names))
