@@ -6,7 +6,7 @@ export const FILL = 255; // inside
 const AROUND = 2; // pixels: a hole's soft border goes with it
 
 /**
- * @param {Uint8Array} mask four bytes a pixel, the first 255 inside of the figure
+ * @param {Uint8ClampedArray} mask four bytes a pixel, the first 255 inside of the figure
  * @param {number} width
  * @param {number} height
  * @param {number} crumb area: smaller parts are dropped

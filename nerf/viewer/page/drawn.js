@@ -7,7 +7,7 @@
 
 import { CAMERA, cameraUniforms } from "./field.js";
 import { crumbsOf } from "./crumbs.js";
-import { Program, bytesOf, freeTarget, makeTarget, makeTexture } from "./gl.js";
+import { PictureReader, Program, freeTarget, makeTarget, makeTexture } from "./gl.js";
 import { MOST_PAINTS, NOWHERE, padded } from "./field_layers.js";
 import { angleBetween } from "./camera.js";
 import { arrayOf } from "./scene.js";
@@ -589,6 +589,7 @@ export class DrawnLook {
     this.recolor = new Program(gl, RECOLOR);
     this.inside = new Program(gl, INSIDE);
     this.slivers = new Program(gl, SLIVERS);
+    this.reader = new PictureReader(gl);
     this.rim = new Program(gl, `#define SPREAD 0.62\n${RIM}`);
     this.flood = new Program(gl, FLOOD);
     this.compose = new Program(gl, COMPOSE);
@@ -781,7 +782,7 @@ export class DrawnLook {
     const hole = record.bent && !record.shape ? HOLE : CRUMB;
     const { gl } = this;
     return async () => {
-      const mask = await bytesOf(gl, targets.inside);
+      const mask = await this.reader.read(targets.inside);
       const crumbs = crumbsOf(mask, into.width, into.height, CRUMB * area, hole * area);
       if (!crumbs) return null;
       return () => {

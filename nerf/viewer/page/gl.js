@@ -25,8 +25,9 @@ export class Program {
    * @param {GL} gl
    * @param {string} fragment source, without version and precision
    * @param {string} [vertex] source; without it one triangle covers everything
+   * @param {string[]} [kept] outputs of the vertex shader that are written to a buffer
    */
-  constructor(gl, fragment, vertex = WHOLE) {
+  constructor(gl, fragment, vertex = WHOLE, kept = []) {
     this.gl = gl;
     this.program = gl.createProgram();
     const shaders = [
@@ -42,6 +43,7 @@ export class Program {
         throw new Error(`shader: ${gl.getShaderInfoLog(shader)}`);
       }
     }
+    if (kept.length) gl.transformFeedbackVaryings(this.program, kept, gl.SEPARATE_ATTRIBS);
     gl.linkProgram(this.program);
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
       throw new Error(`program: ${gl.getProgramInfoLog(this.program)}`);
@@ -187,27 +189,56 @@ export function freeTarget(gl, target) {
   gl.deleteFramebuffer(target.frame);
 }
 
+const TEXELS = `
+uniform sampler2D picture;
+flat out uint texel;
+void main() {
+  int wide = textureSize(picture, 0).x;
+  uvec4 bytes = uvec4(round(texelFetch(picture, ivec2(gl_VertexID % wide, gl_VertexID / wide), 0) * 255.0));
+  texel = bytes.r | bytes.g << 8 | bytes.b << 16 | bytes.a << 24;
+  gl_Position = vec4(0.0);
+}`;
+
 /**
- * Read a target's first texture, which holds bytes, without holding up what is being drawn.
- * @param {GL} gl
- * @param {Target} target
- * @returns {Promise<Uint8Array>} RGBA, the first row first
+ * Reads pictures back by way of a vertex shader's output: unlike `readPixels` it holds up nothing, and
+ * no browser warns of it.
  */
-export async function bytesOf(gl, target) {
-  const bytes = new Uint8Array(target.width * target.height * 4);
-  const buffer = gl.createBuffer();
-  gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
-  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
-  gl.bufferData(gl.PIXEL_PACK_BUFFER, bytes.length, gl.STREAM_READ);
-  gl.readPixels(0, 0, target.width, target.height, gl.RGBA, gl.UNSIGNED_BYTE, 0);
-  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
-  const fence = /** @type {WebGLSync} */ (gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0));
-  gl.flush();
-  while (gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED) await new Promise((later) => setTimeout(later, 2));
-  gl.deleteSync(fence);
-  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
-  gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, bytes);
-  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
-  gl.deleteBuffer(buffer);
-  return bytes;
+export class PictureReader {
+  /** @param {GL} gl */
+  constructor(gl) {
+    this.gl = gl;
+    this.program = new Program(gl, "void main() {}", TEXELS, ["texel"]);
+    this.feedback = gl.createTransformFeedback();
+  }
+
+  /**
+   * @param {Target} target its first texture holds bytes
+   * @returns {Promise<Uint8ClampedArray<ArrayBuffer>>} RGBA, the first row first
+   */
+  async read({ textures, width, height }) {
+    const { gl } = this;
+    const bytes = new Uint8ClampedArray(width * height * 4);
+    const buffer = gl.createBuffer();
+    gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
+    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, buffer);
+    gl.bufferData(gl.TRANSFORM_FEEDBACK_BUFFER, bytes.length, gl.STREAM_READ);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null); // not the one that holds the picture
+    gl.enable(gl.RASTERIZER_DISCARD);
+    this.program.use({ picture: textures[0] });
+    gl.beginTransformFeedback(gl.POINTS);
+    gl.drawArrays(gl.POINTS, 0, width * height);
+    gl.endTransformFeedback();
+    gl.disable(gl.RASTERIZER_DISCARD);
+    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
+    gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
+    const fence = /** @type {WebGLSync} */ (gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0));
+    gl.flush();
+    while (gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED) await new Promise((later) => setTimeout(later, 2));
+    gl.deleteSync(fence);
+    gl.bindBuffer(gl.COPY_READ_BUFFER, buffer);
+    gl.getBufferSubData(gl.COPY_READ_BUFFER, 0, bytes);
+    gl.bindBuffer(gl.COPY_READ_BUFFER, null);
+    gl.deleteBuffer(buffer);
+    return bytes;
+  }
 }

@@ -2,7 +2,7 @@
 
 import { DrawnLook } from "./drawn.js";
 import { Field, cameraUniforms } from "./field.js";
-import { Program, bytesOf, freeTarget, makeTarget } from "./gl.js";
+import { PictureReader, Program, freeTarget, makeTarget } from "./gl.js";
 import { DEPTH, NORMAL, PALETTE, PRESENT, SEEN, padded } from "./field_layers.js";
 import { Shape } from "./shape.js";
 import { project } from "./camera.js";
@@ -36,6 +36,7 @@ export async function createRenderer(canvas, scene, blob) {
   };
   while (field && !field.read(1 << 20));
 
+  const reader = new PictureReader(gl);
   /** @type {Record<string, Target>} */
   let targets = {};
   let [x, y, width, height] = [0, 0, 0, 0];
@@ -206,7 +207,7 @@ export async function createRenderer(canvas, scene, blob) {
       const own = pictures;
       await withoutCrumbs();
       if (own !== pictures) return this.read(shot); // another picture came between
-      const bytes = new Uint8ClampedArray(await bytesOf(gl, made));
+      const bytes = await reader.read(made);
       for (let i = 0; i < bytes.length; i += 4) {
         const alpha = bytes[i + 3];
         for (let c = i; alpha > 0 && alpha < 255 && c < i + 3; c++) bytes[c] = (bytes[c] * 255) / alpha;
