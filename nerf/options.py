@@ -33,6 +33,7 @@ PRESETS: tuple[PresetName, ...] = get_args(PresetName)
 FORMATS = ("gif", "webp", "mp4", "sprites")  # of all views of a turn together
 LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
 LEAST |= {"smoothness": 0, "palette_weight": 0}
+ORIGINAL = "original"  # of a mesh's variants: the run's own colours
 FACES = 8000  # of a mesh at most: docs/decisions.md
 USUAL_STEPS, STEPS_ON_SHAPE = 600, 300  # by default: without the mannequin's shape, and with it
 PAPER_STEPS = 2000
