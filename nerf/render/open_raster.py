@@ -16,6 +16,7 @@ Source: openraster.org, "File Layout Specification" and "Layer Stack Specificati
 from __future__ import annotations
 
 import io
+import itertools
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.images.picture import encode_png
 from toonset.errors import PaletteError, UsageError
@@ -45,7 +46,9 @@ FAINT = 0.02  # of a pixel: less of a line is noise
 HIDDEN = 0.02  # of a pixel: so little is not seen of a paint, whose colour cannot be told there
 PURE = 0.5  # of a pixel, that shows its paint's colour
 BLEND = 0.08  # of colours, that a soft edge may be off a mixture of the paints beside it
-AROUND = np.ones((3, 3), dtype=np.uint8)
+PLAIN = 0.1  # of colours: a thin line, an eye, is its paint's
+AROUND_PX, FEWEST, MOST = 5, 3, 3  # pixels in which paints are looked for, of one, how many of them
+SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Color = Float[np.ndarray, "height width 3"]
@@ -148,13 +151,14 @@ def layered(view: Rendering, layer: str, picture: Picture) -> list[PaintLayer]:
     look = _look(view, layer, picture)
     ink = np.broadcast_to(look.ink_rgb, look.shown.color.shape)
     lines, rest = look.shown.under(_lines(look), ink)
-    pure = _pure_colors(look, rest, lines)
-    upper, edge, lower, rest = _edges(look, rest, pure)
-    flat = _straight(rest, pure, lower)
+    pure = _pure(look, rest, lines)
+    colors = _colors(look, rest, pure)
+    upper, edge, lower, rest = _edges(look, rest, pure, colors)
+    flat = _straight(rest, colors, lower)
     found = [_cut(LINES, ink, lines)]
     for number, name in reversed(list(enumerate(_names(look)))):
         share = np.where(upper == number, edge, np.where(lower == number, rest.alpha, 0))
-        color = np.where((upper == number)[..., None], pure[number], flat)
+        color = np.where((upper == number)[..., None], colors[number], flat)
         found.append(_cut(name, color, share))
     return [one for one in found if one is not None]
 
@@ -195,51 +199,75 @@ def _lines(look: _Look) -> Share:
     return np.where(near & (share > FAINT), share, 0)
 
 
-def _pure_colors(look: _Look, rest: _Rest, lines: Share) -> list[Color]:
+def _pure(look: _Look, rest: _Rest, lines: Share) -> list[Bool[np.ndarray, "height width"]]:
+    """Return where every paint is seen alone: amid its own, or thin and in its own colour."""
+    color = rest.color / np.maximum(rest.alpha, 1e-6)[..., None]
+    off = np.linalg.norm(color - look.paints[look.labels] / 255.0, axis=-1)
+    pure = (_amid(look.labels) | (off < PLAIN)) & (rest.alpha > 1 - FAINT) & (lines < PURE)
+    return [pure & (look.labels == number) for number in range(len(look.paints))]
+
+
+def _amid(labels: Labels) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels whose neighbours have the same label."""
+    small = labels.astype(np.int16)
+    return np.asarray(cv2.erode(small, SQUARE) == cv2.dilate(small, SQUARE))
+
+
+def _colors(
+    look: _Look, rest: _Rest, pure: Sequence[Bool[np.ndarray, "height width"]]
+) -> Float[np.ndarray, "paints height width 3"]:
     """Return every paint's colour at every pixel: that of the nearest that shows it alone."""
-    labels = look.labels.astype(np.int16)
-    alone = cv2.erode(labels, AROUND) == cv2.dilate(labels, AROUND)
-    alone &= (rest.alpha > 1 - FAINT) & (lines < PURE)
-    straight_color = rest.color / np.maximum(rest.alpha, 1e-6)[..., None]
-    found = []
-    for number, rgb in enumerate(look.paints):
-        at = alone & (look.labels == number)
-        plain = np.broadcast_to(rgb / 255.0, straight_color.shape)
-        found.append(straight_color[nearest(at)] if at.any() else plain)
-    return found
+    color = rest.color / np.maximum(rest.alpha, 1e-6)[..., None]
+    plain = np.broadcast_to(look.paints[:, None, None] / 255.0, (len(pure), *color.shape)).copy()
+    for number, at in enumerate(pure):
+        if at.any():
+            plain[number] = color[nearest(at)]
+    return plain
 
 
-def _edges(look: _Look, rest: _Rest, pure: Sequence[Color]) -> tuple[Labels, Share, Labels, _Rest]:
-    """Return the upper paint of soft edges (-1: none), its share, and what lies under it."""
-    own, count = look.labels, len(look.paints)
-    seen = np.stack(
-        [
-            cv2.boxFilter(((own == i) & (rest.alpha > 0)).astype(np.float32), -1, (3, 3))
-            for i in range(count)
-        ]
-    )
-    np.put_along_axis(seen, own[None], 0, axis=0)
-    other = seen.argmax(axis=0)
-    colors = np.stack(pure)
-    first, second = (
-        np.take_along_axis(colors, at[None, ..., None], axis=0)[0] for at in (own, other)
-    )
-    way, off = second - first, rest.color - rest.alpha[..., None] * first
-    part = (off * way).sum(axis=-1) / np.maximum(np.square(way).sum(axis=-1), 1e-6)
-    part = np.clip(part, 0, rest.alpha)
-    left = np.linalg.norm(off - part[..., None] * way, axis=-1)
-    soft = (seen.max(axis=0) > 0) & (part > FAINT) & (left < BLEND)
-    upper = np.where(soft, np.maximum(own, other), -1)
-    lower = np.where(soft, np.minimum(own, other), own)
-    share = np.where(soft, np.where(upper == own, rest.alpha - part, part), 0)
+def _edges(
+    look: _Look,
+    rest: _Rest,
+    pure: Sequence[Bool[np.ndarray, "height width"]],
+    colors: Float[np.ndarray, "paints height width 3"],
+) -> tuple[Labels, Share, Labels, _Rest]:
+    """Return the upper paint of soft edges (-1: none), its share, the lower one, and what is left.
+
+    An edge mixes two of the commonest paints around it; the label of a mixture says nothing.
+    """
+    upper, lower = np.full(look.labels.shape, -1), look.labels.copy()
+    share = np.zeros(look.labels.shape)
+    at = ~_amid(look.labels) & (rest.alpha > 0)
+    side = (AROUND_PX, AROUND_PX)
+    counts = [cv2.boxFilter(one.astype(np.float32), -1, side, normalize=False)[at] for one in pure]
+    seen = np.stack(counts)
+    common = np.argsort(-seen, axis=0, kind="stable")[:MOST]
+    color = (rest.color / np.maximum(rest.alpha, 1e-6)[..., None])[at]
+    every, near = np.arange(len(color)), colors[:, at]
+    least = np.full(len(color), BLEND)
+    found = np.stack([upper[at], lower[at]]), np.zeros(len(color))
+    for i, j in itertools.combinations(range(len(common)), 2):
+        pair = np.sort(common[[i, j]], axis=0)
+        low, high = near[pair[0], every], near[pair[1], every]
+        way = high - low
+        part = ((color - low) * way).sum(axis=-1) / np.maximum(np.square(way).sum(axis=-1), 1e-6)
+        part = part.clip(0, 1)
+        off = np.linalg.norm(color - low - part[:, None] * way, axis=-1)
+        better = (off < least) & (seen[common[j], every] >= FEWEST)
+        least = np.where(better, off, least)
+        found[0][:, better], found[1][better] = pair[::-1, better], part[better]
+    upper[at], lower[at] = found[0]
+    share[at] = found[1] * rest.alpha[at]
     over = np.take_along_axis(colors, upper.clip(0)[None, ..., None], axis=0)[0]
     share, under = rest.under(share, over)
     return upper, share, lower, under
 
 
-def _straight(rest: _Rest, pure: Sequence[Color], labels: Labels) -> Color:
+def _straight(
+    rest: _Rest, colors: Float[np.ndarray, "paints height width 3"], labels: Labels
+) -> Color:
     """Return straight colour; where next to nothing is left of it, that of its paint."""
-    plain = np.take_along_axis(np.stack(pure), labels[None, ..., None], axis=0)[0]
+    plain = np.take_along_axis(colors, labels[None, ..., None], axis=0)[0]
     color = rest.color / np.maximum(rest.alpha, 1e-6)[..., None]
     return np.where((rest.weight > HIDDEN)[..., None], color, plain)
 
