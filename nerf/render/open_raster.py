@@ -43,7 +43,7 @@ STORED_TIME = (1980, 1, 1, 0, 0, 0)  # the same pictures, the same bytes
 NEAR_PX = 2  # from where lines are drawn to where a drawing's own line may lie
 CLEAR = 0.15  # of colours: lines of a colour nearer to the paint cannot be told from it
 FAINT = 0.02  # of a pixel: less of a line is noise
-HIDDEN = 0.02  # of a pixel: so little is not seen of a paint, whose colour cannot be told there
+UNSEEN = 3 / 255  # of what is shown: so much a pixel under others may be off, to be its paint's
 PURE = 0.5  # of a pixel, that shows its paint's colour
 BLEND = 0.08  # of colours, that a soft edge may be off a mixture of the paints beside it
 PLAIN = 0.1  # of colours: a thin line, an eye, is its paint's
@@ -266,10 +266,12 @@ def _edges(
 def _straight(
     rest: _Rest, colors: Float[np.ndarray, "paints height width 3"], labels: Labels
 ) -> Color:
-    """Return straight colour; where next to nothing is left of it, that of its paint."""
+    """Return straight colour; that of its paint where next to nothing of it is seen."""
     plain = np.take_along_axis(colors, labels[None, ..., None], axis=0)[0]
     color = rest.color / np.maximum(rest.alpha, 1e-6)[..., None]
-    return np.where((rest.weight > HIDDEN)[..., None], color, plain)
+    off = rest.weight * rest.alpha * np.abs(color - plain).max(axis=-1)
+    covered = (rest.weight < 1) & (off <= UNSEEN)
+    return np.where(covered[..., None], plain, color)
 
 
 def _names(look: _Look) -> list[str]:
