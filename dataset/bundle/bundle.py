@@ -88,7 +88,7 @@ class Bundle:
         frames, found = self.scene.frames, _calibration_of(self.folder)
         judged = {view.name: view for view in found.views} if found else {}
         size = picture_bytes(len(frames))
-        rows: list[list[Cell]] = []
+        rows: list[Sequence[Cell]] = []
         for frame in frames[:MOST_ROWS]:
             yaw, elevation, _ = (math.degrees(angle) for angle in frame.camera.angles)
             view, thumbnail = judged.get(frame.name), small_png(frame.rgba, THUMBNAIL_PX, size)

@@ -88,7 +88,8 @@ def test_a_palette_per_variant(egg: Surface, tmp_path: Path) -> None:
     found = trimesh.load(tmp_path / "egg.glb", force="mesh")
     assert isinstance(found, trimesh.Trimesh)
     assert len(found.faces) == len(egg.faces)
-    assert found.visual.material.name == "palette"
+    visual: Any = found.visual
+    assert visual.material.name == "palette"
 
 
 def test_a_painted_picture_per_variant(egg: Surface, drawn: Drawings, tmp_path: Path) -> None:
