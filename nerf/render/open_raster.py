@@ -130,8 +130,8 @@ def check_layered(layer: str, *, as_drawn: bool) -> None:
     """
     if layer not in PAINTED:
         raise UsageError(
-            f"layer {layer!r}: has no paints for turntable.ora; choose one of "
-            f"{', '.join(PAINTED)}, first"
+            f"layer {layer!r}: has no paints for turntable.ora; let the first layer be one of "
+            f"{', '.join(PAINTED)}"
         )
     if as_drawn:
         raise UsageError("turntable.ora: its layers do not bend; leave --as-drawn or ora out")

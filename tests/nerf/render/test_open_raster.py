@@ -132,7 +132,7 @@ def test_a_run_without_palette_has_none(drawn: Drawings) -> None:
 
 @pytest.mark.parametrize("layer", ["depth", "labels", "ink", "normal"])
 def test_what_has_no_paints_is_refused(layer: str) -> None:
-    with pytest.raises(UsageError, match="choose one of drawn, rgb, palette"):
+    with pytest.raises(UsageError, match="one of drawn, rgb, palette"):
         check_layered(layer, as_drawn=False)
     with pytest.raises(UsageError, match="leave --as-drawn or ora out"):
         check_layered("drawn", as_drawn=True)
