@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
-from toonset.nerf.options import FACES
+from toonset.nerf.options import FACES, ORIGINAL
 
 
 def mesh(
@@ -37,6 +37,18 @@ def mesh(
         list[str] | None,
         typer.Option("--recolor", help="OLD=NEW, e.g. '#aa0000=#00aa00'; repeatable."),
     ] = None,
+    variants: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--variants",
+            metavar="FILE",
+            help="Other colours besides, a palette file or '#aa0000,#00aa00', in order; "
+            "repeatable: .glb.",
+        ),
+    ] = None,
+    nearest: Annotated[
+        bool, typer.Option("--nearest", help="Match --variants by likeness, not by order.")
+    ] = False,
     threads: Annotated[
         int | None, typer.Option("--threads", min=1, help="CPU threads (default: all cores).")
     ] = None,
@@ -53,12 +65,17 @@ def mesh(
     With --texture the picture holds the drawn look: every patch is painted by the one drawing that
     shows it best, without contour lines. --outline puts an inverted hull round it, in the sheet's
     ink and as wide as its line.
+
+    --variants puts more palettes into one GLB, as variants (KHR_materials_variants) that viewers
+    and engines switch between: the run's own, "original", first, then one per file.
     """
     printer = Printer(as_json, quiet)
     if outline and not texture:
         raise typer.BadParameter("--outline belongs to --texture")
+    if nearest and not variants:
+        raise typer.BadParameter("--nearest belongs to --variants")
     from toonset.nerf.kernels.threads import use_threads
-    from toonset.nerf.render.recolor import recolored
+    from toonset.nerf.render.recolor import recolored, variants_of
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
@@ -67,9 +84,10 @@ def mesh(
 
     trained = recolored(read_field(run), recolor or [])
     if texture:
-        check_textured_files(out, outline=outline, force=force)
+        check_textured_files(out, outline=outline, force=force, variants=bool(variants))
     else:
-        check_mesh_files(out, force=force)
+        check_mesh_files(out, force=force, variants=bool(variants))
+    others = variants_of(trained, variants or [], nearest=nearest)
     use_threads(threads)
 
     def progress(step: str, done: float) -> None:
@@ -77,14 +95,16 @@ def mesh(
 
     values: dict[str, Any] = {}
     if texture:
-        textured = textured_surface_of(trained, faces, progress, outline=outline)
+        textured = textured_surface_of(trained, faces, progress, outline=outline, variants=others)
         surface, files = textured.surface, textured_files(textured, out)
         by_field = float((textured.source < 0).mean())
         values = {"texture": list(textured.atlas.size_wh), "by_field": by_field}
     else:
-        surface = surface_of(trained, faces, progress)
+        surface = surface_of(trained, faces, progress, variants=others)
         files = mesh_files(surface, out)
     write_mesh_files(files, out)
+    if others:
+        values["variants"] = [ORIGINAL, *(name for name, _ in others)]
     sizes = {name: len(data) for name, data in files.items()}
     count = len(surface.faces)
     fewest = " (fewer would open it)" if count > faces else ""
@@ -93,8 +113,9 @@ def mesh(
         width, height = values["texture"]
         unseen = f"{values['by_field']:.0%} of the faces in no drawing"
         drawn = f" texture of {width} x {height} px, {unseen};"
+    colored = f" in the colours {', '.join(values['variants'])};" if others else ""
     printer.result(
         {"out": out, "faces": count, "vertices": len(surface.vertices), "bytes": sizes, **values},
-        f"{out}: {count} faces{fewest};{drawn} "
+        f"{out}: {count} faces{fewest};{drawn}{colored} "
         + ", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes.items()),
     )

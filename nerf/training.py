@@ -27,13 +27,16 @@ from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.checkpoint import Checkpoint, check_scene, versions
 from toonset.nerf.run.manifest import WRITTEN
 from toonset.nerf.run.monitor import INTERRUPTED, Looking, Onlooker
-from toonset.nerf.run.report import write_run
+from toonset.nerf.run.report import preview, write_run
 from toonset.nerf.train.labelling import labelled, without_palette
 from toonset.nerf.train.memory import check_memory, memory_errors
 from toonset.nerf.train.result import HeldOut, Training
 from toonset.nerf.train.train import device_of, fit_field
 from toonset.palette.names import hex_of
+from toonset.view import small_png
 from toonset.write import check_output, new_folder
+
+PREVIEW_PX = 960  # wide, in a notebook
 
 
 class Listener(Protocol):
@@ -77,6 +80,12 @@ class Run:
     test: Scene | None
     held_out: Sequence[HeldOut]
     threads: int
+
+    def _repr_png_(self) -> bytes:
+        """Return four views side by side, for a notebook."""
+        with working_threads(self.threads), memory_errors():
+            shown = preview(baked_of(self.field))
+        return small_png(np.dstack([shown, np.full(shown.shape[:2], 255, np.uint8)]), PREVIEW_PX)
 
     def save(self, folder: str | Path, *, force: bool = False) -> dict[str, Any]:
         """Write a run folder, whole or not at all; return the content of its metrics.json.

@@ -142,7 +142,7 @@ def _glb(folder: Path) -> None:
 
 
 GIVEN = {  # what lies in a document's folder before its first command
-    "README.md": "examples sheet.png strip.png folder held_out mesh.glb",
+    "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase",
     "docs/architecture.md": "sheet.png m.obj",
     "docs/formats.md": "bundle sheet.png views",
     "docs/guide_cameras.md": "sheet.png mannequin.obj m.obj points.json other colmap_folder",

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.errors import SheetError
 
+SHOWN_PX, SHOWN_BYTES = 480, 200_000  # of a picture in a notebook, at most
 VISIBLE = 16  # alpha: fainter is a file's noise
 
 Box = tuple[int, int, int, int]  # x, y, width, height
@@ -69,6 +70,10 @@ class View:
         """Return which pixels the figure covers by at least half."""
         return self.rgba[..., 3] >= 128
 
+    def _repr_png_(self) -> bytes:
+        """Return the drawing for a notebook."""
+        return small_png(self.rgba)
+
     def resized(self, size_wh: tuple[int, int]) -> View:
         """Return the drawing resampled to so many pixels; transparent ones lend no colour."""
         height, width = self.rgba.shape[:2]
@@ -99,6 +104,29 @@ def over_white(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "
     """Return a straight-alpha picture over white, in [0, 1]."""
     values = rgba.astype(np.float64) / 255
     return values[..., :3] * values[..., 3:] + 1 - values[..., 3:]
+
+
+def small_png(
+    rgba: UInt8[np.ndarray, "height width 4"], side_px: int = SHOWN_PX, most: int = SHOWN_BYTES
+) -> bytes:
+    """Return a picture as a PNG file of at most `most` bytes, made smaller where it has to be.
+
+    Args:
+        rgba: with straight alpha.
+        side_px: of the longer side, at most.
+        most: bytes.
+    """
+    height, width = rgba.shape[:2]
+    by = min(1.0, side_px / max(height, width))
+    while True:
+        size = (max(1, round(by * width)), max(1, round(by * height)))
+        small = rgba
+        if size != (width, height):
+            small = straight(cv2.resize(premultiplied(rgba), size, interpolation=cv2.INTER_AREA))
+        data = cv2.imencode(".png", cv2.cvtColor(small, cv2.COLOR_RGBA2BGRA))[1].tobytes()
+        if len(data) <= most or size == (1, 1):
+            return data
+        by *= 0.7
 
 
 SHEET = "sheet"  # the role of a file that holds drawings, side by side or one

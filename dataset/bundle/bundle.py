@@ -19,6 +19,7 @@ it is made or moved to.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,20 +30,23 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.calibration_file import calibration_content
+from toonset.dataset.bundle.calibration_file import calibration_content, read_calibration
+from toonset.dataset.bundle.calibration_schema import CalibrationFile
 from toonset.dataset.bundle.read_scene import MANNEQUIN, member, read_scene
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import load_mesh, save_obj
-from toonset.errors import BundleError
+from toonset.errors import BundleError, ToonsetError
 from toonset.mesh import Mesh
+from toonset.notebook import MOST_ROWS, Cell, picture_bytes, table
 from toonset.palette.formats.schema import read_palette_json
 from toonset.palette.palette import Palette
-from toonset.view import View
+from toonset.view import View, small_png
 from toonset.write import new_folder, write_bytes, write_json
 
+THUMBNAIL_PX = 96  # of a view in a notebook
 OVERLAY, CALIBRATION = "overlay.png", "calibration.json"
 LABELS, TONES, CONTOURS, IMAGES = "labels", "tones", "contours", "images"
 WRITTEN = (
@@ -78,6 +82,32 @@ class Bundle:
     scene: Scene
     palette: Palette | None
     mannequin: Mesh | None
+
+    def _repr_html_(self) -> str:
+        """Return a table of the views for a notebook, with verdicts where it has any."""
+        frames, found = self.scene.frames, _calibration_of(self.folder)
+        judged = {view.name: view for view in found.views} if found else {}
+        size = picture_bytes(len(frames))
+        rows: list[Sequence[Cell]] = []
+        for frame in frames[:MOST_ROWS]:
+            yaw, elevation, _ = (math.degrees(angle) for angle in frame.camera.angles)
+            view, thumbnail = judged.get(frame.name), small_png(frame.rgba, THUMBNAIL_PX, size)
+            told = (view.verdict, view.reason) if view else ("", "")
+            angles = (f"{yaw % 360:.1f}°", f"{elevation:.1f}°")
+            rows.append([thumbnail, frame.name, *angles, *told])
+        rows += [[frame.name] for frame in frames[MOST_ROWS:]]
+        said = f"; {found.verdict}: {found.reason}" if found else ""
+        colors = f", {len(self.palette.colors)} colours" if self.palette else ""
+        caption = f"{self.folder}: {len(frames)} views{colors}{said}"
+        return table(caption, ("", "view", "yaw", "elevation", "verdict", "reason"), rows)
+
+
+def _calibration_of(folder: Path) -> CalibrationFile | None:
+    """Return how cameras were found; None where nothing says it."""
+    try:
+        return read_calibration(transforms_file(folder).parent / CALIBRATION)
+    except ToonsetError:
+        return None
 
 
 def read_bundle(folder: str | Path) -> Bundle:

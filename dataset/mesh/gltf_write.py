@@ -1,12 +1,14 @@
 """Building a GLB file: a description, and one buffer that holds arrays and pictures.
 
-Source: Khronos glTF 2.0 specification, sections 3.6 (binary data) and 4.4 (GLB).
+Source: Khronos glTF 2.0 specification, sections 3.6 (binary data) and 4.4 (GLB), and its extensions
+KHR_materials_unlit and KHR_materials_variants.
 """
 
 from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,14 +19,21 @@ from toonset.dataset.mesh.gltf_file import BINARY_CHUNK, JSON_CHUNK
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 FLOAT, UNSIGNED_INT = 5126, 5125
+VARIANTS = "KHR_materials_variants"
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 @dataclass
 class Gltf:
-    """A file under construction; `roots` are the nodes of its scene."""
+    """A file under construction.
+
+    Attributes:
+        roots: the nodes of its scene.
+        variants: that its primitives can be shown in, a name each and what else is known.
+    """
 
     roots: list[int] = field(default_factory=list)
+    variants: list[dict[str, Any]] = field(default_factory=list)
     _lists: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     _binary: bytearray = field(default_factory=bytearray)
 
@@ -58,11 +67,26 @@ class Gltf:
             self.add("samplers", wrapS=clamped, wrapT=clamped)
         return self.add("textures", source=image, sampler=0)
 
+    def mappings(self, materials: Sequence[int]) -> dict[str, Any]:
+        """Return which material a primitive has in every variant, as part of its description.
+
+        Args:
+            materials: one per variant.
+        """
+        if not self.variants:
+            return {}
+        found = [
+            {"material": one, "variants": [i for i, other in enumerate(materials) if other == one]}
+            for one in dict.fromkeys(materials)
+        ]
+        return {"extensions": {VARIANTS: {"mappings": found}}}
+
     def encode(self, extras: dict[str, Any]) -> bytes:
         """Return the GLB; `extras` go to its scene."""
         content = {
             "asset": {"version": "2.0", "generator": f"toonset {__version__}"},
-            "extensionsUsed": ["KHR_materials_unlit"],
+            "extensionsUsed": ["KHR_materials_unlit", *([VARIANTS] if self.variants else [])],
+            **({"extensions": {VARIANTS: {"variants": self.variants}}} if self.variants else {}),
             "scene": 0,
             "scenes": [{"nodes": self.roots, "extras": extras}],
             **self._lists,

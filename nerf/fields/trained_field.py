@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,11 @@ from toonset.nerf.hull.hull import Hull
 from toonset.nerf.lines.remove import InkStyle
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.prepare.warp_back import KeyWarps
+from toonset.notebook import MOST_PICTURES, Cell, table
+from toonset.palette.names import hex_of, name_of
+from toonset.view import small_png
+
+STRIP_PX = 960  # of all drawings, in a notebook
 
 NO_PALETTE = (
     "run: was trained without palette; train again without --no-palette and without --field hull"
@@ -55,3 +61,25 @@ class TrainedField:
     keys: KeyWarps | None = None
     drawings: Drawings | None = None
     kept: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
+
+    def _repr_html_(self) -> str:
+        """Return drawings and colours for a notebook; `toonset.render` shows the field itself."""
+        colors = [] if self.palette is None else self.palette.tolist()
+        rows: list[list[Cell]] = [
+            [(r, g, b), hex_of((r, g, b)), name_of((r, g, b))] for r, g, b in colors
+        ]
+        views = self.drawings.views if self.drawings is not None else ()
+        caption = (
+            f"{self.field.spec.kind} field of {len(views)} drawings, {self.size_px} px, "
+            f"{len(colors) or 'no'} colours"
+        )
+        strip = _strip([view.rgba for view in views]) if views else None
+        return table(caption, ("", "code", "colour"), rows, strip)
+
+
+def _strip(pictures: Sequence[UInt8[np.ndarray, "height width 4"]]) -> bytes:
+    """Return pictures side by side as a small PNG file."""
+    height = max(len(picture) for picture in pictures)
+    room = [((0, height - len(picture)), (0, 0), (0, 0)) for picture in pictures]
+    padded = [np.pad(picture, wide) for picture, wide in zip(pictures, room, strict=True)]
+    return small_png(np.concatenate(padded, axis=1), STRIP_PX, MOST_PICTURES)

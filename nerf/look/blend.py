@@ -95,6 +95,7 @@ class DrawnView:
         alpha: (height, width) coverage in [0, 1].
         ink: (height, width) share of every pixel that lines cover.
         labels: (height, width) of `Drawings.paints`.
+        paint: (height, width, 3) straight colour under the lines, in [0, 1].
         by_field: share of the figure's pixels that have the field's colour: no drawing shows them.
     """
 
@@ -102,6 +103,7 @@ class DrawnView:
     alpha: Float[np.ndarray, "height width"]
     ink: Float[np.ndarray, "height width"]
     labels: UInt8[np.ndarray, "height width"]
+    paint: Float[np.ndarray, "height width 3"]
     by_field: float
 
     def palette_labels(self, colors: int) -> UInt8[np.ndarray, "height width"]:
@@ -150,6 +152,7 @@ def drawn_view(drawings: Drawings, view: Geometry) -> DrawnView:
         np.zeros((height, width), np.float32),
         np.zeros((height, width), np.float32),
         np.zeros((height, width), np.uint8),
+        np.zeros((height, width, 3), np.float32),
         0.0,
     )
     shape = drawings.shape
@@ -158,7 +161,7 @@ def drawn_view(drawings: Drawings, view: Geometry) -> DrawnView:
         return result
     fitting, border = drawings.fitting(view.camera.scale), _border(drawings, view)
     part = _drawn(fitting, view.crop(*box), border)
-    for name in ("rgb", "alpha", "ink", "labels"):
+    for name in ("rgb", "alpha", "ink", "labels", "paint"):
         getattr(result, name)[box] = getattr(part, name)
     return replace(result, by_field=part.by_field)
 
@@ -212,11 +215,12 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if sight is not None and drawings.shade is not None:
         tone = drawings.shade.tone(smoothed(sight.normal, figure_px), FINER)
     drawn_with = np.array(pen.rgb if pen else (0, 0, 0)) / np.float32(255)
-    rgb = color * tone * (alpha - ink)[..., None] + ink[..., None] * drawn_with
+    paint = color * tone
+    rgb = paint * (alpha - ink)[..., None] + ink[..., None] * drawn_with
     if pen == drawings.outline:  # the drawing's own line, too
         rgb = rgb + part * (np.minimum(whole[..., :3], whole[..., 3:]) - rgb)
         alpha = alpha + part * (whole[..., 3] - alpha)
-    return DrawnView(rgb, alpha, ink, labels, by_field)
+    return DrawnView(rgb, alpha, ink, labels, paint, by_field)
 
 
 def _inner_lines(drawings: Drawings, sight: Sight, scale: float) -> Float[np.ndarray, "h w"]:

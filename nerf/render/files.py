@@ -12,11 +12,12 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.animation import Pictures, encode_gif, encode_mp4, encode_webp
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.depth_levels import DepthLevels
+from toonset.nerf.render.open_raster import PaintLayer, check_layered, encode_ora, layered
 from toonset.nerf.render.sprite_sheet import feet, sprite_json, sprite_sheet
 from toonset.nerf.render.views import render
 
 ANIMATIONS = {"gif": encode_gif, "webp": encode_webp, "mp4": encode_mp4}
-SPRITES = "sprites"
+SPRITES, LAYERED = "sprites", "ora"
 UNSEEN = 0.05  # of a view in the drawn look: worth a word
 DEPTH_FILE = "depth.json"  # the scale of depth pictures
 
@@ -43,8 +44,11 @@ def rendered_files(
         as_drawn: bend pictures as the drawings were.
 
     Raises:
-        ToonsetError: see `Rendering.picture` and `turntable_files`.
+        ToonsetError: see `Rendering.picture`, `turntable_files` and `encode_ora`.
     """
+    in_layers: list[tuple[str, list[PaintLayer]]] = []
+    if LAYERED in formats:
+        check_layered(layers[0], as_drawn=as_drawn)
     baked, turning, depths = Baked.of(trained), [], []
     cameras = [camera for _, camera in named]
     levels = DepthLevels.of(trained.hull, cameras)
@@ -57,7 +61,9 @@ def rendered_files(
             name = f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png"
             yield name, data
             depths += [name] if layer == "depth" else []
-            turning += [picture] if layer == layers[0] else []
+            if layer == layers[0]:
+                turning.append(picture)
+                in_layers += [(stem, layered(view, layer, picture))] if LAYERED in formats else []
             if layer == "drawn":
                 unseen[stem] = view.drawn.by_field
     worst = max(unseen, key=unseen.__getitem__, default="")
@@ -65,7 +71,10 @@ def rendered_files(
         say(f"{worst}: {unseen[worst]:.0%} of it is in no drawing and has the field's own colour")
     if depths:
         yield DEPTH_FILE, _json(levels.to_json(depths))
-    yield from turntable_files(formats, turning, trained, cameras).items()
+    of_pictures = [name for name in formats if name != LAYERED]
+    yield from turntable_files(of_pictures, turning, trained, cameras).items()
+    if in_layers:
+        yield f"turntable.{LAYERED}", encode_ora(in_layers, turning)
 
 
 def turntable_files(
@@ -74,7 +83,7 @@ def turntable_files(
     """Return turntable.gif, .webp, .mp4 and sprites.png with sprites.json, by name.
 
     Args:
-        formats: names out of `nerf.options.FORMATS`.
+        formats: names out of `nerf.options.FORMATS`, but for layers.
         pictures: one per camera, in the order of the turn.
         trained: what they show.
         cameras: that saw them.

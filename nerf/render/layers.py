@@ -28,6 +28,7 @@ from toonset.nerf.render.depth_levels import DepthLevels
 from toonset.nerf.render.line_drawing import inked
 from toonset.nerf.render.normals import normal_picture
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.view import small_png
 from toonset.write import write_bytes
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -147,6 +148,10 @@ class Rendering:
         return encode_indexed_png(picture, self.field.palette), _in_colors(
             picture, self.field.palette
         )
+
+    def _repr_png_(self) -> bytes:
+        """Return what people look at, for a notebook."""
+        return small_png(self.picture(default_layer(self.field)))
 
     def save(self, path: str | Path, layer: str = "rgb", *, as_drawn: bool = False) -> None:
         """Write a layer as a PNG file; the file appears whole or not at all.

@@ -11,8 +11,9 @@ from jaxtyping import UInt8
 from toonset.errors import BundleError, PaletteError
 from toonset.nerf.fields.trained_field import NO_LINES, NO_PALETTE, TrainedField
 from toonset.nerf.look.outline import Outline
+from toonset.nerf.options import ORIGINAL
 from toonset.palette.formats.hex import rgb_of_typed
-from toonset.palette.formats.registry import parse_colors
+from toonset.palette.formats.registry import palette_names, parse_colors
 from toonset.palette.pixels.labels import nearest_colors
 from toonset.palette.recolor import changed_colors
 
@@ -57,7 +58,9 @@ def with_pen(trained: TrainedField, width_px: float | None, color: str | None) -
     return replace(trained, drawings=replace(trained.drawings, pen=pen))
 
 
-def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> TrainedField:
+def repainted(
+    trained: TrainedField, palette: str, *, nearest: bool = False, flag: str = "--palette"
+) -> TrainedField:
     """Return the run in the colours of another palette, without training again.
 
     Args:
@@ -65,6 +68,7 @@ def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> 
         palette: a palette file, or typed colours.
         nearest: give every colour of the run the nearest one (OKLab) of the palette; else the
             first takes the place of the first and so on.
+        flag: that named the palette, for messages.
 
     Raises:
         PaletteError: no palette in the run, none in the file, or by order and other in number.
@@ -77,10 +81,27 @@ def repainted(trained: TrainedField, palette: str, *, nearest: bool = False) -> 
         return _in_colors(trained, colors[place])
     if len(colors) != len(trained.palette):
         raise PaletteError(
-            f"--palette {palette}: {len(colors)} colours, the run has {len(trained.palette)}; "
+            f"{flag} {palette}: {len(colors)} colours, the run has {len(trained.palette)}; "
             "give as many in the same order, or pass --nearest"
         )
     return _in_colors(trained, colors)
+
+
+def variants_of(
+    trained: TrainedField, palettes: Sequence[str], *, nearest: bool = False
+) -> list[tuple[str, TrainedField]]:
+    """Return the run in the colours of other palettes, by their names (`palette_names`).
+
+    Args:
+        trained: the run.
+        palettes: palette files, or typed colours.
+        nearest: see `repainted`.
+
+    Raises:
+        PaletteError: see `repainted`.
+    """
+    fields = [repainted(trained, one, nearest=nearest, flag="--variants") for one in palettes]
+    return list(zip(palette_names(palettes, ORIGINAL), fields, strict=True))
 
 
 def _in_colors(trained: TrainedField, colors: UInt8[np.ndarray, "colors 3"]) -> TrainedField:

@@ -1,7 +1,8 @@
 """A coloured surface as GLB, OBJ or PLY.
 
     GLB   one mesh, one unlit material whose texture holds the palette: flat colours as drawn, one
-          draw call; another palette is another texture of 8 x 8 px per colour
+          draw call; another palette is another texture of 8 x 8 px per colour, which variants
+          hold (KHR_materials_variants)
     OBJ   the same, with NAME.mtl and NAME.png beside it; vertices shared, so it opens closed
     PLY   vertex colours; a vertex between two colours comes once for each, at the same place
 
@@ -10,6 +11,7 @@ World axes are glTF's own: +Y up, the character faces +Z.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,12 +21,26 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.errors import OutputError
+from toonset.nerf.options import ORIGINAL
 from toonset.palette.names import hex_of
 from toonset.write import write_bytes
 
 KINDS = (".glb", ".obj", ".ply")
 CELL_PX = 8  # of the palette's texture: neighbours do not bleed into a colour's middle
 NAME = "figure"
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """Other colours of a surface.
+
+    Attributes:
+        name: for people.
+        palette: (colors, 3) sRGB.
+    """
+
+    name: str
+    palette: UInt8[np.ndarray, "colors 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +52,14 @@ class Surface:
         faces: (m, 3) counter-clockwise as seen from outside; no two vertices at one place.
         labels: (m,) palette colour of every face.
         palette: (colors, 3) sRGB.
+        variants: other colours that a GLB offers besides.
     """
 
     vertices: Float[np.ndarray, "vertices 3"]
     faces: Int[np.ndarray, "faces 3"]
     labels: Int[np.ndarray, " faces"]
     palette: UInt8[np.ndarray, "colors 3"]
+    variants: tuple[Variant, ...] = ()
 
     def save(self, path: str | Path, *, force: bool = False) -> dict[str, int]:
         """Write a .glb, .obj or .ply file and what belongs to it; return the sizes by name.
@@ -51,7 +69,7 @@ class Surface:
                 place cannot be written.
         """
         path = Path(path)
-        check_mesh_files(path, force=force)
+        check_mesh_files(path, force=force, variants=bool(self.variants))
         files = mesh_files(self, path)
         write_mesh_files(files, path)
         return {name: len(data) for name, data in files.items()}
@@ -75,16 +93,18 @@ def mesh_files(surface: Surface, path: Path) -> dict[str, bytes]:
     }
 
 
-def check_mesh_files(path: Path, *, force: bool) -> None:
+def check_mesh_files(path: Path, *, force: bool, variants: bool = False) -> None:
     """Refuse, before any work, files that must not be written or replaced.
 
     Raises:
-        OutputError: the name says no kind of mesh, or a file is there and `force` is off, or a
-            folder is.
+        OutputError: the name says no kind of mesh, or none that holds variants, or a file is there
+            and `force` is off, or a folder is.
     """
     kind = path.suffix.lower()
     if kind not in KINDS:
         raise OutputError(f"{path}: is no mesh file's name; end -o in {', '.join(KINDS)}")
+    if variants and kind != ".glb":
+        raise OutputError(f"{path}: holds no variants; end -o in .glb for --variants")
     if path.parent.is_file():
         raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
     beside = companions(path) if kind == ".obj" else ()
@@ -111,24 +131,61 @@ def encode_glb(surface: Surface) -> bytes:
     """Return the surface as a self-contained GLB."""
     vertices, labels, faces = split_by_label(surface)
     file = Gltf()
-    texture = file.add_texture(encode_png(palette_texture(surface.palette)), "palette")
-    material = file.add(
-        "materials",
-        name="palette",
-        pbrMetallicRoughness={
-            "baseColorTexture": {"index": texture},
-            "metallicFactor": 0,
-            "roughnessFactor": 1,
-        },
-        extensions={"KHR_materials_unlit": {}},
-    )
+    palettes = [surface.palette, *(one.palette for one in surface.variants)]
+    materials = add_variants(file, surface, "palette", [palette_texture(p) for p in palettes])
     uv = _uv(labels, len(surface.palette)) * [1, -1] + [0, 1]  # glTF's v runs down
     attributes = {"POSITION": file.add_array(vertices), "TEXCOORD_0": file.add_array(uv)}
     indices = file.add_array(faces.ravel(), ELEMENT_ARRAY_BUFFER)
-    primitive = {"attributes": attributes, "indices": indices, "material": material}
+    primitive = {"attributes": attributes, "indices": indices, "material": materials[0]}
+    primitive |= file.mappings(materials)
     mesh = file.add("meshes", name=NAME, primitives=[primitive])
     file.roots.append(file.add("nodes", name=NAME, mesh=mesh))
-    return file.encode({"palette": [hex_of((r, g, b)) for r, g, b in surface.palette.tolist()]})
+    return file.encode({"palette": hex_colors(surface.palette)})
+
+
+def add_variants(
+    file: Gltf,
+    surface: Surface,
+    name: str,
+    pictures: Sequence[UInt8[np.ndarray, "height width 3"]],
+    **more: object,
+) -> list[int]:
+    """Return the material of a surface's own look and of every variant; equal ones are one.
+
+    Args:
+        file: gets the materials, and the names of the variants where there are any.
+        surface: whose variants they are.
+        name: of its own material.
+        pictures: of its own look and of every variant.
+        more: of the materials.
+    """
+    looks = [Variant(ORIGINAL, surface.palette), *surface.variants]
+    if surface.variants:
+        file.variants += [
+            {"name": one.name, "extras": {"palette": hex_colors(one.palette)}} for one in looks
+        ]
+    known: dict[bytes, int] = {}
+    files = [encode_png(picture) for picture in pictures]
+    for number, png in enumerate(files):
+        called = f"{name} {looks[number].name}" if number else name
+        if png not in known:
+            texture = {"index": file.add_texture(png, called)}
+            known[png] = add_material(file, called, {"baseColorTexture": texture}, **more)
+    return [known[png] for png in files]
+
+
+def add_material(file: Gltf, name: str, color: dict[str, object], **more: object) -> int:
+    """Return a new material of one colour or picture, without light."""
+    surfacing = {**color, "metallicFactor": 0, "roughnessFactor": 1}
+    unlit: dict[str, object] = {"KHR_materials_unlit": {}}
+    return file.add(
+        "materials", name=name, pbrMetallicRoughness=surfacing, extensions=unlit, **more
+    )
+
+
+def hex_colors(palette: UInt8[np.ndarray, "colors 3"]) -> list[str]:
+    """Return the colours of a palette as "#rrggbb"."""
+    return [hex_of((r, g, b)) for r, g, b in palette.tolist()]
 
 
 def encode_ply(surface: Surface) -> bytes:

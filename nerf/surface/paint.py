@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from scipy import ndimage
 
 from toonset.nerf.lines.explain import step_edges
@@ -37,11 +37,17 @@ class Paint:
         texture: without outlines.
         trust: (height, width) in [0, 1]: low beside edges and where an outline was.
         feature: (height, width) pixels of small patches, and those beside them.
+        under: rows and columns from which every pixel's paint comes; None: its own.
     """
 
     texture: Texture
     trust: Float[np.ndarray, "height width"]
     feature: Bool[np.ndarray, "height width"]
+    under: tuple[Int[np.ndarray, "height width"], Int[np.ndarray, "height width"]] | None = None
+
+    def in_colors_of(self, texture: Texture) -> Paint:
+        """Return the paint of the same drawing in other colours."""
+        return replace(self, texture=_covered(texture, self.under))
 
 
 def paint_of(
@@ -57,13 +63,20 @@ def paint_of(
     ink, paint = _outlines(texture, depth, drawings)
     trust = 1 - (1 - LEAST_TRUST) * np.exp(-((texture.to_edge / FEATHER_PX) ** 2))
     trust = np.where(ink, LEAST_TRUST * trust, trust).astype(np.float32)
-    if ink.any() and paint.any():
-        rows, columns = nearest(paint | ~ink)
-        texture = replace(
-            texture, paint=texture.paint[rows, columns], labels=texture.labels[rows, columns]
-        )
+    under = nearest(paint | ~ink) if ink.any() and paint.any() else None
+    texture = _covered(texture, under)
     figure_px = drawings.height * texture.camera.scale
-    return Paint(texture, trust, _features(texture.labels, SMALL * figure_px**2))
+    return Paint(texture, trust, _features(texture.labels, SMALL * figure_px**2), under)
+
+
+def _covered(
+    texture: Texture,
+    under: tuple[Int[np.ndarray, "height width"], Int[np.ndarray, "height width"]] | None,
+) -> Texture:
+    """Return a drawing with its outlines painted over."""
+    if under is None:
+        return texture
+    return replace(texture, paint=texture.paint[under], labels=texture.labels[under])
 
 
 def _outlines(

@@ -6,7 +6,7 @@ colours are equally likely. Neighbours share the cuts, so the surface stays clos
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,7 @@ from toonset.nerf.options import FACES
 from toonset.nerf.surface.color import label_probabilities
 from toonset.nerf.surface.cut import cut
 from toonset.nerf.surface.decimate import decimated
-from toonset.nerf.surface.files import Surface
+from toonset.nerf.surface.files import Surface, Variant
 from toonset.nerf.surface.solid import SOLID_FROM, Solid, solid_of
 
 ROUNDS = 2  # of averaging colours over neighbours: specks go, borders come out smooth
@@ -32,6 +32,8 @@ def surface_of(
     trained: TrainedField,
     faces: int | None = FACES,
     progress: Callable[[str, float], None] = lambda step, done: None,
+    *,
+    variants: Sequence[tuple[str, TrainedField]] = (),
 ) -> Surface:
     """Return the surface of a trained field.
 
@@ -39,6 +41,7 @@ def surface_of(
         trained: a field with palette.
         faces: at most so many triangles; None: all, a few per voxel of the hull's surface.
         progress: told what is done now, and which share of it.
+        variants: the same field in other colours, by name; for GLB files only.
 
     Raises:
         BundleError: the field shows nothing.
@@ -59,7 +62,9 @@ def surface_of(
         fewer = partial(progress, "merging triangles")
         vertices, corners, labels = decimated(vertices, corners, labels, faces, fewer)
     assert trained.palette is not None  # label_probabilities has refused a run without palette
-    return Surface(vertices, corners, labels, trained.palette)
+    others = [(name, field.palette) for name, field in variants]
+    known = tuple(Variant(name, palette) for name, palette in others if palette is not None)
+    return Surface(vertices, corners, labels, trained.palette, known)
 
 
 def _triangles(solid: Solid) -> tuple[Float[np.ndarray, "vertices 3"], Int[np.ndarray, "faces 3"]]:

@@ -7,6 +7,7 @@ drawing shows it. Beside a seam the next drawing's colour is mixed in where it h
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -45,6 +46,7 @@ def textured_surface_of(
     progress: Callable[[str, float], None] = lambda step, done: None,
     *,
     outline: bool = False,
+    variants: Sequence[tuple[str, TrainedField]] = (),
 ) -> TexturedSurface:
     """Return the surface of a trained field, painted as its drawings are.
 
@@ -53,6 +55,7 @@ def textured_surface_of(
         faces: at most so many triangles; None: all.
         progress: told what is done now, and which share of it.
         outline: with the pen that draws the sheet's outlines; for GLB files only.
+        variants: the same field in other colours, by name; for GLB files only.
 
     Raises:
         BundleError: the run holds no drawings, or none with an outline, or shows nothing.
@@ -66,13 +69,23 @@ def textured_surface_of(
     if outline and drawings.pen is None:
         raise BundleError(NO_OUTLINE)
     check_xatlas()
-    surface = surface_of(trained, faces, progress)
+    surface = surface_of(trained, faces, progress, variants=variants)
     progress("painting", 0.0)
-    return painted(surface, drawings, outline=outline)
+    looks = [field.drawings for _, field in variants if field.drawings is not None]
+    return painted(surface, drawings, outline=outline, others=looks)
 
 
-def painted(surface: Surface, drawings: Drawings, *, outline: bool = False) -> TexturedSurface:
+def painted(
+    surface: Surface, drawings: Drawings, *, outline: bool = False, others: Sequence[Drawings] = ()
+) -> TexturedSurface:
     """Return a surface with the paint of drawings, in the colours that they show.
+
+    Args:
+        surface: to be painted.
+        drawings: of the character.
+        outline: with their pen.
+        others: the same drawings in the colours of the surface's variants; every patch is painted
+            by the same one in all of them.
 
     Raises:
         SetupError: xatlas is not installed.
@@ -88,6 +101,12 @@ def painted(surface: Surface, drawings: Drawings, *, outline: bool = False) -> T
     source = chosen(vertices, faces, merit, paints, drawings.height)
     atlas = unwrap(vertices, faces, parts_of(vertices, faces, surface.labels), FINE * scale)
     picture = _picture(surface, atlas, paints, source, merit > 0)
+    pictures = []
+    for variant, look in zip(surface.variants, others, strict=True):
+        pairs = zip(paints, look.textures, strict=True)
+        again = [paint.in_colors_of(texture) for paint, texture in pairs]
+        colored = replace(surface, palette=variant.palette)
+        pictures.append(_picture(colored, atlas, again, source, merit > 0))
     pen = drawings.pen if outline else None
     return TexturedSurface(
         surface,
@@ -95,6 +114,7 @@ def painted(surface: Surface, drawings: Drawings, *, outline: bool = False) -> T
         picture,
         np.where(source < len(paints), source, -1),
         None if pen is None else Pen(pen.rgb, pen.width_px / scale),
+        tuple(pictures),
     )
 
 

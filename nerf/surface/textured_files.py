@@ -1,9 +1,9 @@
 """A surface with a picture as GLB or OBJ, and the inverted hull that draws its outline.
 
-GLB   one unlit material with the picture. With an outline the surface is moved in by half the
-      line's width, and a second mesh, without its small bumps, lies as far outside of it, inside
-      out, in the ink's colour. Viewers that leave out back faces, as its material asks, show of it
-      only what sticks out behind the figure.
+GLB   one unlit material with the picture, and one per variant. With an outline the surface is
+      moved in by half the line's width, and a second mesh, without its small bumps, lies as far
+      outside of it, inside out, in the ink's colour. Viewers that leave out back faces, as its
+      material asks, show of it only what sticks out behind the figure.
 OBJ   the same without outline, with NAME.mtl and NAME.png beside it
 """
 
@@ -22,14 +22,16 @@ from toonset.nerf.surface.color import neighbour_mean, vertex_normals
 from toonset.nerf.surface.files import (
     NAME,
     Surface,
+    add_material,
+    add_variants,
     check_mesh_files,
     companions,
+    hex_colors,
     material_text,
     write_mesh_files,
 )
 from toonset.nerf.surface.unwrap import Atlas
 from toonset.palette.colors import linear_from_srgb
-from toonset.palette.names import hex_of
 
 TEXTURED = (".glb", ".obj")
 OUTLINED = (".glb",)
@@ -60,6 +62,7 @@ class TexturedSurface:
         picture: (height, width, 3) sRGB.
         source: (faces,) number of the drawing that paints each; -1: the field does.
         pen: draws its outline; None: there is none.
+        others: pictures of the surface's variants.
     """
 
     surface: Surface
@@ -67,6 +70,7 @@ class TexturedSurface:
     picture: UInt8[np.ndarray, "height width 3"]
     source: Int[np.ndarray, " faces"]
     pen: Pen | None = None
+    others: tuple[UInt8[np.ndarray, "height width 3"], ...] = ()
 
     def save(self, path: str | Path, *, force: bool = False) -> dict[str, int]:
         """Write a .glb or .obj file and what belongs to it; return the sizes by name.
@@ -76,19 +80,20 @@ class TexturedSurface:
                 file is there and `force` is off, or the place cannot be written.
         """
         path = Path(path)
-        check_textured_files(path, outline=self.pen is not None, force=force)
+        shown = {"outline": self.pen is not None, "variants": bool(self.others)}
+        check_textured_files(path, **shown, force=force)
         files = textured_files(self, path)
         write_mesh_files(files, path)
         return {name: len(data) for name, data in files.items()}
 
 
-def check_textured_files(path: Path, *, outline: bool, force: bool) -> None:
+def check_textured_files(path: Path, *, outline: bool, force: bool, variants: bool = False) -> None:
     """Refuse, before any work, files that cannot hold it, or must not be written or replaced.
 
     Raises:
         OutputError: see `TexturedSurface.save`.
     """
-    check_mesh_files(path, force=force)
+    check_mesh_files(path, force=force, variants=variants)
     kind = path.suffix.lower()
     if kind not in TEXTURED:
         raise OutputError(f"{path}: holds no texture; end -o in {', '.join(TEXTURED)}")
@@ -112,17 +117,18 @@ def encode_textured_glb(textured: TexturedSurface) -> bytes:
     """Return a textured surface as a self-contained GLB."""
     surface, atlas = textured.surface, textured.atlas
     file = Gltf()
-    texture = file.add_texture(encode_png(textured.picture), "drawn")
-    drawn = _add_material(file, "drawn", baseColorTexture={"index": texture})
+    pictures = [textured.picture, *textured.others]
+    drawn = add_variants(file, surface, "drawn", pictures, doubleSided=False)
     half = 0.0 if textured.pen is None else textured.pen.width / 2
     body = _moved(surface.vertices, surface.faces, -half)[atlas.vertex]
     _add_mesh(file, NAME, drawn, body, atlas.faces, TEXCOORD_0=atlas.uv / atlas.size_wh)
     if textured.pen is not None:
         ink = linear_from_srgb(np.array(textured.pen.rgb) / 255).tolist()
-        outline = _add_material(file, "outline", baseColorFactor=[*ink, 1.0])
+        color: dict[str, object] = {"baseColorFactor": [*ink, 1.0]}
+        outline = [add_material(file, "outline", color, doubleSided=False)] * len(drawn)
         hull = _moved(_smooth(surface.vertices, surface.faces), surface.faces, half)
         _add_mesh(file, "outline", outline, hull, surface.faces[:, ::-1])
-    return file.encode({"palette": [hex_of((r, g, b)) for r, g, b in surface.palette.tolist()]})
+    return file.encode({"palette": hex_colors(surface.palette)})
 
 
 def _moved(
@@ -145,18 +151,10 @@ def _smooth(
     return vertices
 
 
-def _add_material(file: Gltf, name: str, **color: object) -> int:
-    surfacing = {"metallicFactor": 0, "roughnessFactor": 1, **color}
-    unlit: dict[str, object] = {"KHR_materials_unlit": {}}
-    return file.add(
-        "materials", name=name, pbrMetallicRoughness=surfacing, extensions=unlit, doubleSided=False
-    )
-
-
 def _add_mesh(
     file: Gltf,
     name: str,
-    material: int,
+    materials: list[int],
     vertices: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "f 3"],
     **more: np.ndarray,
@@ -164,7 +162,8 @@ def _add_mesh(
     arrays = {"POSITION": vertices, **more}
     attributes = {kind: file.add_array(array) for kind, array in arrays.items()}
     indices = file.add_array(faces.ravel(), ELEMENT_ARRAY_BUFFER)
-    primitive = {"attributes": attributes, "indices": indices, "material": material}
+    primitive = {"attributes": attributes, "indices": indices, "material": materials[0]}
+    primitive |= file.mappings(materials)
     mesh = file.add("meshes", name=name, primitives=[primitive])
     file.roots.append(file.add("nodes", name=name, mesh=mesh))
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from toonset.palette.formats.kpl import kpl_title, read_kpl
 from toonset.palette.formats.pal import read_pal
 from toonset.palette.formats.text import without_mark
 from toonset.palette.formats.tones import paints_of
-from toonset.palette.names import NamedColor
+from toonset.palette.names import NamedColor, clean_name
 from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.read import describe, read_whole
 
@@ -129,6 +130,29 @@ def palette_title(text_or_path: str) -> str:
         return ""
     data, kind = _whole(path)
     return "" if kind.title is None else kind.title(data)
+
+
+def palette_names(texts_or_paths: Sequence[str], *taken: str) -> list[str]:
+    """Return what to call several of what `parse_colors` understands; no two are called alike.
+
+    A file is called by its title, or by its own name where it has none or shares it; typed colours
+    by their place.
+
+    Args:
+        texts_or_paths: what was given.
+        taken: names that none may have.
+    """
+    titles = [palette_title(one) for one in texts_or_paths]
+    names = list(taken)
+    for number, (given, title) in enumerate(zip(texts_or_paths, titles, strict=True), start=1):
+        path, own = Path(given), title
+        if own in ("", UNTITLED) or titles.count(own) > 1:
+            named = path.suffix.lower() in EXTENSIONS or ("#" not in given and _exists(path))
+            own = clean_name(path.stem) if named else ""
+        own = own or f"colours {number}"
+        again = (f"{own} {count}" for count in itertools.count(2))
+        names.append(own if own not in names else next(one for one in again if one not in names))
+    return names[len(taken) :]
 
 
 def encode_palette(palette: Palette, extension: str) -> bytes:

@@ -38,6 +38,30 @@ def test_mesh_of_a_run(toonset: Callable[..., Any], run: Path, tmp_path: Path) -
     assert not list(tmp_path.glob("a.*"))
 
 
+def test_a_mesh_in_several_palettes(toonset: Callable[..., Any], run: Path, tmp_path: Path) -> None:
+    colors = json.loads((run / "config.json").read_text())["field"]["palette"]
+    rows = "\n".join(f"{255 - r} {255 - g} {255 - b}" for r, g, b in colors)
+    dusk = tmp_path / "dusk.gpl"
+    dusk.write_text(f"GIMP Palette\nName: <Dusk>\n#\n{rows}\n")
+    out, asked = tmp_path / "figure.glb", ("mesh", run, "--faces", 800, "-o")
+    typed = ("--variants", "#aabbcc", "--nearest")
+    done = toonset(*asked, out, "--texture", "--variants", dusk, *typed, "--json")
+    assert done.code == 0, done
+    assert done.json["variants"] == ["original", "<Dusk>", "colours 2"]
+    assert len(load_mesh(out).faces) == done.json["faces"]
+    plain = toonset(*asked, tmp_path / "plain.glb", "--variants", dusk)
+    assert "in the colours original, <Dusk>;" in plain.out
+    for arguments, reason in (
+        (("a.glb", "--variants", "#aabbcc"), "--variants #aabbcc: 1 colours, the run has"),
+        (("a.glb", "--variants", tmp_path / "no.gpl"), "no.gpl: no such file"),
+        (("a.obj", "--variants", dusk), "holds no variants; end -o in .glb"),
+        (("a.obj", "--texture", "--variants", dusk), "holds no variants; end -o in .glb"),
+        (("a.glb", "--nearest"), "--nearest belongs to --variants"),
+    ):
+        assert reason in toonset(*asked, tmp_path / arguments[0], *arguments[1:]).reason
+    assert not list(tmp_path.glob("a.*"))
+
+
 def test_a_mesh_is_light_unless_asked_and_says_how_far_it_is(
     toonset: Callable[..., Any], run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

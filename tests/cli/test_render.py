@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
+import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -86,6 +88,26 @@ def test_colours_are_replaced_in_the_drawn_look(lined: Path, toonset, tmp_path: 
     green = np.abs(shown(tmp_path / "new")[..., :3] - (0, 255, 0)).max(axis=-1) < 8
     was = np.abs(shown(tmp_path / "as")[..., :3] - paint).max(axis=-1) < 8
     assert green.sum() > 0.8 * was.sum() > 100
+
+
+def test_a_turn_in_layers(lined: Path, toonset, tmp_path: Path) -> None:
+    out = tmp_path / "layers"
+    turn = ("render", lined, "--turntable", 3, "-o")
+    done = toonset(*turn, out, "--format", "ora", "--json")
+    assert done.json["together"] == ["turntable.ora"]
+    with zipfile.ZipFile(out / "turntable.ora") as file:
+        assert file.namelist()[0] == "mimetype"
+        [stack] = ElementTree.fromstring(file.read("stack.xml"))
+        assert [view.get("name") for view in stack] == ["000", "001", "002"]
+        assert all(view[0].get("name") == "lines" and len(view) > 2 for view in stack)
+        assert file.read("mergedimage.png") == (out / "000.png").read_bytes()
+    bare = toonset(*turn, tmp_path / "bare", "--format", "ora,webp", "--no-lines", "--json")
+    assert bare.json["together"] == ["turntable.webp", "turntable.ora"]
+    with zipfile.ZipFile(tmp_path / "bare" / "turntable.ora") as file:
+        assert b'"lines"' not in file.read("stack.xml")
+    layers = toonset(*turn, tmp_path / "no", "--format", "ora", "--layer", "depth")
+    assert "layer 'depth': has no paints for turntable.ora" in layers.reason
+    assert not (tmp_path / "no").exists()
 
 
 def test_a_run_made_before_says_how_to_get_the_layer(lined: Path, toonset, tmp_path: Path) -> None:

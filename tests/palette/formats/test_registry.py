@@ -15,6 +15,7 @@ from toonset.palette.formats.registry import (
     WRITTEN,
     encode_palette,
     names_tones,
+    palette_names,
     parse_colors,
     parse_named_colors,
 )
@@ -232,3 +233,14 @@ def test_a_folder_and_a_picture_are_no_palettes(tmp_path: Path) -> None:
 
 def test_our_json_is_what_the_writer_says() -> None:
     assert json.loads(encode_palette(PALETTE, ".json")) == to_json(PALETTE)
+
+
+def test_palettes_are_called_by_title_file_or_place(tmp_path: Path) -> None:
+    def gpl(name: str, title: str) -> str:
+        (tmp_path / name).write_text(f"GIMP Palette\nName: {title}\n#\n1 2 3\tink\n")
+        return str(tmp_path / name)
+
+    given = [gpl("a.gpl", "Dusk"), "#010203", gpl("b.gpl", "toonset"), gpl("c.gpl", "original")]
+    assert palette_names(given, "original") == ["Dusk", "colours 2", "b", "original 2"]
+    copies = [gpl("night.gpl", "sheet"), gpl("day.gpl", "sheet"), gpl("sub.gpl", "night")]
+    assert palette_names([*copies, *copies[:1]]) == ["night", "day", "night 2", "night 3"]
