@@ -164,7 +164,9 @@ def _hull_mesh(cameras: Sequence[Camera], alphas: Sequence[np.ndarray]) -> Mesh:
     if support.max() < LEVEL:
         raise BundleError("the drawings' outlines leave no common shape; check the cameras")
     vertices, faces, _, _ = marching_cubes(support, LEVEL)
-    return Mesh(hull.low + hull.voxel * (vertices - 0.5), faces[:, ::-1].astype(np.int64), "hull")
+    return Mesh(
+        hull.low + hull.voxel * (vertices - 0.5), faces[:, ::-1].astype(np.int64), name="hull"
+    )
 
 
 def _paints(

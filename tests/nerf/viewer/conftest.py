@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Request
 
 from tests.nerf.viewer.page_under_test import Viewer, chromium, write_page
 
@@ -35,13 +35,12 @@ def open_page(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         opened.append(viewer)
         viewer.page.on("console", lambda message: viewer.noise.append(message.text))
         viewer.page.on("pageerror", lambda error: viewer.noise.append(str(error)))
-        viewer.page.on(
-            "request",
-            lambda request: (
-                request.url.startswith(("data:", "blob:", path.as_uri()))
-                or viewer.noise.append(request.url)
-            ),
-        )
+
+        def note(request: Request) -> None:
+            if not request.url.startswith(("data:", "blob:", path.as_uri())):
+                viewer.noise.append(request.url)
+
+        viewer.page.on("request", note)
         viewer.page.goto(path.as_uri() + hash)
         started = "#poster[hidden], #fallback:not([hidden])"
         viewer.page.wait_for_selector(started, state="attached")
