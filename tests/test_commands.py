@@ -149,6 +149,7 @@ GIVEN = {  # what lies in a document's folder before its first command
     "docs/guide_palette.md": "bundle sheet.png my.ase",
     "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",
     "docs/guide_training.md": "bundle held_out other dark.ase",
+    "docs/guide_viewer.md": "bundle",
 }
 
 
