@@ -20,26 +20,12 @@ from toonset.cli.common.help import Verb, Verbs
 from toonset.errors import ToonsetError, one_line
 
 VERBS = (  # in the order in which they are used
-    *(
-        "split",
-        "calibrate",
-        "palette",
-        "recolor",
-        "train",
-        "render",
-        "evaluate",
-        "mesh",
-        "view",
-        "planes",
-    ),
-    *("consistency", "info", "check", "export", "import", "mannequin", "synth"),
+    *("split", "calibrate", "palette", "recolor", "train", "render", "view", "evaluate", "mesh"),
+    *("planes", "consistency", "info", "check", "export", "import", "mannequin", "synth"),
 )
 
-MODULES = {
-    "info": "check",
-    "recolor": "palette",
-    "planes": "view",
-}  # where a verb shares another one's module
+# Where a verb shares another one's module:
+MODULES = {"info": "check", "recolor": "palette", "planes": "view"}
 
 INTERRUPTED, REFUSED = 130, 2
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name

@@ -65,9 +65,12 @@ def view(
     printer = Printer(as_json, quiet)
     if out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"{out}: a page's name ends in .html", param_hint="--out")
+    from toonset.errors import BundleError
     from toonset.nerf.viewer.build import view_html
+    from toonset.read import check_there
     from toonset.write import check_new_file, write_bytes
 
+    check_there([folder], "run or bundle", BundleError)
     check_new_file(out, force=force)
     printer.progress("reading the field, drawing a turn")
     data = view_html(folder).encode("utf-8")

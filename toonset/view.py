@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.errors import SheetError
 
 SHOWN_PX, SHOWN_BYTES = 480, 200_000  # of a picture in a notebook, at most
+SHEET = "sheet"  # the role of a file that holds drawings, side by side or one
 VISIBLE = 16  # alpha: fainter is a file's noise
 
 Box = tuple[int, int, int, int]  # x, y, width, height
@@ -127,9 +128,6 @@ def small_png(
         if len(data) <= most or size == (1, 1):
             return data
         by *= 0.7
-
-
-SHEET = "sheet"  # the role of a file that holds drawings, side by side or one
 
 
 @dataclass(frozen=True)

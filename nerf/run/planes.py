@@ -113,10 +113,10 @@ def _about(
         "shape": list(field.shape),
         "density_shift": DENSITY_SHIFT,
         "planes": planes,
-        "decoder": {"hidden": _layer(field.hidden), "out": _layer(field.out)},
+        "decoder": {"hidden": weights_record(field.hidden), "out": weights_record(field.out)},
         "classifier": None
         if classifier is None
-        else {"hidden": _layer(classifier.hidden), "out": _layer(classifier.out)},
+        else {"hidden": weights_record(classifier.hidden), "out": weights_record(classifier.out)},
         "palette": None if trained.palette is None else trained.palette.tolist(),
         "hull": {
             "picture": "hull.png",
@@ -132,7 +132,8 @@ def _about(
     }
 
 
-def _layer(layer: torch.nn.Linear) -> dict[str, Any]:
+def weights_record(layer: torch.nn.Linear) -> dict[str, Any]:
+    """Return a layer's weights and biases, six digits each."""
     digits = np.vectorize(lambda value: float(f"{value:.6g}"))
     weight, bias = layer.weight.detach().double().numpy(), layer.bias.detach().double().numpy()
     return {"weight": digits(weight).tolist(), "bias": digits(bias).tolist()}

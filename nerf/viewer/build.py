@@ -18,6 +18,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.bundle import CALIBRATION, Bundle, read_bundle
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import ViewRecord
+from toonset.dataset.bundle.read_scene import read_palette_of
 from toonset.dataset.silhouettes.mask import alpha_of, has_figure
 from toonset.errors import BundleError
 from toonset.json_file import read_json
@@ -66,15 +67,16 @@ def view_html(folder: Path) -> str:
 def _run_html(run: Path) -> str:
     trained = read_field(run)
     beside = run.resolve().parent
-    bundle = read_bundle(beside) if (beside / CALIBRATION).is_file() else None
-    title = beside.name if bundle is not None else run.resolve().name
+    in_bundle = (beside / CALIBRATION).is_file()
+    palette = read_palette_of(beside) if in_bundle else None
+    title = beside.name if in_bundle else run.resolve().name
     drawings = trained.drawings
     cameras = [] if drawings is None else [view.camera for view in drawings.views]
     metrics = run / METRICS
     verdict = read_json(metrics).get("verdict") if metrics.is_file() else None
     about = {
         "verdict": verdict and {"state": verdict["verdict"], "reasons": verdict["reasons"]},
-        "palette": _paints(trained.palette, None if bundle is None else bundle.palette),
+        "palette": _paints(trained.palette, palette),
         "views": _views(cameras, _calibrated(beside, len(cameras))),
     }
     scene, blob = run_scene(trained, title, about)

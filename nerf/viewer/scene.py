@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int, UInt8
 
 from toonset.camera import Camera
@@ -21,18 +20,31 @@ from toonset.mesh import Mesh
 from toonset.nerf.fields.base import DENSITY_SHIFT
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
-from toonset.nerf.look.blend import FIELD_VOTE, OWN, SIDE, SIDE_VOTE
-from toonset.nerf.look.drawings import CRUMB, STEP, Drawings, Texture, levels_of
+from toonset.nerf.look.blend import (
+    BORDER,
+    FIELD_VOTE,
+    HOLE_PX,
+    OWN,
+    OWN_VOTE,
+    SIDE,
+    SIDE_VOTE,
+    SLIVER,
+)
+from toonset.nerf.look.drawings import STEP, Drawings, Texture, levels_of
+from toonset.nerf.look.outline import CRUMB_AT, CRUMB_PX
 from toonset.nerf.look.paint_flow import NEIGHBOURS
+from toonset.nerf.look.shade import SOFT
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.views import baked_of
-from toonset.nerf.run.planes import packed_plane
+from toonset.nerf.run.planes import packed_plane, weights_record
 from toonset.nerf.run.tensors import rows_near
 from toonset.nerf.viewer.volume import BLOCK, packed_hull
+from toonset.view import premultiplied
 
 CHANNELS = 4  # of a texel
 EDGE_STEPS = 5.0  # per pixel: how finely distances to an edge are kept
 EFFORT = 9
+MOST_PAINTS = 32  # that the page can tell apart: its shaders' arrays, page/field_layers.js
 
 
 @dataclass(eq=False)
@@ -72,24 +84,30 @@ def field_record(trained: TrainedField, blob: Blob) -> dict[str, Any]:
     """Return a trained field.
 
     Raises:
-        BundleError: it has no planes.
+        BundleError: it has no planes, or more colours than a page can show.
     """
     triplane = trained.field
     if not isinstance(triplane, TriplaneField):
         raise BundleError(
             f"run: its field has no planes ({triplane.spec.kind}); train again without --field"
         )
+    drawn = () if trained.drawings is None else trained.drawings.paints
+    count = max(len(drawn), 0 if trained.palette is None else len(trained.palette))
+    if count > MOST_PAINTS:
+        raise BundleError(
+            f"run: has {count} colours, a page shows {MOST_PAINTS} at most; take fewer with "
+            "`toonset palette --max-colors` or --colors, and train again"
+        )
     baked: Baked = baked_of(trained)
     hull = packed_hull(trained)
     texels, low, step = _planes(triplane, rows_near(triplane, trained.hull).numpy())
-    paints = baked.paints.nan_to_num(-1.0)
     return {
         "low": triplane.low.tolist(),
         "cell": triplane.cell,
         "shape": list(triplane.shape),
         "planes": {"texels": blob.add(texels), "axes": PLANES, "low": low, "step": step},
-        "hidden": _layer(triplane.hidden),
-        "out": _layer(triplane.out),
+        "hidden": weights_record(triplane.hidden),
+        "out": weights_record(triplane.out),
         "densityShift": DENSITY_SHIFT,
         "stepsPerCell": trained.step / triplane.cell,
         "hull": {
@@ -102,7 +120,7 @@ def field_record(trained: TrainedField, blob: Blob) -> dict[str, Any]:
         },
         "step": trained.step,
         "table": None if baked.labels is None else blob.add(baked.labels.numpy()),
-        "paints": paints.tolist(),
+        "paints": baked.paints.nan_to_num(-1.0).tolist(),
     }
 
 
@@ -122,13 +140,6 @@ def _planes(
         lows.append(low)
         steps.append(step)
     return np.concatenate(layers), lows, steps
-
-
-def _layer(layer: torch.nn.Linear) -> dict[str, Any]:
-    return {
-        "weight": [[float(f"{v:.6g}") for v in row] for row in layer.weight.detach().tolist()],
-        "bias": [float(f"{v:.6g}") for v in layer.bias.detach().tolist()],
-    }
 
 
 def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
@@ -162,9 +173,13 @@ def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
         "shade": drawings.shade and asdict(drawings.shade),
         "shadow": drawings.painted_shadow and list(drawings.painted_shadow.factor),
         "slack": STEP,
-        "crumb": CRUMB,
+        "crumb": {"area": CRUMB_PX, "hole": HOLE_PX, "height": CRUMB_AT},
+        "border": BORDER,
+        "sliver": SLIVER,
         "fieldVote": FIELD_VOTE,
         "sideVote": SIDE_VOTE,
+        "ownVote": OWN_VOTE,
+        "softNormals": SOFT,
         "own": OWN,
         "side": SIDE,
         "neighbours": NEIGHBOURS,
@@ -179,7 +194,7 @@ def plain_drawings_record(
 ) -> dict[str, Any]:
     """Return drawings and a body beside them, before anything is trained."""
     sizes = [picture.shape[:2] for picture in pictures]
-    whole = [_premultiplied(picture) for picture in pictures]
+    whole = [_bytes(premultiplied(picture) / 255) for picture in pictures]
     return {
         "cameras": [camera_record(camera) for camera in cameras],
         "whole": blob.add(np.stack([_padded(one, _largest(sizes), "constant") for one in whole])),
@@ -197,12 +212,6 @@ def _surface(
         "faces": blob.add(faces.astype(np.uint32)),
         "beyond": beyond,
     }
-
-
-def _premultiplied(picture: UInt8[np.ndarray, "h w 4"]) -> UInt8[np.ndarray, "h w 4"]:
-    whole = picture / np.float32(255)
-    whole[..., :3] *= whole[..., 3:]
-    return _bytes(whole)
 
 
 def _largest(sizes: Sequence[tuple[int, ...]]) -> tuple[int, int]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from jaxtyping import Bool, UInt8
 from toonset.palette.names import name_of
 from toonset.palette.paints.histogram import count_pixels
 from toonset.palette.paints.line_color import find_ink, rounded
-from toonset.palette.palette import Palette
+from toonset.palette.palette import ContourColor, Palette, PaletteColor
 from toonset.palette.pixels.labels import UNLABELLED, nearest_labels
 
 LEAST_PX = 50  # of a paint's inside: fewer do not tell its colour
@@ -25,9 +26,10 @@ SQUARE = np.ones((3, 3), np.uint8)
 
 Pictures = Sequence[UInt8[np.ndarray, "_ _ 4"]]
 RGB = tuple[int, int, int]
+Named = TypeVar("Named", PaletteColor, ContourColor)
 
 
-def as_drawn(
+def with_drawn_colors(
     palette: Palette, drawings: Pictures, smooth: Pictures, apart: Sequence[Bool[np.ndarray, "_ _"]]
 ) -> Palette:
     """Return a palette of smoothed drawings with the colours of the drawings themselves.
@@ -53,14 +55,14 @@ def as_drawn(
     ink = None if palette.contour is None else find_ink(count_pixels(drawings))
     if palette.contour is not None and ink is not None:
         new[palette.contour.rgb] = ink.rgb
-    colors = tuple(
-        replace(color, rgb=rgb, name=name_of(rgb))
-        for color in palette.colors
-        for rgb in [new.get(color.rgb, color.rgb)]
+
+    def renamed(color: Named) -> Named:
+        rgb = new.get(color.rgb, color.rgb)
+        return replace(color, rgb=rgb, name=name_of(rgb))
+
+    return replace(
+        palette,
+        colors=tuple(map(renamed, palette.colors)),
+        contour=palette.contour and renamed(palette.contour),
+        features=tuple(new.get(rgb, rgb) for rgb in palette.features),
     )
-    contour = palette.contour
-    if contour is not None:
-        rgb = new.get(contour.rgb, contour.rgb)
-        contour = replace(contour, rgb=rgb, name=name_of(rgb))
-    features = tuple(new.get(rgb, rgb) for rgb in palette.features)
-    return replace(palette, colors=colors, contour=contour, features=features)

@@ -16,10 +16,6 @@ import { arrayOf } from "./scene.js";
 /** @typedef {import("./gl.js").Target} Target */
 
 const CELL = 4; // pixels of the coarse grid's side
-const CRUMB = 30; // area of parts and holes that are noise, in a figure of CRUMB_AT px
-const HOLE = 80; // of holes between bent drawings
-const CRUMB_AT = 260;
-const SLIVER = 0.03; // of the height: places so near to paint have it, too
 const TAPS = 4; // drawings that a view is made of: two beside it, two that fill gaps
 
 const LOOK_UP = `${CAMERA}
@@ -68,16 +64,14 @@ uniform sampler2D depths;
 uniform float middle;
 layout(location = 0) out vec2 result; // depth; whether something is seen
 
-float filled(ivec2 at) {
-  ivec2 most = textureSize(depths, 0) - 1;
-  float own = texelFetch(depths, clamp(at, ivec2(0), most), 0).r;
-  return own;
+float depth_at(ivec2 at) {
+  return texelFetch(depths, clamp(at, ivec2(0), textureSize(depths, 0) - 1), 0).r;
 }
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  float own = filled(at), low = 1e9, high = -1e9, near = middle, away = 1e9;
+  float own = depth_at(at), low = 1e9, high = -1e9, near = middle, away = 1e9;
   for (int y = -1; y <= 1; y++) for (int x = -1; x <= 1; x++) {
-    float other = filled(at + ivec2(x, y));
+    float other = depth_at(at + ivec2(x, y));
     if (other <= ${NOWHERE}) continue;
     low = min(low, other);
     high = max(high, other);
@@ -87,7 +81,7 @@ void main() {
   bool seen = own > ${NOWHERE};
   if (!seen && high < low) {
     for (int y = -3; y <= 3; y++) for (int x = -3; x <= 3; x++) {
-      float other = filled(at + ivec2(x, y)), off = float(x * x + y * y);
+      float other = depth_at(at + ivec2(x, y)), off = float(x * x + y * y);
       if (other > ${NOWHERE} && off < away) { away = off; near = other; }
     }
     result = vec2(near, 0.0);
@@ -580,7 +574,7 @@ export class DrawnLook {
       const flow = makeTexture(gl, gl.TEXTURE_2D, gl.RG16F, [width, height], arrayOf(blob, one.flow), true);
       return { pair: one.pair, camera: one.camera, flow };
     });
-    const votes = `#define SIDE_VOTE ${record.sideVote}\n#define OWN_VOTE 0.3\n#define FIELD_VOTE ${record.fieldVote}\n`;
+    const votes = `#define SIDE_VOTE ${record.sideVote}\n#define OWN_VOTE ${record.ownVote}\n#define FIELD_VOTE ${record.fieldVote}\n`;
     this.none = makeTexture(gl, gl.TEXTURE_2D, gl.RGBA8, [1, 1], null, false);
     this.surface = new Program(gl, SURFACE);
     this.masks = new Program(gl, MASKS);
@@ -659,7 +653,7 @@ export class DrawnLook {
   /**
    * Draw a view into a target.
    * @param {Camera} camera
-   * @param {Target} seen colour, depth and label of the field: see `SEEN`
+   * @param {Pick<Target, "textures" | "width">} seen colour, depth and label of the field: see `SEEN`
    * @param {(target: Target, finer?: number) => void} bind
    * @param {Target} into
    * @param {{colors: number[][], ink: number[] | null, still: boolean}} style
@@ -685,7 +679,7 @@ export class DrawnLook {
       (/** @type {any} */ one) => one.pair.includes(first) && one.pair.includes(second) && first !== second,
     );
     const smallest = Math.min(...cameras.map((/** @type {Camera} */ c) => c.scale));
-    const bent = record.bent && !record.shape ? 0.5 + Math.min(1, camera.scale / smallest) * 0.2 : 0.5;
+    const bent = record.bent && !record.shape ? 0.5 + Math.min(1, camera.scale / smallest) * (record.border - 0.5) : 0.5;
     const border = bent + part * (0.5 - bent);
     const line = record.pen ? (record.pen.width_px * camera.scale) / cameras[first].scale : 0;
     const ink = (style.ink ?? record.pen?.rgb ?? [0, 0, 0]).map((/** @type {number} */ v) => v / 255);
@@ -751,7 +745,7 @@ export class DrawnLook {
     let voted = targets.vote.textures[0];
     if (record.shape) {
       bind(targets.slivers);
-      const reach = SLIVER * record.height * camera.scale;
+      const reach = record.sliver * record.height * camera.scale;
       this.slivers.use({ ...common, voted, first: one, reach, apart: record.slack * record.height }).fill();
       voted = targets.slivers.textures[0];
     }
@@ -778,12 +772,13 @@ export class DrawnLook {
     finish(null);
     bind(targets.inside);
     this.inside.use({ places: targets.rim.textures[0] }).fill();
-    const area = ((record.height * camera.scale) / CRUMB_AT) ** 2;
-    const hole = record.bent && !record.shape ? HOLE : CRUMB;
+    const { area, hole, height } = record.crumb;
+    const finer = ((record.height * camera.scale) / height) ** 2;
+    const torn = record.bent && !record.shape;
     const { gl } = this;
     return async () => {
       const mask = await this.reader.read(targets.inside);
-      const crumbs = crumbsOf(mask, into.width, into.height, CRUMB * area, hole * area);
+      const crumbs = crumbsOf(mask, into.width, into.height, area * finer, (torn ? hole : area) * finer);
       if (!crumbs) return null;
       return () => {
         const texture = makeTexture(gl, gl.TEXTURE_2D, gl.R8, [into.width, into.height], crumbs, false);

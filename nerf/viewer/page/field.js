@@ -150,7 +150,6 @@ export class Field {
     this.none = makeTexture(gl, gl.TEXTURE_2D, gl.R32F, [1, 1], null, false);
     this.reader = new Program(gl, readingShader(record, layers, [width, height]));
     this.march = new Program(gl, MARCH);
-    this.slices = 0;
     this.points = new Program(gl, POINT_DEPTH, RIM_POINTS);
     /** @type {{list: WebGLVertexArrayObject, places: Float32Array} | null} */
     this.rim = null;
@@ -210,29 +209,21 @@ export class Field {
     return { list, places };
   }
 
-  /**
-   * Read some slices of the volume.
-   * @param {number} most so many
-   * @returns {boolean} whether all are read
-   */
-  read(most) {
+  /** Read the field at the hull's voxels, once. */
+  read() {
     const { gl, size, record } = this;
-    if (this.slices >= size[2]) return true;
     const frame = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.viewport(0, 0, size[0], size[1]);
     gl.disable(gl.SCISSOR_TEST);
-    const { hull } = record;
-    this.reader.use({ planes: this.planes, leaps: this.leaps, low: hull.low, voxel: hull.voxel });
-    const end = Math.min(size[2], this.slices + most);
-    for (; this.slices < end; this.slices++) {
-      gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, this.volume.texture, 0, this.slices);
-      this.reader.use({ slice: this.slices }).fill();
+    const { low, voxel } = record.hull;
+    this.reader.use({ planes: this.planes, leaps: this.leaps, low, voxel });
+    for (let slice = 0; slice < size[2]; slice++) {
+      gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, this.volume.texture, 0, slice);
+      this.reader.use({ slice }).fill();
     }
     gl.deleteFramebuffer(frame);
-    if (this.slices < size[2]) return false;
     gl.deleteTexture(this.planes.texture);
-    return true;
   }
 
   /**

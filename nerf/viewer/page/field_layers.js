@@ -3,7 +3,7 @@
 import { CAMERA } from "./field.js";
 
 export const NOWHERE = "-1e9"; // depth where nothing is seen
-export const MOST_PAINTS = 32;
+export const MOST_PAINTS = 32; // as in scene.py, which refuses more
 
 // Label of a colour, and what is the same for all that read rays: one ray through a pixel's middle,
 // four more through pixels that differ from a neighbour.
@@ -177,6 +177,12 @@ void main() {
   float depth = texelFetch(depths, at, 0).r;
   result = depth <= ${NOWHERE} ? vec4(0.0) : vec4(vec3(1.0 - (depth - range.x) / (range.y - range.x)), 1.0);
 }`;
+
+/** A picture as it is. */
+export const COPY = `
+uniform sampler2D picture;
+layout(location = 0) out vec4 result;
+void main() { result = texelFetch(picture, ivec2(gl_FragCoord.xy), 0); }`;
 
 /** A picture to the canvas, whose first row is at the bottom. */
 export const PRESENT = `

@@ -158,14 +158,15 @@ function formatOf(gl, format) {
  * @param {number} height
  * @param {number[]} formats of its textures
  * @param {boolean} [solid] whether nearer triangles hide others
- * @param {boolean} [smooth] whether it is interpolated when it is read
+ * @param {boolean} [smooth] whether it is interpolated when it is read; 32-bit floats never are, as not
+ *   every device can
  * @returns {Target}
  */
 export function makeTarget(gl, width, height, formats, solid = false, smooth = false) {
   const frame = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
   const textures = formats.map((format, i) => {
-    const made = makeTexture(gl, gl.TEXTURE_2D, format, [width, height], null, smooth);
+    const made = makeTexture(gl, gl.TEXTURE_2D, format, [width, height], null, smooth && format !== gl.R32F);
     const place = gl.COLOR_ATTACHMENT0 + i;
     gl.framebufferTexture2D(gl.FRAMEBUFFER, place, gl.TEXTURE_2D, made.texture, 0);
     return made;

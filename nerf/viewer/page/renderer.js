@@ -3,7 +3,7 @@
 import { DrawnLook } from "./drawn.js";
 import { Field, cameraUniforms } from "./field.js";
 import { PictureReader, Program, freeTarget, makeTarget } from "./gl.js";
-import { DEPTH, NORMAL, PALETTE, PRESENT, SEEN, padded } from "./field_layers.js";
+import { COPY, DEPTH, NORMAL, PALETTE, PRESENT, SEEN, padded } from "./field_layers.js";
 import { Shape } from "./shape.js";
 import { project } from "./camera.js";
 
@@ -19,11 +19,7 @@ import { project } from "./camera.js";
  * @throws {Error} where WebGL2, or pictures of floats, are missing
  */
 export async function createRenderer(canvas, scene, blob) {
-  const gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: true });
-  if (!gl) throw new Error("this browser has no WebGL2");
-  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this browser cannot draw floats");
-  gl.getExtension("OES_texture_float_linear");
-  gl.disable(gl.DITHER);
+  const gl = contextOf(canvas);
   const field = scene.field ? new Field(gl, scene.field, blob) : null;
   const look = field && scene.drawings ? new DrawnLook(gl, scene.drawings, blob) : null;
   const shape = scene.drawings?.shape ? new Shape(gl, scene.drawings, blob) : null;
@@ -32,10 +28,10 @@ export async function createRenderer(canvas, scene, blob) {
     palette: new Program(gl, PALETTE),
     normal: new Program(gl, NORMAL),
     depth: new Program(gl, DEPTH),
+    copy: new Program(gl, COPY),
     present: new Program(gl, PRESENT),
   };
-  while (field && !field.read(1 << 20));
-
+  field?.read();
   const reader = new PictureReader(gl);
   /** @type {Record<string, Target>} */
   let targets = {};
@@ -46,26 +42,24 @@ export async function createRenderer(canvas, scene, blob) {
 
   /** @param {Target} target */
   function bind(target, finer = 1) {
-    const context = /** @type {WebGL2RenderingContext} */ (gl);
-    context.bindFramebuffer(context.FRAMEBUFFER, target.frame);
-    context.viewport(0, 0, target.width, target.height);
-    context.enable(context.SCISSOR_TEST);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+    gl.viewport(0, 0, target.width, target.height);
+    gl.enable(gl.SCISSOR_TEST);
     const [left, top] = [Math.floor(finer * x), Math.floor(finer * y)];
-    context.scissor(left, top, Math.ceil(finer * (x + width)) - left, Math.ceil(finer * (y + height)) - top);
+    gl.scissor(left, top, Math.ceil(finer * (x + width)) - left, Math.ceil(finer * (y + height)) - top);
   }
 
   /** @param {number[]} size */
   function sized([wide, high]) {
-    const context = /** @type {WebGL2RenderingContext} */ (gl);
     if (targets.picture?.width === wide && targets.picture.height === high) return;
-    for (const target of Object.values(targets)) freeTarget(context, target);
-    const { RGBA16F, R32F, RGBA8 } = context;
+    for (const target of Object.values(targets)) freeTarget(gl, target);
+    const { RGBA16F, R32F, RGBA8 } = gl;
     targets = {
-      rays: makeTarget(context, wide, high, [RGBA16F, R32F]),
-      fine: makeTarget(context, 2 * wide, 2 * high, [RGBA16F, R32F]),
-      half: makeTarget(context, Math.ceil(wide / 2), Math.ceil(high / 2), [RGBA16F, R32F], false, true),
-      seen: makeTarget(context, wide, high, [RGBA16F, R32F, RGBA8, RGBA8]),
-      picture: makeTarget(context, wide, high, [RGBA8]),
+      rays: makeTarget(gl, wide, high, [RGBA16F, R32F]),
+      fine: makeTarget(gl, 2 * wide, 2 * high, [RGBA16F, R32F]),
+      half: makeTarget(gl, Math.ceil(wide / 2), Math.ceil(high / 2), [RGBA16F, R32F], false, true),
+      seen: makeTarget(gl, wide, high, [RGBA16F, R32F, RGBA8, RGBA8]),
+      picture: makeTarget(gl, wide, high, [RGBA8]),
     };
   }
 
@@ -75,14 +69,13 @@ export async function createRenderer(canvas, scene, blob) {
    * @returns {Target}
    */
   function picture(shot) {
-    const context = /** @type {WebGL2RenderingContext} */ (gl);
     const { camera, layer, still } = shot;
     crumbs = null;
     pictures++;
     sized(camera.size);
     [x, y, width, height] = [0, 0, ...camera.size];
     bind(targets.picture);
-    context.clearBufferfv(context.COLOR, 0, [0, 0, 0, 0]);
+    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     const box = field ? boxCorners(scene.field.hull) : (shape?.corners() ?? []);
     const corners = box.map((corner) => project(camera, corner));
     [x, y, width, height] = boxOf(corners, camera.size);
@@ -93,8 +86,7 @@ export async function createRenderer(canvas, scene, blob) {
     }
     if (layer === "drawn" && shape && !still) {
       const { depth, normal } = shape.see(camera, false, bind);
-      const { frame } = targets.half;
-      look?.draw(camera, { frame, textures: [normal, depth], width: camera.size[0], height: camera.size[1] }, bind, targets.picture, shot);
+      look?.draw(camera, { textures: [normal, depth], width: camera.size[0] }, bind, targets.picture, shot);
       return targets.picture;
     }
     if (layer === "drawn" && look && !still) {
@@ -148,28 +140,16 @@ export async function createRenderer(canvas, scene, blob) {
       const away = corners.map((corner) => corner[2]);
       programs.depth.use({ seen, depths, range: [Math.min(...away), Math.max(...away)] }).fill();
     } else {
-      programs.present.use({ picture: seen });
-      copy(seen);
+      programs.copy.use({ picture: seen }).fill();
     }
     return targets.picture;
   }
 
-  const same = new Program(
-    gl,
-    "uniform sampler2D picture;\nlayout(location = 0) out vec4 result;\nvoid main() { result = texelFetch(picture, ivec2(gl_FragCoord.xy), 0); }",
-  );
-
-  /** @param {import("./gl.js").Texture} from */
-  function copy(from) {
-    same.use({ picture: from }).fill();
-  }
-
   /** @param {Target} made */
   function present(made) {
-    const context = /** @type {WebGL2RenderingContext} */ (gl);
-    context.bindFramebuffer(context.FRAMEBUFFER, null);
-    context.disable(context.SCISSOR_TEST);
-    context.viewport(0, 0, made.width, made.height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.viewport(0, 0, made.width, made.height);
     programs.present.use({ picture: made.textures[0] }).fill();
   }
 
@@ -215,6 +195,18 @@ export async function createRenderer(canvas, scene, blob) {
       return new ImageData(bytes, made.width, made.height);
     },
   };
+}
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @returns {WebGL2RenderingContext} that can draw floats
+ */
+function contextOf(canvas) {
+  const gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: true });
+  if (!gl) throw new Error("this browser has no WebGL2");
+  if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this browser cannot draw floats");
+  gl.disable(gl.DITHER);
+  return gl;
 }
 
 /**

@@ -16,7 +16,6 @@ import { arrayOf } from "./scene.js";
 const FINEST = 3; // samples per pixel and axis
 const MOST_SAMPLES = 4096; // of a picture's side
 const WIDEST = 40; // samples that a line reaches
-const SOFT = 0.012; // of the figure's height: by how much normals are smoothed
 
 const TRIANGLES = `${CAMERA}
 uniform Camera camera;
@@ -330,7 +329,7 @@ export class Shape {
       this.distances.use({ marks: targets.rows.textures[0], reach, rows: false }).fill();
     }
     if (shade) {
-      const sigma = Math.max(0.5, SOFT * height * camera.scale);
+      const sigma = Math.max(0.5, record.softNormals * height * camera.scale);
       bind(targets.smooth_rows);
       this.smooth.use({ normals: normal, finer, rows: true, sigma }).fill();
       bind(targets.smooth);

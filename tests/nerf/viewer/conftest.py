@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Request
 
-from tests.nerf.viewer.page_under_test import Viewer, chromium, write_page
+from bench.view.compare import chromium
+from tests.nerf.viewer.page_under_test import Viewer, write_page
 
 Open = Callable[..., Viewer]
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shutil
 from base64 import b64encode
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -14,13 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Page
 
 from toonset.camera import Camera
 from toonset.nerf.viewer import page as page_module
 from toonset.nerf.viewer.scene import Blob, camera_record
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SIZE_WH = (60, 90)
 COLORS = ([217, 84, 48], [38, 138, 140], [246, 186, 62])
 PEN = [20, 10, 30]
@@ -100,18 +97,6 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
         **changes,
     }
     return scene, blob.deflated()
-
-
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    """Yield a browser without a window."""
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        pytest.fail("no browser to test the page in: apt-get install chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 @dataclass

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from base64 import b64decode
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,12 +12,11 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
+from bench.view.compare import psnr, rendered, shown
 from tests.nerf.bodies import Hand, body, sheet
 from tests.nerf.ellipsoids import QUICK
-from tests.nerf.viewer.page_under_test import chromium
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.render.depth_levels import LEVELS, DepthLevels
 from toonset.nerf.render.recolor import recolored
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
@@ -29,24 +26,11 @@ from toonset.nerf.viewer.build import run_scene
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.scene import camera_record
 from toonset.palette.names import hex_of
-from toonset.palette.pixels.labels import UNLABELLED
+from toonset.view import over_white
 
 SIDE = 160
 LEAST_DB = {"drawn": 30.0}  # else 33
 SIGHTS = ((0.0, 0.0), (70.0, 20.0), (200.0, -15.0))  # yaw, elevation, degrees
-READ = """async shot => {
-  const { data } = await toonset.read(shot);
-  let text = "";
-  for (let i = 0; i < data.length; i += 1024)
-    text += String.fromCharCode(...data.subarray(i, i + 1024));
-  return btoa(text);
-}"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")
@@ -87,38 +71,11 @@ def camera_at(trained: TrainedField, yaw: float, elevation: float) -> Camera:
     )
 
 
-def shown(page: Page, trained: TrainedField, camera: Camera, layer: str, **more: Any) -> np.ndarray:
-    """Return the page's picture over white."""
+def drawn_by_page(
+    page: Page, trained: TrainedField, camera: Camera, layer: str, **more: Any
+) -> np.ndarray:
     assert trained.palette is not None
-    shot = {"camera": camera_record(camera), "layer": layer, "colors": trained.palette.tolist()}
-    data = b64decode(page.evaluate(READ, json.loads(json.dumps(shot | more))))
-    return over_white(np.frombuffer(data, np.uint8).reshape(SIDE, SIDE, 4))
-
-
-def rendered(trained: TrainedField, camera: Camera, layer: str) -> np.ndarray:
-    """Return what `toonset render` draws, over white; depth as grey of the hull's extent."""
-    view = render(trained, camera)
-    if layer == "depth":
-        scale = DepthLevels.of(trained.hull, [camera])
-        near = 1 - (view.depth - scale.nearest) / (scale.unit * (LEVELS - 1))
-        grey = np.rint(255 * np.nan_to_num(near))
-        return over_white(np.dstack([grey, grey, grey, 255.0 * np.isfinite(view.depth)]))
-    picture = view.picture(layer)
-    if layer == "labels":
-        assert trained.palette is not None
-        there = picture != UNLABELLED
-        colors = trained.palette[np.where(there, picture, 0)]
-        return over_white(np.dstack([colors, 255 * there]))
-    return over_white(picture)
-
-
-def over_white(rgba: np.ndarray) -> np.ndarray:
-    alpha = rgba[..., 3:].astype(float) / 255
-    return rgba[..., :3] * alpha + 255 * (1 - alpha)
-
-
-def psnr(a: np.ndarray, b: np.ndarray) -> float:
-    return 10 * math.log10(255**2 / max(float(np.mean((a - b) ** 2)), 1e-9))
+    return shown(page, camera, layer, **{"colors": trained.palette.tolist(), **more})
 
 
 @pytest.mark.parametrize("layer", ["drawn", "rgb", "palette", "normal", "depth", "labels"])
@@ -129,7 +86,7 @@ def test_a_layer_is_what_render_draws(
     trained, page = pages[name]
     for yaw, elevation in SIGHTS:
         camera = camera_at(trained, yaw, elevation)
-        found = psnr(shown(page, trained, camera, layer), rendered(trained, camera, layer))
+        found = psnr(drawn_by_page(page, trained, camera, layer), rendered(trained, camera, layer))
         assert found >= LEAST_DB.get(layer, 33.0), (yaw, elevation, found)
 
 
@@ -143,9 +100,10 @@ def test_another_colour_changes_only_that_paint(
     new = [40, 220, 60]
     changed = recolored(trained, [f"{hex_of(tuple(colors[0]))}={hex_of((40, 220, 60))}"])
     camera = camera_at(trained, 40.0, 5.0)
-    before = shown(page, trained, camera, layer)
-    after = shown(page, trained, camera, layer, colors=[new, *colors[1:]])
-    moved = np.abs(after - before).max(axis=-1) > 2
+    before = drawn_by_page(page, trained, camera, layer)
+    after = drawn_by_page(page, trained, camera, layer, colors=[new, *colors[1:]])
+    apart = np.abs(over_white(after) - over_white(before)).max(axis=-1)
+    moved = apart > 2 / 255
     view = render(trained, camera)
     assert view.labels is not None
     by_field, by_drawings = view.labels == 0, view.drawn.palette_labels(len(colors)) == 0
@@ -162,7 +120,7 @@ def test_moving_pictures_are_alike(pages: dict[str, tuple[TrainedField, Page]]) 
     for trained, page in pages.values():
         camera = camera_at(trained, 110.0, 10.0)
         still, moving = (
-            shown(page, trained, camera, "drawn", still=still) for still in (True, False)
+            drawn_by_page(page, trained, camera, "drawn", still=still) for still in (True, False)
         )
         assert psnr(still, moving) > 22
 

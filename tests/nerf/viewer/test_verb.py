@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.nerf.bodies import Hand, body, sheet
@@ -13,6 +15,10 @@ from toonset.cli.main import main
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import save_obj
+from toonset.errors import BundleError
+from toonset.nerf.train.result import Training
+from toonset.nerf.viewer.page import FOLDER
+from toonset.nerf.viewer.scene import MOST_PAINTS, Blob, field_record
 from toonset.write import write_bytes, write_json
 
 HOSTILE = "a</script><script>x='1'"
@@ -66,7 +72,7 @@ def test_what_cannot_be_written_is_refused_first(
         ([bundle, "-o", tmp_path / "page.png"], "ends in .html"),
         ([bundle, "-o", there], "exists already; pass --force"),
         ([bundle, "-o", there / "page.html"], "is a file"),
-        ([tmp_path / "nothing", "-o", tmp_path / "x.html"], "does not exist"),
+        ([tmp_path / "nothing", "-o", tmp_path / "x.html"], "no such file"),
     ]
     for words, said in cases:
         assert view(monkeypatch, *words) == 2
@@ -91,3 +97,23 @@ def test_a_run_without_planes_is_refused(
     assert view(monkeypatch, bundle, "-o", tmp_path / "page.html") == 2
     assert "has no planes" in capsys.readouterr().err
     shutil.rmtree(bundle / "run")
+
+
+def test_more_colours_than_a_page_shows_are_refused(training: Training) -> None:
+    many = np.zeros((MOST_PAINTS + 1, 3), np.uint8)
+    with pytest.raises(BundleError, match=f"{MOST_PAINTS + 1} colours"):
+        field_record(replace(training.result, palette=many), Blob())
+
+
+def test_pages_and_shaders_agree_how_many_colours_there_may_be() -> None:
+    text = (FOLDER / "field_layers.js").read_text(encoding="utf-8")
+    assert f"MOST_PAINTS = {MOST_PAINTS};" in text
+
+
+def test_a_place_that_is_missing_is_told_before_a_page_that_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there = tmp_path / "there.html"
+    there.write_text("mine")
+    assert view(monkeypatch, tmp_path / "nothing", "-o", there) == 2
+    assert "no such file; check the name of the run or bundle" in capsys.readouterr().err

@@ -1,0 +1,238 @@
+"""What the page keeps in links and files, and what it does with little or hostile data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from tests.nerf.viewer.conftest import Open
+from tests.nerf.viewer.page_under_test import COLORS, figure_scene
+
+NEW = ((10, 20, 30), (40, 50, 60), (70, 80, 90))
+
+
+# Links
+
+
+def test_a_link_holds_what_is_shown(open_page: Open) -> None:
+    viewer = open_page()
+    assert viewer.page.evaluate("location.hash") == ""
+    shown = {
+        "yaw": -42.5,
+        "elevation": 12.25,
+        "zoom": 1.5,
+        "pan": [0.125, -0.25],
+        "layer": "depth",
+        "colors": [list(rgb) for rgb in NEW],
+        "ink": [1, 2, 3],
+        "cameras": True,
+    }
+    viewer.set(**shown)
+    viewer.rest()
+    other = open_page(viewer.page.evaluate("location.hash"))
+    assert {name: other.state[name] for name in shown} == shown
+    assert other.page.get_by_label("Lines").input_value() == "#010203"
+    assert other.page.get_by_role("radio", name="Depth").is_checked()
+    viewer.set(snapped=1, comparison="onion")
+    viewer.rest()
+    other.page.evaluate("hash => (location.hash = hash)", viewer.page.evaluate("location.hash"))
+    other.rest()
+    assert (other.state["snapped"], other.state["comparison"]) == (1, "onion")
+    assert other.page.locator("#overlay").is_visible()
+    other.page.get_by_role("button", name="Copy link").click()
+    other.page.wait_for_selector("#message:not(:empty)")
+
+
+GARBAGE = (
+    "#",
+    "#%",
+    "#%E0%A4%A",
+    "#yaw=NaN&elevation=Infinity&zoom=-&pan=1&pan=2",
+    "#yaw=1e9&zoom=0x10&pan=a,b&pan=,",
+    "#layer=constructor&colors=red,blue,green&ink=zzz&view=99&compare=__proto__",
+    "#colors=ff0000&view=4&view=-1&cameras=true",
+    "#" + "a=1&" * 20_000,
+    "#<img src=x onerror=alert(1)>",
+)
+
+
+def test_garbage_in_a_link_is_passed_over(open_page: Open) -> None:
+    viewer = open_page()
+    start = viewer.state
+    for hash in GARBAGE:
+        viewer.page.evaluate("hash => { location.hash = hash; }", hash)
+        viewer.page.wait_for_timeout(30)
+        assert viewer.state == start, hash[:80]
+    far = open_page("#zoom=9999&elevation=-400&pan=99,-99&yaw=725").state
+    assert (far["zoom"], far["elevation"], far["pan"], far["yaw"]) == (12, -85, [3, -3], 5)
+
+
+# Saving
+
+
+def test_a_picture_is_saved_with_alpha_at_each_size(open_page: Open, tmp_path: Path) -> None:
+    viewer = open_page(device_scale_factor=2)
+    width = viewer.page.evaluate("document.getElementById('stage').clientWidth")
+    for factor in (1, 2, 4):
+        viewer.page.locator("#factor").select_option(str(factor))
+        with viewer.page.expect_download() as download:
+            viewer.page.get_by_role("button", name="Save PNG").click()
+        assert download.value.suggested_filename == "A-figure.png"
+        download.value.save_as(tmp_path / "a.png")
+        with Image.open(tmp_path / "a.png") as picture:
+            assert picture.width == factor * width
+            assert picture.getpixel((0, 0)) == (0, 0, 0, 0)
+            middle = (picture.width // 2, int(picture.height * 0.6))
+            assert picture.getpixel(middle) == (*COLORS[0], 255)
+
+
+@pytest.mark.parametrize("kind", ["WEBP", "PNG"])
+def test_a_turning_picture_is_saved(open_page: Open, tmp_path: Path, kind: str) -> None:
+    viewer = open_page()
+    if kind == "PNG":  # as browsers do that write no WebP
+        viewer.page.evaluate(
+            """() => {
+              const { toBlob } = HTMLCanvasElement.prototype;
+              HTMLCanvasElement.prototype.toBlob = function (done) { toBlob.call(this, done); };
+            }"""
+        )
+    with viewer.page.expect_download() as download:
+        viewer.page.get_by_role("button", name="Save turntable").click()
+    download.value.save_as(tmp_path / "turn")
+    with Image.open(tmp_path / "turn") as picture:
+        assert (picture.format, picture.size) == (kind, (480, 480))
+        assert picture.n_frames == 24  # type: ignore[attr-defined]
+        frames = []
+        for i in range(24):
+            picture.seek(i)
+            frames.append(picture.convert("RGBA"))
+        assert picture.info["loop"] == 0
+        assert picture.info["duration"] == 100
+    assert frames[0].getpixel((0, 0))[3] == 0  # type: ignore[index]
+    spots = [frame.getpixel((240, 240)) for frame in (frames[0], frames[12])]
+    for spot, color in zip(spots, (COLORS[1], COLORS[0]), strict=True):  # front and back
+        assert spot == pytest.approx([*color, 255], abs=6)
+    viewer.rest()
+    assert viewer.page.get_by_role("button", name="Save turntable").is_visible()
+
+
+# What may go wrong
+
+
+def test_without_3d_fixed_pictures_turn(open_page: Open) -> None:
+    viewer = open_page("#yaw=90", scene={"field": None})
+    page = viewer.page
+    assert "8 fixed pictures" in page.locator("#fallback").inner_text()
+    sources = "JSON.parse(document.getElementById('turn').textContent)"
+    shown = f"{sources}.indexOf(document.getElementById('poster').src)"
+    viewer.rest()
+    assert page.evaluate(shown) == 2
+    viewer.drag(-60, 0)
+    viewer.rest()
+    assert page.evaluate(shown) > 2
+    page.locator("#view").focus()
+    page.keyboard.press("Home")
+    viewer.rest()
+    assert page.evaluate(shown) == 0
+    assert page.get_by_role("radio", name="Normals").is_disabled()
+    assert page.get_by_label("red").is_disabled()
+    assert page.get_by_role("button", name="Save PNG").is_disabled()
+    page.locator("#drawings button").nth(1).click()
+    viewer.rest()
+    assert page.locator("#overlay").is_visible()
+    assert page.evaluate(shown) == 1
+    page.get_by_role("button", name="Copy hex list").click()
+    page.wait_for_selector("#message:not(:empty)")
+
+
+def test_a_renderer_that_fails_later_is_replaced(open_page: Open) -> None:
+    viewer = open_page()
+    viewer.page.evaluate("globalThis.breaks = true")
+    viewer.drag(40, 0)
+    viewer.page.wait_for_selector("#fallback:not([hidden])")
+    assert viewer.page.locator("#poster").is_visible()
+
+
+def test_a_lost_context_is_replaced(open_page: Open) -> None:
+    viewer = open_page()
+    tell = "name => document.getElementById('view').dispatchEvent(new Event(name))"
+    viewer.page.evaluate(tell, "webglcontextlost")
+    assert viewer.page.locator("#fallback").is_visible()
+    assert viewer.page.locator("#poster").is_visible()
+    viewer.page.evaluate(tell, "webglcontextrestored")
+    viewer.page.wait_for_selector("#poster[hidden]", state="attached")
+    assert viewer.page.locator("#fallback").is_hidden()
+    viewer.page.get_by_label("red").fill("#00ff00")
+    viewer.rest()
+    assert viewer.shots[-1]["colors"][0] == [0, 255, 0]
+
+
+def test_a_scene_with_little_in_it_works(open_page: Open) -> None:
+    little = {
+        "views": [],
+        "drawings": None,
+        "palette": [],
+        "pen": None,
+        "verdict": None,
+        "layers": ["rgb"],
+    }
+    viewer = open_page("#view=1&colors=&ink=ffffff", scene={**little, "field": None})
+    for name in ("#timeline", "#paints", "#verdict", "#compare", "#cameras"):
+        assert viewer.page.locator(name).is_hidden(), name
+
+
+HOSTILE = (
+    "</script><script>globalThis.pwned = 1</script>",
+    "\"'><img src=x onerror=globalThis.pwned=1>",
+    "\u202eright to left\u2067",
+    "\x1b[31mred\x1b[0m",
+    "{{script}}",
+    "x" * 10_000,
+    "long words " * 1000,
+)
+
+
+@pytest.mark.parametrize("title", [HOSTILE[i] for i in (0, 2, 5, 6)], ids=range(4))
+def test_hostile_names_are_text(open_page: Open, title: str) -> None:
+    scene, _ = figure_scene()
+    verdict = {"state": title, "reasons": list(HOSTILE)}
+    views = [{**scene["views"][0], "name": text, "reason": text} for text in HOSTILE]
+    palette = [{**scene["palette"][0], "name": text} for text in HOSTILE]
+    hostile = {"title": title, "verdict": verdict, "views": views, "palette": palette, "pen": None}
+    viewer = open_page(scene=hostile, viewport={"width": 360, "height": 800})
+    page = viewer.page
+    assert page.locator("h1").text_content() == title
+    for names in ("#swatches .name", "#drawings .name", "#verdict li"):
+        assert page.locator(names).all_text_contents() == list(HOSTILE)
+    for i, text in enumerate(HOSTILE):
+        page.locator("#drawings button").nth(i).click()
+        assert page.locator("#reason bdi").text_content() == text
+        assert len(viewer.drop(f"{text}.hex", b"no")) < 200
+    assert page.evaluate("globalThis.pwned") is None
+    assert page.locator("img, script").count() == 5  # the poster and the page's own
+    for width in (360, 800):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+    heights = "[...document.querySelectorAll('h1, li, button, #reason')].map(e => e.clientHeight)"
+    assert max(page.evaluate(heights)) < 200
+
+
+def test_the_page_reads_from_right_to_left_too(open_page: Open) -> None:
+    viewer = open_page(viewport={"width": 360, "height": 740})
+    viewer.page.evaluate("document.documentElement.dir = 'rtl'")
+    assert viewer.page.evaluate("document.documentElement.scrollWidth") == 360
+    title, pegs = (viewer.page.locator(name).bounding_box() for name in ("h1", ".pegs"))
+    assert title is not None
+    assert pegs is not None
+    assert title["x"] < pegs["x"]
+
+
+def test_what_is_touched_is_large_enough(open_page: Open) -> None:
+    viewer = open_page("#view=1&compare=onion", viewport={"width": 360, "height": 740})
+    small = """[...document.querySelectorAll("button, select, input, [role=slider]")]
+      .map((e) => [e.id || e.name || e.textContent, e.getBoundingClientRect()])
+      .filter(([, box]) => box.width && Math.min(box.width, box.height) < 24)
+      .map(([name]) => name)"""
+    assert viewer.page.evaluate(small) == []
