@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from toonset.palette.palette import Palette
 
 WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette.png")
-FOLDERS = ("labels", "tones", "contours")
+FOLDERS = ("labels", "tones", "coverage", "contours")
 BUNDLE, OUT, RECOLORED = Path("bundle"), Path("palette"), Path("recolored")
 CHOICE_PANEL = "Choice of colours"
 
@@ -115,9 +115,9 @@ def palette(
 ) -> None:
     """List the colours that make up at least 5 % of the character, and label every pixel.
 
-    Writes palette.json, .gpl, .ase, .hex, .png, labels/, contours/ and, for shaded sheets, tones/
-    into the bundle, replacing those of an earlier run; for images and other folders, or with -o,
-    into a folder of their own.
+    Writes palette.json, .gpl, .ase, .hex, .png, labels/, coverage/, contours/ and, for shaded
+    sheets, tones/ into the bundle, replacing those of an earlier run; for images and other
+    folders, or with -o, into a folder of their own.
     """
     from toonset.dataset.bundle.palette_files import write_labelled
     from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures

@@ -2,7 +2,8 @@
 
 Right: of the pixels that are one colour, how many got it; one that was marked mixed counts as
 wrong. Mixed: pixels whose bytes are no colour's own. "Rim" counts the silhouette's soft pixels too,
-cut out without alpha. A contour's pixel is one that ink covers by half or more.
+cut out without alpha. A contour's pixel is one that ink covers by half or more. Border: how far off
+the coverage of paints is where several cover a pixel, in % of it, mean per drawing.
 """
 
 from __future__ import annotations
@@ -13,10 +14,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
 from bench.records.record import Record, summarise, table
+from toonset.palette.coverage import coverage_map
+from toonset.palette.extract import paint_maps
+from toonset.palette.paints.extract import pick_palette
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED, label_pixels, nearest_labels
@@ -32,7 +36,12 @@ CONTOURS: dict[str, Callable[[LabelCase], np.ndarray]] = {
     "width unknown": lambda case: find_contour(case.rgba),
     "dark pixels": lambda case: _dark(case.rgba),
 }
+COVERAGES: dict[str, Callable[[LabelCase], np.ndarray]] = {
+    "default": lambda case: _shares(case),
+    "nearest colour": lambda case: _whole(nearest_labels(case.rgba, case.palette), case),
+}
 HALF = 128
+LOWER = ("seconds", "border")
 REPEATS = 3
 TIMED_WH = (2048, 1024)
 
@@ -62,6 +71,8 @@ def bench_labels(
         last = case
         for name, labeller in LABELLERS.items():
             _score_labels(samples, case, name, labeller)
+        for name, coverage in COVERAGES.items():
+            _score_borders(samples, case, name, coverage(case))
         if case.outline_px:
             for name, contour in CONTOURS.items():
                 _score_contour(samples, case, name, contour(case))
@@ -73,7 +84,7 @@ def bench_labels(
             method=method,
             metric=metric,
             unit="s/MP" if metric.startswith("seconds") else "%",
-            direction="lower" if metric.startswith("seconds") else "higher",
+            direction="lower" if metric.startswith(LOWER) else "higher",
             seed=seed,
             group=group,
         )
@@ -111,6 +122,33 @@ def _score_contour(samples: Samples, case: LabelCase, method: str, found: np.nda
     samples[case.group, method, "contour recall"].append(_percent(line & truth, truth))
     if line.any():
         samples[case.group, method, "contour precision"].append(_percent(line & truth, line))
+
+
+def _score_borders(samples: Samples, case: LabelCase, method: str, found: np.ndarray) -> None:
+    covered = case.coverage.sum(axis=0)
+    border = (case.rgba[..., 3] >= OPAQUE) & (case.coverage.max(axis=0) < 1) & (covered > 0)
+    if border.any():
+        off = np.abs(found - case.coverage)[:, border].sum(axis=0) / 2
+        samples[case.group, method, "border, off"].append(100 * float(off.mean()))
+
+
+def _shares(case: LabelCase) -> Float[np.ndarray, "colors cell cell"]:
+    """Return how far every paint covers each pixel, as `toonset palette` writes it."""
+    count = len(case.coverage)
+    contour = (
+        find_contour(case.rgba, case.outline_px) if case.outline_px else np.zeros_like(case.ink)
+    )
+    palette = pick_palette([case.rgba], case.palette, [contour >= HALF])
+    (paint,) = paint_maps([case.rgba], [contour], palette)
+    ranks = coverage_map(case.rgba, paint, contour, palette)
+    first, second, part = ranks[..., 0], ranks[..., 1], ranks[..., 2] / 255
+    colors = np.arange(count)[:, None, None]
+    return (first == colors) * part + (second == colors) * (1 - part)
+
+
+def _whole(labels: np.ndarray, case: LabelCase) -> Float[np.ndarray, "colors cell cell"]:
+    colors = np.arange(len(case.coverage))[:, None, None]
+    return (labels == colors).astype(np.float64)
 
 
 def _percent(part: np.ndarray, whole: np.ndarray) -> float:

@@ -12,7 +12,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 from PIL import Image
 
 from bench.palette.cases import characters
@@ -27,6 +27,7 @@ INKS = ((0, 0, 0), (90, 50, 20), (20, 30, 90))  # black, brown, dark blue
 QUALITIES = (0, 90, 80)  # of JPEG; 0 = PNG
 BLACK = (12, 12, 14)
 VIEWS = 3
+FINER = 4  # samples per pixel and axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,7 @@ class LabelCase:
         truth: labels; 255 where mixed, soft or outside.
         ink: coverage of the lines.
         outline_px: width of the outline.
+        coverage: how far every colour but the ink covers each pixel, 0 to 1.
     """
 
     group: str
@@ -48,6 +50,7 @@ class LabelCase:
     truth: UInt8[np.ndarray, "cell cell"]
     ink: UInt8[np.ndarray, "cell cell"]
     outline_px: float
+    coverage: Float[np.ndarray, "colors cell cell"]
 
 
 def label_cases(folder: Path | None, seed: int, *, quick: bool) -> Iterator[LabelCase]:
@@ -71,9 +74,14 @@ def label_cases(folder: Path | None, seed: int, *, quick: bool) -> Iterator[Labe
                 outline_px=OUTLINE * size if lined else 0.0,
                 warp_percent=0.8,
                 yaw_jitter_deg=20,
+                supersample=FINER,
             )
             ink = INKS[number % len(INKS)]
-            yield from _drawings(make_turnaround(body, options, seed + number), ink)
+            fine = replace(
+                options, cell_px=FINER * size, outline_px=FINER * options.outline_px, supersample=1
+            )
+            large = make_turnaround(body, fine, seed + number)
+            yield from _drawings(make_turnaround(body, options, seed + number), large, ink)
 
 
 def _in_black(mesh: Mesh) -> Mesh:
@@ -84,12 +92,18 @@ def _in_black(mesh: Mesh) -> Mesh:
     return replace(mesh, face_colors=colors)
 
 
-def _drawings(drawn: Turnaround, ink_rgb: tuple[int, int, int]) -> Iterator[LabelCase]:
-    lined = drawn.options.outline_px > 0
+def _drawings(
+    drawn: Turnaround, large: Turnaround, ink_rgb: tuple[int, int, int]
+) -> Iterator[LabelCase]:
+    """Yield the views of a turnaround; `large` is the same one, `FINER` times as large."""
+    outline_px = drawn.options.outline_px
+    lined = outline_px > 0
     palette = drawn.palette
     if lined:
         palette = np.concatenate([palette, np.array([ink_rgb])]).astype(np.uint8)
-    for view, labels, ink in zip(drawn.views, drawn.labels, drawn.ink, strict=True):
+    whole = zip(drawn.views, drawn.labels, drawn.ink, large.labels, strict=True)
+    for view, labels, ink, finer in whole:
+        coverage = _coverage(finer, ink, len(drawn.palette))
         clean = _inked(view.rgba, ink, ink_rgb)
         wholly = (ink == 255) & (clean[..., 3] == 255)
         truth = np.where(lined & wholly, len(drawn.palette), labels).astype(np.uint8)
@@ -100,7 +114,17 @@ def _drawings(drawn: Turnaround, ink_rgb: tuple[int, int, int]) -> Iterator[Labe
             lines = "lines" if lined else "no lines"
             group = f"{drawn.options.cell_px} px, {lines}, {kind}"
             rgba = _as_jpeg(clean, quality) if quality else clean
-            yield LabelCase(group, rgba, palette, truth, ink, drawn.options.outline_px)
+            yield LabelCase(group, rgba, palette, truth, ink, outline_px, coverage)
+
+
+def _coverage(
+    labels: UInt8[np.ndarray, "large large"], ink: UInt8[np.ndarray, "cell cell"], colors: int
+) -> Float[np.ndarray, "colors cell cell"]:
+    """Return how far every colour covers each pixel: what lines leave, as in a larger picture."""
+    side = len(ink)
+    blocks = labels.reshape(side, FINER, side, FINER)
+    seen = np.stack([(blocks == color).mean(axis=(1, 3)) for color in range(colors)])
+    return seen / np.maximum(seen.sum(axis=0), 1 / FINER**2) * (1 - ink / 255)
 
 
 def _inked(

@@ -176,7 +176,7 @@ def _model(found: dict[str, Any]) -> str:
 def _pictures(found: dict[str, Any]) -> str:
     total = len(found["views"])
     parts = [f"{found['pictures']} of {total}"]
-    parts += [f"{found[n]} {n}" for n in ("labels", "tones", "contours") if found[n]]
+    parts += [f"{found[n]} {n}" for n in ("labels", "tones", "coverage", "contours") if found[n]]
     return ", ".join(parts)
 
 

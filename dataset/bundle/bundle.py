@@ -8,6 +8,7 @@
     palette.json       the colours, once `toonset palette` has found them; .gpl .ase .hex .png are
                        copies for other programs
     labels/000.png     indexed PNG per picture: which colour a pixel is, 255 = none
+    coverage/000.png   RGB per picture: two paints of every pixel, and how far the first covers it
     tones/000.png      8-bit grey per picture of a shaded sheet: 0 = in light, 1 = in shadow
     contours/000.png   8-bit grey per picture: how much of a pixel is drawn line
     run/               a trained field
@@ -48,11 +49,12 @@ from toonset.write import new_folder, write_bytes, write_json
 
 THUMBNAIL_PX = 96  # of a view in a notebook
 OVERLAY, CALIBRATION = "overlay.png", "calibration.json"
-LABELS, TONES, CONTOURS, IMAGES = "labels", "tones", "contours", "images"
+LABELS, TONES, COVERAGE, CONTOURS = "labels", "tones", "coverage", "contours"
+IMAGES = "images"
 WRITTEN = (
     *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
     # what later verbs put beside
-    *("palette.*", "labels", "tones", "contours", "run", "run.unfinished"),
+    *("palette.*", LABELS, TONES, COVERAGE, CONTOURS, "run", "run.unfinished"),
 )
 
 

@@ -14,7 +14,15 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, IMAGES, LABELS, OVERLAY, TONES
+from toonset.dataset.bundle.bundle import (
+    CALIBRATION,
+    CONTOURS,
+    COVERAGE,
+    IMAGES,
+    LABELS,
+    OVERLAY,
+    TONES,
+)
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile
 from toonset.dataset.bundle.palette_files import COPIES, PALETTE_JSON, SWATCHES
@@ -25,6 +33,7 @@ from toonset.dataset.bundle.read_scene import (
     label_name,
     member,
     read_contour,
+    read_coverage,
     read_labels,
     read_palette_of,
     read_picture,
@@ -42,7 +51,10 @@ from toonset.dataset.images.picture import load_indexed_png, load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.palette.formats.registry import parse_colors
 
-PICTURES = {IMAGES: load_rgba, LABELS: load_indexed_png, TONES: load_rgba, CONTOURS: load_rgba}
+PICTURES = {
+    **dict.fromkeys((IMAGES, TONES, COVERAGE, CONTOURS), load_rgba),
+    LABELS: load_indexed_png,
+}
 SAME_CAMERA = 1e-6  # relative: both files are written from the same numbers
 
 Colors = UInt8[np.ndarray, "colors 3"]
@@ -119,6 +131,8 @@ def _check_colors(log: ProblemLog, file: Path, frames: _Frames) -> None:
         _check_maps(log, TONES, frames, lambda frame: read_tones(log.root, frame))
     elif (log.root / TONES).exists():
         log.add(TONES, "is there but palette.json has no shadow; run `toonset palette` again")
+    if (log.root / COVERAGE).exists():
+        _check_maps(log, COVERAGE, frames, lambda frame: read_coverage(log.root, frame, count))
     _check_copies(log, palette.rgb)
 
 

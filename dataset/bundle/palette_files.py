@@ -5,6 +5,7 @@ palette.gpl, .ase, .hex, .png   the same for other programs, and as a picture fo
 labels/000.png ..    per picture: indexed PNG with all 256 entries, 255 transparent and unlabelled
 tones/000.png ..     per picture of a shaded sheet: grey PNG, 0 = the paint lies in light, 1 = in
                      shadow, 255 = no paint
+coverage/000.png ..  per picture: RGB PNG, which paints cover each pixel and how far
 contours/000.png ..  per picture: grey PNG, how far drawn lines cover each pixel
 """
 
@@ -19,6 +20,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
+from toonset.palette.coverage import coverage_map
 from toonset.palette.extract import paint_maps
 from toonset.palette.formats.registry import encode_palette
 from toonset.palette.names import clean_name
@@ -31,6 +33,7 @@ PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
 COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs
 
 Maps = Sequence[tuple[str, UInt8[np.ndarray, "_ _"]]]
+Coverages = Sequence[tuple[str, UInt8[np.ndarray, "_ _ rgb=3"]]]
 
 
 def palette_title(sheets: Iterable[str], folder: Path) -> str:
@@ -57,20 +60,30 @@ def write_labelled(
     labels = [(name, one.labels) for name, one in zip(names, found, strict=True)]
     pairs = zip(names, found, strict=True)
     tones = [(name, one.tones) for name, one in pairs if one.tones is not None]
-    write_palette(folder, palette, labels, list(zip(names, contours, strict=True)), tones)
+    drawings = zip(names, pictures, found, contours, strict=True)
+    coverage = [
+        (name, coverage_map(rgba, paint, lines, palette)) for name, rgba, paint, lines in drawings
+    ]
+    inked = list(zip(names, contours, strict=True))
+    write_palette(folder, palette, labels, inked, tones, coverage)
 
 
 def write_palette(
-    folder: Path, palette: Palette, labels: Maps, contours: Maps = (), tones: Maps = ()
+    folder: Path,
+    palette: Palette,
+    labels: Maps,
+    contours: Maps = (),
+    tones: Maps = (),
+    coverage: Coverages = (),
 ) -> None:
-    """Write palette.json and its copies, labels/, tones/ and contours/ into an existing folder.
+    """Write palette.json and its copies, label, tone, coverage and contour maps into a folder.
 
     They replace older ones. Without contours, older ones stay: they depend on the pictures alone;
-    without tones, older ones go: a flat sheet has none.
+    without tones or coverage, older ones go: a flat sheet has no tones.
 
     Everything is written beside the old files first and renamed at the end, palette.json last: a
-    full disk leaves the older palette as it was, and whenever palette.json is there, labels and
-    tones fit it.
+    full disk leaves the older palette as it was, and whenever palette.json is there, the other
+    maps fit it.
 
     Args:
         folder: a bundle, or a new folder.
@@ -78,12 +91,14 @@ def write_palette(
         labels: file name and label map of every picture.
         contours: file name and contour map of every picture.
         tones: file name and tone map of every picture, where the palette has a shadow.
+        coverage: file name and coverage of every picture: see `toonset.palette.coverage`.
 
     Raises:
-        OutputError: the folder cannot be written, or its tones/ holds what no palette wrote.
+        OutputError: the folder cannot be written, or a map folder holds what no palette wrote.
     """
-    if not tones:
-        check_removable(folder / "tones", "*.png")
+    beside: dict[str, Maps | Coverages] = {"tones": tones, "coverage": coverage}
+    for name in (name for name, maps in beside.items() if not maps):
+        check_removable(folder / name, "*.png")
     files = {f"palette{end}": encode_palette(palette, end) for end in COPIES}
     files[SWATCHES] = encode_png(draw_swatches(palette))
     files[PALETTE_JSON] = encode_palette(palette, ".json")
@@ -94,16 +109,17 @@ def write_palette(
     placed = folder / "labels"
     with ExitStack() as whole:
         temporary = whole.enter_context(new_folder(placed, force=True))
-        if tones:
-            beside = whole.enter_context(new_folder(folder / "tones", force=True))
-            for name, values in tones:
-                write_bytes(beside / name, encode_grey_png(values))
+        for place, maps in ((folder / name, maps) for name, maps in beside.items() if maps):
+            new = whole.enter_context(new_folder(place, force=True))
+            for name, values in maps:
+                encode = encode_grey_png if values.ndim == 2 else encode_png
+                write_bytes(new / name, encode(values))
         for name, values in labels:
             write_bytes(temporary / name, encode_indexed_png(values, palette.rgb))
         for name, data in files.items():
             write_bytes(temporary / name, data)
         (folder / PALETTE_JSON).unlink(missing_ok=True)
-        if not tones:
-            remove_folder(folder / "tones")
+        for name in (name for name, maps in beside.items() if not maps):
+            remove_folder(folder / name)
     for name in files:
         os.replace(placed / name, folder / name)

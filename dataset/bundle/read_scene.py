@@ -155,6 +155,30 @@ def read_tones(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height wid
     return tones
 
 
+def read_coverage(
+    root: Path, frame: PosedPicture, colors: int
+) -> UInt8[np.ndarray, "height width 3"] | None:
+    """Return which paints cover each pixel (`toonset.palette.coverage`), None where not known.
+
+    Raises:
+        PictureError: it cannot be read.
+        BundleError: it has another size than its camera, or a paint that the palette lacks.
+    """
+    file = member(root, f"coverage/{label_name(frame)}")
+    if file is None:
+        return None
+    ranks = load_rgba(file)[..., :3]
+    check_size(file, ranks, frame.camera, "transforms.json")
+    paints = ranks[..., :2]
+    used = paints[paints != UNLABELLED]
+    if used.size and used.max() >= colors:
+        raise BundleError(
+            f"{file}: paint {used.max()} but the palette has {colors} colours; write the coverage "
+            "again with `toonset palette`"
+        )
+    return ranks
+
+
 def read_contour(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:
     """Return how much of each pixel of a frame is drawn line (255 = all), None where not known.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, LABELS, TONES
+from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, COVERAGE, LABELS, TONES
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecord
 from toonset.dataset.bundle.problem_log import ProblemLog
@@ -46,6 +46,7 @@ def summarise(path: Path) -> dict[str, Any]:
         "palette": None if palette is None else to_json(palette),
         "labels": _count(root / LABELS, frames),
         "tones": _count(root / TONES, frames),
+        "coverage": _count(root / COVERAGE, frames),
         "contours": _count(root / CONTOURS, frames),
         "mannequin": mesh and {"vertices": len(mesh.vertices), "faces": len(mesh.faces)},
         "bytes": sizes(root),

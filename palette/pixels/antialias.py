@@ -100,13 +100,20 @@ def _paints(padded: np.ndarray, inner: np.ndarray, rgba: np.ndarray, palette: np
     places = palette @ YCC_FROM_RGB.T
     for label in np.flatnonzero(np.bincount(labels, minlength=len(palette)) >= FEW):
         places[label] = np.median(seen[labels == label], axis=0)
-    noise = np.zeros(3)
-    if len(ring) >= FEW:
-        noise = np.quantile(np.abs(seen - places[labels]), SIGMA, axis=0)
-    units = YCC_FROM_RGB / np.hypot(BESIDE * noise, ROUNDING)[:, None]
-    places = places / np.hypot(BESIDE * noise, ROUNDING)
+    noise = noise_beside_edges(seen - places[labels])
+    units, places = YCC_FROM_RGB / noise[:, None], places / noise
     apart = np.linalg.norm(places[:, None] - places, axis=2)
     return Paints(units, places, np.maximum(apart, 1e-9))
+
+
+def noise_beside_edges(off: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " 3"]:
+    """Return the noise next to an edge, in levels.
+
+    Args:
+        off: how far pixels two away from one are from their paint, in lightness and chroma.
+    """
+    noise = np.quantile(np.abs(off), SIGMA, axis=0) if len(off) >= FEW else np.zeros(3)
+    return np.hypot(BESIDE * noise, ROUNDING)
 
 
 def _settled(

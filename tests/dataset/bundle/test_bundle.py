@@ -15,7 +15,7 @@ from PIL import Image
 
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.check import bundle_problems
-from toonset.dataset.bundle.read_scene import read_contour, read_scene, read_tones
+from toonset.dataset.bundle.read_scene import read_contour, read_coverage, read_scene, read_tones
 from toonset.dataset.bundle.transforms_read import read_frames
 from toonset.errors import BundleError, ToonsetError
 from toonset.read import parse_json
@@ -106,6 +106,21 @@ def test_tones_are_checked_like_labels(place: Path):
         "write the tones again with `toonset palette`",
         "tones/002.png: is missing; run `toonset palette` again",
     ]
+
+
+def test_coverage_is_checked_like_labels(place: Path):
+    frame = read_frames(place / "transforms.json", need_pictures=True)[0]
+    assert read_coverage(place, frame, 2) is None
+    (place / "coverage").mkdir()
+    for name, paint in (("000.png", 1), ("001.png", 77), ("002.png", 1)):
+        Image.new("RGB", (20, 24), (paint, 255, 200)).save(place / "coverage" / name)
+    ranks = read_coverage(place, frame, 2)
+    assert ranks is not None
+    assert (ranks == (1, 255, 200)).all()
+    (found,) = problems(place)
+    assert found.startswith("coverage/001.png: paint 77 but the palette has")
+    (place / "coverage" / "002.png").unlink()
+    assert problems(place)[1:] == ["coverage/002.png: is missing; run `toonset palette` again"]
 
 
 # ---- versions
