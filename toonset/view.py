@@ -38,6 +38,7 @@ class View:
             where a person has had the chance to correct what was cut out.
         label: what it shows, as a person has said ("front", "3q", "90"); empty where nobody has.
         origin: what it was cut from; None where that is not recorded.
+        sheet: the one file that it was cut from; None where that is not recorded.
     """
 
     rgba: UInt8[np.ndarray, "height width 4"]
@@ -48,6 +49,7 @@ class View:
     paper: tuple[int, int, int] | None = None
     label: str = ""
     origin: Origin | None = None
+    sheet: InputFile | None = None
 
     def __post_init__(self) -> None:
         """Refuse an empty drawing.
