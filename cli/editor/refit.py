@@ -1,0 +1,137 @@
+"""A bundle made again from its sheet and corrections, as the command line would make it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from toonset.calib.calibrate import calibrate
+from toonset.calib.hints import Hints
+from toonset.calib.write_bundle import write_bundle
+from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, LABELS, TONES
+from toonset.dataset.split_folder.load import Sheet, split_sheet
+from toonset.mesh import Mesh
+from toonset.write import exchange_folders, write_bytes
+
+CORRECTIONS = "corrections.json"
+RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
+CUT, CAMERAS, PALETTE = ("background", "boxes"), "views", "palette"
+
+Body = Mesh | Literal["none"] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What is corrected.
+
+    Attributes:
+        sheet: the picture.
+        body: the mannequin, as `calibrate` takes it.
+        folder: the bundle.
+    """
+
+    sheet: Path
+    body: Body
+    folder: Path
+
+    @property
+    def workshop(self) -> Path:
+        """Return where the next bundle is made, beside this one: a later start clears it up."""
+        return self.folder.parent / f".{self.folder.name}.edit"
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What has to be found again.
+
+    Attributes:
+        cut: the drawings, and all that follows.
+        cameras: of the same drawings.
+        palette: of the drawings.
+    """
+
+    cut: bool
+    cameras: bool
+    palette: bool
+
+
+def parts_changed(before: dict[str, Any], after: dict[str, Any]) -> Changed:
+    """Return what corrections change that others did not."""
+
+    def cut(said: dict[str, Any]) -> list[Any]:
+        left = [view["box"] for view in said.get(CAMERAS, ()) if view.get("exclude")]
+        return [*(said.get(key) for key in CUT), left]
+
+    is_cut = cut(before) != cut(after)
+    seen = is_cut or before.get(CAMERAS) != after.get(CAMERAS)
+    return Changed(is_cut, seen, is_cut or before.get(PALETTE) != after.get(PALETTE))
+
+
+def file_of(corrections: dict[str, Any]) -> bytes:
+    """Return corrections.json."""
+    return (json.dumps(corrections, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def cut_sheet(sheet: Path, corrections: dict[str, Any], workshop: Path) -> tuple[Sheet, Path]:
+    """Return the drawings as corrected, and the file that says how."""
+    file = workshop / CORRECTIONS
+    write_bytes(file, file_of(corrections))
+    return split_sheet(sheet, corrections=file), file
+
+
+def make_bundle(
+    subject: Subject,
+    corrections: dict[str, Any],
+    changed: Changed,
+    progress: Callable[[str, float], None] = lambda step, share: None,
+) -> tuple[Sheet, Path]:
+    """Return the drawings, and a new bundle of them in the workshop.
+
+    What is not made again goes along: corrections and page, and the palette of drawings that are
+    still the same.
+
+    Raises:
+        ToonsetError: the corrections do not fit the sheet, or nothing can be found in it.
+    """
+    new, old = subject.workshop / subject.folder.name, subject.folder
+    shutil.rmtree(subject.workshop, ignore_errors=True)
+    sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
+    hints = Hints(corrections=file)
+    found = calibrate(sheet.views, subject.body, hints, progress=progress)
+    write_bundle(new, found)
+    if old.is_dir():
+        _take_along(old, new)
+    if changed.palette:
+        find_palette(new, corrections)
+    return sheet, new
+
+
+def put_in_place(new: Path, subject: Subject, corrections: dict[str, Any]) -> None:
+    """Let a new bundle take the old one's place, with the newest corrections."""
+    old = subject.folder
+    write_bytes(new / CORRECTIONS, file_of(corrections))
+    exchange_folders(new, old)
+    if (new / RUN).is_dir():
+        os.replace(new / RUN, old / RUN)
+    shutil.rmtree(subject.workshop, ignore_errors=True)
+
+
+def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
+    """Find the palette of a bundle's drawings, as corrected, and write it with its maps."""
+    raise NotImplementedError
+
+
+def _take_along(old: Path, new: Path) -> None:
+    for entry in old.iterdir():
+        target = new / entry.name
+        if entry.name in (RUN, CALIBRATION) or target.exists():
+            continue
+        if entry.is_dir() and entry.name in (LABELS, TONES, CONTOURS):
+            shutil.copytree(entry, target)
+        elif entry.is_file():
+            shutil.copy2(entry, target)
