@@ -43,11 +43,11 @@ def html_page(
     """
     script = _script(folder / first)
     style = "".join((folder / name).read_text(encoding="utf-8") for name in styles)
+    server = "connect-src 'self'; " if asks_server else ""
     known = {
         "policy": (
-            f"default-src 'none'; {"connect-src 'self'; " * asks_server}img-src data: blob:; "
-            f"script-src '{_hash(script)}'; style-src '{_hash(style)}'; base-uri 'none'; "
-            "form-action 'none'"
+            f"default-src 'none'; {server}img-src data: blob:; script-src '{_hash(script)}'; "
+            f"style-src '{_hash(style)}'; base-uri 'none'; form-action 'none'"
         ),
         "title": html.escape(title),
         "style": style,

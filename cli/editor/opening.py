@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from toonset.cli.editor.refit import (
     CORRECTIONS,
+    NOTHING,
     Changed,
     Subject,
     cut_sheet,
@@ -32,7 +33,6 @@ from toonset.view import SHEET
 from toonset.write import check_output
 
 ALL = Changed(cut=True, cameras=True, palette=True)
-NOTHING: dict[str, Any] = {"version": 1}
 MESH, BY_HAND = "mesh", "corrections"  # roles of a bundle's inputs
 BESIDE_MESH = ("points of the mesh", "landmarks", "init")
 MANNEQUIN_MADE = "mannequin"  # option: what a body made by code looks like

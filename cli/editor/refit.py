@@ -19,6 +19,7 @@ from toonset.mesh import Mesh
 from toonset.write import exchange_folders, write_bytes
 
 CORRECTIONS = "corrections.json"
+NOTHING: dict[str, Any] = {"version": 1}
 RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
 CUT, CAMERAS, PALETTE = ("background", "boxes"), "views", "palette"
 
@@ -77,8 +78,12 @@ def file_of(corrections: dict[str, Any]) -> bytes:
     return (json.dumps(corrections, indent=1, ensure_ascii=False) + "\n").encode()
 
 
-def cut_sheet(sheet: Path, corrections: dict[str, Any], workshop: Path) -> tuple[Sheet, Path]:
-    """Return the drawings as corrected, and the file that says how."""
+def cut_sheet(
+    sheet: Path, corrections: dict[str, Any], workshop: Path
+) -> tuple[Sheet, Path | None]:
+    """Return the drawings as corrected, and the file that says how; None where nothing is."""
+    if corrections == NOTHING:
+        return split_sheet(sheet), None
     file = workshop / CORRECTIONS
     write_bytes(file, file_of(corrections))
     return split_sheet(sheet, corrections=file), file
@@ -101,7 +106,7 @@ def make_bundle(
     new, old = subject.workshop / subject.folder.name, subject.folder
     shutil.rmtree(subject.workshop, ignore_errors=True)
     sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
-    hints = Hints(corrections=file)
+    hints = Hints(corrections=file) if "corrections" in Hints.__dataclass_fields__ else Hints()
     found = calibrate(sheet.views, subject.body, hints, progress=progress)
     write_bundle(new, found)
     if old.is_dir():
@@ -123,7 +128,15 @@ def put_in_place(new: Path, subject: Subject, corrections: dict[str, Any]) -> No
 
 def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
     """Find the palette of a bundle's drawings, as corrected, and write it with its maps."""
-    raise NotImplementedError
+    from toonset.dataset.bundle.palette_files import write_labelled
+    from toonset.dataset.split_folder.pictures import load_pictures
+    from toonset.palette.extract import choose_palette
+    from toonset.palette.pixels.ink_lines import find_contours
+
+    drawn = load_pictures([folder])
+    contours = find_contours(drawn.pictures)
+    found = choose_palette(drawn.pictures, contours)
+    write_labelled(folder, found, drawn.names, drawn.pictures, contours)
 
 
 def _take_along(old: Path, new: Path) -> None:

@@ -32,7 +32,6 @@ from toonset.errors import ToonsetError, one_line
 from toonset.write import write_bytes
 
 PAGE = "edit.html"
-NOTHING: dict[str, Any] = {"version": 1}
 
 
 class StaleError(Exception):

@@ -6,6 +6,7 @@ import {
   bodyOf,
   boundsOf,
   cameraSaid,
+  contour,
   drawShaded,
   poseOf,
   projected,
@@ -23,7 +24,7 @@ import { clamp, wrapped } from "../../../nerf/viewer/page/state.js";
 /** @typedef {import("./types.js").Tool} Tool */
 /** @typedef {import("./mannequin.js").Pose} Pose */
 /** @typedef {"yaw" | "elevation" | "roll" | "scale" | "shift"} Way */
-/** @typedef {{pose: Pose, points: Float32Array, path: Path2D}} Shape */
+/** @typedef {{pose: Pose, points: Float32Array, path: Path2D, lines: Path2D}} Shape */
 
 const TURN = 180; // degrees of yaw that a drag over the figure's width makes
 const STEEP = 89;
@@ -50,6 +51,7 @@ export function createCamerasTool(model, fits) {
   const masks = new Map();
   /** @type {number[] | null | "mannequin"} landmark that is being clicked: next on the mannequin, or its point */
   let marking = null;
+  let frame = 0;
   /** @type {Point} where the keyboard's cross is */
   let cross = [0, 0];
 
@@ -82,12 +84,19 @@ export function createCamerasTool(model, fits) {
     const old = shapes.get(figure.view);
     if (old && samePose(old.pose, pose)) return old;
     const points = projected(body, pose);
-    const made = { pose, points, path: silhouette(body, points) };
+    const made = { pose, points, path: silhouette(body, points), lines: contour(body, points) };
     shapes.set(figure.view, made);
     return made;
   }
 
-  async function measure() {
+  function measure() {
+    frame ||= requestAnimationFrame(() => {
+      frame = 0;
+      measureNow();
+    });
+  }
+
+  async function measureNow() {
     const figure = model.figure;
     const view = figure?.view;
     const place = part("fit_error", HTMLElement);
@@ -339,14 +348,14 @@ function drawCross(context, [x, y], px) {
 let lineContext = null;
 
 /**
- * Strokes every triangle and takes away what they cover: the outer outline is left.
+ * Strokes the contour and takes away what the mannequin covers: the outer outline is left.
  * @param {CanvasRenderingContext2D} context
  * @param {Shape} shape
  * @param {boolean} chosen
  * @param {number} px
  * @param {string} color
  */
-function drawOutline(context, { path }, chosen, px, color) {
+function drawOutline(context, { path, lines }, chosen, px, color) {
   lineContext ??= new OffscreenCanvas(1, 1).getContext("2d");
   if (!lineContext) return;
   const { width, height } = context.canvas;
@@ -358,9 +367,9 @@ function drawOutline(context, { path }, chosen, px, color) {
   lineContext.clearRect(0, 0, width, height);
   lineContext.setTransform(context.getTransform());
   lineContext.strokeStyle = color;
-  lineContext.lineJoin = "round";
+  lineContext.lineCap = "round";
   lineContext.lineWidth = (chosen ? 5 : 3.5) * px;
-  lineContext.stroke(path);
+  lineContext.stroke(lines);
   lineContext.globalCompositeOperation = "destination-out";
   lineContext.fill(path);
   context.save();

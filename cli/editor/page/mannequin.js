@@ -7,7 +7,7 @@ import { rotationFromAngles } from "../../../nerf/viewer/page/camera.js";
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./types.js").ViewRecord} ViewRecord */
 /** @typedef {CameraSaid & {k: number, aspect: number}} Pose a camera that looks at the mannequin's middle */
-/** @typedef {{vertices: Float32Array, faces: Uint32Array, middle: number[], height: number}} Body */
+/** @typedef {{vertices: Float32Array, faces: Uint32Array, edges: Int32Array, middle: number[], height: number}} Body */
 
 const DEGREE = Math.PI / 180;
 
@@ -17,7 +17,28 @@ export function bodyOf({ mannequin }) {
   const { middle, height } = mannequin;
   const vertices = new Float32Array(bytesOf(mannequin.vertices));
   const faces = new Uint32Array(bytesOf(mannequin.faces));
-  return { vertices, faces, middle, height };
+  return { vertices, faces, edges: edgesOf(faces, vertices.length / 3), middle, height };
+}
+
+/**
+ * @param {Uint32Array} faces
+ * @param {number} count of vertices
+ * @returns {Int32Array} two corners and two faces of every edge; -1 where there is no second face
+ */
+function edgesOf(faces, count) {
+  /** @type {Map<number, number>} */
+  const known = new Map();
+  const edges = [];
+  for (let face = 0; face < faces.length / 3; face++) {
+    for (let i = 0; i < 3; i++) {
+      const [a, b] = [faces[3 * face + i], faces[3 * face + ((i + 1) % 3)]];
+      const key = Math.min(a, b) * count + Math.max(a, b);
+      const at = known.get(key);
+      if (at !== undefined && edges[at + 3] < 0) edges[at + 3] = face;
+      else known.set(key, edges.push(a, b, face, -1) - 4);
+    }
+  }
+  return Int32Array.from(edges);
 }
 
 /** @param {string} text base64 @returns {ArrayBuffer} */
@@ -91,6 +112,23 @@ export function silhouette({ faces }, points) {
     path.lineTo(points[b], points[b + 1]);
     path.lineTo(points[c], points[c + 1]);
     path.closePath();
+  }
+  return path;
+}
+
+/**
+ * @param {Body} body
+ * @param {Float32Array} points projected
+ * @returns {Path2D} edges between faces that look here and faces that look away: the outline is of these
+ */
+export function contour({ faces, edges }, points) {
+  const path = new Path2D();
+  const side = (/** @type {number} */ face) =>
+    areaOf(points, 3 * faces[3 * face], 3 * faces[3 * face + 1], 3 * faces[3 * face + 2]) > 0;
+  for (let i = 0; i < edges.length; i += 4) {
+    if (edges[i + 3] >= 0 && side(edges[i + 2]) === side(edges[i + 3])) continue;
+    path.moveTo(points[3 * edges[i]], points[3 * edges[i] + 1]);
+    path.lineTo(points[3 * edges[i + 1]], points[3 * edges[i + 1] + 1]);
   }
   return path;
 }
