@@ -1,24 +1,21 @@
-"""What a person corrects of a palette, and the palette and label maps after it.
+"""What a person corrects of a palette, as corrections.json has it.
 
-Colours are named by the hex that palette.json has for them; one that is up to `NEAR_LEVELS` off in
-every channel is meant, too, for a palette found anew can differ by that much.
+Colours are named by the hex that palette.json has for them.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from toonset.json_file import STRICT
 from toonset.palette.names import clean_name
 from toonset.view import Box
 
-NEAR_LEVELS = 6  # of 255, in every channel
-MOST_NAME, MOST_RADIUS = 200, 1000.0
+MOST_NAME, MOST_RADIUS, MOST_PX = 200, 1000.0, 1e6
 
 
 def hex_word(text: str) -> str:
@@ -32,13 +29,11 @@ def hex_word(text: str) -> str:
     return text.lower()
 
 
-def box_around(box: tuple[float, float, float, float]) -> Box:
-    """Return a box (x, y, width, height) in whole pixels, rounded outwards.
-
-    Raises:
-        ValueError: it is empty.
-    """
-    x, y, width, height = box
+def _box_around(box: object) -> object:
+    """Return a box (x, y, width, height) in whole pixels, rounded outwards."""
+    if not isinstance(box, list) or len(box) != 4 or {type(side) for side in box} - {int, float}:
+        raise ValueError("four numbers x, y, width, height are needed")
+    x, y, width, height = (min(max(side, -MOST_PX), MOST_PX) for side in box)
     if width <= 0 or height <= 0:
         raise ValueError(f"{width:g} x {height:g} px is empty")
     left, top = math.floor(x), math.floor(y)
@@ -53,9 +48,9 @@ def _name(text: str) -> str:
 
 Hex = Annotated[str, AfterValidator(hex_word)]
 Name = Annotated[str, Field(max_length=MOST_NAME), AfterValidator(_name)]
-Number = Annotated[float, Field(ge=-1e6, le=1e6)]
+Number = Annotated[float, Field(ge=-MOST_PX, le=MOST_PX)]
 Pixel = tuple[Number, Number]
-FigureBox = Annotated[tuple[Number, Number, Number, Number], AfterValidator(box_around)]
+FigureBox = Annotated[Box, BeforeValidator(_box_around)]
 
 
 @dataclass(frozen=True)
@@ -113,18 +108,3 @@ class PaletteCorrections:
     split: tuple[Divided, ...] = ()
     names: dict[Hex, Name] = field(default_factory=dict)
     strokes: tuple[Stroke, ...] = ()
-
-    def contradiction(self) -> str:
-        """Return where two corrections contradict each other, and how; "" if none do."""
-        gone = [("drop", color) for color in self.drop]
-        gone += [("merge", color) for group in self.merge for color in group[1:]]
-        gone += [("split", one.color) for one in self.split]
-        twice = [color for color, count in Counter(c for _, c in gone).items() if count > 1]
-        if twice:
-            places = " and ".join(key for key, color in gone if color == twice[0])
-            return f"palette: {twice[0]} stands in {places}; let one of them speak of it"
-        taken = {color for _, color in gone}
-        for group in self.merge:
-            if group[0] in taken:
-                return f"palette.merge: {group[0]} is to stay, but goes elsewhere; correct one"
-        return ""

@@ -133,7 +133,7 @@ def anchors(
 def locks(
     ties: dict[str, Tie], poses: Sequence[Pose], values: Mapping[str, Float[np.ndarray, " views"]]
 ) -> list[tuple[Tie, float]]:
-    """Return ties that keep every view's yaw, elevation or log scale at given values."""
+    """Return ties that keep views' yaw, elevation or log scale at given values; nan is free."""
     kept = []
     views = len(poses)
     for name, wanted in values.items():
@@ -145,7 +145,9 @@ def locks(
             off = (now - wanted + np.pi) % (2 * np.pi) - np.pi
         else:
             slopes, off = ties[name].slopes, ties[name].values - wanted
-        kept.append((Tie(off, slopes, np.eye(views), np.ones(views)), LOCK_SIGMA))
+        held = np.isfinite(wanted)
+        off = np.where(held, off, 0.0)
+        kept.append((Tie(off, slopes, np.eye(views), held.astype(float)), LOCK_SIGMA))
     return kept
 
 

@@ -17,9 +17,11 @@ from toonset.dataset.split_folder.corrections import (
     ViewCorrection,
     read_corrections,
 )
+from toonset.dataset.split_folder.pictures import Picture, Place
 from toonset.dataset.split_folder.views import Split, without
 from toonset.errors import SheetError, UsageError
-from toonset.view import Box, InputFile, View
+from toonset.palette.corrections import Stroke
+from toonset.view import Box, InputFile, View, visible_box
 
 LEAST_OVERLAP = 0.5  # intersection over union
 
@@ -58,6 +60,7 @@ class Given:
             "views": ("views.label", any(view.label for view in self.content.views)),
             "front": ("views.label", any(view.label for view in self.content.views)),
             "landmarks": ("views.landmarks", any(view.landmarks for view in self.content.views)),
+            "keep": ("palette.keep", self.content.palette.keep),
             "init": ("views.camera", any(view.camera or view.lock for view in self.content.views)),
         }
         for name, value in options.items():
@@ -126,6 +129,35 @@ class Given:
         for at, entry in self.matched([views[i] for i in own], wanted).items():
             found[own[at]] = wanted[entry]
         return tuple(found)
+
+    def strokes_on(
+        self, pictures: Sequence[Picture], places: Sequence[Place | None]
+    ) -> tuple[list[list[tuple[int, Stroke]]], tuple[str, ...]]:
+        """Return every picture's strokes, with their numbers and in its pixels; and notes.
+
+        Args:
+            pictures: of one or more sheets, sRGB with straight alpha.
+            places: where they lie there.
+        """
+        strokes = self.content.palette.strokes
+        found: list[list[tuple[int, Stroke]]] = [[] for _ in pictures]
+        sheets = list(dict.fromkeys(place.sheet for place in places if place))
+        boxes = list(dict.fromkeys(stroke.box for stroke in strokes))
+        picture_of: dict[Box, tuple[int, Box]] = {}
+        if strokes and sheets:
+            sheet = sheets[self.number_of_sheet(sheets)]
+            own = [(i, at.box) for i, at in enumerate(places) if at and at.sheet == sheet]
+            figures = [(box, visible_box(pictures[i], box)) for i, box in own]
+            whole = {box: [one for one in own if _around(box, [one[1]])] for box in boxes}
+            picture_of = {box: on[0] for box, on in whole.items() if len(on) == 1}
+            picture_of |= {boxes[j]: own[i] for i, j in match_boxes(figures, boxes).items()}
+        for number, stroke in enumerate(strokes):
+            if stroke.box in picture_of:
+                i, (x, y, _, _) = picture_of[stroke.box]
+                points = tuple((u - x, v - y) for u, v in stroke.points)
+                found[i].append((number, replace(stroke, points=points)))
+        lost = f"{self.path.name}: palette.strokes, box {{}}, is no figure of this split: ignored"
+        return found, tuple(lost.format(list(box)) for box in boxes if box not in picture_of)
 
     def matched(self, views: Sequence[View], wanted: Sequence[ViewCorrection]) -> dict[int, int]:
         """Return which entry of `wanted` speaks of which view, by their numbers."""

@@ -39,10 +39,9 @@ def _label(word: str) -> str:
     if "," in word:
         raise ValueError("several directions; write one")
     try:
-        parse_labels(word[:SHOWN], 1)
+        return word.strip() if parse_labels(word[:SHOWN], 1)[0] else ""
     except SheetError as error:
         raise ValueError(str(error).removeprefix("--views: ")) from error
-    return word.strip()
 
 
 def _paper(text: str) -> str:
@@ -211,9 +210,6 @@ def _check(found: Corrections, where: str) -> None:
             raise SheetError(
                 f"{key}.lock: there is no one yaw to keep; give a camera, or a label such as left"
             )
-    doubt = found.palette.contradiction()
-    if doubt:
-        raise SheetError(f"{where}: {doubt}")
 
 
 def _problem(error: ValidationError) -> str:
