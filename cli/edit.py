@@ -41,9 +41,7 @@ def edit(
     ] = None,
     out: Annotated[
         Path,
-        typer.Option(
-            "-o", "--out", help="Bundle folder of a sheet.", rich_help_panel=OUTPUT_PANEL
-        ),
+        typer.Option("-o", "--out", help="Bundle folder of a sheet.", rich_help_panel=OUTPUT_PANEL),
     ] = Path("bundle"),
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")

@@ -58,7 +58,7 @@ def folder_of(place: Path, out: Path) -> Path:
 def open_session(
     place: Path, folder: Path, mesh: MeshOption, tell: Callable[[str], None]
 ) -> Session:
-    """Return the session; what no bundle follows yet, a sheet or newer corrections, is fitted first.
+    """Return the session; a sheet, or corrections that no bundle follows yet, are fitted first.
 
     Raises:
         ToonsetError: the bundle's sheet is not to be found, or the sheet cannot be calibrated.
@@ -130,7 +130,9 @@ def _found(record: InputFile, folder: Path, place: Path) -> Path | None:
     """Return a file that a bundle was made of: the one named, or one near it with its content."""
     if record.role == SHEET and place.is_file():
         if _sha256(place) != record.sha256:
-            raise UsageError(f"{folder}: was made of another sheet, {record.name}; choose another -o")
+            raise UsageError(
+                f"{folder}: was made of another sheet, {record.name}; choose another -o"
+            )
         return place
     near = dict.fromkeys([folder.resolve().parent, Path.cwd(), place.resolve().parent])
     for here in (*near, *(child for one in near for child in sorted(one.glob("*/")))):

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,12 +14,22 @@ from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
 from toonset.calib.write_bundle import write_bundle
 from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, LABELS, TONES
+from toonset.dataset.bundle.palette_files import write_labelled
+from toonset.dataset.split_folder.corrected import Given
+from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
+from toonset.dataset.split_folder.pictures import load_pictures
 from toonset.mesh import Mesh
+from toonset.palette.corrected import corrected
+from toonset.palette.corrections import PaletteCorrections
+from toonset.palette.extract import choose_palette, options_of
+from toonset.palette.palette import MAX_COLORS
+from toonset.palette.pixels.ink_lines import find_contours
 from toonset.write import exchange_folders, write_bytes
 
 CORRECTIONS = "corrections.json"
 NOTHING: dict[str, Any] = {"version": 1}
+LEAST_SHARE = 0.05  # of a paint, as `palette` has it
 RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
 CUT, CAMERAS, PALETTE = ("background", "boxes"), "views", "palette"
 
@@ -106,7 +116,7 @@ def make_bundle(
     new, old = subject.workshop / subject.folder.name, subject.folder
     shutil.rmtree(subject.workshop, ignore_errors=True)
     sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
-    hints = Hints(corrections=file) if "corrections" in Hints.__dataclass_fields__ else Hints()
+    hints = Hints(corrections=file)
     found = calibrate(sheet.views, subject.body, hints, progress=progress)
     write_bundle(new, found)
     if old.is_dir():
@@ -127,16 +137,25 @@ def put_in_place(new: Path, subject: Subject, corrections: dict[str, Any]) -> No
 
 
 def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
-    """Find the palette of a bundle's drawings, as corrected, and write it with its maps."""
-    from toonset.dataset.bundle.palette_files import write_labelled
-    from toonset.dataset.split_folder.pictures import load_pictures
-    from toonset.palette.extract import choose_palette
-    from toonset.palette.pixels.ink_lines import find_contours
+    """Find the palette of a bundle's drawings, as corrected, and write it with its maps.
 
+    Raises:
+        ToonsetError: the corrections speak of colours that the drawings do not have.
+    """
+    given = Given(Path(CORRECTIONS), parse_corrections(file_of(corrections), CORRECTIONS))
+    wanted = given.content.palette
     drawn = load_pictures([folder])
     contours = find_contours(drawn.pictures)
-    found = choose_palette(drawn.pictures, contours)
-    write_labelled(folder, found, drawn.names, drawn.pictures, contours)
+    options = options_of(LEAST_SHARE, MAX_COLORS, ",".join(wanted.keep))
+    found = choose_palette(drawn.pictures, contours, options)
+    maps = None
+    if wanted != PaletteCorrections():
+        strokes, _ = given.strokes_on(drawn.pictures, drawn.places)
+        found, maps = corrected(
+            drawn.pictures, contours, found, wanted, strokes, where=CORRECTIONS, space="rgb"
+        )
+    found = replace(found, title=found.title or drawn.title)
+    write_labelled(folder, found, drawn.names, drawn.pictures, contours, "rgb", maps)
 
 
 def _take_along(old: Path, new: Path) -> None:

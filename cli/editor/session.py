@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from toonset.cli.editor.refit import (
@@ -198,4 +197,3 @@ class Session:
         if self._stopped:
             raise StoppedError
         self.tell(f"{step} {share:.0%}" if share else step)
-

@@ -24,6 +24,11 @@ export function createCompass(number, choose) {
   const svg = svgElement("svg", { viewBox: `0 0 ${SIDE} ${SIDE}`, "aria-hidden": "true" });
   const spread = svgElement("path", { class: "spread" });
   const needle = svgElement("path", { class: "needle" });
+  for (const [word, y] of /** @type {[string, string][]} */ ([["back", "36"], ["front", "90"]])) {
+    const text = svgElement("text", { x: "60", y });
+    text.textContent = word;
+    svg.append(text);
+  }
   svg.append(svgElement("circle", { cx: "60", cy: "60", r: String(RING), class: "ring" }), spread, needle);
   const inputs = DIRECTIONS.map(([label, yaw, word]) => {
     const input = element("input", { type: "radio", name: `direction${number}`, value: label, "aria-label": word, title: word });

@@ -70,8 +70,14 @@ export function createPalettePanel(model) {
 
   /** @param {string} id @param {() => void} act */
   const on = (id, act) => part(id, HTMLElement).addEventListener("click", act);
-  on("merge_paints", () => model.change(merged(model.said, chosen)));
-  on("drop_paints", () => model.change(chosen.reduce(dropped, model.said)));
+  /** @param {import("./types.js").Corrections} next */
+  function act(next) {
+    [chosen, shown] = [[], ""];
+    model.change(next);
+  }
+
+  on("merge_paints", () => act(merged(model.said, chosen)));
+  on("drop_paints", () => act(chosen.reduce(dropped, model.said)));
   model.listen(show);
   show();
   return {
@@ -85,7 +91,7 @@ export function createPalettePanel(model) {
           pick("Now click the second one.", (second) => {
             pick("", null);
             if (first === second) return say("Those two are the same colour.");
-            model.change(divided(model.said, color, [first, second]));
+            act(divided(model.said, color, [first, second]));
           }),
         );
       });
