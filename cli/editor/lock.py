@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from toonset.errors import UsageError
+from toonset.errors import BundleError
 from toonset.write import write_json
 
 ANSWER_S = 0.5  # a port of this machine answers at once
@@ -23,12 +23,12 @@ def locked(folder: Path, port: int) -> Iterator[None]:
     A lock whose process has ended, or whose port does not answer, was left behind: it is taken.
 
     Raises:
-        UsageError: it is being edited.
+        BundleError: it is being edited.
     """
     file = folder.absolute().parent / f".{folder.absolute().name}.edit.lock"
     owner = _owner(file)
     if owner is not None:
-        raise UsageError(
+        raise BundleError(
             f"{folder}: is being edited by process {owner}; use its page, or stop it with Ctrl-C"
         )
     write_json(file, {"pid": os.getpid(), "port": port})

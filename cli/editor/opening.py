@@ -25,7 +25,7 @@ from toonset.dataset.bundle.calibration_schema import CalibrationFile, InputFile
 from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
-from toonset.errors import SheetError, ToonsetError, UsageError
+from toonset.errors import BundleError, SheetError, ToonsetError
 from toonset.mesh import Mesh
 from toonset.palette.names import hex_of
 from toonset.read import check_there, parse_json, read_whole
@@ -51,7 +51,7 @@ def folder_of(place: Path, out: Path) -> Path:
     if not place.is_dir():
         return out
     if not (place / CALIBRATION).is_file():
-        raise UsageError(f"{place}: is no bundle; name one, or the sheet, a single picture")
+        raise BundleError(f"{place}: is no bundle; name one, or the sheet, a single picture")
     return place
 
 
@@ -104,12 +104,12 @@ def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile
     """Return what a bundle was made of."""
     sheets = [one for one in found.inputs if one.role not in (MESH, BY_HAND, *BESIDE_MESH)]
     if len(sheets) != 1 or sheets[0].role != SHEET:
-        raise UsageError(
+        raise BundleError(
             f"{folder}: was made of {len(sheets)} files; name the one sheet, with another -o"
         )
     sheet = _found(sheets[0], folder, place)
     if sheet is None:
-        raise UsageError(
+        raise BundleError(
             f"{folder}: was made of {sheets[0].name}, which is not beside it; run `toonset edit "
             f"{sheets[0].name} -o {folder}` with that file's place"
         )
@@ -120,7 +120,7 @@ def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile
         return Subject(sheet, None if MANNEQUIN_MADE in found.options else "none", folder)
     file = _found(record, folder, place)
     if file is None:
-        raise UsageError(
+        raise BundleError(
             f"{folder}: was made with {record.name}, which is not beside it; give it: --mesh FILE"
         )
     return Subject(sheet, load_mesh(file), folder)
@@ -130,7 +130,7 @@ def _found(record: InputFile, folder: Path, place: Path) -> Path | None:
     """Return a file that a bundle was made of: the one named, or one near it with its content."""
     if record.role == SHEET and place.is_file():
         if _sha256(place) != record.sha256:
-            raise UsageError(
+            raise BundleError(
                 f"{folder}: was made of another sheet, {record.name}; choose another -o"
             )
         return place
@@ -170,7 +170,7 @@ def _as_it_was_cut(subject: Subject, found: CalibrationFile) -> tuple[Sheet, dic
     options = {name: found.options[name] for name in CUT_BY if found.options.get(name)}
     sheet = split_sheet(subject.sheet, **options)
     if len(sheet.views) != len(found.views) or found.options.get("boxes"):
-        raise UsageError(
+        raise BundleError(
             f"{subject.folder}: its sheet was cut by a file of boxes; run `toonset edit "
             f"{subject.sheet}` with another -o, and draw them"
         )
