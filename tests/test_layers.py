@@ -55,7 +55,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "run",
         "@training viewer",
     ),
-    "cli": ("common", "@"),  # a verb imports no other verb
+    "cli": ("common", "editor", "@"),  # a verb imports no other verb
 }
 MOST_FILES, MOST_ROOMS = 16, 42  # in a folder; of the product
 

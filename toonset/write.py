@@ -206,7 +206,11 @@ def exchange_folders(new: Path, path: Path) -> None:
     try:
         if not _exchanged(new, path):
             old = _put_aside(path)
-            os.replace(new, path)
+            try:
+                os.replace(new, path)
+            except OSError:
+                os.replace(old, path)
+                raise
             os.replace(old, new)
     except OSError as error:
         raise _output_error(path, error) from error

@@ -15,9 +15,11 @@ from toonset.cli.editor.refit import (
     Changed,
     Subject,
     cut_sheet,
+    find_palette,
     make_bundle,
     put_in_place,
 )
+from toonset.cli.editor.scene import PALETTE
 from toonset.cli.editor.session import Session
 from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
 from toonset.dataset.bundle.calibration_file import read_calibration
@@ -82,12 +84,12 @@ def open_session(
     data = _corrections_file(folder)
     if data is None and _has_body(found, subject):
         sheet, corrections = _as_it_was_cut(subject, found)
-        return Session(subject, sheet, corrections, corrections, tell)
+        return _session(subject, sheet, corrections, tell)
     corrections = NOTHING if data is None else parse_json(data, CORRECTIONS, SheetError)
     if data is not None and _recorded(found, BY_HAND, data) and _has_body(found, subject):
         sheet, _ = cut_sheet(subject.sheet, corrections, subject.workshop)
         shutil.rmtree(subject.workshop, ignore_errors=True)
-        return Session(subject, sheet, corrections, corrections, tell)
+        return _session(subject, sheet, corrections, tell)
     fitted = corrections
     try:
         sheet, new = make_bundle(subject, fitted, ALL, progress)
@@ -98,6 +100,15 @@ def open_session(
         sheet, new = make_bundle(subject, fitted, ALL, progress)
     put_in_place(new, subject, corrections)
     return Session(subject, sheet, fitted, corrections, tell)
+
+
+def _session(
+    subject: Subject, sheet: Sheet, corrections: dict[str, Any], tell: Callable[[str], None]
+) -> Session:
+    """Return the session of a bundle that follows its corrections; its palette is found now."""
+    if not (subject.folder / PALETTE).is_file():
+        find_palette(subject.folder, corrections)
+    return Session(subject, sheet, corrections, corrections, tell)
 
 
 def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile) -> Subject:

@@ -85,7 +85,7 @@ def parts_changed(before: dict[str, Any], after: dict[str, Any]) -> Changed:
 
 def file_of(corrections: dict[str, Any]) -> bytes:
     """Return corrections.json."""
-    return (json.dumps(corrections, indent=1, ensure_ascii=False) + "\n").encode()
+    return (json.dumps(corrections, indent=1) + "\n").encode()
 
 
 def cut_sheet(

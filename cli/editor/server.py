@@ -83,7 +83,7 @@ class Server(ThreadingHTTPServer):
     def opened(self, key: str) -> str | None:
         """Return the token for the key, which another one takes the place of; None for no key."""
         with self.lock:
-            if not hmac.compare_digest(key.encode(), self.key.encode()):
+            if not _same(key, self.key):
                 return None
             self.key = secrets.token_urlsafe(24)
         self.tell_address(self.address)
@@ -92,7 +92,7 @@ class Server(ThreadingHTTPServer):
     def serve(self, session: Session) -> threading.Thread:
         """Answer, in a thread that ends with `shutdown`."""
         self.session = session
-        thread = threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.2})
+        thread = threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.05})
         thread.start()
         return thread
 
@@ -124,6 +124,13 @@ class _Handler(BaseHTTPRequestHandler):
         except RefusedError as error:
             self.close_connection = True  # a body that was not read would be the next request
             self._send(error.status, "application/json", _json({"error": str(error)}))
+        except (ConnectionError, TimeoutError):
+            raise
+        except Exception as error:  # our bug: the page says so, and goes on
+            self.close_connection = True
+            reason = one_line(f"{type(error).__name__}: {error}")
+            data = _json({"error": reason})
+            self._send(HTTPStatus.INTERNAL_SERVER_ERROR, "application/json", data)
 
     def _check_origin(self) -> None:
         """Refuse what comes by way of another name, or from another site's page."""
@@ -139,11 +146,12 @@ class _Handler(BaseHTTPRequestHandler):
     def _session(self) -> Session:
         """Return the session, for those who have its token."""
         given = self.headers.get(TOKEN_HEADER, "")
-        if not hmac.compare_digest(given.encode(), self.server.token.encode()):
+        if not _same(given, self.server.token):
             raise RefusedError(HTTPStatus.UNAUTHORIZED, "the token is missing or another one")
-        if self.server.session is None:
-            raise RefusedError(HTTPStatus.SERVICE_UNAVAILABLE, "nothing is open yet")
-        return self.server.session
+        session = self.server.session
+        if session is None or session.stopped:
+            raise RefusedError(HTTPStatus.SERVICE_UNAVAILABLE, "nothing is open")
+        return session
 
     def _body(self) -> Any:
         length = self.headers.get("Content-Length", "")
@@ -207,6 +215,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Say nothing: the terminal is the command's."""
+
+
+def _same(given: str, own: str) -> bool:
+    """Compare in a time that does not tell how far they agree."""
+    return hmac.compare_digest(given.encode("utf-8", "replace"), own.encode())
 
 
 def _json(values: dict[str, Any]) -> bytes:

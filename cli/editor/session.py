@@ -58,6 +58,7 @@ class Session:
         error: why the newest corrections could not be fitted; empty if they could.
         seconds: that the last fit took.
         acted: when a person last did something.
+        stopped: it has ended, or is about to.
     """
 
     subject: Subject
@@ -72,10 +73,10 @@ class Session:
     error: str = ""
     seconds: float = 0.0
     acted: float = field(default_factory=time.monotonic)
+    stopped: bool = False
     picture: str = field(init=False)
     _tried: dict[str, Any] = field(init=False)
     _busy: bool = False
-    _stopped: bool = False
     _thread: threading.Thread = field(init=False)
     _news: threading.Condition = field(default_factory=threading.Condition)
 
@@ -90,7 +91,7 @@ class Session:
     def stop(self) -> None:
         """End; what is being fitted is given up, its corrections are on disk."""
         with self._news:
-            self._stopped = True
+            self.stopped = True
             self._news.notify_all()
         self._thread.join()
 
@@ -122,7 +123,7 @@ class Session:
             wait_s: how long to wait at most.
         """
         with self._news:
-            self._news.wait_for(lambda: self.number > after or self._stopped, wait_s)
+            self._news.wait_for(lambda: self.number > after or self.stopped, wait_s)
             known = {
                 "number": self.number,
                 "revision": self.revision,
@@ -156,8 +157,8 @@ class Session:
         while True:
             with self._news:
                 self._busy = False
-                self._news.wait_for(lambda: self._waits() or self._stopped)
-                if self._stopped:
+                self._news.wait_for(lambda: self._waits() or self.stopped)
+                if self.stopped:
                     return
                 self._busy = True
                 self._tried = self.corrections
@@ -194,6 +195,6 @@ class Session:
             self._show()
 
     def _progress(self, step: str, share: float) -> None:
-        if self._stopped:
+        if self.stopped:
             raise StoppedError
         self.tell(f"{step} {share:.0%}" if share else step)

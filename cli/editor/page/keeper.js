@@ -72,10 +72,10 @@ async function keptThere(tell, warn) {
     const answer = await ask(`/api/state?after=${number}&scene=${sceneNumber}`);
     if (!answer.ok) throw new Error("the server does not know this page any more");
     const state = await answer.json();
-    if (state.scene) state.scene.sheet.picture = picture;
     number = state.number;
+    if (sending || state.revision < revision) return; // its own corrections are newer
+    if (state.scene) state.scene.sheet.picture = picture;
     sceneNumber = state.sceneNumber;
-    if (sending) return; // its own corrections are on their way: those are newer
     const other = revision >= 0 && state.revision > revision;
     if (state.revision > revision) revision = state.revision;
     tell({ ...state, other });
@@ -96,9 +96,9 @@ async function keptThere(tell, warn) {
       waiting = null;
       const answer = await ask("/api/corrections", body);
       if (answer.status === 409) {
-        [revision, number, waiting] = [-1, -1, null];
+        [revision, number, waiting, sending] = [-1, -1, null, false];
         warn("Another tab was faster: this one now shows what is there.");
-        break;
+        return look();
       }
       const said = await answer.json();
       if (!answer.ok) warn(`Not kept: ${said.error}`);

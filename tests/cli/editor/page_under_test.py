@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -113,6 +114,13 @@ class Editor:
     @property
     def palette(self) -> dict[str, Any]:
         return self.said.get("palette", {})
+
+    def until(self, expression: str, timeout_s: float = 60) -> None:
+        """Wait until an expression is true; the page's policy lets nobody else do so."""
+        end = time.monotonic() + timeout_s
+        while not self.page.evaluate(expression):
+            assert time.monotonic() < end, expression
+            self.page.wait_for_timeout(30)
 
     def mode(self, name: str) -> None:
         self.page.get_by_role("radio", name=name, exact=True).check(force=True)

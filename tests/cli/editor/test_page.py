@@ -123,16 +123,14 @@ def test_verdict_and_reason_stand_under_each_drawing(open_page: Open) -> None:
 def test_the_mannequin_is_dragged_and_the_error_is_live(open_page: Open) -> None:
     editor = open_page()
     error = editor.page.locator("#fit_error")
-    editor.page.wait_for_function("document.getElementById('fit_error').textContent.includes('%')")
+    editor.until("document.getElementById('fit_error').textContent.includes('%')")
     before = error.inner_text()
     assert float(before.split("by ")[1].split(" %")[0]) > 95  # the slab is as large as the drawing
     start = editor.place(40, 130)
     editor.page.mouse.move(*start)
     editor.page.mouse.down()
     editor.page.mouse.move(start[0] + 60, start[1], steps=4)
-    editor.page.wait_for_function(
-        "before => document.getElementById('fit_error').textContent !== before", arg=before
-    )
+    editor.until(f"document.getElementById('fit_error').textContent !== {before!r}")
     assert editor.views == []  # it is not let go yet
     editor.page.mouse.up()
     camera = editor.views[0]["camera"]
