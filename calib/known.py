@@ -92,6 +92,10 @@ class Known:
                 yaws[i] = self.labels[i][0]
         return yaws
 
+    def kept_yaws(self, views: int) -> Float[np.ndarray, " views"]:
+        """Return the yaws at which single views stay, radians; nan where a view is free."""
+        return np.where(np.array(self.kept or (False,) * views), self.asked_yaws(views), np.nan)
+
     def locks(self, middle: Float[np.ndarray, " 3"]) -> dict[str, Float[np.ndarray, " views"]]:
         """Return yaw, elevation (radians) and log scale to keep; nan where a view is free."""
         poses = self.start_poses(middle)
@@ -102,10 +106,9 @@ class Known:
         }
         found = {name: values[name]() for name in sorted(self.locked - {"fov"})}
         if any(self.kept):
-            kept = np.array(self.kept)
             own = [tilt(pose)[0][1] if pose else np.nan for pose in self.placed]
-            found.setdefault("yaw", np.where(kept, self.asked_yaws(len(kept)), np.nan))
-            found.setdefault("elevation", np.where(kept, own, np.nan))
+            found.setdefault("yaw", self.kept_yaws(len(own)))
+            found.setdefault("elevation", np.where(self.kept, own, np.nan))
         return found
 
     def at_locks(self, poses: Sequence[Pose], middle: Float[np.ndarray, " 3"]) -> tuple[Pose, ...]:

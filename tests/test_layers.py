@@ -22,9 +22,9 @@ FLOORS: dict[str, tuple[str, ...]] = {
     "palette": (
         "@colors @palette",
         "@names pixels",
-        "@swatch_image formats paints",
+        "@corrections @swatch_image formats paints",
         "@extract",
-        "@recolor",
+        "@corrected @recolor",
     ),
     "dataset": (
         "images split.figures",
