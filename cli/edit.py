@@ -75,11 +75,13 @@ def edit(
         server.tell_address = lambda address: printer.say(f"for another tab: {address}")
         thread = server.serve(session)
         try:
-            told = f"{server.address}\n{folder}: stop with Ctrl-C"
-            printer.result({"url": server.address, "bundle": folder}, told)
+            printer.result({"url": server.address, "bundle": folder}, server.address)
             sys.stdout.flush()
-            if browser:
-                webbrowser.open(server.address)
+            printer.say(f"{folder}: open that address once; stop with Ctrl-C")
+            if browser:  # a browser in this terminal would not return
+                opening = threading.Thread(target=webbrowser.open, args=(server.address,))
+                opening.daemon = True
+                opening.start()
             _wait(session, ended, idle)
         finally:
             server.shutdown()
