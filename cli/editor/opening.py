@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toonset.cli.editor.refit import (
+    BY_HAND,
     CORRECTIONS,
     NOTHING,
     Changed,
@@ -35,7 +36,7 @@ from toonset.view import SHEET
 from toonset.write import check_output
 
 ALL = Changed(cut=True, cameras=True, palette=True)
-MESH, BY_HAND = "mesh", "corrections"  # roles of a bundle's inputs
+MESH = "mesh"  # role of a bundle's input
 BESIDE_MESH = ("points of the mesh", "landmarks", "init")
 MANNEQUIN_MADE = "mannequin"  # option: what a body made by code looks like
 CUT_BY = ("grid", "background", "drop")  # options of `calibrate` that a bundle records

@@ -7,6 +7,7 @@ import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,17 +20,20 @@ from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
 from toonset.dataset.split_folder.pictures import load_pictures
+from toonset.json_file import read_json
 from toonset.mesh import Mesh
 from toonset.palette.corrected import corrected
 from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import choose_palette, options_of
 from toonset.palette.palette import MAX_COLORS
 from toonset.palette.pixels.ink_lines import find_contours
-from toonset.write import exchange_folders, write_bytes
+from toonset.view import SHEET
+from toonset.write import exchange_folders, write_bytes, write_json
 
 CORRECTIONS = "corrections.json"
 NOTHING: dict[str, Any] = {"version": 1}
 LEAST_SHARE = 0.05  # of a paint, as `palette` has it
+BY_HAND = "corrections"  # the file's role among a bundle's inputs
 RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
 CUT, CAMERAS, PALETTE = ("background", "boxes"), "views", "palette"
 
@@ -156,6 +160,20 @@ def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
         )
     found = replace(found, title=found.title or drawn.title)
     write_labelled(folder, found, drawn.names, drawn.pictures, contours, "rgb", maps)
+
+
+def note_corrections(folder: Path, corrections: dict[str, Any]) -> None:
+    """Let a bundle say that it follows these corrections: they change nothing of its cameras.
+
+    Its calibration.json is then what `calibrate --corrections` writes.
+    """
+    content = read_json(folder / CALIBRATION)
+    others = [one for one in content["inputs"] if one["role"] != BY_HAND]
+    after = 1 + max(i for i, one in enumerate(others) if one["role"] == SHEET)
+    digest = sha256(file_of(corrections)).hexdigest()
+    record = {"name": CORRECTIONS, "sha256": digest, "role": BY_HAND}
+    content["inputs"] = [*others[:after], record, *others[after:]]
+    write_json(folder / CALIBRATION, content)
 
 
 def _take_along(old: Path, new: Path) -> None:

@@ -21,6 +21,7 @@ from toonset.cli.editor.refit import (
     file_of,
     find_palette,
     make_bundle,
+    note_corrections,
     parts_changed,
     put_in_place,
 )
@@ -188,8 +189,10 @@ class Session:
             with self._news:
                 put_in_place(new, self.subject, self.corrections)
                 self.sheet = sheet
-        elif changed.palette:
-            find_palette(folder, wanted)
+        else:
+            if changed.palette:
+                find_palette(folder, wanted)
+            note_corrections(folder, wanted)
         self.fitted = wanted
         if changed.cameras or changed.palette:
             self._show()

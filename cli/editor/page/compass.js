@@ -24,8 +24,8 @@ export function createCompass(number, choose) {
   const svg = svgElement("svg", { viewBox: `0 0 ${SIDE} ${SIDE}`, "aria-hidden": "true" });
   const spread = svgElement("path", { class: "spread" });
   const needle = svgElement("path", { class: "needle" });
-  for (const [word, y] of /** @type {[string, string][]} */ ([["back", "36"], ["front", "90"]])) {
-    const text = svgElement("text", { x: "60", y });
+  for (const [word, y] of /** @type {[string, string][]} */ ([["back", "14"], ["front", "114"]])) {
+    const text = svgElement("text", { x: "75", y });
     text.textContent = word;
     svg.append(text);
   }

@@ -11,6 +11,7 @@ import { clamp } from "../../../nerf/viewer/page/state.js";
 const STEP = 1.25;
 const DEEPEST = 40; // times
 const AROUND = 12; // pixels about the sheet
+const BELOW = 44; // pixels, for the buttons
 
 /**
  * @param {import("./model.js").Model} model
@@ -42,7 +43,7 @@ export function createSheet(model, picture, tool) {
   }
 
   function whole() {
-    const [wide, high] = [canvas.clientWidth - 2 * AROUND, canvas.clientHeight - 2 * AROUND];
+    const [wide, high] = [canvas.clientWidth - 2 * AROUND, canvas.clientHeight - AROUND - BELOW];
     const zoom = Math.min(wide / width, high / height);
     view = {
       zoom,

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from toonset.cli.editor import opening
 from toonset.cli.editor import session as session_module
 from toonset.cli.editor.lock import locked
 from toonset.cli.editor.opening import folder_of, open_session
@@ -101,20 +102,31 @@ def test_the_command_line_makes_the_same_of_it(
 
 
 def test_only_what_is_touched_is_found_again(
-    session: Session, bundle: Path, monkeypatch: pytest.MonkeyPatch
+    session: Session, bundle: Path, toonset: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: Any) -> Any:
         raise AssertionError("cameras were not touched")
 
     monkeypatch.setattr(session_module, "make_bundle", refuse)
-    cameras = (bundle / "calibration.json").read_bytes()
+    cameras = (bundle / "transforms.json").read_bytes()
     color = session.scene["palette"]["colors"][0]["color"]
     session.save({"version": 1, "palette": {"names": {color: "coat"}}}, 0)
     state = settled(session)
     assert state["error"] == ""
     assert state["scene"]["palette"]["colors"][0]["name"] == "coat"
     assert json.loads((bundle / PALETTE).read_bytes())["colors"][0]["name"] == "coat"
-    assert (bundle / "calibration.json").read_bytes() == cameras
+    assert (bundle / "transforms.json").read_bytes() == cameras
+    session.stop()
+    monkeypatch.setattr(opening, "make_bundle", refuse)  # it is known to be fitted
+    again = open_session(bundle, bundle, None, lambda text: None)
+    again.stop()
+    assert again.fitted == again.corrections
+    arguments = ("--corrections", bundle / CORRECTIONS, "--mesh", bundle.parent / "mannequin.obj")
+    other = bundle.parent / "other"
+    toonset("calibrate", bundle.parent / "sheet.png", *arguments, "-o", other, "-q")
+    toonset("palette", other, "--corrections", bundle / CORRECTIONS, "-q")
+    for name in ("calibration.json", "palette.json", "labels/000.png"):
+        assert (other / name).read_bytes() == (bundle / name).read_bytes(), name
 
 
 def test_what_cannot_be_fitted_is_said_and_undone(session: Session, bundle: Path) -> None:
