@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from toonset.errors import BundleError
-from toonset.write import write_json
 
 ANSWER_S = 0.5  # a port of this machine answers at once
 
@@ -27,11 +26,16 @@ def locked(folder: Path, port: int) -> Iterator[None]:
     """
     file = folder.absolute().parent / f".{folder.absolute().name}.edit.lock"
     owner = _owner(file)
-    if owner is not None:
+    if owner is None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.unlink(missing_ok=True)
+        with contextlib.suppress(FileExistsError), file.open("x") as new:
+            json.dump({"pid": os.getpid(), "port": port}, new)
+        owner = _pid(file)  # another's, who was faster
+    if owner != os.getpid():
         raise BundleError(
             f"{folder}: is being edited by process {owner}; use its page, or stop it with Ctrl-C"
         )
-    write_json(file, {"pid": os.getpid(), "port": port})
     try:
         yield
     finally:
@@ -57,7 +61,7 @@ def _owner(file: Path) -> int | None:
         os.kill(pid, 0)
     except PermissionError:
         pass  # somebody else's
-    except OSError:
+    except (OSError, OverflowError):
         return None
     try:
         port = int(json.loads(file.read_bytes())["port"])

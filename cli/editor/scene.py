@@ -68,7 +68,7 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
             "background": None if ground is None else hex_of(ground),
             "notes": list(sheet.warnings),
         },
-        "leftOut": [{"box": list(one.box), "kind": one.kind} for one in source.left_out],
+        "leftOut": left_out_of(sheet),
         "verdict": {"state": found.verdict, "reason": found.reason},
         "views": [
             _view(folder, view, said) for view, said in zip(sheet.views, found.views, strict=True)
@@ -76,6 +76,12 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
         "mannequin": None if mesh is None else _mannequin(mesh),
         "palette": _palette(folder / PALETTE),
     }
+
+
+def left_out_of(sheet: Sheet) -> list[dict[str, Any]]:
+    """Return what the splitter saw on a sheet that is no figure."""
+    left = sheet.split.sources[0].left_out
+    return [{"box": list(one.box), "kind": one.kind} for one in left]
 
 
 def sheet_url(path: Path) -> str:

@@ -25,9 +25,9 @@ from toonset.cli.editor.refit import (
     parts_changed,
     put_in_place,
 )
-from toonset.cli.editor.scene import page_of, scene_of, sheet_url
+from toonset.cli.editor.scene import left_out_of, page_of, scene_of, sheet_url
 from toonset.dataset.split_folder.corrections import parse_corrections
-from toonset.dataset.split_folder.load import Sheet
+from toonset.dataset.split_folder.load import Sheet, split_sheet
 from toonset.errors import ToonsetError, one_line
 from toonset.write import write_bytes
 
@@ -77,6 +77,7 @@ class Session:
     stopped: bool = False
     picture: str = field(init=False)
     _tried: dict[str, Any] = field(init=False)
+    _left_out: list[dict[str, Any]] | None = None  # of the sheet as it is cut without boxes
     _busy: bool = False
     _thread: threading.Thread = field(init=False)
     _news: threading.Condition = field(default_factory=threading.Condition)
@@ -146,6 +147,11 @@ class Session:
     def _show(self) -> None:
         """Make the page's scene, and the page as a file of its own."""
         scene = scene_of(self.subject.folder, self.sheet)
+        if not self.fitted.get("boxes"):
+            self._left_out = scene["leftOut"]
+        elif self._left_out is None:  # who draws boxes wants to see what else there is
+            self._left_out = left_out_of(split_sheet(self.subject.sheet))
+        scene["leftOut"] = self._left_out
         with self._news:
             self.scene = scene
             self._tell_all()

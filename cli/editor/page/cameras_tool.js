@@ -29,6 +29,7 @@ import { clamp, wrapped } from "../../../nerf/viewer/page/state.js";
 const TURN = 180; // degrees of yaw that a drag over the figure's width makes
 const STEEP = 89;
 const GRASP = 16; // pixels of the screen round a handle
+const LOW = 110; // pixels of the screen: a lower figure has no room for handles
 const STEPS = { yaw: 2, elevation: 2, roll: 1, scale: 1.01, shift: 1 };
 const BLUE = "#1173bb";
 const MARK = "#c2410c";
@@ -176,7 +177,7 @@ export function createCamerasTool(model, fits) {
       if (marking) return (mark(at), null);
       const own = model.figure;
       const shape = own && shapeOf(own);
-      const handle = shape && handleAt(shape, at, GRASP * px);
+      const handle = shape && handleAt(shape, at, px);
       const hit = topmost(model.figures.map((figure) => figure.view?.crop ?? figure.box), at);
       if (!handle) {
         if (hit < 0) return null;
@@ -204,7 +205,7 @@ export function createCamerasTool(model, fits) {
     cursor(at, px) {
       if (marking) return "crosshair";
       const shape = model.figure && shapeOf(model.figure);
-      const handle = shape && handleAt(shape, at, GRASP * px);
+      const handle = shape && handleAt(shape, at, px);
       if (handle) return { yaw: "ew-resize", elevation: "ns-resize", roll: "alias", scale: "nwse-resize", shift: "move" }[handle];
       return topmost(model.figures.map((figure) => figure.view?.crop ?? figure.box), at) < 0 ? "grab" : "ew-resize";
     },
@@ -296,20 +297,23 @@ function dragged(pose, way, from, to, [left, top, right, bottom]) {
   return turned(pose, "roll", pose.roll + (angle * 180) / Math.PI);
 }
 
-/** @param {Shape} shape @returns {Record<string, Point>} where each way of dragging is gripped */
-function handlesOf({ points, pose }) {
+/** @param {Shape} shape @param {number} px @returns {Record<string, Point>} where each way of dragging is gripped */
+function handlesOf({ points, pose }, px) {
   const [left, top, right, bottom] = boundsOf(points);
+  if (bottom - top < LOW * px) return {};
+  const away = 16 * px;
   return {
-    roll: [pose.middle[0], top - 0.05 * (bottom - top)],
-    scale: [right, bottom],
-    elevation: [right + 0.04 * (bottom - top), pose.middle[1]],
-    shift: [pose.middle[0], pose.middle[1]],
+    roll: [pose.middle[0], top - away],
+    scale: [right + away, bottom],
+    elevation: [right + away, (top + bottom) / 2],
+    shift: [(left + right) / 2, bottom + away],
   };
 }
 
-/** @param {Shape} shape @param {Point} at @param {number} near @returns {Way | null} */
-function handleAt(shape, [x, y], near) {
-  const hit = Object.entries(handlesOf(shape)).find(([, [u, v]]) => Math.hypot(u - x, v - y) < near);
+/** @param {Shape} shape @param {Point} at @param {number} px @returns {Way | null} */
+function handleAt(shape, [x, y], px) {
+  const near = GRASP * px;
+  const hit = Object.entries(handlesOf(shape, px)).find(([, [u, v]]) => Math.hypot(u - x, v - y) < near);
   return hit ? /** @type {Way} */ (hit[0]) : null;
 }
 
@@ -318,7 +322,7 @@ function drawHandles(context, shape, px) {
   const icons = /** @type {Record<string, string>} */ ({ roll: "↻", scale: "⤡", elevation: "↕", shift: "✥" });
   context.font = `${13 * px}px system-ui, sans-serif`;
   [context.textAlign, context.textBaseline] = ["center", "middle"];
-  for (const [way, [x, y]] of Object.entries(handlesOf(shape))) {
+  for (const [way, [x, y]] of Object.entries(handlesOf(shape, px))) {
     context.fillStyle = "white";
     context.strokeStyle = BLUE;
     context.lineWidth = 1.5 * px;

@@ -44,7 +44,7 @@ try {
 async function start({ scene, corrections, busy, error }, keeper) {
   if (!scene) return;
   const shown = (model = createModel(scene, corrections));
-  [shown.save, shown.busy, shown.error] = [keeper.save, busy && keeper.fits, error];
+  [shown.save, shown.busy, shown.error] = [keeper.save, busy || !keeper.fits, error];
   const picture = await pictureOf(scene.sheet.picture ?? "");
   part("work", HTMLElement).hidden = false;
   const colorAt = colorsOf(picture, scene.sheet.size);
