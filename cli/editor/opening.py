@@ -73,7 +73,7 @@ def open_session(
     if not (folder / CALIBRATION).is_file():
         check_output(folder, [place], WRITTEN, force=False)
         subject = Subject(place, load_mesh(mesh) if isinstance(mesh, Path) else mesh, folder)
-        sheet, new = make_bundle(subject, NOTHING, ALL, progress)
+        sheet, new = make_bundle(subject, NOTHING, ALL, None, progress)
         folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.is_dir():
             folder.rmdir()  # it is empty
@@ -93,12 +93,12 @@ def open_session(
         return _session(subject, sheet, corrections, tell)
     fitted = corrections
     try:
-        sheet, new = make_bundle(subject, fitted, ALL, progress)
+        sheet, new = make_bundle(subject, fitted, ALL, None, progress)
     except ToonsetError:
         if corrections == NOTHING:
             raise
         fitted = NOTHING  # the page says what is wrong with them
-        sheet, new = make_bundle(subject, fitted, ALL, progress)
+        sheet, new = make_bundle(subject, fitted, ALL, None, progress)
     put_in_place(new, subject, corrections)
     return Session(subject, sheet, fitted, corrections, tell)
 

@@ -27,7 +27,7 @@ from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import choose_palette, options_of
 from toonset.palette.palette import MAX_COLORS
 from toonset.palette.pixels.ink_lines import find_contours
-from toonset.view import SHEET
+from toonset.view import SHEET, InputFile, Origin
 from toonset.write import exchange_folders, write_bytes, write_json
 
 CORRECTIONS = "corrections.json"
@@ -103,10 +103,22 @@ def cut_sheet(
     return split_sheet(sheet, corrections=file), file
 
 
+def _said_anew(sheet: Sheet, file: Path) -> Sheet:
+    """Return drawings that stay as they are cut, labelled as a file of corrections says."""
+    files = (*(one for one in sheet.files if one.role != BY_HAND), InputFile.of(BY_HAND, file))
+    origin = Origin(files, sheet.options)
+    views = tuple(
+        replace(view, label="" if said is None else said.label, origin=origin)
+        for view, said in zip(sheet.views, Given.of(file).of_views(sheet.views), strict=True)
+    )
+    return replace(sheet, split=replace(sheet.split, views=views), files=files)
+
+
 def make_bundle(
     subject: Subject,
     corrections: dict[str, Any],
     changed: Changed,
+    before: Sheet | None = None,
     progress: Callable[[str, float], None] = lambda step, share: None,
 ) -> tuple[Sheet, Path]:
     """Return the drawings, and a new bundle of them in the workshop.
@@ -114,12 +126,24 @@ def make_bundle(
     What is not made again goes along: corrections and page, and the palette of drawings that are
     still the same.
 
+    Args:
+        subject: what is corrected.
+        corrections: what a person said.
+        changed: what that changes.
+        before: the drawings, where they are cut already; None: cut them.
+        progress: told which step is how far.
+
     Raises:
         ToonsetError: the corrections do not fit the sheet, or nothing can be found in it.
     """
     new, old = subject.workshop / subject.folder.name, subject.folder
     shutil.rmtree(subject.workshop, ignore_errors=True)
-    sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
+    if before is None or before.options or changed.cut:
+        sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
+    else:
+        file = subject.workshop / CORRECTIONS
+        write_bytes(file, file_of(corrections))
+        sheet = _said_anew(before, file)
     hints = Hints(corrections=file)
     found = calibrate(sheet.views, subject.body, hints, progress=progress)
     write_bundle(new, found)

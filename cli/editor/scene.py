@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -138,17 +139,25 @@ def _mask(mask: Bool[np.ndarray, "height width"]) -> bytes:
 
 
 def _mannequin(mesh: Mesh) -> dict[str, Any]:
-    vertices, faces = mesh.vertices, mesh.faces
-    if len(faces) > MOST_FACES:
-        one_label = np.zeros(len(faces), np.int64)
-        vertices, faces, _ = decimated(vertices, faces, one_label, MOST_FACES)
+    vertices, faces = _few_faces(mesh.vertices.tobytes(), mesh.faces.tobytes())
     low, high = mesh.bounds
     return {
-        "vertices": base64_text(vertices.astype("<f4").tobytes()),
-        "faces": base64_text(faces.astype("<u4").tobytes()),
+        "vertices": base64_text(vertices),
+        "faces": base64_text(faces),
         "middle": ((low + high) / 2).tolist(),
         "height": float(high[1] - low[1]),
     }
+
+
+@lru_cache(maxsize=2)
+def _few_faces(vertices: bytes, faces: bytes) -> tuple[bytes, bytes]:
+    """Return a surface of few faces, as a page reads it; a second of work, so it is kept."""
+    places = np.frombuffer(vertices, np.float64).reshape(-1, 3)
+    corners = np.frombuffer(faces, np.int64).reshape(-1, 3)
+    if len(corners) > MOST_FACES:
+        one_label = np.zeros(len(corners), np.int64)
+        places, corners, _ = decimated(places, corners, one_label, MOST_FACES)
+    return places.astype("<f4").tobytes(), corners.astype("<u4").tobytes()
 
 
 def _palette(file: Path) -> dict[str, Any]:

@@ -101,10 +101,15 @@ class Server(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: Server
     server_version, sys_version = "toonset", ""
     protocol_version = "HTTP/1.1"
     timeout = SOCKET_S
+
+    @property
+    def own(self) -> Server:
+        """Return the server."""
+        assert isinstance(self.server, Server)
+        return self.server
 
     def do_GET(self) -> None:
         """Answer with the page, what it shows, or the sheet."""
@@ -134,11 +139,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _check_origin(self) -> None:
         """Refuse what comes by way of another name, or from another site's page."""
-        if self.headers.get_all("Host") != [self.server.origin.removeprefix("http://")]:
+        if self.headers.get_all("Host") != [self.own.origin.removeprefix("http://")]:
             raise RefusedError(HTTPStatus.MISDIRECTED_REQUEST, "this is another host")
         origins = self.headers.get_all("Origin") or []
         needed = self.command == "POST"
-        if origins != [self.server.origin] and (needed or origins):
+        if origins != [self.own.origin] and (needed or origins):
             raise RefusedError(HTTPStatus.FORBIDDEN, "this is another origin")
         if self.headers.get("Sec-Fetch-Site", "same-origin") not in ("same-origin", "none"):
             raise RefusedError(HTTPStatus.FORBIDDEN, "this is another site")
@@ -146,9 +151,9 @@ class _Handler(BaseHTTPRequestHandler):
     def _session(self) -> Session:
         """Return the session, for those who have its token."""
         given = self.headers.get(TOKEN_HEADER, "")
-        if not _same(given, self.server.token):
+        if not _same(given, self.own.token):
             raise RefusedError(HTTPStatus.UNAUTHORIZED, "the token is missing or another one")
-        session = self.server.session
+        session = self.own.session
         if session is None or session.stopped:
             raise RefusedError(HTTPStatus.SERVICE_UNAVAILABLE, "nothing is open")
         return session
@@ -168,12 +173,12 @@ class _Handler(BaseHTTPRequestHandler):
             raise RefusedError(HTTPStatus.BAD_REQUEST, one_line(error)) from error
 
     def _page(self) -> None:
-        self._send(HTTPStatus.OK, "text/html; charset=utf-8", self.server.page)
+        self._send(HTTPStatus.OK, "text/html; charset=utf-8", self.own.page)
 
     def _open(self) -> None:
         body = self._body()
         key = body.get("key") if isinstance(body, dict) else None
-        token = self.server.opened(key) if isinstance(key, str) else None
+        token = self.own.opened(key) if isinstance(key, str) else None
         if token is None:
             raise RefusedError(HTTPStatus.UNAUTHORIZED, "this address was used already")
         self._send(HTTPStatus.OK, "application/json", _json({"token": token}))

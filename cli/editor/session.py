@@ -191,7 +191,7 @@ class Session:
     def _fit(self, changed: Changed) -> None:
         wanted, folder = self._tried, self.subject.folder
         if changed.cameras:
-            sheet, new = make_bundle(self.subject, wanted, changed, self._progress)
+            sheet, new = make_bundle(self.subject, wanted, changed, self.sheet, self._progress)
             with self._news:
                 put_in_place(new, self.subject, self.corrections)
                 self.sheet = sheet

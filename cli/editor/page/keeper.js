@@ -124,11 +124,12 @@ async function keptThere(tell, warn) {
 /** @returns {Promise<string>} the server's token, for the key in the address or as kept by this tab */
 async function enter() {
   const key = location.hash.slice(1);
-  if (!key) return sessionStorage.getItem(TOKEN) ?? "";
+  const kept = sessionStorage.getItem(TOKEN) ?? "";
+  if (!key) return kept;
   history.replaceState(null, "", location.pathname);
   const headers = { "Content-Type": "application/json" };
   const answer = await fetch("/api/open", { method: "POST", headers, body: JSON.stringify({ key }) });
-  if (!answer.ok) return "";
+  if (!answer.ok) return kept;
   const { token } = await answer.json();
   sessionStorage.setItem(TOKEN, token);
   return token;
