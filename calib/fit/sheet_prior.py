@@ -42,10 +42,12 @@ class Turn:
     Attributes:
         places: (views,) yaw in radians; nan where nothing is known of a view.
         anchored: the places are known (labels), not only their differences.
+        named: which views' places are, where the turn goes beyond what is labelled; empty for all.
     """
 
     places: Float[np.ndarray, " views"]
     anchored: bool = False
+    named: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +126,7 @@ def anchors(
     known = [(Tie(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)), prior.sigma)]
     if turn is not None and turn.anchored and "yaw" in ties:
         yaw = ties["yaw"]
-        placed = np.isfinite(turn.places)
+        placed = np.array(turn.named) if turn.named else np.isfinite(turn.places)
         over = (placed / placed.sum())[None]
         known.append((Tie(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
     return known

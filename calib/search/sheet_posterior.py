@@ -49,17 +49,36 @@ class Turns:
         places: (t, views) yaw in radians; nan where an alternative says nothing about a view.
         log_prior: (t,).
         anchored: a person has said so.
+        named: of which views, where it is not of all that have places; empty for all.
     """
 
     places: Float[np.ndarray, "t views"]
     log_prior: Float[np.ndarray, " t"]
     anchored: bool = False
+    named: tuple[bool, ...] = ()
 
 
 def possible_turns(views: int, labels: tuple[Label, ...] = ()) -> Turns:
-    """Return the readings of the labels, or without any label "no turn" and the even turns."""
+    """Return the readings of the labels, or without any label "no turn" and the even turns.
+
+    Where only some views are labelled, the others may stand in an even turn with them.
+    """
     if any(labels):
-        return Turns(*label_rows(labels), anchored=True)
+        rows, log_odds = label_rows(labels)
+        if all(labels) or views < TURN_VIEWS:
+            return Turns(rows, log_odds, anchored=True)
+        near = [
+            (turn, odds + np.log(P_TURN / 2))
+            for row, odds in zip(rows, log_odds, strict=True)
+            for way in (1, -1)
+            if (turn := _even_turn(row, way)) is not None
+        ]
+        return Turns(
+            np.array([*rows, *(turn for turn, _ in near)]),
+            np.array([*(log_odds + np.log(1 - P_TURN)), *(odds for _, odds in near)]),
+            anchored=True,
+            named=tuple(np.isfinite(rows[0]).tolist()),
+        )
     places, log_prior = np.full((1, views), np.nan), np.zeros(1)
     if views >= TURN_VIEWS:
         starts = np.arange(TURN_STARTS) * 2 * np.pi / TURN_STARTS
@@ -71,6 +90,16 @@ def possible_turns(views: int, labels: tuple[Label, ...] = ()) -> Turns:
         places = np.concatenate([places, even])
         log_prior = np.log(np.concatenate([[1 - P_TURN], np.tile(P_TURN * p_start / 2, 2)]))
     return Turns(places, log_prior)
+
+
+def _even_turn(row: Float[np.ndarray, " views"], way: int) -> Float[np.ndarray, " views"] | None:
+    """Return a reading of labels with its other views in an even turn; None if it is in none."""
+    known, even = np.isfinite(row), way * np.arange(len(row)) * 2 * np.pi / len(row)
+    start = np.angle(np.exp(1j * (row - even)[known]).mean())
+    off = (row - even - start + np.pi) % (2 * np.pi) - np.pi
+    if np.abs(off[known]).max() > 2 * TURN_SIGMA:
+        return None
+    return np.where(known, row, (start + even) % (2 * np.pi))
 
 
 class SheetPosterior:
@@ -191,7 +220,8 @@ class SheetPosterior:
         return np.where(np.abs((off + np.pi) % (2 * np.pi) - np.pi) > NEAR_ASKED, UNASKED, 0.0)
 
     def _turn(self, hypothesis: int) -> Turn:
-        return Turn(self.places[hypothesis % len(self.places)], self.turns.anchored)
+        places = self.places[hypothesis % len(self.places)]
+        return Turn(places, self.turns.anchored, self.turns.named)
 
     def _energies(
         self, poses: Sequence[Pose], data: Float[np.ndarray, " n"], index: int

@@ -119,7 +119,7 @@ def _weighed(
     evidence = Evidence.of(figures.views)
     turns = turn_hypotheses(views, labels)
     if views in FREE_VIEWS and not (labels and all(labels)):
-        turns = _with_free(figures, evidence, turns, labels)
+        turns = _with_free(figures, evidence, turns, known)
     turns = held(turns, known.asked_yaws(views), known.kept_yaws(views))
     outlines = outlines_log_likelihood(figures, turns) if views > 1 else np.zeros(len(turns.yaws))
     likelihood = evidence.log_likelihood(turns.yaws, outlines)
@@ -129,7 +129,7 @@ def _weighed(
 
 
 def _with_free(
-    figures: Figures, evidence: Evidence, turns: TurnHypotheses, labels: Sequence[Label]
+    figures: Figures, evidence: Evidence, turns: TurnHypotheses, known: Known
 ) -> TurnHypotheses:
     """Return the turns, the even ones replaced where drawings prove that theirs is another."""
     relative, gain = uneven_yaws(figures, evidence.paint)
@@ -139,6 +139,8 @@ def _with_free(
     first = np.full(len(rows), np.log((1 - P_FRONT_FIRST) / (len(rows) - 1)))
     first[0] = np.log(P_FRONT_FIRST)
     free = TurnHypotheses(rows[:, None] + relative, first, np.zeros(len(rows)))
+    views, labels = len(figures.views), known.labels
+    free = held(free, known.asked_yaws(views), known.kept_yaws(views))  # the others may stay
     return labelled(free, labels) if any(labels) else free
 
 

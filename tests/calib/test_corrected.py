@@ -97,7 +97,7 @@ def test_a_locked_camera_stays_and_the_verdict_says_if_outlines_do_not(drawn: Dr
     assert "is what is locked right?" in wrong.views[1].reason
     others = [i for i in range(len(plain.views)) if i != 1]
     moved = off_deg(wrong, [view.camera for view in plain.views])
-    assert max(moved[i] for i in others) < 3
+    assert max(moved[i] for i in others) < 4
 
 
 def test_a_dragged_camera_is_refitted_in_its_basin(drawn: Drawn, plain):

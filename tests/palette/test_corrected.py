@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -143,7 +145,7 @@ def test_a_colour_a_few_levels_off_is_meant(sheet):
 def test_what_cannot_be_done_names_file_and_key(wanted, words, sheet):
     hexes = dict(zip("ABCDEFGH", [hex_of(color.rgb) for color in sheet[2].colors], strict=False))
 
-    def named(value):
+    def named(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(named(one) for one in value)
         return hexes.get(value, value) if isinstance(value, str) else value
