@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 import tempfile
 import time
@@ -82,7 +83,7 @@ def cases(root: Path) -> Iterator[Case]:
             yield Case(folder.name, folder / "sheet.png", None, tuple(truth))
     for folder in sorted((root / "sheets").iterdir()):
         character, _, condition = folder.name.partition("-")
-        if condition not in ("uneven", "artist", "generic"):
+        if condition not in ("uneven", "artist", "generic", "drawn"):
             continue
         own = (
             folder if condition == "generic" else root / "sheets" / f"{OTHER_BODY[character]}-drawn"
@@ -184,13 +185,13 @@ def _next_said(
 
 def main(
     root: Annotated[Path, typer.Argument(metavar="CASES", help="Folder of the public cases.")],
-    only: Annotated[str, typer.Option(help="Cases whose name has this.")] = "",
+    only: Annotated[str, typer.Option(help="Cases whose name matches this.")] = "",
 ) -> None:
     """Print what corrections make of sheets that are doubtful."""
-    found = []
+    found: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as place:
         for case in cases(root):
-            if only not in case.name or len(found) == MOST_SHEETS:
+            if not re.search(only, case.name) or len(found) == MOST_SHEETS:
                 continue
             folder = Path(place) / case.name
             try:
