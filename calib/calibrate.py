@@ -65,6 +65,8 @@ def calibrate(
         _check_without_body(hints)
         with threadpool_limits(1, user_api="blas"):
             known = known_of(hints, views, {})
+            if known.landmarks:
+                raise UsageError("landmarks need a mannequin; drop them or --mesh none")
             return _alone(views, calibrate_without_body(views, known, progress), hints, seed)
     body = _Body.of(mesh)
     known = known_of(hints, views, body.points_for(hints))
@@ -170,7 +172,8 @@ def _origin(views: Sequence[View], body: _Body | None, hints: Hints, seed: int) 
     if body is not None and body.mesh.path is not None and body.mesh.sha256:
         files.append(InputFile("mesh", body.mesh.path.name, body.mesh.sha256))
     mesh = None if body is None else body.mesh
-    files += [InputFile.of(*each) for each in _hint_files(mesh, hints)]
+    said = [InputFile.of(*each) for each in _hint_files(mesh, hints)]
+    files += [file for file in said if file not in files]  # corrections may be the sheet's, too
     cut = origins[0].options if origins else {}
     made = {} if body is None or body.looks is None else {"mannequin": asdict(body.looks)}
     return {
@@ -190,6 +193,8 @@ def _hint_files(mesh: Mesh | None, hints: Hints) -> list[tuple[str, Path]]:
         files.append(("landmarks", Path(hints.landmarks)))
         if mesh is not None and mesh.path is not None and landmarks_path(mesh.path).exists():
             files.append(("points of the mesh", landmarks_path(mesh.path)))
+    if hints.corrections is not None:
+        files.append(("corrections", Path(hints.corrections)))
     if hints.init is not None:
         files.append(("init", transforms_file(Path(hints.init))))
     return files

@@ -17,6 +17,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from toonset.calib.corrections.stretched import (
     as_drawn,
     nothing_stretched,
@@ -147,9 +149,11 @@ def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -
             judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
             for i, v in enumerate(problem.views)
         ]
-        if differs and not fitted.turn.anchored:  # labels are no even steps
+        labels = problem.known.labels  # of every view they are no even steps
+        even = np.isfinite(fitted.turn.places).all() and not (labels and all(labels))
+        if differs and even:
             each = with_places_in_mind(each, off_places(joint.poses, fitted.turn))
-        each = with_labels_in_mind(with_elevations_in_mind(each), problem.known.labels)
+        each = with_labels_in_mind(with_elevations_in_mind(each), labels)
         each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)
         judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from toonset.calib.from_landmarks import landmarks_of_every_view
 from toonset.calib.known import LOCKS, Known
-from toonset.camera import Camera
+from toonset.calib.outline.pose import Pose
+from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.bundle.transforms_read import read_cameras
-from toonset.dataset.mannequin.landmark_file import Landmarks, read_landmarks
+from toonset.dataset.mannequin.landmark_file import Landmarks, check_inside, read_landmarks
+from toonset.dataset.split_folder.corrected import Given
+from toonset.dataset.split_folder.corrections import PlacedCamera, PointPair
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.errors import CameraError, UsageError
 from toonset.view import View
@@ -30,6 +35,8 @@ class Hints:
         landmarks_only: cameras from landmarks alone; the outline is not the mannequin's.
         init: bundle or transforms.json of these views to start from.
         lock: what stays as `init` has it (or yaw as labels have it): yaw, elevation, scale, fov.
+        corrections: file of what a person said of single views of a sheet: cameras, locks, labels
+            and landmarks; `split_sheet` takes the same file.
     """
 
     labels: str = ""
@@ -37,6 +44,7 @@ class Hints:
     landmarks_only: bool = False
     init: str | Path | None = None
     lock: tuple[str, ...] = ()
+    corrections: str | Path | None = None
 
     def check(self) -> None:
         """Refuse what contradicts itself.
@@ -56,6 +64,7 @@ class Hints:
             "--views": self.labels,
             "--init": self.init,
             "--lock": self.lock,
+            "--corrections": self.corrections,
         }.items():
             if value:
                 raise UsageError(f"{name} does nothing beside --landmarks-only; drop one")
@@ -95,8 +104,57 @@ def known_of(hints: Hints, views: Sequence[View], points: Mapping[str, Sequence[
         landmarks_of_every_view(views, landmarks)
     cameras = _cameras(Path(hints.init), views) if hints.init else ()
     known = Known(labels, landmarks, cameras, frozenset(hints.lock))
+    if hints.corrections is not None:
+        given = Given.of(hints.corrections)
+        given.check_beside(views=hints.labels, landmarks=hints.landmarks, init=hints.init)
+        known = _corrected(known, given, views)
     known.check(views)
     return known
+
+
+def _corrected(known: Known, given: Given, views: Sequence[View]) -> Known:
+    """Return what is known with what was said of single views; empty where nothing was."""
+    said = given.of_views(views)
+    if not any(said):
+        return known
+    labels = [
+        (own.yaws if own else ()) or label
+        for own, label in zip(said, known.labels or ((),) * len(views), strict=True)
+    ]
+    placed = tuple(
+        _placed(own.camera, view) if own and own.camera else None
+        for own, view in zip(said, views, strict=True)
+    )
+    kept = tuple(own is not None and own.lock for own in said)
+    landmarks = tuple(
+        _pairs(f"{given.path}: view {view.name}", own.landmarks, view) if own else None
+        for own, view in zip(said, views, strict=True)
+    )
+    return replace(
+        known,
+        labels=tuple(labels) if any(labels) else (),
+        landmarks=landmarks if any(landmarks) else known.landmarks,
+        placed=placed if any(placed) or any(kept) else (),
+        kept=kept if any(kept) else (),
+    )
+
+
+def _placed(camera: PlacedCamera, view: View) -> Pose:
+    """Return a camera placed by hand, in pixels of the view's crop."""
+    yaw, elevation, roll = np.radians([camera.yaw, camera.elevation, camera.roll]).tolist()
+    shift = np.array(camera.middle) - view.box[:2]
+    return Pose(rotation_from_angles(yaw, elevation, roll), shift, camera.scale)
+
+
+def _pairs(where: str, pairs: Sequence[PointPair], view: View) -> Landmarks | None:
+    """Return clicked points as landmarks, in pixels of the view's crop."""
+    if not pairs:
+        return None
+    for i, pair in enumerate(pairs):
+        check_inside(f"{where}: landmarks.{i}", pair.pixel, view, in_sheet=True)
+    pixels = np.array([pair.pixel for pair in pairs]) - view.box[:2]
+    names = tuple(f"point {i}" for i in range(len(pairs)))
+    return Landmarks(view.name, names, np.array([pair.world for pair in pairs]), pixels)
 
 
 def _cameras(path: Path, views: Sequence[View]) -> tuple[Camera, ...]:

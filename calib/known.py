@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
+from toonset.calib.fit.align import tilt
 from toonset.calib.outline.pose import Pose, project
 from toonset.calib.search.hypotheses import Candidates
 from toonset.camera import Camera, angles_from_rotation, rotation_from_angles
@@ -29,12 +30,22 @@ class Known:
         landmarks: pairs of every view, None for a view without; empty for nothing.
         cameras: where to start, in pixels of the views' crops; empty to search.
         locked: which of `LOCKS` stay as `cameras` (or, for yaw, single labels) have them.
+        placed: where a person put the cameras of single views, pixels of their crops, relative to
+            the mannequin's middle; None for a view left alone; empty for nothing.
+        kept: which views keep yaw and elevation of `placed`, or their label's yaw; empty for none.
     """
 
     labels: tuple[Label, ...] = ()
     landmarks: tuple[Landmarks | None, ...] = ()
     cameras: tuple[Camera, ...] = ()
     locked: frozenset[str] = frozenset()
+    placed: tuple[Pose | None, ...] = ()
+    kept: tuple[bool, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Return whether an angle or a size is locked, of the sheet or of a view."""
+        return bool(self.locked - {"fov"}) or any(self.kept)
 
     def check(self, views: Sequence[View]) -> None:
         """Refuse what does not belong to the views or cannot be locked.
@@ -71,20 +82,52 @@ class Known:
             return np.array([angles_from_rotation(pose.rotation)[0] for pose in poses])
         return np.array([label[0] for label in self.labels])
 
-    def at_locked_yaws(
-        self, poses: Sequence[Pose], middle: Float[np.ndarray, " 3"]
-    ) -> tuple[Pose, ...]:
-        """Return the poses turned about +Y to the yaws to keep, if yaw is locked.
+    def asked_yaws(self, views: int) -> Float[np.ndarray, " views"]:
+        """Return the yaws at which a person put single views, radians; nan where nobody did."""
+        yaws = np.full(views, np.nan)
+        for i, pose in enumerate(self.placed):
+            if pose is not None:
+                yaws[i] = angles_from_rotation(pose.rotation)[0]
+            elif self.kept and self.kept[i]:
+                yaws[i] = self.labels[i][0]
+        return yaws
 
-        Steps are limited: a lock keeps a yaw, but does not bring a far one there.
+    def kept_yaws(self, views: int) -> Float[np.ndarray, " views"]:
+        """Return the yaws at which single views stay, radians; nan where a view is free."""
+        return np.where(np.array(self.kept or (False,) * views), self.asked_yaws(views), np.nan)
+
+    def locks(self, middle: Float[np.ndarray, " 3"]) -> dict[str, Float[np.ndarray, " views"]]:
+        """Return yaw, elevation (radians) and log scale to keep; nan where a view is free."""
+        poses = self.start_poses(middle)
+        values: dict[str, Callable[[], Float[np.ndarray, " views"]]] = {
+            "yaw": lambda: self.yaws(middle),
+            "elevation": lambda: np.array([tilt(pose)[0][1] for pose in poses]),
+            "scale": lambda: np.log([pose.scale for pose in poses]),
+        }
+        found = {name: values[name]() for name in sorted(self.locked - {"fov"})}
+        if any(self.kept):
+            own = [tilt(pose)[0][1] if pose else np.nan for pose in self.placed]
+            found.setdefault("yaw", self.kept_yaws(len(own)))
+            found.setdefault("elevation", np.where(self.kept, own, np.nan))
+        return found
+
+    def at_locks(self, poses: Sequence[Pose], middle: Float[np.ndarray, " 3"]) -> tuple[Pose, ...]:
+        """Return the poses turned to the yaws to keep; kept views to their elevation, too.
+
+        Steps are limited: a lock keeps an angle, but does not bring a far one there.
         """
-        if "yaw" not in self.locked:
-            return tuple(poses)
-        kept = []
-        for pose, yaw in zip(poses, self.yaws(middle), strict=True):
-            _, elevation, roll = angles_from_rotation(pose.rotation)
-            kept.append(replace(pose, rotation=rotation_from_angles(yaw, elevation, roll)))
-        return tuple(kept)
+        yaws = self.locks(middle).get("yaw", np.full(len(poses), np.nan))
+        turned = list(poses)
+        for i, yaw in enumerate(yaws.tolist()):
+            if not np.isfinite(yaw):
+                continue
+            _, elevation, roll = angles_from_rotation(poses[i].rotation)
+            own = self.placed[i] if self.kept and self.kept[i] else None
+            if own is not None:
+                elevation = tilt(own)[0][1]
+            rotation = rotation_from_angles(yaw, elevation, roll)
+            turned[i] = replace(poses[i], rotation=rotation)
+        return tuple(turned)
 
 
 def weighed_by_landmarks(

@@ -6,7 +6,7 @@ data.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from toonset.calib.evidence.coherence_state import TELLING_VIEWS
 from toonset.calib.evidence.common_elevation import common_elevation
 from toonset.calib.evidence.face import read_faces
 from toonset.calib.evidence.texture import read_paint
-from toonset.calib.fit.align import ElevationPrior, tilt
+from toonset.calib.fit.align import ElevationPrior
 from toonset.calib.fit.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.fit.model_selection import (
     BODY_WIDTHS,
@@ -136,7 +136,9 @@ class Problem:
             load_bank(surface),
             [Drawing(c, options.coarse_height_px, COARSE_POINTS) for c in contours],
             [Drawing(c, options.fine_height_px, FINE_POINTS) for c in contours],
-            SheetPosterior(turns, read_faces(views), read_paint(views)),
+            SheetPosterior(
+                turns, read_faces(views), read_paint(views), known.asked_yaws(len(views))
+            ),
             known,
             options,
             progress,
@@ -160,6 +162,8 @@ class Problem:
             starts = [*starts, starts[0].twin(), *(turn.poses[i] for turn in together)]
             own = marked[i] if marked else None
             starts += with_k(own.poses, 0.0) if own else []
+            placed = self.known.placed[i] if self.known.placed else None
+            starts += [placed] if placed else []
             reached = refine(self.coarse[i], self.surface, starts, COARSE_WIDTHS)
             candidates.append(self._informed(reached, i))
         return candidates, together
@@ -188,9 +192,9 @@ class Problem:
         if differs is None:
             differs = typical_coverage(self.fine, sketch) < SAME_BODY_COVERAGE
         samples = ROUGH_POINTS if differs else WHITE_POINTS
-        problem = JointProblem(self.fine, turn, self._kept(), samples)
+        problem = JointProblem(self.fine, turn, self.known.locks(self.surface.middle), samples)
         keep_fov = "fov" in self.known.locked
-        starts = self.known.at_locked_yaws(sketch.poses, self.surface.middle)
+        starts = self.known.at_locks(sketch.poses, self.surface.middle)
         joint, model = climb(problem, sketch.body, starts, doubtful=differs, keep_fov=keep_fov)
         return SheetFit(problem, joint, model, differs)
 
@@ -211,7 +215,7 @@ class Problem:
         factor = SIGMA_OF_ANOTHER_BODY if fit.differs else SIGMA_OF_SAME_BODY
         joint = replace(joint, covariance=factor**2 * joint.covariance)
         if not fit.differs and not self.known.locked - {"fov"}:
-            joint = with_turned_bodies(joint, turn)
+            joint = with_turned_bodies(joint, turn, self.known.kept)
         return replace(fit, joint=joint, model=model)
 
     def cut_off(self, whole: SheetFit, turn: Turn) -> tuple[Problem, SheetFit, tuple[CutOff, ...]]:
@@ -298,7 +302,7 @@ class Problem:
         self, joint: JointFit, model: ModelChoice, turn: Turn
     ) -> Float[np.ndarray, " views"]:
         """Return how far every view would turn without the locks, radians."""
-        if not self.known.locked - {"fov"}:
+        if not self.known.holds:
             return np.zeros(len(joint.poses))
         problem = JointProblem(self.fine, turn)
         free = problem.fit(
@@ -310,15 +314,6 @@ class Problem:
                 for p, q in zip(joint.poses, free.poses, strict=True)
             ]
         )
-
-    def _kept(self) -> dict[str, Float[np.ndarray, " views"]]:
-        poses = self.known.start_poses(self.surface.middle)
-        values: dict[str, Callable[[], Float[np.ndarray, " views"]]] = {
-            "yaw": lambda: self.known.yaws(self.surface.middle),
-            "elevation": lambda: np.array([tilt(pose)[0][1] for pose in poses]),
-            "scale": lambda: np.log([pose.scale for pose in poses]),
-        }
-        return {name: values[name]() for name in sorted(self.known.locked - {"fov"})}
 
     def _level(self, problem: JointProblem, joint: JointFit) -> JointProblem:
         """Return the problem with the mean elevation that the drawings agree on best."""

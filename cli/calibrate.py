@@ -15,6 +15,7 @@ from toonset.cli.common.cutting import (
     LABELS_HELP,
     BackgroundOption,
     BoxesOption,
+    CorrectionsOption,
     DropOption,
     GridOption,
 )
@@ -121,6 +122,7 @@ def calibrate(
     grid: GridOption = "",
     background: BackgroundOption = "",
     drop: DropOption = "",
+    corrections: CorrectionsOption = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Bundle folder.", rich_help_panel=OUTPUT_PANEL)
     ] = Path("bundle"),
@@ -142,6 +144,7 @@ def calibrate(
     from toonset.dataset.bundle.bundle import WRITTEN
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.mesh.load import load_mesh
+    from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
     from toonset.dataset.split_folder.view_labels import front_label
@@ -149,7 +152,7 @@ def calibrate(
     from toonset.read import check_there
 
     lock = tuple(lock.value for lock in locked or ())
-    hints = Hints(labels, landmarks, landmarks_only, init, lock)
+    hints = Hints(labels, landmarks, landmarks_only, init, lock, corrections)
     hints.check()
     if front is not None and (labels or landmarks_only):
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
@@ -158,15 +161,25 @@ def calibrate(
     check_there(sheets, "picture", PictureError)
     check_there([landmarks], "landmark", LandmarkError)
     check_there([boxes], "boxes", SheetError)
+    if corrections is not None:
+        Given.of(corrections).check_beside(
+            **{"front": front is not None, "landmarks": landmarks, "init": init}
+        )
     if init is not None:
         transforms_file(init)
     given = None if str(mesh) == NO_BODY else mesh
     body: Mesh | Literal["none"] | None = NO_BODY if mesh is not None else None
     if given is not None:
         body = load_mesh(given)
-    check_output(out, [*sheets, given, landmarks, init, boxes], WRITTEN, force=force)
+    check_output(out, [*sheets, given, landmarks, init, boxes, corrections], WRITTEN, force=force)
     sheet = split_sheet(
-        sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
+        sheets,
+        boxes=boxes,
+        grid=grid,
+        background=background,
+        drop=drop,
+        labels=labels,
+        corrections=corrections,
     )
 
     if front is not None:

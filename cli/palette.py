@@ -70,6 +70,15 @@ def palette(
             rich_help_panel=CHOICE_PANEL,
         ),
     ] = "",
+    corrections: Annotated[
+        Path | None,
+        typer.Option(
+            "--corrections",
+            metavar="FILE",
+            help="What a person corrected: the corrections.json of `toonset edit`, or by hand.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = None,
     contour: Annotated[
         bool,
         typer.Option(
@@ -120,27 +129,51 @@ def palette(
     folders, or with -o, into a folder of their own.
     """
     from toonset.dataset.bundle.palette_files import write_labelled
+    from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
+    from toonset.errors import PaletteError, ToonsetError
+    from toonset.palette.corrected import corrected
+    from toonset.palette.corrections import PaletteCorrections
     from toonset.palette.extract import choose_palette, options_of
     from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
     printer = Printer(as_json, quiet, verbose)
     places = inputs or [BUNDLE]
+    given = None if corrections is None else Given.of(corrections)
+    if given is not None:
+        given.check_beside(keep=keep)
+        keep = ",".join(given.content.palette.keep) or keep
     check_pictures(places)
     bundle = bundle_of(places)
     target = out or bundle or OUT
     if target != bundle:
-        check_output(target, places, (*WRITTEN, *FOLDERS), force=force)
+        read = places if corrections is None else [*places, corrections]
+        check_output(target, read, (*WRITTEN, *FOLDERS), force=force)
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     drawn = load_pictures(places)
     for note in drawn.notes:
         printer.say(note)
     contours = find_contours(drawn.pictures)
-    found = choose_palette(drawn.pictures, contours, options, colors, method)
+    try:
+        found = choose_palette(drawn.pictures, contours, options, colors, method)
+    except ToonsetError as error:
+        if given is None or not given.content.palette.keep:
+            raise
+        key = f"{given.path}: palette.keep"
+        raise PaletteError(str(error).replace("--keep", key)) from error
+    maps = None
+    if given is not None and given.content.palette != PaletteCorrections():
+        strokes, notes = given.strokes_on(drawn.pictures, drawn.places)
+        for note in notes:
+            printer.say(note)
+        wanted, where = given.content.palette, str(given.path)
+        found, maps = corrected(
+            drawn.pictures, contours, found, wanted, strokes, where=where, space=space
+        )
     found = replace(found, title=found.title or drawn.title)
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
-        write_labelled(folder, found, drawn.names, drawn.pictures, contours, space)
+        write_labelled(folder, found, drawn.names, drawn.pictures, contours, space, maps)
     _report(found, target, printer, in_bundle=target == bundle)
 
 

@@ -256,10 +256,28 @@ def paint_maps(
     pictures: Sequence[Picture], contours: Sequence[Map], palette: Palette, space: Space = "rgb"
 ) -> list[PaintMap]:
     """Return labels and tones of pictures whose drawn lines are known; see `label_image`."""
-    pictures, dark = without_grain(pictures), None
-    if palette.shadow is not None:
-        dark = find_tones(pictures, contours, palette.shadow)
-        pictures = lit_pictures(pictures, contours, dark, palette.shadow)
+    return maps_in_light(*in_light(pictures, contours, palette.shadow), contours, palette, space)
+
+
+def in_light(
+    pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow | None
+) -> tuple[list[Picture], list[Mask] | None]:
+    """Return pictures without grain and shadow, and where it lay; None: there is none."""
+    smooth = without_grain(pictures)
+    if shadow is None:
+        return list(smooth), None
+    dark = find_tones(smooth, contours, shadow)
+    return list(lit_pictures(smooth, contours, dark, shadow)), list(dark)
+
+
+def maps_in_light(
+    pictures: Sequence[Picture],
+    dark: Sequence[Mask] | None,
+    contours: Sequence[Map],
+    palette: Palette,
+    space: Space = "rgb",
+) -> list[PaintMap]:
+    """Return labels and tones of what `in_light` returns."""
     maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
     ink = palette.contour
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:

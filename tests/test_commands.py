@@ -92,6 +92,7 @@ def drawings(tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path
     for name in ("dark.ase", "my.ase"):
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
     _six_figures(folder)
+    (folder / "corrections.json").write_text('{"version": 1}')
     _clicks(folder)
     _glb(folder)
     return folder
@@ -145,6 +146,7 @@ GIVEN = {  # what lies in a document's folder before its first command
     "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase",
     "docs/architecture.md": "sheet.png m.obj",
     "docs/formats.md": "bundle sheet.png views",
+    "docs/guide_corrections.md": "bundle sheet.png mannequin.obj corrections.json",
     "docs/guide_cameras.md": "sheet.png mannequin.obj m.obj points.json other colmap_folder",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
     "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",
@@ -181,12 +183,18 @@ def given(
     indirect=["given"],
 )
 def test_commands_of_a_document_run_as_they_stand(
-    document: str, given: Path, toonset: Toonset
+    document: str,
+    given: Path,
+    toonset: Toonset,
+    interrupted: Toonset,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setenv("BROWSER", "true")
     for command in filter(runs_here, commands(document)):
         words = arguments(command)
         assert words is not None, command
-        done = toonset(*words)
+        serves = words[0] == "edit"
+        done = interrupted("stop with Ctrl-C", given, *words) if serves else toonset(*words)
         assert done.code in (0, 3), (command, done)
 
 

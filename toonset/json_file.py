@@ -11,13 +11,15 @@ import re
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from toonset.errors import BundleError, one_line
 from toonset.read import parse_json, read_whole
 
 MAX_JSON_BYTES = 32 * 2**20
 MOST_PROBLEMS = 20  # of one file; the rest is counted
+# Of a file that a person writes: a key that is not known is a slip
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 Record = TypeVar("Record", bound=BaseModel)
 

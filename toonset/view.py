@@ -38,6 +38,7 @@ class View:
             where a person has had the chance to correct what was cut out.
         label: what it shows, as a person has said ("front", "3q", "90"); empty where nobody has.
         origin: what it was cut from; None where that is not recorded.
+        sheet: the one file that it was cut from; None where that is not recorded.
     """
 
     rgba: UInt8[np.ndarray, "height width 4"]
@@ -48,6 +49,7 @@ class View:
     paper: tuple[int, int, int] | None = None
     label: str = ""
     origin: Origin | None = None
+    sheet: InputFile | None = None
 
     def __post_init__(self) -> None:
         """Refuse an empty drawing.
@@ -61,10 +63,7 @@ class View:
     @property
     def figure_box(self) -> tuple[int, int, int, int]:
         """Return (x, y, width, height) in the sheet of what the figure visibly covers."""
-        covered = self.rgba[..., 3] >= VISIBLE
-        rows, columns = (np.flatnonzero(covered.any(axis=axis)) for axis in (1, 0))
-        x, y = self.box[0] + int(columns[0]), self.box[1] + int(rows[0])
-        return x, y, int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
+        return visible_box(self.rgba, self.box)
 
     @property
     def mask(self) -> Bool[np.ndarray, "height width"]:
@@ -85,6 +84,14 @@ class View:
         return replace(
             self, rgba=rgba, box=(*self.box[:2], *size_wh), ends=(left, top, right, bottom)
         )
+
+
+def visible_box(rgba: UInt8[np.ndarray, "height width 4"], box: Box) -> Box:
+    """Return (x, y, width, height) in the sheet of what a picture with this box there shows."""
+    covered = rgba[..., 3] >= VISIBLE
+    rows, columns = (np.flatnonzero(covered.any(axis=axis)) for axis in (1, 0))
+    x, y = box[0] + int(columns[0]), box[1] + int(rows[0])
+    return x, y, int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
 
 
 def premultiplied(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "height width 4"]:

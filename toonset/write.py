@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import fnmatch
 import json
 import os
@@ -191,6 +192,39 @@ def _swap_in(temporary: Path, path: Path) -> None:
     old = _put_aside(path)
     os.replace(temporary, path)
     shutil.rmtree(old, ignore_errors=True)
+
+
+def exchange_folders(new: Path, path: Path) -> None:
+    """Put a folder where another is, which comes to lie where the first one was.
+
+    In one step where the system can (Linux): whoever reads `path`, and whoever is killed, sees the
+    one or the other. Elsewhere `path` is missing for a moment.
+
+    Raises:
+        OutputError: the place cannot be written.
+    """
+    try:
+        if not _exchanged(new, path):
+            old = _put_aside(path)
+            try:
+                os.replace(new, path)
+            except OSError:
+                os.replace(old, path)
+                raise
+            os.replace(old, new)
+    except OSError as error:
+        raise _output_error(path, error) from error
+
+
+def _exchanged(new: Path, path: Path) -> bool:
+    """Swap two names by Linux' renameat2; False where there is none, or the disk cannot."""
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError, TypeError):
+        return False
+    here = -100  # AT_FDCWD
+    exchange = 2  # RENAME_EXCHANGE
+    return rename(here, os.fsencode(new), here, os.fsencode(path), exchange) == 0
 
 
 def _put_aside(path: Path) -> Path:

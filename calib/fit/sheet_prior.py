@@ -42,10 +42,12 @@ class Turn:
     Attributes:
         places: (views,) yaw in radians; nan where nothing is known of a view.
         anchored: the places are known (labels), not only their differences.
+        named: which views' places are, where the turn goes beyond what is labelled; empty for all.
     """
 
     places: Float[np.ndarray, " views"]
     anchored: bool = False
+    named: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +126,7 @@ def anchors(
     known = [(Tie(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)), prior.sigma)]
     if turn is not None and turn.anchored and "yaw" in ties:
         yaw = ties["yaw"]
-        placed = np.isfinite(turn.places)
+        placed = np.array(turn.named) if turn.named else np.isfinite(turn.places)
         over = (placed / placed.sum())[None]
         known.append((Tie(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
     return known
@@ -133,7 +135,7 @@ def anchors(
 def locks(
     ties: dict[str, Tie], poses: Sequence[Pose], values: Mapping[str, Float[np.ndarray, " views"]]
 ) -> list[tuple[Tie, float]]:
-    """Return ties that keep every view's yaw, elevation or log scale at given values."""
+    """Return ties that keep views' yaw, elevation or log scale at given values; nan is free."""
     kept = []
     views = len(poses)
     for name, wanted in values.items():
@@ -145,7 +147,9 @@ def locks(
             off = (now - wanted + np.pi) % (2 * np.pi) - np.pi
         else:
             slopes, off = ties[name].slopes, ties[name].values - wanted
-        kept.append((Tie(off, slopes, np.eye(views), np.ones(views)), LOCK_SIGMA))
+        held = np.isfinite(wanted)
+        off = np.where(held, off, 0.0)
+        kept.append((Tie(off, slopes, np.eye(views), held.astype(float)), LOCK_SIGMA))
     return kept
 
 

@@ -22,7 +22,9 @@ Bayesian Data Analysis, chapter 5). The ratios are those of synthetic artists' s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 from jaxtyping import Float
@@ -40,7 +42,7 @@ FEWEST = 4  # views whose scatter tells
 TIED = 0.3  # least share of a variance that the drawings decide
 
 
-def with_turned_bodies(joint: JointFit, turn: Turn) -> JointFit:
+def with_turned_bodies(joint: JointFit, turn: Turn, kept: Sequence[bool] = ()) -> JointFit:
     """Return the fit with its rotations and their covariance as bodies that turn ask for.
 
     Unchanged where elevation or roll scatter no more than they are uncertain.
@@ -48,6 +50,7 @@ def with_turned_bodies(joint: JointFit, turn: Turn) -> JointFit:
     Args:
         joint: of one body, its covariance true where every drawing shows that body.
         turn: where the views are meant to be seen from.
+        kept: which views a person has locked; they stay as they are. Empty for none.
     """
     views = len(joint.poses)
     if views < FEWEST:
@@ -70,10 +73,14 @@ def with_turned_bodies(joint: JointFit, turn: Turn) -> JointFit:
     taken = np.tile(turned / (meant + turned), (views, 1))
     far = (TAIL + 1) / (TAIL + off[:, 0] ** 2 / (meant[0] + turned[0]))
     taken[:, 0] *= np.where(np.isfinite(turn.places), np.minimum(far, 1), 0)
-    angles -= taken * off
+    free = ~np.array(kept or (False,) * views)
+    angles -= taken * off * free[:, None]
     rotations = [rotation_from_angles(*row) for row in angles.tolist()]
-    poses = [replace(p, rotation=r) for p, r in zip(joint.poses, rotations, strict=True)]
-    for at, by, share in zip(own, slopes, taken, strict=True):
+    poses = [
+        replace(p, rotation=r) if moves else p
+        for p, r, moves in zip(joint.poses, rotations, free, strict=True)
+    ]
+    for at, by, share in compress(zip(own, slopes, taken, strict=True), free):
         back = np.linalg.pinv(by)
         covariance[at, at] += back @ np.diag((1 - share) * turned) @ back.T
     noise = replace(joint.noise, turned=float(np.sqrt(variance)))

@@ -17,7 +17,7 @@ from toonset.calib.landmarks.models import MARGIN, Explanation, choose
 from toonset.calib.landmarks.pose import Points, on_a_line, squared_error
 from toonset.calib.outline.occluding_contour import Surface
 from toonset.calib.outline.pose import PARAMETERS, Pose, project_with_jacobian
-from toonset.dataset.mannequin.landmark_file import Landmarks
+from toonset.dataset.mannequin.landmark_file import LEAST_POINTS, Landmarks
 from toonset.errors import LandmarkError
 
 CLICK_OF_HEIGHT = 0.01  # error of a click or of the mannequin's proportions, before looking
@@ -62,12 +62,15 @@ class LandmarkFit:
 def landmark_starts(
     landmarks: Sequence[Landmarks | None], surface: Surface
 ) -> tuple[LandmarkFit | None, ...]:
-    """Return what the landmarks of every view say about its camera; None for views without.
+    """Return what the landmarks of every view say about its camera; None for too few or none.
 
     Raises:
         LandmarkError: a view's pairs lie on a line or in one place, or far from the mannequin.
     """
-    return tuple(None if view is None else solve_landmarks(view, surface) for view in landmarks)
+    return tuple(
+        None if view is None or len(view.names) < LEAST_POINTS else solve_landmarks(view, surface)
+        for view in landmarks
+    )
 
 
 def solve_landmarks(landmarks: Landmarks, surface: Surface) -> LandmarkFit:

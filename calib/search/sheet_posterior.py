@@ -37,6 +37,7 @@ TURN_SIGMA = np.radians(8.0)  # of a view about its place
 P_TURN = 0.5  # before looking: half of all sheets are evenly spaced turns
 # Of the turns: start at the front, at the back; the others start anywhere (docs/decisions.md)
 P_FRONT_FIRST, P_BACK_FIRST = 0.4, 0.1
+NEAR_ASKED, UNASKED = np.radians(25.0), 50.0  # nats, of a yaw farther from where a person put it
 UNLIKELY = 20.0  # nats: hypotheses this far behind are not asked about paint
 
 
@@ -48,17 +49,36 @@ class Turns:
         places: (t, views) yaw in radians; nan where an alternative says nothing about a view.
         log_prior: (t,).
         anchored: a person has said so.
+        named: of which views, where it is not of all that have places; empty for all.
     """
 
     places: Float[np.ndarray, "t views"]
     log_prior: Float[np.ndarray, " t"]
     anchored: bool = False
+    named: tuple[bool, ...] = ()
 
 
 def possible_turns(views: int, labels: tuple[Label, ...] = ()) -> Turns:
-    """Return the readings of the labels, or without any label "no turn" and the even turns."""
+    """Return the readings of the labels, or without any label "no turn" and the even turns.
+
+    Where only some views are labelled, the others may stand in an even turn with them.
+    """
     if any(labels):
-        return Turns(*label_rows(labels), anchored=True)
+        rows, log_odds = label_rows(labels)
+        if all(labels) or views < TURN_VIEWS:
+            return Turns(rows, log_odds, anchored=True)
+        near = [
+            (turn, odds + np.log(P_TURN / 2))
+            for row, odds in zip(rows, log_odds, strict=True)
+            for way in (1, -1)
+            if (turn := _even_turn(row, way)) is not None
+        ]
+        return Turns(
+            np.array([*rows, *(turn for turn, _ in near)]),
+            np.array([*(log_odds + np.log(1 - P_TURN)), *(odds for _, odds in near)]),
+            anchored=True,
+            named=tuple(np.isfinite(rows[0]).tolist()),
+        )
     places, log_prior = np.full((1, views), np.nan), np.zeros(1)
     if views >= TURN_VIEWS:
         starts = np.arange(TURN_STARTS) * 2 * np.pi / TURN_STARTS
@@ -72,11 +92,25 @@ def possible_turns(views: int, labels: tuple[Label, ...] = ()) -> Turns:
     return Turns(places, log_prior)
 
 
+def _even_turn(row: Float[np.ndarray, " views"], way: int) -> Float[np.ndarray, " views"] | None:
+    """Return a reading of labels with its other views in an even turn; None if it is in none."""
+    known, even = np.isfinite(row), way * np.arange(len(row)) * 2 * np.pi / len(row)
+    start = np.angle(np.exp(1j * (row - even)[known]).mean())
+    off = (row - even - start + np.pi) % (2 * np.pi) - np.pi
+    if np.abs(off[known]).max() > 2 * TURN_SIGMA:
+        return None
+    return np.where(known, row, (start + even) % (2 * np.pi))
+
+
 class SheetPosterior:
     """The grid of what the views might share, against which candidates are weighed."""
 
     def __init__(
-        self, turns: Turns, faces: FaceEvidence | None = None, paint: Paint | None = None
+        self,
+        turns: Turns,
+        faces: FaceEvidence | None = None,
+        paint: Paint | None = None,
+        asked: Float[np.ndarray, " views"] | None = None,
     ) -> None:
         """Cross the turns with the elevations, and with whether what is drawn inside can be read.
 
@@ -84,12 +118,14 @@ class SheetPosterior:
             turns: where the views might be meant to be seen from.
             faces: what the heads say; None for nothing.
             paint: what the colours say; None for nothing.
+            asked: yaws at which a person put views, nan elsewhere. Selections stay there; how
+                probable they are is still the drawings' to say.
         """
         wide = ElevationPrior()
         log_elevation = -0.5 * ((ELEVATION_GRID - wide.mean) / wide.sigma) ** 2
         log_elevation -= np.log(np.exp(log_elevation).sum())
         many, grid = len(turns.places), len(ELEVATION_GRID)
-        self.turns, self.faces, self.paint = turns, faces, paint
+        self.turns, self.faces, self.paint, self.asked = turns, faces, paint, asked
         self.elevations = np.repeat(ELEVATION_GRID, many)
         self.places = np.tile(turns.places, (grid, 1))
         log_prior = np.repeat(log_elevation, many) + np.tile(turns.log_prior, grid)
@@ -98,7 +134,10 @@ class SheetPosterior:
 
     def choose(self, views: Sequence[Candidates]) -> tuple[list[int], Turn]:
         """Return each view's candidate under the best hypothesis, and its turn."""
-        energies = self._of_candidates(views)
+        energies = [
+            energy + self._unasked([fit.pose for fit in view.fits], i)
+            for i, (energy, view) in enumerate(zip(self._of_candidates(views), views, strict=True))
+        ]
         total = np.sum([e.min(axis=1) for e in energies], axis=0) - self.log_prior
         chosen = np.stack([e.argmin(axis=1) for e in energies], axis=1)
         total -= self._paint(views, chosen, total)
@@ -112,7 +151,8 @@ class SheetPosterior:
             terms = [self._energies([p], np.zeros(1), i)[:, 0] for i, p in enumerate(poses)]
             total = np.sum(terms, axis=0) - self.log_prior
             best = int(np.argmin(total))
-            costs.append(float(total[best]))
+            unasked = sum(float(self._unasked([p], i)[0]) for i, p in enumerate(poses))
+            costs.append(float(total[best]) + unasked)
             turns.append(self._turn(best))
         if self.paint is None:
             return np.array(costs), turns
@@ -172,8 +212,16 @@ class SheetPosterior:
         all_of_them[worth] = found[place.reshape(-1)]
         return all_of_them
 
+    def _unasked(self, poses: Sequence[Pose], index: int) -> Float[np.ndarray, " n"]:
+        """Return what poses cost that are not where a person put the view."""
+        if self.asked is None:
+            return np.zeros(len(poses))
+        off = np.array([_yaw(pose) for pose in poses]) - self.asked[index]
+        return np.where(np.abs((off + np.pi) % (2 * np.pi) - np.pi) > NEAR_ASKED, UNASKED, 0.0)
+
     def _turn(self, hypothesis: int) -> Turn:
-        return Turn(self.places[hypothesis % len(self.places)], self.turns.anchored)
+        places = self.places[hypothesis % len(self.places)]
+        return Turn(places, self.turns.anchored, self.turns.named)
 
     def _energies(
         self, poses: Sequence[Pose], data: Float[np.ndarray, " n"], index: int

@@ -129,8 +129,8 @@ def with_locks_in_mind(
         replace(
             view,
             verdict="weak",
-            reason=f"without --lock the outlines turn this view by {np.degrees(turn):.0f} degrees: "
-            "is what is locked right?",
+            reason=f"without the lock the outlines turn this view by {np.degrees(turn):.0f} "
+            "degrees: is what is locked right?",
         )
         if view.verdict == "ok" and turn > least
         else view

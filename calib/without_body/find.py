@@ -37,6 +37,7 @@ from toonset.calib.without_body.turns import (
     P_FRONT_FIRST,
     STARTS,
     TurnHypotheses,
+    held,
     is_even,
     labelled,
     turn_hypotheses,
@@ -90,33 +91,36 @@ def calibrate_without_body(
 
     Args:
         views: the drawings, at least one.
-        known: labels count, the rest needs a mannequin.
+        known: labels and the yaws of cameras count, the rest needs a mannequin.
         progress: called with the step's name and the share of it that is done.
     """
     began = time.perf_counter()
     progress("turns", 0.0)
     figures = Figures(views)
-    turns, posterior, likelihood = _weighed(figures, known.labels)
+    turns, posterior, likelihood = _weighed(figures, known)
     chosen = int(posterior.argmax())
     weighed = time.perf_counter()
     progress("cameras", 0.0)
     yaws = turns.yaws[chosen]
     even = is_even(yaws)
-    placed = place(figures, yaws, 0.0 if even else float(FREE_YAW))
+    free = 0.0 if even else float(FREE_YAW)
+    locked = np.isfinite(known.kept_yaws(len(views)))
+    placed = place(figures, yaws, np.where(locked, 0.0, free))
     found = Found(turns, posterior, likelihood, chosen, placed, even)
     seconds = {"turns": weighed - began, "cameras": time.perf_counter() - weighed}
     return _judged(figures, found, known.labels, seconds)
 
 
 def _weighed(
-    figures: Figures, labels: Sequence[Label]
+    figures: Figures, known: Known
 ) -> tuple[TurnHypotheses, Float[np.ndarray, " turns"], Float[np.ndarray, " turns"]]:
     """Return the turns, their probabilities and the drawings' part in them, nats."""
-    views = len(figures.views)
+    views, labels = len(figures.views), known.labels
     evidence = Evidence.of(figures.views)
     turns = turn_hypotheses(views, labels)
     if views in FREE_VIEWS and not (labels and all(labels)):
-        turns = _with_free(figures, evidence, turns, labels)
+        turns = _with_free(figures, evidence, turns, known)
+    turns = held(turns, known.asked_yaws(views), known.kept_yaws(views))
     outlines = outlines_log_likelihood(figures, turns) if views > 1 else np.zeros(len(turns.yaws))
     likelihood = evidence.log_likelihood(turns.yaws, outlines)
     total = turns.log_prior + likelihood
@@ -125,7 +129,7 @@ def _weighed(
 
 
 def _with_free(
-    figures: Figures, evidence: Evidence, turns: TurnHypotheses, labels: Sequence[Label]
+    figures: Figures, evidence: Evidence, turns: TurnHypotheses, known: Known
 ) -> TurnHypotheses:
     """Return the turns, the even ones replaced where drawings prove that theirs is another."""
     relative, gain = uneven_yaws(figures, evidence.paint)
@@ -135,6 +139,8 @@ def _with_free(
     first = np.full(len(rows), np.log((1 - P_FRONT_FIRST) / (len(rows) - 1)))
     first[0] = np.log(P_FRONT_FIRST)
     free = TurnHypotheses(rows[:, None] + relative, first, np.zeros(len(rows)))
+    views, labels = len(figures.views), known.labels
+    free = held(free, known.asked_yaws(views), known.kept_yaws(views))  # the others may stay
     return labelled(free, labels) if any(labels) else free
 
 

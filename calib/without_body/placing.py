@@ -111,13 +111,15 @@ def coherence_log_likelihood(
     return -0.5 * MEASUREMENTS * views * np.log(np.square(apart) + floor**2)
 
 
-def place(figures: Figures, yaws: Float[np.ndarray, " views"], yaw_sigma: float) -> SheetCameras:
+def place(
+    figures: Figures, yaws: Float[np.ndarray, " views"], yaw_sigma: Float[np.ndarray, " views"]
+) -> SheetCameras:
     """Return cameras of the turn whose outlines cohere best.
 
     Args:
         figures: the drawings.
         yaws: of the turn, radians.
-        yaw_sigma: by how much a view may leave its place in the turn, radians; 0: not at all.
+        yaw_sigma: by how much each may leave its place in the turn, radians; 0: not at all.
     """
     views = len(figures.views)
     prior = elevation_log_prior(ELEVATIONS)
@@ -161,10 +163,12 @@ def size_of_figures(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[f
     return float(np.median(heights)), max(reach)
 
 
-def _fitted(figures: Figures, cameras: list[Camera], yaw_sigma: float, rounds: int) -> SheetCameras:
+def _fitted(
+    figures: Figures, cameras: list[Camera], yaw_sigma: Float[np.ndarray, " views"], rounds: int
+) -> SheetCameras:
     outlines = outlines_of(cameras, figures.alphas)
     ratio = outlines.ratio(cameras[0])
-    fit = fit_turns(outlines, np.full(len(cameras), yaw_sigma), 0.0, TAU, rounds)
+    fit = fit_turns(outlines, yaw_sigma, 0.0, TAU, rounds)
     moved = [
         camera_moved(camera, Square(view.square.low / ratio, view.square.size / ratio), own, 0.0)
         for camera, view, own in zip(cameras, outlines.views, fit.numbers, strict=True)

@@ -29,7 +29,8 @@ def without_body_if_better(
 
     A body that explains nothing loses to drawings that cohere; else paint, faces, detail, outlines
     and layout decide. Nothing is tried where the mannequin's cameras are certain, or, where
-    somebody gave it, not failed; nor where landmarks, cameras or locks belong to it.
+    somebody gave it or put it on a view, not failed; nor where landmarks, cameras or locks of the
+    whole sheet belong to it.
 
     Args:
         views: the drawings.
@@ -38,7 +39,7 @@ def without_body_if_better(
         given: somebody chose the mannequin; then no view without it is better than weak.
         tell: called with the step's name and the share of it that is done.
     """
-    fine = found.verdict != "failed" if given else found.is_certain
+    fine = found.verdict != "failed" if given or any(known.placed) else found.is_certain
     if fine or len(views) < FEWEST or known.landmarks or known.cameras or known.locked:
         return None
     alone = calibrate_without_body(views, known, tell)

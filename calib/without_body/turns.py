@@ -8,7 +8,7 @@ character's left, read from the left; labels that a person gave count for more t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -102,6 +102,26 @@ def labelled(turns: TurnHypotheses, labels: Sequence[Label]) -> TurnHypotheses:
         np.concatenate([log_prior, odds]),
         np.concatenate([turns.pattern, own]),
     )
+
+
+def held(
+    turns: TurnHypotheses, asked: Float[np.ndarray, " views"], kept: Float[np.ndarray, " views"]
+) -> TurnHypotheses:
+    """Return the turns with the views where a person put them.
+
+    An even ring stays even but for its locked views: a camera is dragged less exactly than artists
+    divide a circle.
+
+    Args:
+        turns: alternatives.
+        asked: yaws at which a person put views, radians; nan elsewhere.
+        kept: those that are locked.
+    """
+    if not np.isfinite(asked).any():
+        return turns
+    even = np.array([is_even(row) for row in turns.yaws])[:, None]
+    there = np.where(even, kept, asked)
+    return replace(turns, yaws=np.where(np.isfinite(there), there, turns.yaws))
 
 
 def _is_near(yaws: Float[np.ndarray, " turns"], label: Label) -> np.ndarray:

@@ -44,6 +44,15 @@ GridOption = Annotated[
         rich_help_panel=CORRECTIONS_PANEL,
     ),
 ]
+CorrectionsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--corrections",
+        metavar="FILE",
+        help="What a person corrected: the corrections.json of `toonset edit`, or by hand.",
+        rich_help_panel=CORRECTIONS_PANEL,
+    ),
+]
 LABELS_HELP = (
     "What each view shows, in sheet order: front,3q,side,back ..., yaws in degrees, ? if unknown."
 )

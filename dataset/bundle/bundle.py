@@ -12,6 +12,7 @@
     tones/000.png      8-bit grey per picture of a shaded sheet: 0 = in light, 1 = in shadow
     contours/000.png   8-bit grey per picture: how much of a pixel is drawn line
     run/               a trained field
+    corrections.json   what a person corrected with `toonset edit`; edit.html is its page
 
 The folder appears whole or not at all. It holds no path and no name of a machine and, but for the
 seconds in run/, no time: the same input, options, seed and versions give the same bytes, wherever
@@ -54,7 +55,7 @@ IMAGES = "images"
 WRITTEN = (
     *("transforms.json", "images", "calibration.json", "overlay.png", "mannequin.obj"),
     # what later verbs put beside
-    *("palette.*", LABELS, TONES, COVERAGE, CONTOURS, "run", "run.unfinished"),
+    *("palette.*", LABELS, TONES, COVERAGE, CONTOURS, "run", "run.unfinished", "edit.html"),
 )
 
 

@@ -31,11 +31,17 @@ def calibration_content(report: Mapping[str, Any], views: Sequence[View]) -> dic
     """
     content = {key: value for key, value in report.items() if key not in RUN_ONLY}
     content["views"] = [
-        {**found, "line_width_px": round(view.line_width_px, 3)}
+        {**found, "line_width_px": round(view.line_width_px, 3), **_place(view)}
         for found, view in zip(report["views"], views, strict=True)
     ]
     CalibrationFile.model_validate(content)  # what is written can be read
     return content
+
+
+def _place(view: View) -> dict[str, Any]:
+    """Return where a drawing lies in which sheet."""
+    sheet = view.sheet and {"name": view.sheet.name, "sha256": view.sheet.sha256}
+    return {"box": [int(side) for side in view.box], **({"sheet": sheet} if sheet else {})}
 
 
 def read_calibration(file: Path) -> CalibrationFile:

@@ -89,8 +89,18 @@ class Alternative(_Record):
     camera: CalibratedCamera
 
 
+class SheetFile(_Record):
+    """The picture that a drawing was cut from."""
+
+    name: Annotated[str, Field(min_length=1, max_length=255)]
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
 class ViewRecord(_Record):
-    """One drawing's camera; `line_width_px` is None in bundles of version 1."""
+    """One drawing's camera; what older bundles do not say is None.
+
+    `box` is its picture's (x, y, width, height) in `sheet`, pixels.
+    """
 
     name: Annotated[str, Field(min_length=1, max_length=255)]
     verdict: Verdict
@@ -105,6 +115,8 @@ class ViewRecord(_Record):
     outline_error_of_height: Spread
     outline_coverage: Probability
     line_width_px: Spread | None = None
+    box: tuple[int, int, int, int] | None = None
+    sheet: SheetFile | None = None
 
     def check(self) -> None:
         """Refuse what no calibration writes.

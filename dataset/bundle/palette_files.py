@@ -21,7 +21,7 @@ from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.palette.coverage import coverage_map
-from toonset.palette.extract import paint_maps
+from toonset.palette.extract import PaintMap, paint_maps
 from toonset.palette.formats.registry import encode_palette
 from toonset.palette.names import clean_name
 from toonset.palette.palette import Palette
@@ -54,9 +54,13 @@ def write_labelled(
     pictures: Sequence[UInt8[np.ndarray, "_ _ rgba=4"]],
     contours: Sequence[UInt8[np.ndarray, "_ _"]],
     space: Space = "rgb",
+    maps: Sequence[PaintMap] | None = None,
 ) -> None:
-    """Label pictures whose contour maps are known, and write all; see `write_palette`."""
-    found = paint_maps(pictures, contours, palette, space)
+    """Write a palette and the maps of pictures whose contours are known; see `write_palette`.
+
+    Without `maps`, pixels are labelled here.
+    """
+    found = paint_maps(pictures, contours, palette, space) if maps is None else maps
     labels = [(name, one.labels) for name, one in zip(names, found, strict=True)]
     pairs = zip(names, found, strict=True)
     tones = [(name, one.tones) for name, one in pairs if one.tones is not None]

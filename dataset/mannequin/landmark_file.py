@@ -115,8 +115,8 @@ def _landmarks(
 ) -> Landmarks:
     corner = views[index].box[:2] if file.in_sheet else (0, 0)
     pixels = np.array([pair.pixel for pair in pairs]) - np.array(corner, dtype=np.float64)
-    for pair, pixel in zip(pairs, pixels, strict=True):
-        _check_inside(f"{where}: {pair.name}", pair, pixel, views[index], file.in_sheet)
+    for pair in pairs:
+        check_inside(f"{where}: {pair.name}", pair.pixel, views[index], in_sheet=file.in_sheet)
     return Landmarks(
         views[index].name,
         tuple(pair.name for pair in pairs),
@@ -138,14 +138,23 @@ def _world(where: str, pair: Pair, points: Mapping[str, Numbers]) -> Numbers:
     raise LandmarkError(f"{where}: unknown name {pair.name!r}; {closest(pair.name, list(points))}")
 
 
-def _check_inside(
-    where: str, pair: Pair, pixel: Float[np.ndarray, " 2"], view: View, in_sheet: bool
-) -> None:
+def check_inside(where: str, pixel: Numbers, view: View, *, in_sheet: bool) -> None:
+    """Refuse a pixel that a view does not have.
+
+    Args:
+        where: file and point, for the message.
+        pixel: of the sheet, or of the view's crop.
+        view: the drawing.
+        in_sheet: it is the sheet's.
+
+    Raises:
+        LandmarkError: it lies outside.
+    """
     x, y, _, _ = view.box if in_sheet else (0, 0, 0, 0)
     height, width = view.rgba.shape[:2]
-    if not (0 <= pixel[0] <= width and 0 <= pixel[1] <= height):
+    if not (x <= pixel[0] <= x + width and y <= pixel[1] <= y + height):
         unit = "sheet" if in_sheet else "view"
         raise LandmarkError(
-            f"{where}: ({pair.pixel[0]:g}, {pair.pixel[1]:g}) lies outside of the view, which has "
+            f"{where}: ({pixel[0]:g}, {pixel[1]:g}) lies outside of the view, which has "
             f"{unit} pixels {x} to {x + width}, {y} to {y + height}; correct the pixel or the view"
         )

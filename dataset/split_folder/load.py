@@ -19,12 +19,14 @@ from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
 from toonset.dataset.split_folder.checks import odd_files
+from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.cutting import Cutting
 from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
 from toonset.errors import PictureError, SheetError, UsageError
+from toonset.palette.formats.hex import rgb_of_hex
 from toonset.read import read_whole
 from toonset.view import SHEET, InputFile, Origin, View
 
@@ -83,6 +85,7 @@ def split_sheet(
     background: str = "",
     drop: str = "",
     labels: str = "",
+    corrections: str | Path | None = None,
 ) -> Sheet:
     """Return the drawings of a character sheet, cut out with alpha.
 
@@ -94,6 +97,7 @@ def split_sheet(
         background: the paper's colour: "#rrggbb", "white" or "black".
         drop: leave these out, as numbered without it: "3,5" or "3-5".
         labels: what each view shows, in sheet order: "front,3q,side,back", yaws in degrees, "?".
+        corrections: file of what a person corrected of one of the sheets (docs/formats.md).
 
     Raises:
         ToonsetError: a file is no picture or shows no figure, is given twice, a split folder is
@@ -104,19 +108,31 @@ def split_sheet(
         raise UsageError("split_sheet: no sheet; give a picture, several, or a folder")
     cutting = Cutting(None if boxes is None else Path(boxes), grid, background, drop)
     cutting.check()
-    return _labelled(_load([Path(path) for path in paths], cutting), labels)
+    given = None if corrections is None else Given.of(corrections)
+    if given is not None:
+        given.check_beside(boxes=boxes, grid=grid, background=background, drop=drop, views=labels)
+    return _labelled(_load([Path(path) for path in paths], cutting, given), labels)
 
 
-def _load(paths: Sequence[Path], cutting: Cutting) -> Sheet:
+def _load(paths: Sequence[Path], cutting: Cutting, given: Given | None) -> Sheet:
     """Return the views of all sheets, in order and named through."""
     places, skipped = sheet_places(paths)
+    cut = _options_per_sheet(places, cutting)
+    where = "--boxes"
+    if given is not None and (given.content.boxes or given.content.background):
+        cut = _as_corrected(places, cut, given)
+        where = f"{given.path}: boxes"
     parts = [
-        _of_split_folder(place) if options is None else _of_sheet(place, options)
-        for place, options in zip(places, _options_per_sheet(places, cutting), strict=True)
+        _of_split_folder(place) if options is None else _of_sheet(place, options, where)
+        for place, options in zip(places, cut, strict=True)
     ]
     whole = replace(_joined(parts), skipped=tuple(skipped))
     if cutting.boxes is not None:
         whole = replace(whole, files=(*whole.files, InputFile.of("boxes", cutting.boxes)))
+    if given is not None:
+        split, notes = given.applied(whole.split)
+        files = (*whole.files, InputFile.of("corrections", given.path))
+        whole = replace(whole, split=split, notes=(*whole.notes, *notes), files=files)
     kept = _dropped(whole, cutting.dropped)
     if not any(place.is_dir() for place in places):  # a split folder has been looked at
         kept = replace(kept, notes=(*kept.notes, *odd_files(kept.split)))
@@ -149,8 +165,11 @@ def _with_origin(sheet: Sheet) -> Sheet:
     split, origin = sheet.split, Origin(sheet.files, sheet.options)
     cut_now = [picture is not None for picture in sheet.pictures]
     papers = [split.sources[of].background if cut_now[of] else None for of in split.source_of]
-    pairs = zip(split.views, papers, strict=True)
-    views = tuple(replace(view, origin=origin, paper=paper) for view, paper in pairs)
+    sheets = [InputFile(SHEET, source.name, source.sha256) for source in split.sources]
+    views = tuple(
+        replace(view, origin=origin, paper=paper, sheet=sheets[of])
+        for view, paper, of in zip(split.views, papers, split.source_of, strict=True)
+    )
     return replace(sheet, split=replace(split, views=views))
 
 
@@ -175,6 +194,29 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOp
     return [replace(common, boxes=of_sheet) for of_sheet in boxes]
 
 
+def _as_corrected(
+    places: Sequence[Path], options: Sequence[SheetOptions | None], given: Given
+) -> list[SheetOptions | None]:
+    """Return how every sheet is cut, the corrected one with its boxes and background."""
+    found = list(options)
+    number = 0
+    if len(places) > 1:
+        files = [i for i, place in enumerate(places) if not place.is_dir()]
+        number = files[given.number_of_sheet([InputFile.of(SHEET, places[i]) for i in files])]
+    cut = found[number]
+    if cut is None:
+        raise SheetError(
+            f"{given.path}: {places[number]} is cut already; give the sheet that it was cut from"
+        )
+    paper = given.content.background
+    found[number] = replace(
+        cut,
+        boxes=given.content.boxes,
+        background_rgb=rgb_of_hex(paper, "background") if paper else cut.background_rgb,
+    )
+    return found
+
+
 def _of_split_folder(folder: Path) -> Sheet:
     split, notes = read_split(folder)
     views = [("view", path) for path in picture_files(folder / IMAGES)[0]]
@@ -182,11 +224,11 @@ def _of_split_folder(folder: Path) -> Sheet:
     return Sheet(split, len(split.views), (None,) * len(split.sources), files, notes=notes)
 
 
-def _of_sheet(path: Path, options: SheetOptions) -> Sheet:
+def _of_sheet(path: Path, options: SheetOptions, where: str) -> Sheet:
     data = read_whole(path, "picture", PictureError)
     picture = decode_rgba(data, path)
     height, width = picture.shape[:2]
-    check_boxes(options.boxes, (width, height), "--boxes")
+    check_boxes(options.boxes, (width, height), where)
     try:
         found = split_picture(picture, options)
     except SheetError as error:

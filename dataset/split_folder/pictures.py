@@ -11,6 +11,7 @@ from jaxtyping import UInt8
 
 from toonset.dataset.bundle.bundle import CALIBRATION
 from toonset.dataset.bundle.calibration_file import read_calibration
+from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecord
 from toonset.dataset.bundle.palette_files import palette_title
 from toonset.dataset.bundle.transforms_read import NAMES, picture_paths, transforms_file
 from toonset.dataset.images.picture import load_rgba
@@ -19,7 +20,7 @@ from toonset.dataset.split_folder.places import is_split_folder, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.errors import BundleError, PictureError, SheetError
 from toonset.read import check_there
-from toonset.view import SHEET
+from toonset.view import SHEET, Box, InputFile
 
 Picture = UInt8[np.ndarray, "height width 4"]
 
@@ -33,12 +34,27 @@ class Pictures:
         pictures: the character on transparent ground.
         notes: what a person should know of the files.
         title: what to call the character: its sheet's name, or the folder's.
+        places: where each picture lies in which sheet; None where nobody has recorded it.
     """
 
     names: tuple[str, ...]
     pictures: tuple[Picture, ...]
     notes: tuple[str, ...]
     title: str
+    places: tuple[Place | None, ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a picture lies.
+
+    Attributes:
+        sheet: the picture that it was cut from.
+        box: (x, y, width, height) in it, pixels.
+    """
+
+    sheet: InputFile
+    box: Box
 
 
 def bundle_of(places: Sequence[Path]) -> Path | None:
@@ -76,15 +92,11 @@ def load_pictures(places: Sequence[Path]) -> Pictures:
         SheetError: a folder without pictures, or a split folder that is broken.
         PictureError: a picture cannot be read.
     """
-    notes: list[str] = []
     if bundle_of(places) is not None:
-        paths = picture_paths(places[0])
-        names = tuple(f"{path.stem}.png" for path in paths)
-        if len(set(names)) < len(names):
-            raise BundleError(f"{places[0]}: two pictures have the same file name; rename one")
-        pictures = [_loaded(path, notes) for path in paths]
-        return Pictures(names, tuple(pictures), tuple(notes), _bundle_title(places[0]))
+        return _of_bundle(places[0])
+    notes: list[str] = []
     pictures, sheets = [], []
+    at_sheet: list[Place | None] = []
     found, skipped = sheet_places([_inner(place) for place in places])
     notes += skipped
     for place in found:
@@ -93,21 +105,45 @@ def load_pictures(places: Sequence[Path]) -> Pictures:
             notes += changed
             pictures += [view.rgba for view in split.views]
             sheets += [source.name for source in split.sources]
+            files = [InputFile(SHEET, one.name, one.sha256) for one in split.sources]
+            pairs = zip(split.views, split.source_of, strict=True)
+            at_sheet += [Place(files[of], view.box) for view, of in pairs]
         else:
             pictures.append(_loaded(place, notes))
             sheets.append(place.name)
+            height, width = pictures[-1].shape[:2]
+            at_sheet.append(Place(InputFile.of(SHEET, place), (0, 0, width, height)))
     names = tuple(f"{number:03d}.png" for number in range(len(pictures)))
     folder = places[0] if places[0].is_dir() else places[0].parent
-    return Pictures(names, tuple(pictures), tuple(notes), palette_title(sheets, folder))
+    title = palette_title(sheets, folder)
+    return Pictures(names, tuple(pictures), tuple(notes), title, tuple(at_sheet))
 
 
-def _bundle_title(place: Path) -> str:
-    root = transforms_file(place).parent
+def _of_bundle(place: Path) -> Pictures:
+    notes: list[str] = []
+    paths = picture_paths(place)
+    names = tuple(f"{path.stem}.png" for path in paths)
+    if len(set(names)) < len(names):
+        raise BundleError(f"{place}: two pictures have the same file name; rename one")
+    pictures = tuple(_loaded(path, notes) for path in paths)
+    found = _calibration(place)
+    sheets = (file.name for file in (found.inputs if found else ()) if file.role == SHEET)
+    title = palette_title(sheets, transforms_file(place).parent)
+    lies = {view.name: _place(view) for view in found.views} if found else {}
+    return Pictures(names, pictures, tuple(notes), title, tuple(lies.get(p.name) for p in paths))
+
+
+def _calibration(place: Path) -> CalibrationFile | None:
     try:
-        inputs = read_calibration(root / CALIBRATION).inputs
+        return read_calibration(transforms_file(place).parent / CALIBRATION)
     except BundleError:  # of other programs there is none; `toonset check` tells of a broken one
-        inputs = []
-    return palette_title((file.name for file in inputs if file.role == SHEET), root)
+        return None
+
+
+def _place(view: ViewRecord) -> Place | None:
+    if view.sheet is None or view.box is None:
+        return None
+    return Place(InputFile(SHEET, view.sheet.name, view.sheet.sha256), view.box)
 
 
 def _is_meant_as_bundle(place: Path) -> bool:

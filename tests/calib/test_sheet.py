@@ -112,6 +112,18 @@ def test_even_turns_need_four_views_and_labels_replace_them():
     assert degrees(named.places) == [[0, 90], [0, 270]]
 
 
+def test_one_label_leaves_the_others_their_even_turn():
+    turns = possible_turns(4, parse_labels("?,95,?,?", 4))
+    assert turns.anchored
+    known = turns.places[np.isfinite(turns.places).all(axis=1)]
+    assert degrees(known) == [[5, 95, 185, 275], [185, 95, 5, 275]]
+    alone = turns.places[np.isnan(turns.places).any(axis=1)]
+    np.testing.assert_allclose(np.degrees(alone), [[np.nan, 95, np.nan, np.nan]])
+    assert np.exp(turns.log_prior).sum() == pytest.approx(1)
+    apart = possible_turns(4, parse_labels("0,40,?,?", 4))  # in no even turn
+    assert len(apart.places) == 1
+
+
 def body():
     shape = trimesh.creation.capsule(height=1.0, radius=0.3)
     shape.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))

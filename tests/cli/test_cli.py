@@ -135,6 +135,9 @@ def test_calibrate_prints_one_json_object_and_nothing_else(calibrated):
     assert {path.name for path in bundle.iterdir()} == BUNDLE_FILES
     written = json.loads((bundle / "calibration.json").read_text())
     widths = [view.pop("line_width_px") for view in written["views"]]
+    boxes = [view.pop("box") for view in written["views"]]
+    assert all(view.pop("sheet")["name"] for view in written["views"])
+    assert [box[2:] for box in boxes] == [v["camera"]["size_wh"] for v in written["views"]]
     assert written.items() <= done.json.items()
     assert set(done.json) - set(written) == {"bundle", "seconds"}  # of the run, not of the result
     assert all(width >= 0 for width in widths)

@@ -255,3 +255,55 @@ def test_starts_and_locks_that_cannot_be(
     done = toonset("calibrate", drawn / "sheet.png", *mesh, "-o", "new", *more, "-q")
     assert words in done.reason
     assert snapshot(tmp_path) == before
+
+
+# ---- corrections
+
+
+def corrections(folder: Path, **content: Any) -> Path:
+    path = folder / "corrections.json"
+    path.write_text(json.dumps({"version": 1, **content}))
+    return path
+
+
+def test_corrections_are_an_input_and_change_only_what_they_say(
+    drawn, bundle: Path, toonset, tmp_path
+):
+    boxes = [view["box"] for view in json.loads((bundle / "calibration.json").read_text())["views"]]
+    views = [{"box": boxes[2], "label": "144"}, {"box": boxes[4], "exclude": True}]
+    path = corrections(tmp_path, views=views)
+    done = started(drawn, toonset, tmp_path / "b", "--corrections", path)
+    assert done.code in (0, 3)
+    assert [given["role"] for given in done.json["inputs"]] == ["sheet", "corrections", "mesh"]
+    assert done.json["options"]["views"] == "?,?,144,?"
+    assert len(done.json["views"]) == VIEWS - 1
+
+
+@pytest.mark.parametrize(
+    ("content", "more", "words"),
+    [
+        ({"view": []}, [], "corrections.json: unknown key 'view'"),
+        ({"views": [{"box": [0, 0, 9, 9], "label": "up"}]}, [], "views.0.label: 'up' is no dir"),
+        ({"boxes": [[0, 0, 9999, 9]]}, [], "boxes: box 0 (x 0, y 0, 9999 x 9 px) leaves the sheet"),
+        ({"boxes": [[0, 0, 99, 99]]}, ["--boxes", "b.csv"], "boxes and --boxes say the same"),
+        (
+            {"views": [{"box": [0, 0, 9, 9], "label": "0"}]},
+            ["--front", "1"],
+            "views.label and --fr",
+        ),
+        ({}, ["--landmarks-only", "--landmarks", "l.json"], "--corrections does nothing beside"),
+    ],
+)
+def test_corrections_that_cannot_be(
+    content, more, words, drawn, toonset, snapshot, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    Path("b.csv").write_text("0,0,99,99\n")
+    Path("l.json").write_text("{}")
+    path = corrections(tmp_path, **content)
+    before = snapshot(tmp_path)
+    mesh = ("--mesh", drawn / "mannequin.obj")
+    sheet = drawn / "sheet.png"
+    done = toonset("calibrate", sheet, *mesh, "--corrections", path, *more, "-o", "new", "-q")
+    assert words in done.reason
+    assert snapshot(tmp_path) == before

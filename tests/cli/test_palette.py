@@ -319,3 +319,34 @@ def test_nothing_is_written_where_colours_cannot_be_changed(tmp_path: Path) -> N
     with pytest.raises(ToonsetError, match=r"labels/001\.png: is missing"):
         recolor(["red=#00ff00"], [bundle], tmp_path / "new")
     assert tree(tmp_path) == {"b", *(f"b/{name}" for name in tree(bundle))}
+
+
+def test_corrections_are_applied_to_palette_and_labels(tmp_path: Path, toonset) -> None:
+    """Loose pictures are sheets of their own: a stroke's box lies in the whole picture."""
+    write_bytes(tmp_path / "sheet.png", encode_png(figure()))
+    path = tmp_path / "corrections.json"
+    stroke = {"box": [8, 4, 24, 52], "color": "#1e3cb4", "radius": 3, "points": [[20.5, 10.5]]}
+    names = {"#143cb4": "trousers"}
+    path.write_text(json.dumps({"version": 1, "palette": {"names": names, "strokes": [stroke]}}))
+    out = tmp_path / "out"
+    refused = toonset("palette", tmp_path / "sheet.png", "--corrections", path, "-o", out)
+    assert "palette.strokes.0.color: #1e3cb4 is no colour of the palette" in refused.reason
+    assert not out.exists()
+    stroke["color"] = "#143cb4"
+    path.write_text(json.dumps({"version": 1, "palette": {"names": names, "strokes": [stroke]}}))
+    done = toonset("palette", tmp_path / "sheet.png", "--corrections", path, "-o", out, "--json")
+    assert [color["name"] for color in done.json["colors"]] == ["red", "trousers"]
+    labels = load_indexed_png(out / "labels" / "000.png")
+    assert (labels[8:13, 18:23] == 1).all()
+    assert (labels[5:37, 10:30] == 1).sum() < 60
+
+
+def test_a_corrections_file_without_colours_changes_no_byte(tmp_path: Path, toonset) -> None:
+    write_bytes(tmp_path / "sheet.png", encode_png(figure()))
+    path = tmp_path / "corrections.json"
+    path.write_text('{"version": 1}')
+    for name, more in {"a": (), "b": ("--corrections", path)}.items():
+        assert toonset("palette", tmp_path / "sheet.png", *more, "-o", tmp_path / name).code == 0
+    for file in tree(tmp_path / "a"):
+        if (tmp_path / "a" / file).is_file():
+            assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()

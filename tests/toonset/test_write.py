@@ -5,8 +5,9 @@ import os
 
 import pytest
 
+from toonset import write
 from toonset.errors import OutputError
-from toonset.write import check_new_folder, new_folder, write_bytes, write_json
+from toonset.write import check_new_folder, exchange_folders, new_folder, write_bytes, write_json
 
 
 def names(folder):
@@ -78,3 +79,20 @@ def test_a_file_in_the_way_is_refused(tmp_path):
         check_new_folder(tmp_path / "out", force=True)
     with pytest.raises(OutputError, match="is a file, not a folder"):
         check_new_folder(tmp_path / "out" / "deeper")
+
+
+def test_two_folders_change_places(tmp_path, monkeypatch):
+    one, other = tmp_path / "one", tmp_path / "other"
+    for folder in (one, other):
+        folder.mkdir()
+        (folder / folder.name).write_text("")
+    exchange_folders(one, other)
+    assert (one / "other").is_file()
+    monkeypatch.setattr(write, "_exchanged", lambda new, path: False)  # as where no system call is
+    exchange_folders(one, other)
+    assert (one / "one").is_file()
+    assert (other / "other").is_file()
+    assert sorted(place.name for place in tmp_path.iterdir()) == ["one", "other"]
+    with pytest.raises(OutputError):
+        exchange_folders(tmp_path / "nothing", one)
+    assert (one / "one").is_file()

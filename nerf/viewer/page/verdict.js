@@ -40,7 +40,7 @@ export function badge(state, word) {
 }
 
 /**
- * @param {ViewRecord} view
+ * @param {Pick<ViewRecord, "verdict" | "reason">} view
  * @returns {string} why its verdict is what it is
  */
 export function reasonOf(view) {

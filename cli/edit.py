@@ -1,0 +1,105 @@
+"""`toonset edit`: a page on which a person corrects what calibration and palette got wrong."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag
+
+if TYPE_CHECKING:
+    from toonset.cli.editor.session import Session
+
+NO_BODY = "none"
+LOOK_S = 1.0  # between two looks at whether anybody is there
+ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # Ctrl-C, the system, the terminal's window
+
+
+def edit(
+    place: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SHEET|BUNDLE",
+            help="A character sheet, one picture, or a bundle of one.",
+            show_default=False,
+        ),
+    ],
+    mesh: Annotated[
+        Path | None,
+        typer.Option(
+            "--mesh",
+            metavar="FILE",
+            help="Posed mannequin, as `calibrate` takes it; none: no body (default: the bundle's).",
+        ),
+    ] = None,
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--out", help="Bundle folder of a sheet.", rich_help_panel=OUTPUT_PANEL),
+    ] = Path("bundle"),
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
+    ] = True,
+    idle: Annotated[
+        float,
+        typer.Option(
+            "--idle", metavar="MINUTES", min=0.01, help="Stop after so long without a correction."
+        ),
+    ] = 60.0,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Correct a sheet's figures, cameras and palette on a page in the browser.
+
+    A sheet without a bundle is calibrated first. Everything done is kept at once in the bundle's
+    corrections.json, which `calibrate --corrections` and `palette --corrections` take, too; cameras
+    and palette follow within seconds. The bundle's edit.html is the same page without a server.
+    Stop with Ctrl-C.
+    """
+    from toonset.cli.editor.lock import locked
+    from toonset.cli.editor.opening import folder_of, open_session
+    from toonset.cli.editor.server import Server
+
+    printer = Printer(as_json, quiet)
+    folder = folder_of(place, out)
+    body: Any = NO_BODY if str(mesh) == NO_BODY else mesh
+    with Server(folder.resolve().name) as server, locked(folder, server.server_port):
+        session = open_session(place, folder, body, printer.progress)
+        ended = _ended()
+        server.tell_address = lambda address: printer.say(f"for another tab: {address}")
+        thread = server.serve(session)
+        try:
+            printer.result({"url": server.address, "bundle": folder}, server.address)
+            sys.stdout.flush()
+            printer.say(f"{folder}: open that address once; stop with Ctrl-C")
+            if browser:  # a browser in this terminal would not return
+                opening = threading.Thread(target=webbrowser.open, args=(server.address,))
+                opening.daemon = True
+                opening.start()
+            _wait(session, ended, idle)
+        finally:
+            server.shutdown()
+            session.stop()
+            thread.join()
+    printer.say(f"{folder}: everything is kept")
+
+
+def _ended() -> threading.Event:
+    """Return what is set when the process is asked to end."""
+    ended = threading.Event()
+    for name in ENDS:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: ended.set())
+    return ended
+
+
+def _wait(session: Session, ended: threading.Event, idle_minutes: float) -> None:
+    while not ended.wait(LOOK_S):
+        if time.monotonic() - session.acted > 60 * idle_minutes:
+            return

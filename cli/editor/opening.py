@@ -1,0 +1,206 @@
+"""From what a person names, a sheet or a bundle, to a session that corrects it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+from toonset.cli.editor.refit import (
+    BY_HAND,
+    CORRECTIONS,
+    NOTHING,
+    Changed,
+    Subject,
+    cut_sheet,
+    find_palette,
+    make_bundle,
+    put_in_place,
+)
+from toonset.cli.editor.scene import PALETTE
+from toonset.cli.editor.session import Session
+from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
+from toonset.dataset.bundle.calibration_file import read_calibration
+from toonset.dataset.bundle.calibration_schema import CalibrationFile, InputFile
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.split_folder.corrections import parse_corrections
+from toonset.dataset.split_folder.load import Sheet, split_sheet
+from toonset.errors import BundleError, SheetError, ToonsetError
+from toonset.mesh import Mesh
+from toonset.palette.names import hex_of
+from toonset.read import check_there, parse_json, read_whole
+from toonset.view import SHEET
+from toonset.write import check_output
+
+ALL = Changed(cut=True, cameras=True, palette=True)
+MESH = "mesh"  # role of a bundle's input
+BESIDE_MESH = ("points of the mesh", "landmarks", "init")
+MANNEQUIN_MADE = "mannequin"  # option: what a body made by code looks like
+CUT_BY = ("grid", "background", "drop")  # options of `calibrate` that a bundle records
+
+MeshOption = Path | Literal["none"] | None
+
+
+def folder_of(place: Path, out: Path) -> Path:
+    """Return the bundle that is meant: the place itself, or what a sheet becomes.
+
+    Raises:
+        ToonsetError: there is nothing, or several pictures.
+    """
+    check_there([place], "sheet or bundle", SheetError)
+    if not place.is_dir():
+        return out
+    if not (place / CALIBRATION).is_file():
+        raise BundleError(f"{place}: is no bundle; name one, or the sheet, a single picture")
+    return place
+
+
+def open_session(
+    place: Path, folder: Path, mesh: MeshOption, tell: Callable[[str], None]
+) -> Session:
+    """Return the session; a sheet, or corrections that no bundle follows yet, are fitted first.
+
+    Raises:
+        ToonsetError: the bundle's sheet is not to be found, or the sheet cannot be calibrated.
+    """
+
+    def progress(step: str, share: float) -> None:
+        tell(f"{step} {share:.0%}" if share else step)
+
+    if not (folder / CALIBRATION).is_file():
+        check_output(folder, [place], WRITTEN, force=False)
+        subject = Subject(place, load_mesh(mesh) if isinstance(mesh, Path) else mesh, folder)
+        sheet, new = make_bundle(subject, NOTHING, ALL, None, progress)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        if folder.is_dir():
+            folder.rmdir()  # it is empty
+        os.replace(new, folder)
+        shutil.rmtree(subject.workshop, ignore_errors=True)
+        return Session(subject, sheet, NOTHING, NOTHING, tell)
+    found = read_calibration(folder / CALIBRATION)
+    subject = _subject(place, folder, mesh, found)
+    data = _corrections_file(folder)
+    if data is None and _has_body(found, subject):
+        sheet, corrections = _as_it_was_cut(subject, found)
+        return _session(subject, sheet, corrections, tell)
+    corrections = NOTHING if data is None else parse_json(data, CORRECTIONS, SheetError)
+    if data is not None and _recorded(found, BY_HAND, data) and _has_body(found, subject):
+        sheet, _ = cut_sheet(subject.sheet, corrections, subject.workshop)
+        shutil.rmtree(subject.workshop, ignore_errors=True)
+        return _session(subject, sheet, corrections, tell)
+    fitted = corrections
+    try:
+        sheet, new = make_bundle(subject, fitted, ALL, None, progress)
+    except ToonsetError:
+        if corrections == NOTHING:
+            raise
+        fitted = NOTHING  # the page says what is wrong with them
+        sheet, new = make_bundle(subject, fitted, ALL, None, progress)
+    put_in_place(new, subject, corrections)
+    return Session(subject, sheet, fitted, corrections, tell)
+
+
+def _session(
+    subject: Subject, sheet: Sheet, corrections: dict[str, Any], tell: Callable[[str], None]
+) -> Session:
+    """Return the session of a bundle that follows its corrections; its palette is found now."""
+    if not (subject.folder / PALETTE).is_file():
+        find_palette(subject.folder, corrections)
+    return Session(subject, sheet, corrections, corrections, tell)
+
+
+def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile) -> Subject:
+    """Return what a bundle was made of."""
+    sheets = [one for one in found.inputs if one.role not in (MESH, BY_HAND, *BESIDE_MESH)]
+    if len(sheets) != 1 or sheets[0].role != SHEET:
+        raise BundleError(
+            f"{folder}: was made of {len(sheets)} files; name the one sheet, with another -o"
+        )
+    sheet = _found(sheets[0], folder, place)
+    if sheet is None:
+        raise BundleError(
+            f"{folder}: was made of {sheets[0].name}, which is not beside it; run `toonset edit "
+            f"{sheets[0].name} -o {folder}` with that file's place"
+        )
+    if mesh is not None:
+        return Subject(sheet, load_mesh(mesh) if isinstance(mesh, Path) else mesh, folder)
+    record = next((one for one in found.inputs if one.role == MESH), None)
+    if record is None:
+        return Subject(sheet, None if MANNEQUIN_MADE in found.options else "none", folder)
+    file = _found(record, folder, place)
+    if file is None:
+        raise BundleError(
+            f"{folder}: was made with {record.name}, which is not beside it; give it: --mesh FILE"
+        )
+    return Subject(sheet, load_mesh(file), folder)
+
+
+def _found(record: InputFile, folder: Path, place: Path) -> Path | None:
+    """Return a file that a bundle was made of: the one named, or one near it with its content."""
+    if record.role == SHEET and place.is_file():
+        if _sha256(place) != record.sha256:
+            raise BundleError(
+                f"{folder}: was made of another sheet, {record.name}; choose another -o"
+            )
+        return place
+    near = dict.fromkeys([folder.resolve().parent, Path.cwd(), place.resolve().parent])
+    for here in (*near, *(child for one in near for child in sorted(one.glob("*/")))):
+        file = here / record.name
+        if file.is_file() and _sha256(file) == record.sha256:
+            return file
+    return None
+
+
+def _has_body(found: CalibrationFile, subject: Subject) -> bool:
+    """Return whether a bundle was made with this body."""
+    record = next((one for one in found.inputs if one.role == MESH), None)
+    if isinstance(subject.body, Mesh):
+        return record is not None and record.sha256 == subject.body.sha256
+    made = MANNEQUIN_MADE in found.options
+    return record is None and (subject.body is None or not made)
+
+
+def _recorded(found: CalibrationFile, role: str, data: bytes) -> bool:
+    digest = sha256(data).hexdigest()
+    return any(one.role == role and one.sha256 == digest for one in found.inputs)
+
+
+def _corrections_file(folder: Path) -> bytes | None:
+    file = folder / CORRECTIONS
+    if not file.is_file():
+        return None
+    data = read_whole(file, "corrections", SheetError)
+    parse_corrections(data, str(file))
+    return data
+
+
+def _as_it_was_cut(subject: Subject, found: CalibrationFile) -> tuple[Sheet, dict[str, Any]]:
+    """Return the drawings of a bundle without corrections, and its options as corrections."""
+    options = {name: found.options[name] for name in CUT_BY if found.options.get(name)}
+    sheet = split_sheet(subject.sheet, **options)
+    if len(sheet.views) != len(found.views) or found.options.get("boxes"):
+        raise BundleError(
+            f"{subject.folder}: its sheet was cut by a file of boxes; run `toonset edit "
+            f"{subject.sheet}` with another -o, and draw them"
+        )
+    words = (found.options.get("views") or "").split(",")
+    labels = [word.strip() for word in words] if any(words) else []
+    corrections = dict(NOTHING)
+    boxes = [list(view.figure_box) for view in sheet.views]
+    if "background" in options:
+        corrections["background"] = hex_of(sheet.split.sources[0].background or (255, 255, 255))
+    if options.keys() & {"grid", "drop"}:
+        corrections["boxes"] = boxes
+    said = [
+        {"box": box, "label": label}
+        for box, label in zip(boxes, labels, strict=False)
+        if label and label != "?"
+    ]
+    return sheet, corrections | ({"views": said} if said else {})
+
+
+def _sha256(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,211 @@
+"""A bundle made again from its sheet and corrections, as the command line would make it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+from toonset.calib.calibrate import calibrate
+from toonset.calib.hints import Hints
+from toonset.calib.write_bundle import write_bundle
+from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, LABELS, TONES
+from toonset.dataset.bundle.palette_files import write_labelled
+from toonset.dataset.split_folder.corrected import Given
+from toonset.dataset.split_folder.corrections import parse_corrections
+from toonset.dataset.split_folder.load import Sheet, split_sheet
+from toonset.dataset.split_folder.pictures import load_pictures
+from toonset.json_file import read_json
+from toonset.mesh import Mesh
+from toonset.palette.corrected import corrected
+from toonset.palette.corrections import PaletteCorrections
+from toonset.palette.extract import choose_palette, options_of
+from toonset.palette.palette import MAX_COLORS
+from toonset.palette.pixels.ink_lines import find_contours
+from toonset.view import SHEET, InputFile, Origin
+from toonset.write import exchange_folders, write_bytes, write_json
+
+CORRECTIONS = "corrections.json"
+NOTHING: dict[str, Any] = {"version": 1}
+LEAST_SHARE = 0.05  # of a paint, as `palette` has it
+BY_HAND = "corrections"  # the file's role among a bundle's inputs
+RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
+CUT, CAMERAS, PALETTE = ("background", "boxes"), "views", "palette"
+
+Body = Mesh | Literal["none"] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What is corrected.
+
+    Attributes:
+        sheet: the picture.
+        body: the mannequin, as `calibrate` takes it.
+        folder: the bundle.
+    """
+
+    sheet: Path
+    body: Body
+    folder: Path
+
+    @property
+    def workshop(self) -> Path:
+        """Return where the next bundle is made, beside this one: a later start clears it up."""
+        return self.folder.parent / f".{self.folder.name}.edit"
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What has to be found again.
+
+    Attributes:
+        cut: the drawings, and all that follows.
+        cameras: of the same drawings.
+        palette: of the drawings.
+    """
+
+    cut: bool
+    cameras: bool
+    palette: bool
+
+
+def parts_changed(before: dict[str, Any], after: dict[str, Any]) -> Changed:
+    """Return what corrections change that others did not."""
+
+    def cut(said: dict[str, Any]) -> list[Any]:
+        left = [view["box"] for view in said.get(CAMERAS, ()) if view.get("exclude")]
+        return [*(said.get(key) for key in CUT), left]
+
+    is_cut = cut(before) != cut(after)
+    seen = is_cut or before.get(CAMERAS) != after.get(CAMERAS)
+    return Changed(is_cut, seen, is_cut or before.get(PALETTE) != after.get(PALETTE))
+
+
+def file_of(corrections: dict[str, Any]) -> bytes:
+    """Return corrections.json."""
+    return (json.dumps(corrections, indent=1) + "\n").encode()
+
+
+def cut_sheet(
+    sheet: Path, corrections: dict[str, Any], workshop: Path
+) -> tuple[Sheet, Path | None]:
+    """Return the drawings as corrected, and the file that says how; None where nothing is."""
+    if corrections == NOTHING:
+        return split_sheet(sheet), None
+    file = workshop / CORRECTIONS
+    write_bytes(file, file_of(corrections))
+    return split_sheet(sheet, corrections=file), file
+
+
+def _said_anew(sheet: Sheet, file: Path) -> Sheet:
+    """Return drawings that stay as they are cut, labelled as a file of corrections says."""
+    files = (*(one for one in sheet.files if one.role != BY_HAND), InputFile.of(BY_HAND, file))
+    origin = Origin(files, sheet.options)
+    views = tuple(
+        replace(view, label="" if said is None else said.label, origin=origin)
+        for view, said in zip(sheet.views, Given.of(file).of_views(sheet.views), strict=True)
+    )
+    return replace(sheet, split=replace(sheet.split, views=views), files=files)
+
+
+def make_bundle(
+    subject: Subject,
+    corrections: dict[str, Any],
+    changed: Changed,
+    before: Sheet | None = None,
+    progress: Callable[[str, float], None] = lambda step, share: None,
+) -> tuple[Sheet, Path]:
+    """Return the drawings, and a new bundle of them in the workshop.
+
+    What is not made again goes along: corrections and page, and the palette of drawings that are
+    still the same.
+
+    Args:
+        subject: what is corrected.
+        corrections: what a person said.
+        changed: what that changes.
+        before: the drawings, where they are cut already; None: cut them.
+        progress: told which step is how far.
+
+    Raises:
+        ToonsetError: the corrections do not fit the sheet, or nothing can be found in it.
+    """
+    new, old = subject.workshop / subject.folder.name, subject.folder
+    shutil.rmtree(subject.workshop, ignore_errors=True)
+    if before is None or before.options or changed.cut:
+        sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
+    else:
+        file = subject.workshop / CORRECTIONS
+        write_bytes(file, file_of(corrections))
+        sheet = _said_anew(before, file)
+    hints = Hints(corrections=file)
+    found = calibrate(sheet.views, subject.body, hints, progress=progress)
+    write_bundle(new, found)
+    if old.is_dir():
+        _take_along(old, new)
+    if changed.palette:
+        find_palette(new, corrections)
+    return sheet, new
+
+
+def put_in_place(new: Path, subject: Subject, corrections: dict[str, Any]) -> None:
+    """Let a new bundle take the old one's place, with the newest corrections."""
+    old = subject.folder
+    write_bytes(new / CORRECTIONS, file_of(corrections))
+    exchange_folders(new, old)
+    if (new / RUN).is_dir():
+        os.replace(new / RUN, old / RUN)
+    shutil.rmtree(subject.workshop, ignore_errors=True)
+
+
+def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
+    """Find the palette of a bundle's drawings, as corrected, and write it with its maps.
+
+    Raises:
+        ToonsetError: the corrections speak of colours that the drawings do not have.
+    """
+    given = Given(Path(CORRECTIONS), parse_corrections(file_of(corrections), CORRECTIONS))
+    wanted = given.content.palette
+    drawn = load_pictures([folder])
+    contours = find_contours(drawn.pictures)
+    options = options_of(LEAST_SHARE, MAX_COLORS, ",".join(wanted.keep))
+    found = choose_palette(drawn.pictures, contours, options)
+    maps = None
+    if wanted != PaletteCorrections():
+        strokes, _ = given.strokes_on(drawn.pictures, drawn.places)
+        found, maps = corrected(
+            drawn.pictures, contours, found, wanted, strokes, where=CORRECTIONS, space="rgb"
+        )
+    found = replace(found, title=found.title or drawn.title)
+    write_labelled(folder, found, drawn.names, drawn.pictures, contours, "rgb", maps)
+
+
+def note_corrections(folder: Path, corrections: dict[str, Any]) -> None:
+    """Let a bundle say that it follows these corrections: they change nothing of its cameras.
+
+    Its calibration.json is then what `calibrate --corrections` writes.
+    """
+    content = read_json(folder / CALIBRATION)
+    others = [one for one in content["inputs"] if one["role"] != BY_HAND]
+    after = 1 + max(i for i, one in enumerate(others) if one["role"] == SHEET)
+    digest = sha256(file_of(corrections)).hexdigest()
+    record = {"name": CORRECTIONS, "sha256": digest, "role": BY_HAND}
+    content["inputs"] = [*others[:after], record, *others[after:]]
+    write_json(folder / CALIBRATION, content)
+
+
+def _take_along(old: Path, new: Path) -> None:
+    for entry in old.iterdir():
+        target = new / entry.name
+        if entry.name in (RUN, CALIBRATION) or target.exists():
+            continue
+        if entry.is_dir() and entry.name in (LABELS, TONES, CONTOURS):
+            shutil.copytree(entry, target)
+        elif entry.is_file():
+            shutil.copy2(entry, target)

@@ -1,0 +1,244 @@
+"""A palette and its label maps as a person corrected them.
+
+Every colour that was found has colours that it becomes: itself; the one that it is merged into;
+those that it is split into; all that are left, if it is dropped. A pixel that was labelled with it
+gets the nearest of them, so no other pixel changes. Shares and tones go the same way. Labels are
+numbered anew, since colours stand by their share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Int, UInt8
+
+from toonset.errors import PaletteError
+from toonset.palette.corrections import PaletteCorrections, Stroke
+from toonset.palette.extract import IN_LIGHT, LINE, PaintMap, in_light, maps_in_light
+from toonset.palette.formats.hex import rgb_of_hex
+from toonset.palette.names import RGB, hex_of, name_of
+from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
+from toonset.palette.pixels.antialias import OPAQUE
+from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
+from toonset.palette.pixels.shadow import shaded
+
+Picture = UInt8[np.ndarray, "height width 4"]
+Map = UInt8[np.ndarray, "height width"]
+
+NEAR_LEVELS = 6  # in every channel: a palette that is found anew can differ by that much
+BY_HAND = "; corrected by hand"  # of a palette's rule
+FRACTION_BITS = 4  # of a pixel, in which strokes are drawn
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """What becomes of every colour.
+
+    Attributes:
+        old: colours as found.
+        becomes: per old colour, what its pixels may become.
+        final: all that they become.
+        where: the file and "palette", for messages.
+    """
+
+    old: tuple[RGB, ...]
+    becomes: tuple[tuple[RGB, ...], ...]
+    final: tuple[RGB, ...]
+    where: str
+
+    def number(self, text: str, key: str) -> int:
+        """Return which of the final colours is meant; one that was merged is where it went."""
+        meant = [(rgb, rgb) for rgb in self.final]
+        meant += [(o, to[0]) for o, to in zip(self.old, self.becomes, strict=True) if len(to) == 1]
+        found = meant[_nearest([rgb for rgb, _ in meant], text, f"{self.where}.{key}")]
+        return self.final.index(found[1])
+
+
+def corrected(
+    pictures: Sequence[Picture],
+    contours: Sequence[Map],
+    found: Palette,
+    wanted: PaletteCorrections,
+    strokes: Sequence[Sequence[tuple[int, Stroke]]] = (),
+    *,
+    where: str = "corrections",
+    space: Space = "rgb",
+) -> tuple[Palette, list[PaintMap]]:
+    """Return a palette as corrected, and labels and tones of its pictures.
+
+    `keep` is not looked at: it says how a palette is found (`PaletteOptions`).
+
+    Args:
+        pictures: sRGB with straight alpha.
+        contours: how far drawn lines cover their pixels, of 255.
+        found: the palette of these pictures.
+        wanted: what a person corrects of it.
+        strokes: of the label brush on every picture, with their number in the file, in its own
+            pixels; empty for none.
+        where: the file, for messages.
+        space: in which nearest is meant.
+
+    Raises:
+        PaletteError: a colour that the palette does not have, two corrections of one colour, or
+            none is left; the message names file and key.
+    """
+    lit, dark = in_light(pictures, contours, found.shadow)
+    maps = maps_in_light(lit, dark, contours, found, space)
+    plan = _plan(found, wanted, f"{where}: palette")
+    moved = [_moved(one.labels, light, plan, space) for one, light in zip(maps, lit, strict=True)]
+    labels = [own for own, _ in moved]
+    colors = _colors(found, plan, np.sum([counts for _, counts in moved], axis=0))
+    names = {plan.number(color, f"names.{color}"): name for color, name in wanted.names.items()}
+    colors = [replace(one, name=names.get(i, one.name)) for i, one in enumerate(colors)]
+    ink, is_paint = _ink(found, plan)
+    for number, (own, contour) in enumerate(zip(labels, contours, strict=True)):
+        free = (pictures[number][..., 3] >= OPAQUE) & (contour < LINE)
+        for at, stroke in strokes[number] if strokes else ():
+            color = plan.number(stroke.color, f"strokes.{at}.color")
+            own[_covered(stroke, own.shape) & free] = color
+        if not is_paint:
+            own[contour >= LINE] = UNLABELLED
+    order = sorted(range(len(colors)), key=lambda i: -colors[i].share)
+    anew = np.full(256, UNLABELLED, dtype=np.uint8)
+    anew[order] = np.arange(len(order))
+    palette = replace(
+        found,
+        colors=tuple(colors[i] for i in order),
+        rule=found.rule.removesuffix(BY_HAND) + BY_HAND,
+        contour=ink,
+        features=tuple(rgb for rgb in found.features if rgb in plan.final),
+    )
+    pairs = zip(maps, labels, strict=True)
+    return palette, [_with_tones(before, anew[own]) for before, own in pairs]
+
+
+def _plan(found: Palette, wanted: PaletteCorrections, where: str) -> _Plan:
+    """Return what becomes of every colour; `where` is the file and "palette"."""
+    old = tuple(color.rgb for color in found.colors)
+    gone: dict[int, str] = {}
+    becomes: dict[int, tuple[RGB, ...]] = {i: (rgb,) for i, rgb in enumerate(old)}
+
+    def take(text: str, key: str) -> int:
+        number = _nearest(old, text, f"{where}.{key}")
+        if number in gone:
+            raise PaletteError(
+                f"{where}.{key}: {text} goes elsewhere by {gone[number]}, too; remove one"
+            )
+        gone[number] = key
+        return number
+
+    dropped = [take(text, f"drop.{i}") for i, text in enumerate(wanted.drop)]
+    for i, one in enumerate(wanted.split):
+        into = tuple(dict.fromkeys(rgb_of_hex(text, "split") for text in one.into))
+        becomes[take(one.color, f"split.{i}.color")] = into
+    for i, group in enumerate(wanted.merge):
+        for j, text in enumerate(group[1:], start=1):
+            number = take(text, f"merge.{i}.{j}")
+            becomes[number] = (old[_nearest(old, group[0], f"{where}.merge.{i}.0")],)
+    for i, group in enumerate(wanted.merge):
+        stays = _nearest(old, group[0], f"{where}.merge.{i}.0")
+        if stays in gone:
+            raise PaletteError(
+                f"{where}.merge.{i}.0: {group[0]} is to stay, but goes elsewhere by {gone[stays]}; "
+                "remove one"
+            )
+    left = tuple(dict.fromkeys(rgb for i in becomes if i not in dropped for rgb in becomes[i]))
+    if not left:
+        raise PaletteError(f"{where}.drop: leaves no colour; keep at least one")
+    for number in dropped:
+        becomes[number] = left
+    return _Plan(old, tuple(becomes.values()), left, where)
+
+
+def _nearest(colors: Sequence[RGB], text: str, key: str) -> int:
+    """Return which colour is meant.
+
+    Raises:
+        PaletteError: none is within `NEAR_LEVELS`.
+    """
+    wanted = np.array(rgb_of_hex(text, key))
+    off = np.abs(np.array(colors) - wanted).max(axis=1)
+    best = int(off.argmin())
+    if off[best] > NEAR_LEVELS:
+        raise PaletteError(
+            f"{key}: {text} is no colour of the palette; the nearest is {hex_of(colors[best])}: "
+            "correct it"
+        )
+    return best
+
+
+def _moved(
+    labels: Map, picture: Picture, plan: _Plan, space: Space
+) -> tuple[Map, Int[np.ndarray, "old final"]]:
+    """Return labels by final colours, and how many pixels of each colour went where."""
+    moved = np.full_like(labels, UNLABELLED)
+    counts = np.zeros((len(plan.old), len(plan.final)), dtype=np.int64)
+    for number, targets in enumerate(plan.becomes):
+        own = labels == number
+        at = np.array([plan.final.index(rgb) for rgb in targets], dtype=np.uint8)
+        pick = nearest_colors(picture[own][:, :3], np.array(targets, dtype=np.uint8), space=space)
+        moved[own] = at[pick]
+        counts[number] = np.bincount(at[pick], minlength=len(plan.final))
+    return moved, counts
+
+
+def _colors(
+    found: Palette, plan: _Plan, pixels: Int[np.ndarray, "old final"]
+) -> list[PaletteColor]:
+    """Return the final colours, what they are made of moved to them; others as they were."""
+    parts = pixels / np.maximum(pixels.sum(axis=1, keepdims=True), 1)
+    for number, targets in enumerate(plan.becomes):
+        if not pixels[number].any():
+            parts[number, plan.final.index(targets[0])] = 1
+    total = np.array([color.share for color in found.colors]) @ parts
+    dark = np.array([sum(tone.share for tone in color.tones[1:]) for color in found.colors]) @ parts
+    colors = []
+    for number, rgb in enumerate(plan.final):
+        same = plan.old.index(rgb) if rgb in plan.old else None
+        if same is not None and parts[same, number] == 1 and parts[:, number].sum() == 1:
+            colors.append(found.colors[same])
+            continue
+        name = name_of(rgb) if same is None else found.colors[same].name
+        share, in_shadow = float(total[number]), float(dark[number])
+        tones: tuple[Tone, ...] = ()
+        if found.shadow is not None:
+            red, green, blue = shaded(np.array(rgb), found.shadow.factor).tolist()
+            both = Tone(rgb, share - in_shadow), Tone((red, green, blue), in_shadow)
+            tones = both if in_shadow > 0 else both[:1]
+        colors.append(PaletteColor(rgb, share, name, tones))
+    return colors
+
+
+def _ink(found: Palette, plan: _Plan) -> tuple[ContourColor | None, bool]:
+    """Return the lines' colour, and False if it was a paint and is none: lines have no label."""
+    ink = found.contour
+    if ink is None or ink.rgb not in plan.old:
+        return ink, True
+    targets = plan.becomes[plan.old.index(ink.rgb)]
+    if len(targets) == 1 and targets[0] != ink.rgb:
+        return replace(ink, rgb=targets[0], name=name_of(targets[0])), True
+    return ink, ink.rgb in plan.final
+
+
+def _covered(stroke: Stroke, shape: tuple[int, ...]) -> Bool[np.ndarray, "height width"]:
+    """Return which pixels of a picture a stroke covers."""
+    mask = np.zeros(shape, dtype=np.uint8)
+    unit = 1 << FRACTION_BITS
+    points = np.rint((np.array(stroke.points) - 0.5) * unit).astype(np.int32)
+    thick = max(1, round(2 * stroke.radius))
+    cv2.polylines(mask, [points], False, 1, thick, shift=FRACTION_BITS)
+    for x, y in points[[0, -1]].tolist():
+        cv2.circle(mask, (x, y), round(stroke.radius * unit), 1, cv2.FILLED, shift=FRACTION_BITS)
+    return mask > 0
+
+
+def _with_tones(before: PaintMap, labels: Map) -> PaintMap:
+    """Return labels with their tones; what had no paint before lies in light."""
+    if before.tones is None:
+        return PaintMap(labels, None)
+    tones = np.where(before.tones == UNLABELLED, IN_LIGHT, before.tones)
+    tones[labels == UNLABELLED] = UNLABELLED
+    return PaintMap(labels, tones.astype(np.uint8))

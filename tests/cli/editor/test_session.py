@@ -1,0 +1,271 @@
+"""A bundle that is corrected: what is kept, what is fitted, what is left when all ends at once."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from toonset.cli.editor import opening
+from toonset.cli.editor import session as session_module
+from toonset.cli.editor.lock import locked
+from toonset.cli.editor.opening import folder_of, open_session
+from toonset.cli.editor.refit import CORRECTIONS, Changed, parts_changed
+from toonset.cli.editor.scene import PALETTE
+from toonset.cli.editor.session import Session, StaleError
+from toonset.dataset.bundle.bundle import read_bundle
+from toonset.dataset.bundle.check import bundle_problems
+from toonset.errors import BundleError, SheetError, ToonsetError
+
+Command = Any
+Outcome = Any
+
+
+@pytest.fixture
+def bundle(drawn: Path, calibrated: tuple[Path, Outcome], tmp_path: Path) -> Path:
+    """Return a bundle of five views beside its sheet and mannequin."""
+    for name in ("sheet.png", "mannequin.obj"):
+        shutil.copy(drawn / name, tmp_path / name)
+    return Path(shutil.copytree(calibrated[0], tmp_path / "bundle"))
+
+
+@pytest.fixture
+def session(bundle: Path) -> Iterator[Session]:
+    found = open_session(bundle, bundle, None, lambda text: None)
+    yield found
+    found.stop()
+
+
+def settled(session: Session) -> dict[str, Any]:
+    """Return the state once everything that was said is fitted."""
+    state = session.state()
+    while state["busy"]:
+        state = session.state(after=state["number"], wait_s=60)
+    return state
+
+
+def yaw_of(session: Session, number: int) -> float:
+    return session.scene["views"][number]["yaw"]
+
+
+def test_a_correction_is_kept_at_once_and_fitted_soon(session: Session, bundle: Path) -> None:
+    before = settled(session)
+    assert len(before["scene"]["views"]) == 5
+    assert before["scene"]["palette"]["colors"]
+    (bundle / "run").mkdir()
+    (bundle / "run" / "config.json").write_text("{}")
+    box = session.scene["views"][1]["box"]
+    said = {"version": 1, "views": [{"box": box, "exclude": True}]}
+    assert session.save(said, 0) == 1
+    assert json.loads((bundle / CORRECTIONS).read_bytes()) == said
+    state = settled(session)
+    assert state["error"] == ""
+    assert len(state["scene"]["views"]) == 4
+    assert len(read_bundle(bundle).scene.frames) == 4
+    assert (bundle / "run" / "config.json").read_text() == "{}"  # a trained field stays
+    assert json.loads((bundle / CORRECTIONS).read_bytes()) == said
+    assert sorted(place.name for place in bundle.parent.iterdir()) == [
+        "bundle",
+        "mannequin.obj",
+        "sheet.png",
+    ]
+    page = (bundle / "edit.html").read_text(encoding="utf-8")
+    assert "exclude" in page
+
+
+def test_the_command_line_makes_the_same_of_it(
+    session: Session, bundle: Path, toonset: Command
+) -> None:
+    view = session.scene["views"][2]
+    yaw = (view["yaw"] + 180) % 360
+    said = {"version": 1, "views": [{"box": view["box"], "label": str(yaw), "lock": True}]}
+    session.save(said, 0)
+    assert settled(session)["error"] == ""
+    off = abs((yaw_of(session, 2) - yaw + 180) % 360 - 180)
+    assert off < 1
+    other = bundle.parent / "other"
+    arguments = ("--corrections", bundle / CORRECTIONS, "--mesh", bundle.parent / "mannequin.obj")
+    done = toonset("calibrate", bundle.parent / "sheet.png", *arguments, "-o", other, "-q")
+    assert done.code in (0, 3)
+    for name in ("calibration.json", "transforms.json", "mannequin.obj"):
+        assert (other / name).read_bytes() == (bundle / name).read_bytes(), name
+
+
+def test_only_what_is_touched_is_found_again(
+    session: Session, bundle: Path, toonset: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: Any) -> Any:
+        raise AssertionError("cameras were not touched")
+
+    monkeypatch.setattr(session_module, "make_bundle", refuse)
+    cameras = (bundle / "transforms.json").read_bytes()
+    color = session.scene["palette"]["colors"][0]["color"]
+    session.save({"version": 1, "palette": {"names": {color: "coat"}}}, 0)
+    state = settled(session)
+    assert state["error"] == ""
+    assert state["scene"]["palette"]["colors"][0]["name"] == "coat"
+    assert json.loads((bundle / PALETTE).read_bytes())["colors"][0]["name"] == "coat"
+    assert (bundle / "transforms.json").read_bytes() == cameras
+    session.stop()
+    monkeypatch.setattr(opening, "make_bundle", refuse)  # it is known to be fitted
+    again = open_session(bundle, bundle, None, lambda text: None)
+    again.stop()
+    assert again.fitted == again.corrections
+    arguments = ("--corrections", bundle / CORRECTIONS, "--mesh", bundle.parent / "mannequin.obj")
+    other = bundle.parent / "other"
+    toonset("calibrate", bundle.parent / "sheet.png", *arguments, "-o", other, "-q")
+    toonset("palette", other, "--corrections", bundle / CORRECTIONS, "-q")
+    for name in ("calibration.json", "palette.json", "labels/000.png"):
+        assert (other / name).read_bytes() == (bundle / name).read_bytes(), name
+
+
+def test_what_cannot_be_fitted_is_said_and_undone(session: Session, bundle: Path) -> None:
+    before = (bundle / "calibration.json").read_bytes()
+    session.save({"version": 1, "boxes": [[0, 0, 9, 9]]}, 0)
+    state = settled(session)
+    assert "background only" in state["error"]
+    assert (bundle / "calibration.json").read_bytes() == before
+    session.save({"version": 1}, 1)
+    assert settled(session)["error"] == ""
+    assert bundle_problems(bundle) == []
+
+
+def test_a_newer_correction_takes_the_place_of_one_that_waits(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began, go_on, fitted = threading.Event(), threading.Event(), []
+
+    def slow(*arguments: Any) -> Any:
+        fitted.append(arguments[1])
+        began.set()
+        assert go_on.wait(20)
+        raise SheetError("not today")
+
+    monkeypatch.setattr(session_module, "make_bundle", slow)
+    said = [{"version": 1, "background": f"#00000{i}"} for i in range(4)]
+    session.save(said[0], 0)
+    assert began.wait(20)
+    for revision, one in enumerate(said[1:], 1):
+        session.save(one, revision)  # at once, while it fits
+    go_on.set()
+    settled(session)
+    assert fitted == [said[0], said[3]]
+
+
+def test_a_tab_that_is_behind_is_told(session: Session, bundle: Path) -> None:
+    session.save({"version": 1, "background": "#ffffff"}, 0)
+    with pytest.raises(StaleError):
+        session.save({"version": 1}, 0)
+    with pytest.raises(SheetError):
+        session.save({"version": 1, "boxen": []}, 1)
+    assert json.loads((bundle / CORRECTIONS).read_bytes())["background"] == "#ffffff"
+
+
+def test_parts_that_change() -> None:
+    view = {"box": [1, 2, 3, 4]}
+    nothing: dict[str, Any] = {"version": 1}
+    assert parts_changed(nothing, {"version": 1, "sheet": {}}) == Changed(False, False, False)
+    said = nothing | {"views": [view | {"label": "front"}]}
+    assert parts_changed(nothing, said) == Changed(False, True, False)
+    assert parts_changed(nothing, {"views": [view | {"exclude": True}]}) == Changed(
+        True, True, True
+    )
+    assert parts_changed(said, said | {"palette": {"drop": []}}) == Changed(False, False, True)
+
+
+def test_what_is_no_bundle_is_refused(bundle: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(BundleError, match="is no bundle"):
+        folder_of(tmp_path / "empty", tmp_path / "out")
+    with pytest.raises(ToonsetError, match="no such file"):
+        folder_of(tmp_path / "nothing", tmp_path / "out")
+    (tmp_path / "sheet.png").rename(tmp_path / "moved.png")
+    with pytest.raises(BundleError, match=r"made of sheet\.png, which is not beside it"):
+        open_session(bundle, bundle, None, lambda text: None)
+    other = tmp_path / "other.png"
+    other.write_bytes(b"other")
+    with pytest.raises(BundleError, match=r"made of another sheet, sheet\.png"):
+        open_session(other, bundle, None, lambda text: None)
+
+
+def test_a_lock_that_was_left_behind_is_taken(tmp_path: Path) -> None:
+    file = tmp_path / ".bundle.edit.lock"
+    for left in ('{"pid": 999999999, "port": 1}', f'{{"pid": {os.getpid()}, "port": 1}}', "?"):
+        file.write_text(left)
+        with locked(tmp_path / "bundle", 5):
+            assert json.loads(file.read_text())["port"] == 5
+        assert not file.exists()
+
+
+class Editing:
+    """`toonset edit` as a process, and what asks its server."""
+
+    def __init__(self, bundle: Path) -> None:
+        command = [sys.executable, "-m", "toonset", "edit", bundle.name, "--no-browser", "--json"]
+        self.process = subprocess.Popen(
+            command, cwd=bundle.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        assert line, self.process.communicate()
+        self.origin, _, key = json.loads(line)["url"].partition("/#")
+        self.token = ""
+        self.token = self.ask("/api/open", {"key": key})["token"]
+
+    def ask(self, path: str, body: Any = None) -> Any:
+        connection = HTTPConnection(self.origin.removeprefix("http://"), timeout=60)
+        headers = {"X-Toonset-Token": self.token}
+        if body is None:
+            connection.request("GET", path, headers=headers)
+        else:
+            headers |= {"Content-Type": "application/json", "Origin": self.origin}
+            connection.request("POST", path, json.dumps(body), headers)
+        answer = connection.getresponse()
+        assert answer.status == 200, answer.read()
+        return json.loads(answer.read())
+
+    def settled(self) -> Any:
+        state = self.ask("/api/state?after=-1&scene=-1")
+        while state["busy"]:
+            state |= self.ask(f"/api/state?after={state['number']}&scene=-1")
+        return state
+
+    def end(self, sign: signal.Signals) -> int:
+        self.process.send_signal(sign)
+        self.process.communicate(timeout=60)
+        return self.process.returncode
+
+
+def test_a_kill_loses_nothing_that_was_answered(bundle: Path, shell: Command) -> None:
+    editing = Editing(bundle)
+    refused = shell("edit", bundle, "--no-browser")
+    assert f"is being edited by process {editing.process.pid}" in refused.reason
+    box = editing.settled()["scene"]["views"][0]["box"]
+    said = {"version": 1, "views": [{"box": box, "exclude": True}]}
+    editing.ask("/api/corrections", {"revision": 0, "corrections": said})
+    assert editing.end(signal.SIGKILL) == -signal.SIGKILL  # while it fits
+    assert json.loads((bundle / CORRECTIONS).read_bytes()) == said
+    assert bundle_problems(bundle) == []  # the older one, whole
+    again = Editing(bundle)
+    state = again.settled()
+    assert state["corrections"] == said
+    assert len(state["scene"]["views"]) == 4
+    assert again.end(signal.SIGINT) == 0
+    left = {".bundle.edit", ".bundle.edit.lock"} & {one.name for one in bundle.parent.iterdir()}
+    assert not left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGHUP])
+def test_it_ends_with_its_terminal(bundle: Path, sign: signal.Signals) -> None:
+    assert Editing(bundle).end(sign) == 0
