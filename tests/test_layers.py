@@ -24,7 +24,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@names pixels",
         "@corrections @swatch_image formats paints",
         "@extract",
-        "@corrected @recolor",
+        "@corrected @coverage @recolor",
     ),
     "dataset": (
         "images split.figures",
