@@ -249,9 +249,9 @@ def test_a_wrong_lock_that_hides_in_another_number_is_not_ok():
         for yaw, up, roll in [camera.angles]
     )
     wrong = find_cameras(views, turnaround.mesh, known=Known(cameras=tilted, locked=elevation))
-    assert not any("--lock" in view.reason for view in right.views)
+    assert not any("without the lock" in view.reason for view in right.views)
     assert all(view.verdict != "ok" for view in wrong.views)
-    assert any("--lock" in view.reason for view in wrong.views)
+    assert any("without the lock" in view.reason for view in wrong.views)
 
 
 def test_a_label_that_the_drawing_contradicts_is_said():

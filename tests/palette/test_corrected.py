@@ -143,18 +143,19 @@ def test_a_colour_a_few_levels_off_is_meant(sheet):
     ],
 )
 def test_what_cannot_be_done_names_file_and_key(wanted, words, sheet):
-    hexes = dict(zip("ABCDEFGH", [hex_of(color.rgb) for color in sheet[2].colors], strict=False))
+    pictures, contours, found, _ = sheet
+    hexes = dict(zip("ABCDEFGH", [hex_of(color.rgb) for color in found.colors], strict=False))
 
     def named(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(named(one) for one in value)
         return hexes.get(value, value) if isinstance(value, str) else value
 
-    filled = {key: named(value) for key, value in wanted.items()}
+    filled: dict[str, Any] = {key: named(value) for key, value in wanted.items()}
     if "leaves no colour" in words:
         filled = {"drop": tuple(hexes.values())}
     with pytest.raises(PaletteError) as refused:
-        corrected(*sheet[:3], PaletteCorrections(**filled), where="file.json")
+        corrected(pictures, contours, found, PaletteCorrections(**filled), where="file.json")
     assert str(refused.value).startswith("file.json: ")
     assert words in str(refused.value)
 
