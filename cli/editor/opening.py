@@ -170,16 +170,17 @@ def _recorded(found: CalibrationFile, role: str, data: bytes) -> bool:
 
 def _corrections_file(folder: Path, found: CalibrationFile, place: Path) -> bytes | None:
     """Return the bundle's corrections, else those that `calibrate --corrections` was given."""
-    file: Path | None = folder / CORRECTIONS
-    if not (folder / CORRECTIONS).is_file():
+    file = folder / CORRECTIONS
+    if not file.is_file():
         record = next((one for one in found.inputs if one.role == BY_HAND), None)
         if record is None:
             return None
-        file = _found(record, folder, place)
-        if file is None:
+        given = _found(record, folder, place)
+        if given is None:
             raise BundleError(
                 f"{folder}: was made with {record.name}, which is not beside it; put it there"
             )
+        file = given
     data = read_whole(file, "corrections", SheetError)
     parse_corrections(data, str(file))
     return data
