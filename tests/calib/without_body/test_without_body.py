@@ -110,7 +110,7 @@ def test_odd_labels_are_read_as_they_are() -> None:
 
 @pytest.mark.parametrize("elevation", [0.1, 0.35])
 def test_the_elevation_is_the_one_under_which_outlines_cohere(elevation: float) -> None:
-    placed = place(Figures(sheet(RING, elevation)), RING, 0.0)
+    placed = place(Figures(sheet(RING, elevation)), RING, np.zeros(len(RING)))
     assert placed.elevation == pytest.approx(elevation, abs=0.1)
     assert placed.apart < 0.01
     np.testing.assert_allclose(wrapped(yaws_of(placed.cameras) - RING), 0, atol=1e-6)
