@@ -92,7 +92,6 @@ def drawings(tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path
     for name in ("dark.ase", "my.ase"):
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
     _six_figures(folder)
-    (folder / "corrections.json").write_text('{"version": 1}')
     _clicks(folder)
     views = json.loads((folder / "bundle" / "calibration.json").read_text())["views"]
     front = {"version": 1, "views": [{"box": views[0]["box"], "label": "front"}]}
@@ -149,9 +148,8 @@ GIVEN = {  # what lies in a document's folder before its first command
     "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase",
     "docs/architecture.md": "sheet.png m.obj",
     "docs/formats.md": "bundle sheet.png views",
-    "docs/guide_corrections.md": "bundle sheet.png mannequin.obj corrections.json",
     "docs/guide_cameras.md": "sheet.png mannequin.obj m.obj points.json other colmap_folder",
-    "docs/guide_corrections.md": "sheet.png corrections.json",
+    "docs/guide_corrections.md": "sheet.png mannequin.obj corrections.json",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
     "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",
     "docs/guide_training.md": "bundle held_out other dark.ase",

@@ -1,8 +1,8 @@
 """`python -m bench.edit CASES`: how few corrections make doubtful sheets right, and how soon.
 
 Sheets are drawn sprites with the plain body, and sheets of 3D characters with another character's
-mannequin. Of those that come out wrong, weak or ambiguous, ten are corrected by what a person sees:
-the drawing that is farthest off, or else the first that is not ok, gets the nearest of the
+mannequin. Of those that come out wrong or ambiguous, ten are corrected by what a person sees: the
+drawing that is farthest off, or else the first that is ambiguous, gets the nearest of the
 compass's eight directions; where that was said already, the mannequin is dragged to the drawing's
 own angles, to 10 degrees. Every correction is what the page would send, and is fitted before the
 next. Truth is the cases' own; of sprites only yaw is known.
@@ -125,8 +125,8 @@ def corrected(case: Case, session: Session) -> dict[str, Any]:
     seconds: list[tuple[float, float]] = []  # by the clock, of the processor
     start = _state(case, session)
     state = start
-    while state["wrong"] and len(actions) < MOST_ACTIONS:
-        view, truth = state["worst"]
+    while not state["right"] and len(actions) < MOST_ACTIONS:
+        view, truth = state["next"]
         entry = next((one for one in said.get("views", []) if one["box"] == view["box"]), None)
         entry, word = _next_said(view, truth, entry)
         others = [one for one in said.get("views", []) if one["box"] != view["box"]]
@@ -147,17 +147,20 @@ def corrected(case: Case, session: Session) -> dict[str, Any]:
         "worst_deg": f"{start['most']:.0f} -> {state['most']:.0f}",
         "actions": actions,
         "seconds": seconds,
-        "right": not state["wrong"],
+        "right": state["right"],
     }
 
 
 def _state(case: Case, session: Session) -> dict[str, Any]:
     both = pairs(case, session.scene)
     errors = [truth.error_deg(view) for view, truth in both]
-    worst = int(np.argmax(errors))
+    doubtful = [i for i, (view, _) in enumerate(both) if view["verdict"] == "ambiguous"]
+    number = int(np.argmax(errors)) if max(errors) > RIGHT_DEG else (*doubtful, 0)[0]
     wrong = [error for error in errors if error > RIGHT_DEG]
     verdict = session.scene["verdict"]["state"]
-    return {"worst": both[worst], "wrong": wrong, "most": max(errors), "verdict": verdict}
+    right = not wrong and verdict != "ambiguous"
+    told = {"wrong": wrong, "most": max(errors), "verdict": verdict, "right": right}
+    return {"next": both[number], **told}
 
 
 def _next_said(
@@ -204,7 +207,7 @@ def main(
                     print(
                         f"{case.name}: {len(session.scene['views'])} of {len(case.truth)} drawings"
                     )
-                elif _state(case, session)["wrong"]:
+                elif not _state(case, session)["right"]:
                     found.append(corrected(case, session))
                     _tell(found[-1])
                 else:
@@ -214,7 +217,9 @@ def main(
                 shutil.rmtree(folder, ignore_errors=True)
     seconds = [one for each in found for one in each["seconds"]]
     right = sum(each["right"] for each in found)
-    print(f"{right} of {len(found)} sheets right with {MOST_ACTIONS} actions at most")
+    print(
+        f"{right} of {len(found)} sheets right, not ambiguous, with {MOST_ACTIONS} actions at most"
+    )
     for name, times in zip(("clock", "processor"), zip(*seconds, strict=True), strict=False):
         print(f"fits, {name}: median {np.median(times):.1f} s, most {max(times):.1f} s")
 

@@ -82,7 +82,7 @@ def open_session(
         return Session(subject, sheet, NOTHING, NOTHING, tell)
     found = read_calibration(folder / CALIBRATION)
     subject = _subject(place, folder, mesh, found)
-    data = _corrections_file(folder)
+    data = _corrections_file(folder, found, place)
     if data is None and _has_body(found, subject):
         sheet, corrections = _as_it_was_cut(subject, found)
         return _session(subject, sheet, corrections, tell)
@@ -168,10 +168,19 @@ def _recorded(found: CalibrationFile, role: str, data: bytes) -> bool:
     return any(one.role == role and one.sha256 == digest for one in found.inputs)
 
 
-def _corrections_file(folder: Path) -> bytes | None:
+def _corrections_file(folder: Path, found: CalibrationFile, place: Path) -> bytes | None:
+    """Return the bundle's corrections, else those that `calibrate --corrections` was given."""
     file = folder / CORRECTIONS
     if not file.is_file():
-        return None
+        record = next((one for one in found.inputs if one.role == BY_HAND), None)
+        if record is None:
+            return None
+        given = _found(record, folder, place)
+        if given is None:
+            raise BundleError(
+                f"{folder}: was made with {record.name}, which is not beside it; put it there"
+            )
+        file = given
     data = read_whole(file, "corrections", SheetError)
     parse_corrections(data, str(file))
     return data

@@ -198,6 +198,23 @@ def test_what_is_no_bundle_is_refused(bundle: Path, tmp_path: Path) -> None:
         open_session(other, bundle, None, lambda text: None)
 
 
+def test_corrections_that_calibrate_was_given_are_taken_over(
+    bundle: Path, toonset: Command
+) -> None:
+    box = [0, 0, 120, 120]
+    said = {"version": 1, "views": [{"box": box, "exclude": True}]}
+    (bundle.parent / "mine.json").write_text(json.dumps(said))
+    other = bundle.parent / "other"
+    arguments = ("--corrections", bundle.parent / "mine.json", "-q", "-o", other)
+    toonset("calibrate", bundle.parent / "sheet.png", *arguments)
+    session = open_session(other, other, None, lambda text: None)
+    session.stop()
+    assert session.corrections == session.fitted == said
+    (bundle.parent / "mine.json").unlink()
+    with pytest.raises(BundleError, match=r"made with mine\.json, which is not beside it"):
+        open_session(other, other, None, lambda text: None)
+
+
 def test_a_lock_that_was_left_behind_is_taken(tmp_path: Path) -> None:
     file = tmp_path / ".bundle.edit.lock"
     for left in ('{"pid": 999999999, "port": 1}', f'{{"pid": {os.getpid()}, "port": 1}}', "?"):
