@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 from threadpoolctl import threadpool_limits
 
-from toonset.calib.corrections.cropped import at_cuts
-from toonset.calib.corrections.false_holes import without_false_holes
 from toonset.calib.find_cameras import find_cameras
+from toonset.calib.flaws.cropped import at_cuts
+from toonset.calib.flaws.false_holes import without_false_holes
 from toonset.calib.from_landmarks import calibrate_by_landmarks
 from toonset.calib.hints import Hints, known_of
 from toonset.calib.known import Known

@@ -5,7 +5,7 @@
 2. contour alignment of every start at low resolution
 3. selections of one candidate per view, compared by a joint fit of the sheet
 4. the camera model, from orthography up; drawings that are stretched are begun anew without it
-   (`toonset.calib.corrections.stretched`); the mannequin's proportions where outlines
+   (`toonset.calib.flaws.stretched`); the mannequin's proportions where outlines
    do not meet or a glance proves them
 5. rivals of the chosen cameras at full resolution: probabilities, uncertainties, verdicts
 """
@@ -19,15 +19,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toonset.calib.corrections.stretched import (
+from toonset.calib.evidence.coherence_state import state_of
+from toonset.calib.fit.model_selection import Rung
+from toonset.calib.fit.sheet_prior import Turn, off_places
+from toonset.calib.flaws.stretched import (
     as_drawn,
     nothing_stretched,
     stretched_mannequin,
     unstretched,
 )
-from toonset.calib.evidence.coherence_state import state_of
-from toonset.calib.fit.model_selection import Rung
-from toonset.calib.fit.sheet_prior import Turn, off_places
 from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.pipeline import Problem, SheetFit

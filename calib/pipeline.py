@@ -12,9 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.corrections.cropped import ending_at
-from toonset.calib.corrections.cropped_evidence import Cuts, possible_cuts, proven_cuts
-from toonset.calib.corrections.stretched import Stretches, find_stretches, nothing_stretched
 from toonset.calib.evidence.coherence_state import TELLING_VIEWS
 from toonset.calib.evidence.common_elevation import common_elevation
 from toonset.calib.evidence.face import read_faces
@@ -35,6 +32,9 @@ from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
 from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.fit.turned_bodies import with_turned_bodies
+from toonset.calib.flaws.cropped import ending_at
+from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, proven_cuts
+from toonset.calib.flaws.stretched import Stretches, find_stretches, nothing_stretched
 from toonset.calib.known import Known, weighed_by_landmarks
 from toonset.calib.landmarks.landmarks import landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress

@@ -39,7 +39,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@options evidence outline",
         "@mannequin_points fit landmarks",
         "@result search",
-        "@known corrections verdict",
+        "@known flaws verdict",
         "@from_landmarks @pipeline without_body",
         "@find_cameras @hints @write_bundle",
         "@calibrate",

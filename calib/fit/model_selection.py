@@ -4,7 +4,7 @@
 2. perspective, one distance for the sheet
 3. if that is proven: perspective, a distance per view; if not: orthographic, a scale per view
 with drawings and a mannequin that are stretched, where that is proven
-(`toonset.calib.corrections.stretched`), and the mannequin's proportions (which have priors of their
+(`toonset.calib.flaws.stretched`), and the mannequin's proportions (which have priors of their
 own and therefore pay Akaike's 2 per number instead of BIC's log(samples)), where its outline is
 visibly not theirs or a glance says so.
 

@@ -5,7 +5,7 @@ the cut when it is laid on a sheet, with paper beyond. There the drawing is opaq
 pixel, along a row or column, while a drawn outline is mixed with paper wherever it does not lie
 between two pixels by chance (hard pixels end like this everywhere: only smooth drawings are looked
 at). A flat sole may do so, too, as a whole figure may touch the picture's edge; so the mannequin
-decides (`toonset.calib.corrections.cropped_evidence`): it ends at a sole and goes on beyond a cut.
+decides (`toonset.calib.flaws.cropped_evidence`): it ends at a sole and goes on beyond a cut.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
-from toonset.calib.corrections.false_holes import without_false_holes
+from toonset.calib.flaws.false_holes import without_false_holes
 from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png, load_rgba

@@ -10,14 +10,9 @@ import pytest
 
 from bench.cases.bodies import random_body
 from bench.stability.damage import stretched
-from toonset.calib.corrections.stretched import (
-    Stretches,
-    as_drawn,
-    stretched_mannequin,
-    unstretched,
-)
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import BIC_MARGIN, STRETCHED, TALLER
+from toonset.calib.flaws.stretched import Stretches, as_drawn, stretched_mannequin, unstretched
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.result import Calibration, CutOff, FlatSide
 from toonset.camera import rotation_distance

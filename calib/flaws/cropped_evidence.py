@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toonset.calib.corrections.cropped import beyond_px, flat_sides, overhang_px
 from toonset.calib.fit.sheet_adjustment import JointFit
+from toonset.calib.flaws.cropped import beyond_px, flat_sides, overhang_px
 from toonset.calib.result import CutOff, FlatSide
 from toonset.view import View
 

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from bench.cases.bodies import random_body
-from toonset.calib.corrections.cropped import at_cuts, ending_at, flat_sides
 from toonset.calib.find_cameras import find_cameras
+from toonset.calib.flaws.cropped import at_cuts, ending_at, flat_sides
 from toonset.calib.outline.correspondences import Drawing
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png, load_rgba
