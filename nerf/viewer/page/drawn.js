@@ -28,10 +28,11 @@ uniform float edge_steps;
 uniform sampler2D depths;
 uniform bool still;
 
-float far_of(int tap, ivec2 place) {
-  float level = round(texelFetch(about, ivec3(place, layers[tap]), 0).r * 255.0);
+float far_in(float byte) {
+  float level = round(byte * 255.0);
   return level > 0.0 ? mix(depth_range.x, depth_range.y, (level - 1.0) / 254.0) : -1e8;
 }
+float far_of(int tap, ivec2 place) { return far_in(texelFetch(about, ivec3(place, layers[tap]), 0).r); }
 vec4 smooth_at(highp sampler2DArray from, int tap, vec2 place) {
   vec2 size = vec2(textureSize(from, 0).xy);
   vec2 kept = clamp(place, vec2(0.0), vec2(sizes[tap]) - 1.0);
@@ -182,7 +183,7 @@ void main() {
     vec2 place = seen_by(pair, point).xy;
     apart = sign * textureLod(flow, place / vec2(textureSize(flow, 0)), 0.0).rg;
   }
-  vec3 color = vec3(0.0);
+  vec3 color = vec3(0.0), best = vec3(0.0); // place and drawing
   float heaviest = 0.0;
   for (int tap = 0; tap < ${TAPS}; tap++) {
     if (layers[tap] < 0 || (tap == 1 && heaviest >= 1.0 - share) || (tap > 1 && heaviest > 0.0)) continue;
@@ -191,15 +192,19 @@ void main() {
     ivec2 cell = ivec2(round(place));
     if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, sizes[tap]))) continue;
     vec4 known = texelFetch(about, ivec3(cell, layers[tap]), 0);
-    if (known.b <= 0.5 || seen.z > far_of(tap, cell) + slack) continue;
+    if (known.b <= 0.5 || seen.z > far_in(known.r) + slack) continue;
     float edge = known.g * 255.0 / edge_steps / 4.0;
     float weight = (tap == 0 ? share : tap == 1 ? 1.0 - share : 1.0) * (1.0 - 0.9 * exp(-edge * edge));
     if (weight <= heaviest) continue;
     heaviest = weight;
-    vec2 moved = place + (tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0) * apart;
-    color = smooth_at(paint, tap, moved).rgb;
+    best = vec3(place + (tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0) * apart, float(tap));
+  }
+  if (heaviest > 0.0) {
+    int tap = int(best.z);
+    color = smooth_at(paint, tap, best.xy).rgb;
     if (changed) {
-      int label = int(round(texelFetch(paint, ivec3(clamp(ivec2(round(moved)), ivec2(0), sizes[tap] - 1), layers[tap]), 0).a * 255.0));
+      ivec2 cell = clamp(ivec2(round(best.xy)), ivec2(0), sizes[tap] - 1);
+      int label = int(round(texelFetch(paint, ivec3(cell, layers[tap]), 0).a * 255.0));
       color = clamp(color + new_paints[label] - old_paints[label], 0.0, 1.0);
     }
   }
