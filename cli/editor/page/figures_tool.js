@@ -114,8 +114,9 @@ export function createFiguresTool(model, colorAt) {
   });
 
   function showLeftOut() {
-    const items = leftOut().map(({ box, kind }) => {
-      const button = element("button", { type: "button" }, `Take ${KINDS[kind] ?? kind} as a figure`);
+    const items = leftOut().map(({ box, kind }, i) => {
+      const word = `Take “${letterOf(i)}”, ${KINDS[kind] ?? kind}, as a figure`;
+      const button = element("button", { type: "button" }, word);
       button.addEventListener("click", () => add(box));
       return element("li", {}, button);
     });
@@ -138,10 +139,10 @@ export function createFiguresTool(model, colorAt) {
   return {
     draw(context, px) {
       context.textBaseline = "top";
-      for (const { box, kind } of leftOut()) {
+      leftOut().forEach(({ box }, i) => {
         outline(context, box, px, SHADES.left, [4, 3]);
-        tag(context, box, px, SHADES.left, KINDS[kind] ?? kind);
-      }
+        tag(context, box, px, SHADES.left, letterOf(i)); // its kind would cover the next one's
+      });
       model.figures.forEach(({ box, said }, i) => {
         const chosen = i === model.selected || model.also.includes(i);
         const shown = draft && i === model.selected ? draft : box;
@@ -269,6 +270,12 @@ function gapOf(a, b) {
 /** @param {number[]} size @returns {Box} */
 function middleOf([width, height]) {
   return [width * 0.4, height * 0.25, width * 0.2, height * 0.5];
+}
+
+/** @param {number} index @returns {string} a, b, ... z, aa, ab, ...: figures have numbers */
+function letterOf(index) {
+  const before = Math.floor(index / 26);
+  return (before ? letterOf(before - 1) : "") + String.fromCharCode(97 + (index % 26));
 }
 
 /** @param {CanvasRenderingContext2D} context @param {Box} box @param {number} px @param {string} shade @param {number[]} dash */

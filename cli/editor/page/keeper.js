@@ -101,6 +101,7 @@ async function keptThere(tell, warn) {
         return look();
       }
       const said = await answer.json();
+      if (answer.status === 503) throw new Error(said.error); // it is about to stop
       if (!answer.ok) warn(`Not kept: ${said.error}`);
       else revision = said.revision;
     }
@@ -116,7 +117,7 @@ async function keptThere(tell, warn) {
     fits: true,
     save(corrections) {
       waiting = corrections;
-      if (!sending) send().catch(() => ((sending = false), warn("Not kept: the server has stopped.")));
+      if (!sending) send().catch(() => ((sending = false), warn("Not kept: the server has stopped. Save corrections.json, and lay it into the bundle.")));
     },
   };
 }

@@ -31,9 +31,17 @@ function hear(news) {
   else model.take(news);
 }
 
+/** @param {string} trouble */
+function warn(trouble) {
+  say(trouble);
+  if (!model) return;
+  model.trouble = trouble;
+  model.tell();
+}
+
 try {
   const data = JSON.parse(part("data", HTMLElement).textContent ?? "null");
-  const keeper = await createKeeper(data, hear, say);
+  const keeper = await createKeeper(data, hear, warn);
   if (first) await start(/** @type {News} */ (first), keeper);
 } catch (error) {
   part("trouble", HTMLElement).hidden = false;

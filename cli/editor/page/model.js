@@ -27,6 +27,7 @@ export function createModel(scene, corrections) {
     future: goesOn && kept ? kept.future : [],
     busy: false,
     error: "",
+    trouble: "", // why nothing is kept, or no more
     /** @type {Mode} */
     mode: "cameras",
     selected: 0,
@@ -81,7 +82,7 @@ export function createModel(scene, corrections) {
         model.future = [];
         model.said = news.corrections;
       }
-      [model.busy, model.error] = [news.busy, news.error];
+      [model.busy, model.error, model.trouble] = [news.busy, news.error, ""];
       model.selected = Math.min(model.selected, Math.max(0, model.figures.length - 1));
       model.tell();
     },
@@ -91,7 +92,7 @@ export function createModel(scene, corrections) {
   function keep(next) {
     const { name, sha256, size } = model.scene.sheet;
     model.said = { ...next, sheet: { name, sha256, size } };
-    model.busy = true;
+    [model.busy, model.trouble] = [true, ""];
     model.save(model.said);
     store(sessionStorage, key, { past: model.past, future: model.future, now: JSON.stringify(model.said) });
     model.tell();

@@ -5,6 +5,7 @@ import { element, part, say } from "../../../nerf/viewer/page/elements.js";
 
 /** @typedef {import("./types.js").Paint} Paint */
 /** @typedef {import("./types.js").PaletteSaid} PaletteSaid */
+/** @typedef {{item: HTMLElement, show: (paint: Paint) => void}} PaintRow */
 
 const LONGEST = 200; // letters of a name
 
@@ -13,6 +14,8 @@ export function createPalettePanel(model) {
   /** @type {string[]} in the order in which they were chosen */
   let chosen = [];
   let shown = "";
+  /** @type {Map<string, PaintRow>} by colour: who writes in one goes on, whatever is fitted meanwhile */
+  const rows = new Map();
 
   const colors = () => model.scene.palette.colors;
   const said = () => model.said.palette ?? {};
@@ -28,7 +31,14 @@ export function createPalettePanel(model) {
   }
 
   function build() {
-    part("swatches", HTMLElement).replaceChildren(...colors().map(paintRow));
+    const items = colors().map((paint) => {
+      const row = rows.get(paint.color) ?? paintRow(paint.color);
+      rows.set(paint.color, row);
+      row.show(paint);
+      return row.item;
+    });
+    const list = part("swatches", HTMLElement);
+    if (items.length !== list.children.length || items.some((item, i) => item !== list.children[i])) list.replaceChildren(...items);
     part("dropped", HTMLElement).replaceChildren(...model.scene.palette.dropped.map(droppedRow));
     part("dropped_row", HTMLElement).hidden = !model.scene.palette.dropped.length;
     const done = doneRows(said(), (change) => model.change(withPalette(model.said, change)));
@@ -36,19 +46,24 @@ export function createPalettePanel(model) {
     part("done_row", HTMLElement).hidden = !done.length;
   }
 
-  /** @param {Paint} paint */
-  function paintRow({ color, name, share }) {
+  /** @param {string} color @returns {PaintRow} */
+  function paintRow(color) {
     const check = element("input", { type: "checkbox", "aria-label": `Choose ${color}` });
-    check.checked = chosen.includes(color);
     check.addEventListener("change", () => {
       chosen = check.checked ? [...chosen, color] : chosen.filter((one) => one !== color);
       show();
     });
     const input = element("input", { type: "text", maxlength: String(LONGEST), dir: "auto", "aria-label": `Name of ${color}` });
-    input.value = said().names?.[color] ?? name;
     input.addEventListener("change", () => rename(color, input.value.trim()));
-    const part = element("span", { class: "share" }, `${(100 * share).toFixed(0)} %`);
-    return element("li", {}, check, swatch(color), input, part);
+    const percent = element("span", { class: "share" });
+    return {
+      item: element("li", {}, check, swatch(color), input, percent),
+      show({ name, share }) {
+        check.checked = chosen.includes(color);
+        if (document.activeElement !== input) input.value = said().names?.[color] ?? name;
+        percent.textContent = `${(100 * share).toFixed(0)} %`;
+      },
+    };
   }
 
   /** @param {string} color @param {string} name */

@@ -3,6 +3,7 @@
 import { withView } from "./corrections.js";
 import { part } from "../../../nerf/viewer/page/elements.js";
 
+const NO_BODY = "Click a drawing to choose it; its compass below says from which side it is seen.";
 const FIELDS = ["yaw", "elevation", "roll", "scale"];
 
 /**
@@ -11,6 +12,8 @@ const FIELDS = ["yaw", "elevation", "roll", "scale"];
  */
 export function createPosePanel(model, cameras) {
   const inputs = FIELDS.map((name) => part(`pose_${name}`, HTMLInputElement));
+  const help = part("help_cameras", HTMLElement);
+  const helpWithBody = help.textContent;
   const shift = ["x", "y"].map((name) => part(`pose_${name}`, HTMLInputElement));
 
   function show() {
@@ -19,6 +22,7 @@ export function createPosePanel(model, cameras) {
     part("pose_title", HTMLElement).textContent = figure ? `Drawing ${model.selected + 1}` : "No drawing";
     part("pose", HTMLFieldSetElement).disabled = !pose || !cameras.hasBody;
     part("no_body", HTMLElement).hidden = cameras.hasBody;
+    help.textContent = cameras.hasBody ? helpWithBody : NO_BODY;
     part("forget_marks", HTMLButtonElement).disabled = !figure?.said?.landmarks?.length;
     if (!pose) return;
     const values = [pose.yaw, pose.elevation, pose.roll, pose.scale, ...pose.middle];

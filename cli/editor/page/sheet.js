@@ -12,6 +12,7 @@ const STEP = 1.25;
 const DEEPEST = 40; // times
 const AROUND = 12; // pixels about the sheet
 const BELOW = 44; // pixels, for the buttons
+const STILL = 3; // pixels: a click that moves less drags nothing
 
 /**
  * @param {import("./model.js").Model} model
@@ -30,6 +31,8 @@ export function createSheet(model, picture, tool) {
   const pointers = new Map();
   /** @type {Drag | null} */
   let drag = null;
+  /** @type {Point | null} where a press has not moved from yet */
+  let pressed = null;
 
   /** @param {{clientX: number, clientY: number}} event @returns {Point} on the canvas */
   function spot(event) {
@@ -85,14 +88,17 @@ export function createSheet(model, picture, tool) {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, spot(event));
     if (pointers.size > 1) drag?.end();
-    drag = null;
+    [drag, pressed] = [null, null];
     if (pointers.size > 1 || event.button === 1) return;
     drag = tool().down(onSheet(spot(event)), event, 1 / view.zoom);
+    pressed = spot(event);
     draw();
   });
   canvas.addEventListener("pointermove", (event) => {
     const [now, before] = [spot(event), pointers.get(event.pointerId)];
     if (!before) return void (canvas.style.cursor = tool().cursor(onSheet(now), 1 / view.zoom));
+    if (pressed && Math.hypot(now[0] - pressed[0], now[1] - pressed[1]) < STILL) return;
+    pressed = null;
     if (drag) drag.move(onSheet(now), event);
     else moveAll(event.pointerId, before, now);
     pointers.set(event.pointerId, now);

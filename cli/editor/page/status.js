@@ -18,15 +18,15 @@ export function createStatus(model, fits) {
     const place = part("verdict", HTMLElement);
     place.replaceChildren(badge(state, `Sheet ${state || "not rated"}`), ...(notes.length ? [list] : []));
     const at = part("state", HTMLElement);
-    at.toggleAttribute("data-busy", fits && model.busy);
-    at.toggleAttribute("data-error", !!model.error && !model.busy);
+    at.toggleAttribute("data-busy", fits && model.busy && !model.trouble);
+    at.toggleAttribute("data-error", !!model.trouble || (!!model.error && !model.busy));
     at.textContent = stateText(model, fits);
   }
 
   undo.addEventListener("click", model.undo);
   redo.addEventListener("click", model.redo);
   addEventListener("keydown", (event) => {
-    if (!(event.ctrlKey || event.metaKey) || event.target instanceof HTMLInputElement) return;
+    if (!(event.ctrlKey || event.metaKey) || isWriting(event.target)) return;
     const key = event.key.toLowerCase();
     if (key === "z" && !event.shiftKey) model.undo();
     else if (key === "y" || key === "z") model.redo();
@@ -47,9 +47,15 @@ export function createStatus(model, fits) {
   show();
 }
 
+/** @param {EventTarget | null} target @returns {boolean} whether it is a field with an undo of its own */
+function isWriting(target) {
+  return target instanceof HTMLInputElement && ["text", "number"].includes(target.type);
+}
+
 /** @param {import("./model.js").Model} model @param {boolean} fits @returns {string} */
 function stateText(model, fits) {
   if (!fits) return "This page is a file: save corrections.json, and give it to toonset calibrate --corrections.";
+  if (model.trouble) return model.trouble;
   if (model.busy) return "Kept. Fitting…";
   if (model.error) return `Kept, but it cannot be fitted: ${model.error}`;
   return "Kept and fitted.";

@@ -61,7 +61,7 @@ def test_boxes_are_merged_and_cut(open_page: Open) -> None:
 def test_what_was_left_out_is_named_and_comes_back(open_page: Open) -> None:
     editor = open_page()
     editor.mode("Figures")
-    editor.click("Take text as a figure")
+    editor.click("Take “a”, text, as a figure")
     assert editor.said["boxes"][3] == [300, 170, 90, 20]
     assert editor.page.locator("#left_out_row").is_hidden()
 
@@ -148,6 +148,17 @@ def test_the_mannequin_is_dragged_and_the_error_is_live(open_page: Open) -> None
     assert is_valid(editor)
 
 
+def test_a_click_with_a_trembling_hand_turns_nothing(open_page: Open) -> None:
+    editor = open_page()
+    x, y = editor.place(170, 100)
+    editor.page.mouse.move(x, y)
+    editor.page.mouse.down()
+    editor.page.mouse.move(x + 2, y + 1)
+    editor.page.mouse.up()
+    assert editor.page.evaluate("toonset.model.selected") == 1
+    assert editor.views == []
+
+
 def test_keys_and_numbers_place_the_mannequin(open_page: Open) -> None:
     editor = open_page()
     editor.page.locator("#sheet").focus()
@@ -181,6 +192,7 @@ def test_without_a_mannequin_there_are_compasses(open_page: Open) -> None:
     assert editor.views == [{"box": BOXES[1], "label": "left"}]
     editor.tap(170, 100)
     assert editor.page.locator("#fit_error").inner_text() == ""
+    assert "mannequin" not in editor.page.locator("#help_cameras").inner_text()
 
 
 # Palette
@@ -207,6 +219,24 @@ def test_paints_are_merged_split_dropped_kept_and_named(open_page: Open) -> None
     editor.tap(50, 140)
     assert editor.palette["split"] == [{"color": HEXES[0], "into": list(HEXES[:2])}]
     assert is_valid(editor)
+
+
+def test_names_are_written_while_the_palette_is_fitted(open_page: Open) -> None:
+    editor = open_page()
+    editor.mode("Palette")
+    editor.page.get_by_label(f"Name of {HEXES[0]}").fill("coat")
+    editor.page.keyboard.press("Tab")
+    focus = "document.activeElement.getAttribute('aria-label')"
+    assert editor.page.evaluate(focus) == f"Choose {HEXES[1]}"
+    editor.page.keyboard.press("Tab")
+    editor.page.keyboard.type("ca")
+    editor.page.evaluate(
+        "toonset.model.take({ scene: structuredClone(toonset.model.scene),"
+        " corrections: toonset.model.said, busy: false, error: '' })"
+    )
+    editor.page.keyboard.type("pe")
+    editor.page.keyboard.press("Tab")
+    assert editor.palette["names"] == {HEXES[0]: "coat", HEXES[1]: "cape"}
 
 
 def test_a_wrong_label_is_painted_over(open_page: Open) -> None:
@@ -242,6 +272,15 @@ def test_undo_redo_and_a_reload(open_page: Open) -> None:
         editor.click("Undo")
     assert editor.views == []
     assert editor.page.locator("#undo").is_disabled()
+
+
+def test_the_key_of_undo_works_wherever_nothing_is_written(open_page: Open) -> None:
+    editor = open_page()
+    editor.page.get_by_role("radio", name="its left side").first.check()
+    editor.page.keyboard.press("Control+z")
+    assert editor.views == []
+    editor.page.keyboard.press("Control+y")
+    assert editor.views[0]["label"] == "left"
 
 
 def test_a_file_that_is_newer_than_what_the_browser_kept_counts(open_page: Open) -> None:

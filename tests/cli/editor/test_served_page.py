@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,11 @@ class Desk:
     server: Server
     session: Session
     open_at: Open
+    opened: list[Editor] = field(default_factory=list)
 
     def open(self) -> Editor:
-        return self.open_at(self.server.address, self.server.origin + "/")
+        self.opened.append(self.open_at(self.server.address, self.server.origin + "/"))
+        return self.opened[-1]
 
     @property
     def kept(self) -> dict[str, Any]:
@@ -46,7 +48,10 @@ def desk(
     session = open_session(folder, folder, None, lambda text: None)
     with Server("bundle") as server:
         thread = server.serve(session)
-        yield Desk(folder, server, session, open_at)
+        desk = Desk(folder, server, session, open_at)
+        yield desk
+        for editor in desk.opened:  # an open page would ask a server that stops, and complain
+            editor.page.context.close()
         server.shutdown()
         session.stop()
         thread.join()
@@ -123,5 +128,9 @@ def test_a_server_that_stops_is_told(desk: Desk) -> None:
     desk.server.shutdown()
     desk.session.stop()
     desk.server.server_close()
-    editor.page.get_by_text("The server has stopped").wait_for()
+    state = editor.page.locator("#state")
+    state.get_by_text("The server has stopped").wait_for()
+    editor.card("Lock", 1)
+    state.get_by_text("Not kept: the server has stopped").wait_for()
+    assert editor.download()["views"][0]["lock"]
     editor.noise.clear()
