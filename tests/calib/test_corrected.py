@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ class Drawn:
         self.path.write_bytes(encode_png(self.truth.sheet))
         self.plain = split_sheet(self.path)
 
-    def found(self, *views: dict[str, Any], mesh: Mesh | str | None = None, **other: Any):
+    def found(self, *views: dict[str, Any], mesh: Mesh | Literal["none"] | None = None, **other: Any):
         """Return the calibration with what is said of views."""
         path = self.path.with_name("corrections.json")
         path.write_text(json.dumps({"version": 1, "views": views}))
