@@ -14,7 +14,7 @@ from typing import Any, Literal
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
 from toonset.calib.write_bundle import write_bundle
-from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, LABELS, TONES
+from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, COVERAGE, LABELS, TONES
 from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.corrections import parse_corrections
@@ -205,7 +205,7 @@ def _take_along(old: Path, new: Path) -> None:
         target = new / entry.name
         if entry.name in (RUN, CALIBRATION) or target.exists():
             continue
-        if entry.is_dir() and entry.name in (LABELS, TONES, CONTOURS):
+        if entry.is_dir() and entry.name in (LABELS, TONES, COVERAGE, CONTOURS):
             shutil.copytree(entry, target)
         elif entry.is_file():
             shutil.copy2(entry, target)

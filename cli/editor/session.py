@@ -8,6 +8,7 @@ older one, and the next start fits what the newest corrections say.
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from collections.abc import Callable
@@ -28,7 +29,7 @@ from toonset.cli.editor.refit import (
 from toonset.cli.editor.scene import left_out_of, page_of, scene_of, sheet_url
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
-from toonset.errors import ToonsetError, one_line
+from toonset.errors import SheetError, ToonsetError, one_line
 from toonset.write import write_bytes
 
 PAGE = "edit.html"
@@ -102,19 +103,35 @@ class Session:
 
         Raises:
             StaleError: they follow on other than the newest ones.
-            ToonsetError: they are none, or the disk is full.
+            ToonsetError: they are none, the disk is full, or somebody else has written the file.
         """
         data = file_of(corrections)
         parse_corrections(data, CORRECTIONS)
         with self._news:
             if revision != self.revision:
                 raise StaleError
+            self._check_file()
             write_bytes(self.subject.folder / CORRECTIONS, data)
             self.corrections = corrections
             self.revision += 1
             self.acted = time.monotonic()
             self._tell_all()
             return self.revision
+
+    def _check_file(self) -> None:
+        """Refuse to write over what was written into corrections.json by hand meanwhile."""
+        file = self.subject.folder / CORRECTIONS
+        if not file.exists():
+            return
+        try:
+            same = json.loads(file.read_bytes()) == self.corrections
+        except ValueError:
+            same = False
+        if not same:
+            raise SheetError(
+                f"{CORRECTIONS} was changed by another program; stop `toonset edit` and start it "
+                "again: it reads the file anew"
+            )
 
     def state(self, after: int = -1, scene: int = -1, wait_s: float = 0.0) -> dict[str, Any]:
         """Return what a page should know; wait until there is something newer than `after`.

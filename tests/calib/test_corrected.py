@@ -13,6 +13,7 @@ import pytest
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
+from toonset.calib.result import Calibration
 from toonset.camera import Camera, rotation_distance
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split_folder.load import split_sheet
@@ -35,7 +36,9 @@ class Drawn:
         self.path.write_bytes(encode_png(self.truth.sheet))
         self.plain = split_sheet(self.path)
 
-    def found(self, *views: dict[str, Any], mesh: Mesh | Literal["none"] | None = None, **other: Any):
+    def found(
+        self, *views: dict[str, Any], mesh: Mesh | Literal["none"] | None = None, **other: Any
+    ) -> Calibration:
         """Return the calibration with what is said of views."""
         path = self.path.with_name("corrections.json")
         path.write_text(json.dumps({"version": 1, "views": views}))

@@ -113,6 +113,11 @@ export function createFiguresTool(model, colorAt) {
     model.change(rest);
   });
 
+  on("find_boxes", () => {
+    const { boxes, ...rest } = model.said;
+    model.change(rest);
+  });
+
   function showLeftOut() {
     const items = leftOut().map(({ box, kind }, i) => {
       const word = `Take “${letterOf(i)}”, ${KINDS[kind] ?? kind}, as a figure`;
@@ -126,6 +131,7 @@ export function createFiguresTool(model, colorAt) {
     part("paper", HTMLElement).style.backgroundColor = paper ?? "transparent";
     part("paper_word", HTMLElement).textContent = paper ?? "transparent";
     part("find_paper", HTMLButtonElement).disabled = !model.said.background;
+    part("find_boxes", HTMLButtonElement).disabled = !model.said.boxes;
     const excluded = !!model.figure?.said?.exclude;
     part("drop_box", HTMLElement).textContent = excluded ? "Bring back" : "Drop";
     for (const id of ["merge_boxes", "cut_box", "drop_box"]) {

@@ -64,6 +64,9 @@ def test_what_was_left_out_is_named_and_comes_back(open_page: Open) -> None:
     editor.click("Take “a”, text, as a figure")
     assert editor.said["boxes"][3] == [300, 170, 90, 20]
     assert editor.page.locator("#left_out_row").is_hidden()
+    editor.click("All as found")
+    assert "boxes" not in editor.said
+    assert editor.page.locator("#left_out_row").is_visible()
 
 
 def test_the_paper_is_picked(open_page: Open) -> None:

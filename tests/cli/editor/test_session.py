@@ -171,6 +171,18 @@ def test_a_tab_that_is_behind_is_told(session: Session, bundle: Path) -> None:
     assert json.loads((bundle / CORRECTIONS).read_bytes())["background"] == "#ffffff"
 
 
+def test_what_was_written_by_hand_meanwhile_is_not_written_over(
+    session: Session, bundle: Path
+) -> None:
+    session.save({"version": 1, "background": "#ffffff"}, 0)
+    settled(session)
+    by_hand = b'{"version": 1, "background": "#fffffe"}'
+    (bundle / CORRECTIONS).write_bytes(by_hand)
+    with pytest.raises(SheetError, match="was changed by another program; stop `toonset edit`"):
+        session.save({"version": 1}, 1)
+    assert (bundle / CORRECTIONS).read_bytes() == by_hand
+
+
 def test_parts_that_change() -> None:
     view = {"box": [1, 2, 3, 4]}
     nothing: dict[str, Any] = {"version": 1}
