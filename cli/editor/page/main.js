@@ -72,10 +72,9 @@ async function start({ scene, corrections, busy, error }, keeper) {
   part("modes", HTMLElement).append(...modes.parts);
   const showMode = () => {
     modes.show(shown.mode);
-    for (const mode of Object.keys(MODES)) {
-      for (const one of document.querySelectorAll(`[data-mode="${mode}"]`)) {
-        one.toggleAttribute("hidden", mode !== shown.mode);
-      }
+    for (const one of document.querySelectorAll("[data-modes]")) {
+      const modes = /** @type {HTMLElement} */ (one).dataset.modes ?? "";
+      one.toggleAttribute("hidden", !modes.split(" ").includes(shown.mode));
     }
   };
   shown.listen(showMode);

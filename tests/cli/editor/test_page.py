@@ -308,6 +308,8 @@ def test_names_that_mean_harm_on_a_phone(open_page: Open, scheme: str) -> None:
         assert page.evaluate(small) == 0, mode
     assert page.locator("#title").inner_text() == HOSTILE
     assert page.title().startswith("</script>")
+    assert page.locator("#cards").is_hidden()  # they are no paints
+    editor.mode("Cameras")
     editor.card("Leave out", 1)
     assert editor.download()["sheet"]["name"] == HOSTILE
 
