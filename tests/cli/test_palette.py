@@ -100,6 +100,7 @@ def test_pictures_go_into_a_folder_of_their_own(
     assert [color["hex"] for color in result["colors"]] == ["#c81e28", "#143cb4"]
     assert tree(out) == {
         *("contours", "contours/000.png", "contours/001.png"),
+        *("coverage", "coverage/000.png", "coverage/001.png"),
         *("labels", "labels/000.png", "labels/001.png"),
         *(f"palette.{extension}" for extension in ("ase", "gpl", "hex", "json", "png")),
     }
