@@ -11,15 +11,18 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from threadpoolctl import threadpool_limits
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 # Sums depend in their last digits on how many threads share them. A process of its own has one
 # (`main` sees to it); here plugins have imported numpy before anything could be set.
@@ -298,3 +301,12 @@ def calibration_report(names: list[str], cameras: list[Any]) -> dict[str, Any]:
         "versions": {"toonset": "0.1.0"},
         "inputs": [{"name": "sheet.png", "sha256": "0" * 64, "role": "sheet"}],
     }
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Yield a browser; only one can be driven at a time."""
+    from bench.view.compare import chromium
+
+    with chromium() as browser:
+        yield browser

@@ -1,4 +1,4 @@
-"""What tests of the correcting page share: one browser, and pages that must stay quiet."""
+"""What tests of the correcting page share: pages that must stay quiet."""
 
 from __future__ import annotations
 
@@ -9,17 +9,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Request
 
-from bench.view.compare import chromium
 from tests.cli.editor.page_under_test import Editor, figure_scene
 from toonset.cli.editor.scene import page_of
 
 Open = Callable[..., Editor]
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture

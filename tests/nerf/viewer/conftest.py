@@ -1,4 +1,4 @@
-"""What tests of the page share: one browser, and pages that must stay quiet."""
+"""What tests of the page share: pages that must stay quiet."""
 
 from __future__ import annotations
 
@@ -9,16 +9,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Request
 
-from bench.view.compare import chromium
 from tests.nerf.viewer.page_under_test import Viewer, write_page
 
 Open = Callable[..., Viewer]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture
