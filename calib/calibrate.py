@@ -11,12 +11,12 @@ from typing import Any, Literal
 from threadpoolctl import threadpool_limits
 
 from toonset.calib.find_cameras import find_cameras
+from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.flaws.cropped import at_cuts
 from toonset.calib.flaws.false_holes import without_false_holes
 from toonset.calib.from_landmarks import calibrate_by_landmarks
 from toonset.calib.hints import Hints, known_of
 from toonset.calib.known import Known
-from toonset.calib.landmarks.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import Calibration

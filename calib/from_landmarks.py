@@ -1,6 +1,6 @@
 """Cameras from landmarks alone: for drawings whose outline is not the mannequin's.
 
-Every view is solved by itself (`toonset.calib.landmarks.landmarks`). How far its outline is from
+Every view is solved by itself (`toonset.calib.fit.landmarks`). How far its outline is from
 the mannequin's is reported, and judges nothing: who clicks points of a body under a cloak knows.
 """
 
@@ -14,9 +14,9 @@ import numpy as np
 from toonset.calib.evidence.coherence_state import state_of
 from toonset.calib.fit.align import measure
 from toonset.calib.fit.drawing_error import Noise
+from toonset.calib.fit.landmark_models import MARGIN
+from toonset.calib.fit.landmarks import LandmarkFit, solve_landmarks
 from toonset.calib.fit.model_selection import ORTHOGRAPHIC, PER_VIEW, ModelChoice, Rung
-from toonset.calib.landmarks.landmarks import LandmarkFit, solve_landmarks
-from toonset.calib.landmarks.models import MARGIN
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration

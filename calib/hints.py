@@ -51,11 +51,16 @@ class Hints:
 
         Raises:
             UsageError: `landmarks_only` without landmarks or beside what it does not use, or a
-                lock that does not exist.
+                lock that does not exist, or corrections that say what other hints say.
+            SheetError: the file of corrections is broken.
         """
         unknown = [name for name in self.lock if name not in LOCKS]
         if unknown:
             raise UsageError(f"--lock: {unknown[0]!r} is none of {', '.join(LOCKS)}")
+        if self.corrections is not None:
+            Given.of(self.corrections).check_beside(
+                views=self.labels, landmarks=self.landmarks, init=self.init
+            )
         if not self.landmarks_only:
             return
         if self.landmarks is None:
@@ -105,9 +110,7 @@ def known_of(hints: Hints, views: Sequence[View], points: Mapping[str, Sequence[
     cameras = _cameras(Path(hints.init), views) if hints.init else ()
     known = Known(labels, landmarks, cameras, frozenset(hints.lock))
     if hints.corrections is not None:
-        given = Given.of(hints.corrections)
-        given.check_beside(views=hints.labels, landmarks=hints.landmarks, init=hints.init)
-        known = _corrected(known, given, views)
+        known = _corrected(known, Given.of(hints.corrections), views)
     known.check(views)
     return known
 

@@ -18,6 +18,7 @@ from toonset.calib.evidence.face import read_faces
 from toonset.calib.evidence.texture import read_paint
 from toonset.calib.fit.align import ElevationPrior
 from toonset.calib.fit.drawing_error import ROUGH_POINTS, WHITE_POINTS
+from toonset.calib.fit.landmarks import landmark_starts
 from toonset.calib.fit.model_selection import (
     BODY_WIDTHS,
     GLANCE_MARGIN,
@@ -36,7 +37,6 @@ from toonset.calib.flaws.cropped import ending_at
 from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, proven_cuts
 from toonset.calib.flaws.stretched import Stretches, find_stretches, nothing_stretched
 from toonset.calib.known import Known, weighed_by_landmarks
-from toonset.calib.landmarks.landmarks import landmark_starts
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface

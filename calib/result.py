@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.fit.drawing_error import Noise
+from toonset.calib.fit.landmarks import LandmarkFit
 from toonset.calib.fit.model_selection import ModelChoice
-from toonset.calib.landmarks.landmarks import LandmarkFit
 from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.view import Box, View

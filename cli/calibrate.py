@@ -162,9 +162,7 @@ def calibrate(
     check_there([landmarks], "landmark", LandmarkError)
     check_there([boxes], "boxes", SheetError)
     if corrections is not None:
-        Given.of(corrections).check_beside(
-            **{"front": front is not None, "landmarks": landmarks, "init": init}
-        )
+        Given.of(corrections).check_beside(front=front is not None)
     if init is not None:
         transforms_file(init)
     given = None if str(mesh) == NO_BODY else mesh

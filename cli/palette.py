@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shlex
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -128,13 +127,11 @@ def palette(
     sheets, tones/ into the bundle, replacing those of an earlier run; for images and other
     folders, or with -o, into a folder of their own.
     """
+    from toonset.cli.common.label_drawings import label_drawings
     from toonset.dataset.bundle.palette_files import write_labelled
     from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
-    from toonset.errors import PaletteError, ToonsetError
-    from toonset.palette.corrected import corrected
-    from toonset.palette.corrections import PaletteCorrections
-    from toonset.palette.extract import choose_palette, options_of
+    from toonset.palette.extract import options_of
     from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
@@ -155,23 +152,11 @@ def palette(
     for note in drawn.notes:
         printer.say(note)
     contours = find_contours(drawn.pictures)
-    try:
-        found = choose_palette(drawn.pictures, contours, options, colors, method)
-    except ToonsetError as error:
-        if given is None or not given.content.palette.keep:
-            raise
-        key = f"{given.path}: palette.keep"
-        raise PaletteError(str(error).replace("--keep", key)) from error
-    maps = None
-    if given is not None and given.content.palette != PaletteCorrections():
-        strokes, notes = given.strokes_on(drawn.pictures, drawn.places)
-        for note in notes:
-            printer.say(note)
-        wanted, where = given.content.palette, str(given.path)
-        found, maps = corrected(
-            drawn.pictures, contours, found, wanted, strokes, where=where, space=space
-        )
-    found = replace(found, title=found.title or drawn.title)
+    found, maps, notes = label_drawings(
+        drawn, contours, options, given, colors=colors, method=method, space=space
+    )
+    for note in notes:
+        printer.say(note)
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
         write_labelled(folder, found, drawn.names, drawn.pictures, contours, space, maps)
     _report(found, target, printer, in_bundle=target == bundle)

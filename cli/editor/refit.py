@@ -14,6 +14,7 @@ from typing import Any, Literal
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
 from toonset.calib.write_bundle import write_bundle
+from toonset.cli.common.label_drawings import label_drawings
 from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, COVERAGE, LABELS, TONES
 from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.dataset.split_folder.corrected import Given
@@ -22,9 +23,7 @@ from toonset.dataset.split_folder.load import Sheet, split_sheet
 from toonset.dataset.split_folder.pictures import load_pictures
 from toonset.json_file import read_json
 from toonset.mesh import Mesh
-from toonset.palette.corrected import corrected
-from toonset.palette.corrections import PaletteCorrections
-from toonset.palette.extract import choose_palette, options_of
+from toonset.palette.extract import options_of
 from toonset.palette.palette import MAX_COLORS
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.view import SHEET, InputFile, Origin
@@ -171,18 +170,10 @@ def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
         ToonsetError: the corrections speak of colours that the drawings do not have.
     """
     given = Given(Path(CORRECTIONS), parse_corrections(file_of(corrections), CORRECTIONS))
-    wanted = given.content.palette
     drawn = load_pictures([folder])
     contours = find_contours(drawn.pictures)
-    options = options_of(LEAST_SHARE, MAX_COLORS, ",".join(wanted.keep))
-    found = choose_palette(drawn.pictures, contours, options)
-    maps = None
-    if wanted != PaletteCorrections():
-        strokes, _ = given.strokes_on(drawn.pictures, drawn.places)
-        found, maps = corrected(
-            drawn.pictures, contours, found, wanted, strokes, where=CORRECTIONS, space="rgb"
-        )
-    found = replace(found, title=found.title or drawn.title)
+    options = options_of(LEAST_SHARE, MAX_COLORS, ",".join(given.content.palette.keep))
+    found, maps, _ = label_drawings(drawn, contours, options, given)
     write_labelled(folder, found, drawn.names, drawn.pictures, contours, "rgb", maps)
 
 

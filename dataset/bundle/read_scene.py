@@ -124,12 +124,7 @@ def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
         return None
     labels = load_indexed_png(file)
     check_size(file, labels, frame.camera, "transforms.json")
-    used = labels[labels != UNLABELLED]
-    if used.size and used.max() >= colors:
-        raise BundleError(
-            f"{file}: label {used.max()} but the palette has {colors} colours; write the labels "
-            "again with `toonset palette`"
-        )
+    _check_paints(file, labels, colors, "label")
     return labels
 
 
@@ -169,14 +164,17 @@ def read_coverage(
         return None
     ranks = load_rgba(file)[..., :3]
     check_size(file, ranks, frame.camera, "transforms.json")
-    paints = ranks[..., :2]
+    _check_paints(file, ranks[..., :2], colors, "paint")
+    return ranks
+
+
+def _check_paints(file: Path, paints: UInt8[np.ndarray, ...], colors: int, what: str) -> None:
     used = paints[paints != UNLABELLED]
     if used.size and used.max() >= colors:
         raise BundleError(
-            f"{file}: paint {used.max()} but the palette has {colors} colours; write the coverage "
-            "again with `toonset palette`"
+            f"{file}: {what} {used.max()} but the palette has {colors} colours; run `toonset "
+            "palette` again"
         )
-    return ranks
 
 
 def read_contour(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:

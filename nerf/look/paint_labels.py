@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, UInt8
 
+from toonset.palette.extract import in_light
 from toonset.palette.palette import Shadow
-from toonset.palette.pixels.grain import without_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import label_pixels, nearest_labels
 from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
-from toonset.palette.pixels.shadow import find_tones, lit_pictures
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -57,8 +56,6 @@ def _in_light(
     pictures: Sequence[Picture], shadow: Shadow | None
 ) -> tuple[Sequence[Picture], list[Bool[np.ndarray, "height width"]], list[Map]]:
     """Return the drawings without shadow, where it lay, and how far lines cover every pixel."""
-    pictures, contours = without_grain(pictures), find_contours(pictures)
-    if shadow is None:
-        return pictures, [np.zeros(one.shape, dtype=bool) for one in contours], contours
-    dark = find_tones(pictures, contours, shadow)
-    return lit_pictures(pictures, contours, dark, shadow), dark, contours
+    contours = find_contours(pictures)
+    lit, dark = in_light(pictures, contours, shadow)
+    return lit, dark or [np.zeros(one.shape, dtype=bool) for one in contours], contours

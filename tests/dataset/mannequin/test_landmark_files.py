@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from toonset.calib.landmarks.landmarks import LandmarkFit, landmark_starts
+from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.dataset.mannequin.landmark_file import read_known_points, read_landmarks
 from toonset.errors import LandmarkError

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from toonset.calib.landmarks.landmarks import solve_landmarks
-from toonset.calib.landmarks.models import explain
-from toonset.calib.landmarks.pose import depth_reversed, refined, solve_pinhole, squared_error
+from toonset.calib.fit.landmark_models import explain
+from toonset.calib.fit.landmark_pose import depth_reversed, refined, solve_pinhole, squared_error
+from toonset.calib.fit.landmarks import solve_landmarks
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance, rotation_from_angles

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from toonset.calib.landmarks.pose import (
+from toonset.calib.fit.landmark_pose import (
     Pixels,
     Points,
     depth_reversed,

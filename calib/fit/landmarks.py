@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.landmarks.models import MARGIN, Explanation, choose
-from toonset.calib.landmarks.pose import Points, on_a_line, squared_error
+from toonset.calib.fit.landmark_models import MARGIN, Explanation, choose
+from toonset.calib.fit.landmark_pose import Points, on_a_line, squared_error
 from toonset.calib.outline.occluding_contour import Surface
 from toonset.calib.outline.pose import PARAMETERS, Pose, project_with_jacobian
 from toonset.dataset.mannequin.landmark_file import LEAST_POINTS, Landmarks

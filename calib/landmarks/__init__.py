@@ -1,1 +1,0 @@
-"""Cameras from pairs of points and pixels."""
