@@ -57,11 +57,11 @@ class Hints:
         unknown = [name for name in self.lock if name not in LOCKS]
         if unknown:
             raise UsageError(f"--lock: {unknown[0]!r} is none of {', '.join(LOCKS)}")
-        if self.corrections is not None:
-            Given.of(self.corrections).check_beside(
-                views=self.labels, landmarks=self.landmarks, init=self.init
-            )
         if not self.landmarks_only:
+            if self.corrections is not None:
+                Given.of(self.corrections).check_beside(
+                    views=self.labels, landmarks=self.landmarks, init=self.init
+                )
             return
         if self.landmarks is None:
             raise UsageError("--landmarks-only needs --landmarks FILE")
