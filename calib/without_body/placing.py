@@ -22,9 +22,10 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.camera import Camera
-from toonset.dataset.silhouettes.hull_rays import Silhouette, contradiction, cut_rays
+from toonset.dataset.silhouettes.hull_rays import Silhouette
 from toonset.dataset.silhouettes.outlines import Square, outlines_of
 from toonset.dataset.silhouettes.turn_fit import camera_moved, fit_turns
+from toonset.dataset.silhouettes.turned_rays import TurnedRays
 from toonset.view import View
 
 ELEVATIONS = np.radians([0.0, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 37, 45])
@@ -90,11 +91,12 @@ class Figures:
 
     def contradiction(self, cameras: Sequence[Camera]) -> float:
         """Return how far outlines lie outside of the others' hull, RMS over the height."""
-        seen = [own.seen_by(c) for own, c in zip(self.silhouettes, cameras, strict=True)]
-        if len(seen) < 2:
-            return 0.0
-        return float(
-            np.sqrt(np.mean([contradiction(cut_rays(seen, i)[1]) for i in range(len(seen))]))
+        return self.rays(cameras).contradiction() if len(cameras) > 1 else 0.0
+
+    def rays(self, cameras: Sequence[Camera]) -> TurnedRays:
+        """Return the rays of the outlines of two views or more, cut by each other."""
+        return TurnedRays.of(
+            [own.seen_by(c) for own, c in zip(self.silhouettes, cameras, strict=True)]
         )
 
 

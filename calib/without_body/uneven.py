@@ -6,6 +6,8 @@ six characters), with the paint that moves as the body turns to 7 (docs/decision
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from jaxtyping import Float
 
@@ -15,6 +17,7 @@ from toonset.calib.without_body.placing import (
     coherence_log_likelihood,
     elevation_log_prior,
 )
+from toonset.dataset.silhouettes.turned_rays import TurnedRays
 
 STARTS = 4  # even, and three that are not
 STEPS = np.radians([24.0, 12.0, 6.0, 3.0])
@@ -46,40 +49,67 @@ def uneven_yaws(figures: Figures, paint: Paint) -> tuple[Float[np.ndarray, " vie
     return best[1], float(best[0] - max(begun))
 
 
+@dataclass(frozen=True, eq=False)
+class _Stand:
+    """Where the views are seen from, and what speaks for it.
+
+    Attributes:
+        yaws: radians.
+        tilt: elevation of all views, radians.
+        rays: the outlines' under these cameras.
+        worth: log-likelihood of the whole, nats.
+    """
+
+    yaws: Float[np.ndarray, " views"]
+    tilt: float
+    rays: TurnedRays
+    worth: float
+
+    @classmethod
+    def of(
+        cls, figures: Figures, paint: Paint, yaws: Float[np.ndarray, " views"], tilt: float
+    ) -> _Stand:
+        """Weigh yaws."""
+        rays = figures.rays(figures.cameras(yaws, tilt))
+        return cls(yaws, tilt, rays, _worth(rays, paint, yaws, tilt))
+
+    def turned(self, figures: Figures, paint: Paint, view: int, by: float) -> _Stand:
+        """Weigh the yaws with one view turned."""
+        yaws = self.yaws.copy()
+        yaws[view] += by
+        camera = figures.cameras(yaws, self.tilt)[view]
+        rays = self.rays.with_turned(view, figures.silhouettes[view].seen_by(camera))
+        return replace(self, yaws=yaws, rays=rays, worth=_worth(rays, paint, yaws, self.tilt))
+
+
 def _climbed(
     figures: Figures, paint: Paint, start: Float[np.ndarray, " views"]
 ) -> tuple[float, tuple[float, Float[np.ndarray, " views"]]]:
     """Return the worth of a start, and the worth and yaws that it leads to."""
-    yaws, tilt = start, float(FIRST_TILT)
-    best = _worth(figures, paint, yaws, tilt)
+    best = _Stand.of(figures, paint, start, float(FIRST_TILT))
     for step in STEPS:
         for _ in range(SWEEPS):
             before = best
-            for view in range(1, len(yaws)):
+            for view in range(1, len(start)):
                 for move in (-step, step):
-                    other = yaws.copy()
-                    other[view] += move
-                    worth = _worth(figures, paint, other, tilt)
-                    if worth > best:
-                        best, yaws = worth, other
+                    other = best.turned(figures, paint, view, move)
+                    best = max(best, other, key=lambda stand: stand.worth)
             for move in (-TILT, TILT):
-                if 0 <= tilt + move <= MOST_TILT:
-                    worth = _worth(figures, paint, yaws, tilt + move)
-                    if worth > best:
-                        best, tilt = worth, tilt + move
-            if best <= before:
+                if 0 <= best.tilt + move <= MOST_TILT:
+                    other = _Stand.of(figures, paint, best.yaws, best.tilt + move)
+                    best = max(best, other, key=lambda stand: stand.worth)
+            if best is before:
                 break
-    return _worth_at_best_tilt(figures, paint, start), (best, yaws)
+    return _worth_at_best_tilt(figures, paint, start), (best.worth, best.yaws)
 
 
 def _worth_at_best_tilt(figures: Figures, paint: Paint, yaws: Float[np.ndarray, " views"]) -> float:
     tilts = np.arange(0.0, MOST_TILT, 2 * TILT)
-    return max(_worth(figures, paint, yaws, float(tilt)) for tilt in tilts)
+    return max(_Stand.of(figures, paint, yaws, float(tilt)).worth for tilt in tilts)
 
 
-def _worth(figures: Figures, paint: Paint, yaws: Float[np.ndarray, " views"], tilt: float) -> float:
-    apart = figures.contradiction(figures.cameras(yaws, tilt))
-    outlines = coherence_log_likelihood(np.array([apart]), len(yaws), ROUGH)
+def _worth(rays: TurnedRays, paint: Paint, yaws: Float[np.ndarray, " views"], tilt: float) -> float:
+    outlines = coherence_log_likelihood(np.array([rays.contradiction()]), len(yaws), ROUGH)
     around = np.sort(yaws % (2 * np.pi))
     gaps = np.diff(np.append(around, around[0] + 2 * np.pi))
     crowded = np.square(np.maximum(LEAST_GAP - gaps, 0) / GAP_SIGMA).sum()

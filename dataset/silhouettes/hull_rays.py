@@ -8,11 +8,13 @@ the silhouettes says how deep in the hull, or how far outside of it, a sample li
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import reduce
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.contour import drawn_contour
@@ -58,14 +60,68 @@ class Silhouette:
         camera = self.camera
         start = ((origins - camera.target) @ camera.rotation.T).astype(np.float32)
         slope = (directions @ camera.rotation.T).astype(np.float32)
-        x, y, z = (start[:, a, None] + along * slope[:, a, None] for a in range(3))
-        scale = np.float32(camera.scale) / np.maximum(1 + np.float32(camera.k) * z, 1e-6)
+        x, y = (start[:, a, None] + along * slope[:, a, None] for a in range(2))
+        scale = np.float32(camera.scale)
+        if not camera.is_orthographic:
+            z = start[:, 2, None] + along * slope[:, 2, None]
+            scale = scale / np.maximum(1 + np.float32(camera.k) * z, 1e-6)
         left, top = camera.center.astype(np.float32) - 0.5 + self.pad
         u = np.clip(left + scale * x, 0, self.distance.shape[1] - 1)
         v = np.clip(
             top + np.float32(camera.pixel_aspect) * scale * y, 0, self.distance.shape[0] - 1
         )
         return cv2.remap(self.distance, u, v, cv2.INTER_LINEAR) / np.float32(self.height)
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Rays of a view, and where along them to look.
+
+    Attributes:
+        origins: (points, 3) world.
+        directions: (points, 3) world, of length 1.
+        along: (t,) parameters, evenly spaced through the whole figure.
+    """
+
+    origins: Float[np.ndarray, "points 3"]
+    directions: Float[np.ndarray, "points 3"]
+    along: Float[np.ndarray, " t"]
+
+    @classmethod
+    def of(
+        cls,
+        camera: Camera,
+        pixels: Float[np.ndarray, "points 2"],
+        middle: Float[np.ndarray, " 3"],
+        radius: float,
+    ) -> Rays:
+        """Return the rays through pixels, as far as `radius` from where they pass the middle."""
+        _, (depth,), _ = camera.project(middle[None])
+        along = float(depth) + np.linspace(-radius, radius, SAMPLES)
+        return cls(*camera.rays(pixels), along.astype(np.float32))
+
+    def inside(self, silhouette: Silhouette) -> Float[np.ndarray, "points t"]:
+        """Return the samples' signed distances from a silhouette's rim over its height."""
+        along = np.broadcast_to(self.along, (len(self.origins), len(self.along)))
+        return silhouette.depth_inside(self.origins, self.directions, along)
+
+    def refined(
+        self,
+        silhouettes: Iterable[Silhouette],
+        points: Int[np.ndarray, " n"],
+        nearest: Int[np.ndarray, " n"],
+    ) -> Float[np.ndarray, " n"]:
+        """Return the largest minimum over silhouettes between the neighbours of a sample.
+
+        Args:
+            silhouettes: of the others, one or more.
+            points: which rays.
+            nearest: the best sample of each.
+        """
+        fine = (self.along[1] - self.along[0]) * np.linspace(-1, 1, FINE, dtype=np.float32)
+        along = self.along[nearest][:, None] + fine
+        own = self.origins[points], self.directions[points]
+        return least(f.depth_inside(*own, along) for f in silhouettes).max(axis=1)
 
 
 def cut_rays(
@@ -97,28 +153,24 @@ def depth_in_hull(
 def _cut(
     silhouettes: Sequence[Silhouette], i: int, points: Float[np.ndarray, "points 2"]
 ) -> tuple[Float[np.ndarray, "views points t"], Float[np.ndarray, " points"]]:
-    anchor = middle_of(silhouettes)
-    radius = max(silhouette.reach(anchor) for silhouette in silhouettes)
-    camera = silhouettes[i].camera
-    _, (middle,), _ = camera.project(anchor[None])
-    origins, directions = camera.rays(points)
-    coarse = (float(middle) + np.linspace(-radius, radius, SAMPLES)).astype(np.float32)
-    step = coarse[1] - coarse[0]
-    fine = step * np.linspace(-1, 1, FINE, dtype=np.float32)
-
-    def depths(along: Float[np.ndarray, "points t"]) -> Float[np.ndarray, "views points t"]:
-        own = np.full(along.shape, np.inf, np.float32)
-        return np.stack(
-            [
-                own if j == i else f.depth_inside(origins, directions, along)
-                for j, f in enumerate(silhouettes)
-            ]
-        )
-
-    sampled = depths(np.broadcast_to(coarse, (len(points), SAMPLES)))
-    best = coarse[sampled.min(axis=0).argmax(axis=1)]
-    refined = depths(best[:, None] + fine).min(axis=0).max(axis=1)
+    rays = Rays.of(silhouettes[i].camera, points, *figure_of(silhouettes))
+    own = np.full((len(points), SAMPLES), np.inf, np.float32)
+    sampled = np.stack([own if j == i else rays.inside(f) for j, f in enumerate(silhouettes)])
+    nearest = sampled.min(axis=0).argmax(axis=1)
+    others = (f for j, f in enumerate(silhouettes) if j != i)
+    refined = rays.refined(others, np.arange(len(points)), nearest)
     return sampled, refined.astype(np.float64)
+
+
+def least(each: Iterable[Float[np.ndarray, "points t"]]) -> Float[np.ndarray, "points t"]:
+    """Return the least of one array or more, element by element."""
+    return reduce(np.minimum, each)
+
+
+def figure_of(silhouettes: Sequence[Silhouette]) -> tuple[Float[np.ndarray, " 3"], float]:
+    """Return the figure's middle and how far from there it goes, world units."""
+    middle = middle_of(silhouettes)
+    return middle, max(silhouette.reach(middle) for silhouette in silhouettes)
 
 
 def middle_of(silhouettes: Sequence[Silhouette]) -> Float[np.ndarray, " 3"]:
