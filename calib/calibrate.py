@@ -20,6 +20,7 @@ from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import Calibration
+from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.rival import without_body_if_better
 from toonset.dataset.bundle.transforms_read import transforms_file
@@ -42,6 +43,7 @@ def calibrate(
     *,
     seed: int = 0,
     progress: Progress = lambda step, share: None,
+    cues: Cues | None = None,
 ) -> Calibration:
     """Return one camera per drawing, with how sure it is.
 
@@ -54,6 +56,8 @@ def calibrate(
         hints: what is known of the views.
         seed: recorded with the result; nothing is random.
         progress: called with the step's name and the share of it that is done.
+        cues: what an earlier call has found in the same drawings, and keeps what this one finds;
+            those of other drawings are passed over.
 
     Raises:
         ToonsetError: no view, two of one name, a mannequin that lies, or hints that contradict
@@ -61,13 +65,16 @@ def calibrate(
     """
     hints.check()
     _check_names([view.name for view in views])
+    if cues is None or not cues.are_of(views):
+        cues = Cues(views)
     if isinstance(mesh, str):
         _check_without_body(hints)
         with threadpool_limits(1, user_api="blas"):
             known = known_of(hints, views, {})
             if known.landmarks:
                 raise UsageError("landmarks need a mannequin; drop them or --mesh none")
-            return _alone(views, calibrate_without_body(views, known, progress), hints, seed)
+            alone = calibrate_without_body(views, known, progress, cues)
+            return _alone(views, alone, hints, seed)
     body = _Body.of(mesh)
     known = known_of(hints, views, body.points_for(hints))
     with threadpool_limits(1, user_api="blas"):  # more only wait, and change the last digits
@@ -76,11 +83,11 @@ def calibrate(
             found = calibrate_by_landmarks(views, body.mesh, known.landmarks)
         else:
             found = find_cameras(views, body.mesh, CalibrationOptions(), progress, known)
-            alone = without_body_if_better(
-                views, found, known, given=body.looks is None, tell=progress
+            better = without_body_if_better(
+                views, found, known, given=body.looks is None, tell=progress, cues=cues
             )
-            if alone is not None:
-                return _alone(views, alone, hints, seed)
+            if better is not None:
+                return _alone(views, better, hints, seed)
     drawings, found = at_cuts(views, found)
     drawings, filled = without_false_holes(drawings, found.views, found.mannequin)
     return replace(

@@ -24,14 +24,9 @@ from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, View
 from toonset.calib.verdict.judge import SURE, judge_sheet
 from toonset.calib.verdict.one_character import with_one_character_in_mind
 from toonset.calib.verdict.repeated import with_repeats_in_mind
-from toonset.calib.without_body.placing import Figures, SheetCameras, place
-from toonset.calib.without_body.posterior import (
-    Doubts,
-    Evidence,
-    doubts,
-    outlines_log_likelihood,
-    view_doubt,
-)
+from toonset.calib.without_body.cues import Cues
+from toonset.calib.without_body.placing import Figures, SheetCameras
+from toonset.calib.without_body.posterior import Doubts, doubts, outlines_log_likelihood, view_doubt
 from toonset.calib.without_body.turns import (
     NEAR,
     P_FRONT_FIRST,
@@ -43,7 +38,6 @@ from toonset.calib.without_body.turns import (
     turn_hypotheses,
     wrapped,
 )
-from toonset.calib.without_body.uneven import uneven_yaws
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.coherence import coherence
 from toonset.dataset.split_folder.view_labels import Label
@@ -85,7 +79,10 @@ class Found:
 
 
 def calibrate_without_body(
-    views: Sequence[View], known: Known, progress: Progress = lambda step, share: None
+    views: Sequence[View],
+    known: Known,
+    progress: Progress = lambda step, share: None,
+    cues: Cues | None = None,
 ) -> Calibration:
     """Return one camera per view from the drawings alone; the world is the figure's, 1 high.
 
@@ -93,11 +90,12 @@ def calibrate_without_body(
         views: the drawings, at least one.
         known: labels and the yaws of cameras count, the rest needs a mannequin.
         progress: called with the step's name and the share of it that is done.
+        cues: of these drawings, if they were looked at before.
     """
     began = time.perf_counter()
     progress("turns", 0.0)
-    figures = Figures(views)
-    turns, posterior, likelihood = _weighed(figures, known)
+    cues = cues or Cues(views)
+    turns, posterior, likelihood = _weighed(cues, known)
     chosen = int(posterior.argmax())
     weighed = time.perf_counter()
     progress("cameras", 0.0)
@@ -105,41 +103,40 @@ def calibrate_without_body(
     even = is_even(yaws)
     free = 0.0 if even else float(FREE_YAW)
     locked = np.isfinite(known.kept_yaws(len(views)))
-    placed = place(figures, yaws, np.where(locked, 0.0, free))
+    placed = cues.placed(yaws, np.where(locked, 0.0, free))
     found = Found(turns, posterior, likelihood, chosen, placed, even)
     seconds = {"turns": weighed - began, "cameras": time.perf_counter() - weighed}
-    return _judged(figures, found, known.labels, seconds)
+    return _judged(cues.figures, found, known.labels, seconds)
 
 
 def _weighed(
-    figures: Figures, known: Known
+    cues: Cues, known: Known
 ) -> tuple[TurnHypotheses, Float[np.ndarray, " turns"], Float[np.ndarray, " turns"]]:
     """Return the turns, their probabilities and the drawings' part in them, nats."""
-    views, labels = len(figures.views), known.labels
-    evidence = Evidence.of(figures.views)
+    views, labels = len(cues.views), known.labels
     turns = turn_hypotheses(views, labels)
     if views in FREE_VIEWS and not (labels and all(labels)):
-        turns = _with_free(figures, evidence, turns, known)
+        turns = _with_free(cues, turns, known)
     turns = held(turns, known.asked_yaws(views), known.kept_yaws(views))
-    outlines = outlines_log_likelihood(figures, turns) if views > 1 else np.zeros(len(turns.yaws))
-    likelihood = evidence.log_likelihood(turns.yaws, outlines)
+    outlines = np.zeros(len(turns.yaws))
+    if views > 1:
+        outlines = outlines_log_likelihood(cues.figures, turns)
+    likelihood = cues.evidence.log_likelihood(turns.yaws, outlines)
     total = turns.log_prior + likelihood
     posterior = np.exp(total - total.max())
     return turns, posterior / posterior.sum(), likelihood
 
 
-def _with_free(
-    figures: Figures, evidence: Evidence, turns: TurnHypotheses, known: Known
-) -> TurnHypotheses:
+def _with_free(cues: Cues, turns: TurnHypotheses, known: Known) -> TurnHypotheses:
     """Return the turns, the even ones replaced where drawings prove that theirs is another."""
-    relative, gain = uneven_yaws(figures, evidence.paint)
+    relative, gain = cues.free_yaws
     if gain < LEAST_GAIN:
         return turns
     rows = np.arange(3 * STARTS) * 2 * np.pi / (3 * STARTS)
     first = np.full(len(rows), np.log((1 - P_FRONT_FIRST) / (len(rows) - 1)))
     first[0] = np.log(P_FRONT_FIRST)
     free = TurnHypotheses(rows[:, None] + relative, first, np.zeros(len(rows)))
-    views, labels = len(figures.views), known.labels
+    views, labels = len(cues.views), known.labels
     free = held(free, known.asked_yaws(views), known.kept_yaws(views))  # the others may stay
     return labelled(free, labels) if any(labels) else free
 

@@ -11,9 +11,10 @@ from scipy.special import logsumexp
 from toonset.calib.known import Known
 from toonset.calib.options import Progress
 from toonset.calib.result import Calibration
+from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
-from toonset.calib.without_body.placing import Figures, coherence_log_likelihood
-from toonset.calib.without_body.posterior import ROUGH, Evidence
+from toonset.calib.without_body.placing import coherence_log_likelihood
+from toonset.calib.without_body.posterior import ROUGH
 from toonset.calib.without_body.turns import NEAR, STARTS, turn_hypotheses, wrapped
 from toonset.view import View
 
@@ -23,7 +24,13 @@ WITHOUT = "no body explains the drawings better than the mannequin: cameras are 
 
 
 def without_body_if_better(
-    views: Sequence[View], found: Calibration, known: Known, *, given: bool, tell: Progress
+    views: Sequence[View],
+    found: Calibration,
+    known: Known,
+    *,
+    given: bool,
+    tell: Progress,
+    cues: Cues | None = None,
 ) -> Calibration | None:
     """Return the calibration without a body if it explains the drawings better, else None.
 
@@ -38,13 +45,15 @@ def without_body_if_better(
         known: beforehand.
         given: somebody chose the mannequin; then no view without it is better than weak.
         tell: called with the step's name and the share of it that is done.
+        cues: of these drawings, if they were looked at before.
     """
     fine = found.verdict != "failed" if given or any(known.placed) else found.is_certain
     if fine or len(views) < FEWEST or known.landmarks or known.cameras or known.locked:
         return None
-    alone = calibrate_without_body(views, known, tell)
+    cues = cues or Cues(views)
+    alone = calibrate_without_body(views, known, tell, cues)
     explains = found.verdict != "failed"
-    worse = _odds(views, alone, found, known) <= 0 if explains else alone.verdict == "failed"
+    worse = _odds(cues, alone, found, known) <= 0 if explains else alone.verdict == "failed"
     if worse:
         return None
     if not given:
@@ -57,18 +66,18 @@ def without_body_if_better(
     return replace(alone, views=weak, verdict=verdict, reason=f"{WITHOUT}; {alone.reason}")
 
 
-def _odds(views: Sequence[View], one: Calibration, other: Calibration, known: Known) -> float:
+def _odds(cues: Cues, one: Calibration, other: Calibration, known: Known) -> float:
     """Return by how many nats the first calibration's cameras are the likelier ones."""
-    figures, evidence = Figures(views), Evidence.of(views)
-    turns = turn_hypotheses(len(views), known.labels)
+    views = len(cues.views)
+    turns = turn_hypotheses(views, known.labels)
     cameras = [[view.camera for view in found.views] for found in (one, other)]
     yaws = np.array([[camera.angles[0] for camera in own] for own in cameras])
-    apart = np.array([figures.contradiction(own) for own in cameras])
-    outlines = coherence_log_likelihood(apart, len(views), ROUGH)
-    elsewhere = np.log(P_ELSEWHERE) - len(views) * np.log(STARTS)
+    apart = np.array([cues.figures.contradiction(own) for own in cameras])
+    outlines = coherence_log_likelihood(apart, views, ROUGH)
+    elsewhere = np.log(P_ELSEWHERE) - views * np.log(STARTS)
     prior = []
     for own in yaws:
         near = (np.abs(wrapped(turns.yaws - own)) <= NEAR).all(axis=1)
         prior.append(logsumexp(np.append(turns.log_prior[near], elsewhere)))
-    total = np.array(prior) + evidence.log_likelihood(yaws, outlines)
+    total = np.array(prior) + cues.evidence.log_likelihood(yaws, outlines)
     return float(total[0] - total[1])

@@ -14,6 +14,7 @@ from toonset.cli.editor.refit import (
     CORRECTIONS,
     NOTHING,
     Changed,
+    Cut,
     Subject,
     cut_sheet,
     find_palette,
@@ -73,13 +74,13 @@ def open_session(
     if not (folder / CALIBRATION).is_file():
         check_output(folder, [place], WRITTEN, force=False)
         subject = Subject(place, load_mesh(mesh) if isinstance(mesh, Path) else mesh, folder)
-        sheet, new = make_bundle(subject, NOTHING, ALL, None, progress)
+        drawn, new = make_bundle(subject, NOTHING, ALL, None, progress)
         folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.is_dir():
             folder.rmdir()  # it is empty
         os.replace(new, folder)
         shutil.rmtree(subject.workshop, ignore_errors=True)
-        return Session(subject, sheet, NOTHING, NOTHING, tell)
+        return Session(subject, drawn, NOTHING, NOTHING, tell)
     found = read_calibration(folder / CALIBRATION)
     subject = _subject(place, folder, mesh, found)
     data = _corrections_file(folder, found, place)
@@ -93,14 +94,14 @@ def open_session(
         return _session(subject, sheet, corrections, tell)
     fitted = corrections
     try:
-        sheet, new = make_bundle(subject, fitted, ALL, None, progress)
+        drawn, new = make_bundle(subject, fitted, ALL, None, progress)
     except ToonsetError:
         if corrections == NOTHING:
             raise
         fitted = NOTHING  # the page says what is wrong with them
-        sheet, new = make_bundle(subject, fitted, ALL, None, progress)
+        drawn, new = make_bundle(subject, fitted, ALL, None, progress)
     put_in_place(new, subject, corrections)
-    return Session(subject, sheet, fitted, corrections, tell)
+    return Session(subject, drawn, fitted, corrections, tell)
 
 
 def _session(
@@ -109,7 +110,7 @@ def _session(
     """Return the session of a bundle that follows its corrections; its palette is found now."""
     if not (subject.folder / PALETTE).is_file():
         find_palette(subject.folder, corrections)
-    return Session(subject, sheet, corrections, corrections, tell)
+    return Session(subject, Cut.of(sheet), corrections, corrections, tell)
 
 
 def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile) -> Subject:

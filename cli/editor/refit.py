@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
+from toonset.calib.without_body.cues import Cues
 from toonset.calib.write_bundle import write_bundle
 from toonset.cli.common.label_drawings import label_drawings
 from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, COVERAGE, LABELS, TONES
@@ -74,6 +75,24 @@ class Changed:
     palette: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A sheet's drawings, and what was found in them: both stay until they are cut anew.
+
+    Attributes:
+        sheet: the drawings as a person calls them now.
+        cues: what they show, whatever a person calls them.
+    """
+
+    sheet: Sheet
+    cues: Cues
+
+    @classmethod
+    def of(cls, sheet: Sheet) -> Cut:
+        """Return drawings that nobody has looked at yet."""
+        return cls(sheet, Cues(sheet.views))
+
+
 def parts_changed(before: dict[str, Any], after: dict[str, Any]) -> Changed:
     """Return what corrections change that others did not."""
 
@@ -117,9 +136,9 @@ def make_bundle(
     subject: Subject,
     corrections: dict[str, Any],
     changed: Changed,
-    before: Sheet | None = None,
+    before: Cut | None = None,
     progress: Callable[[str, float], None] = lambda step, share: None,
-) -> tuple[Sheet, Path]:
+) -> tuple[Cut, Path]:
     """Return the drawings, and a new bundle of them in the workshop.
 
     What is not made again goes along: corrections and page, and the palette of drawings that are
@@ -137,20 +156,22 @@ def make_bundle(
     """
     new, old = subject.workshop / subject.folder.name, subject.folder
     shutil.rmtree(subject.workshop, ignore_errors=True)
-    if before is None or before.options or changed.cut:
+    if before is None or before.sheet.options or changed.cut:
         sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
+        drawn = Cut.of(sheet)
     else:
         file = subject.workshop / CORRECTIONS
         write_bytes(file, file_of(corrections))
-        sheet = _said_anew(before, file)
+        drawn = replace(before, sheet=_said_anew(before.sheet, file))
     hints = Hints(corrections=file)
-    found = calibrate(sheet.views, subject.body, hints, progress=progress)
+    views, body = drawn.sheet.views, subject.body
+    found = calibrate(views, body, hints, progress=progress, cues=drawn.cues)
     write_bundle(new, found)
     if old.is_dir():
         _take_along(old, new)
     if changed.palette:
         find_palette(new, corrections)
-    return sheet, new
+    return drawn, new
 
 
 def put_in_place(new: Path, subject: Subject, corrections: dict[str, Any]) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 from toonset.cli.editor.refit import (
     CORRECTIONS,
     Changed,
+    Cut,
     Subject,
     file_of,
     find_palette,
@@ -28,7 +29,7 @@ from toonset.cli.editor.refit import (
 )
 from toonset.cli.editor.scene import left_out_of, page_of, scene_of, sheet_url
 from toonset.dataset.split_folder.corrections import parse_corrections
-from toonset.dataset.split_folder.load import Sheet, split_sheet
+from toonset.dataset.split_folder.load import split_sheet
 from toonset.errors import SheetError, ToonsetError, one_line
 from toonset.write import write_bytes
 
@@ -49,7 +50,7 @@ class Session:
 
     Attributes:
         subject: what is corrected.
-        sheet: its drawings, as the bundle has them.
+        drawn: its drawings, as the bundle has them.
         fitted: corrections that the bundle follows.
         corrections: the newest, as they are on disk.
         tell: told how far a fit is.
@@ -64,7 +65,7 @@ class Session:
     """
 
     subject: Subject
-    sheet: Sheet
+    drawn: Cut
     fitted: dict[str, Any]
     corrections: dict[str, Any]
     tell: Callable[[str], None] = lambda text: None
@@ -163,7 +164,7 @@ class Session:
 
     def _show(self) -> None:
         """Make the page's scene, and the page as a file of its own."""
-        scene = scene_of(self.subject.folder, self.sheet)
+        scene = scene_of(self.subject.folder, self.drawn.sheet)
         if not self.fitted.get("boxes"):
             self._left_out = scene["leftOut"]
         elif self._left_out is None:  # who draws boxes wants to see what else there is
@@ -208,10 +209,10 @@ class Session:
     def _fit(self, changed: Changed) -> None:
         wanted, folder = self._tried, self.subject.folder
         if changed.cameras:
-            sheet, new = make_bundle(self.subject, wanted, changed, self.sheet, self._progress)
+            drawn, new = make_bundle(self.subject, wanted, changed, self.drawn, self._progress)
             with self._news:
                 put_in_place(new, self.subject, self.corrections)
-                self.sheet = sheet
+                self.drawn = drawn
         else:
             if changed.palette:
                 find_palette(folder, wanted)
