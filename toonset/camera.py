@@ -184,6 +184,9 @@ class Camera:
         """
         local = (np.asarray(points_world, dtype=np.float64) - self.target) @ self.rotation.T
         depth = local[..., 2]
+        if self.is_orthographic:
+            pixels = self.center + self.scale_uv * local[..., :2]
+            return pixels, depth, np.ones(depth.shape, dtype=bool)
         relative = 1 + self.k * depth
         in_front = relative > MIN_RELATIVE_DEPTH
         divisor = np.where(in_front, relative, np.nan)

@@ -18,7 +18,8 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.camera import Camera, rotation_from_angles
-from toonset.dataset.silhouettes.hull_rays import Silhouette, contradiction, cut_rays, middle_of
+from toonset.dataset.silhouettes.hull_rays import Silhouette, middle_of
+from toonset.dataset.silhouettes.turned_rays import TurnedRays
 from toonset.errors import CameraError
 from toonset.view import View
 
@@ -69,7 +70,7 @@ def common_elevation(views: Sequence[View], cameras: Sequence[Camera]) -> Common
 def _contradiction_at(silhouettes: Sequence[Silhouette], offset: float) -> float:
     anchor = middle_of(silhouettes)
     moved = [s.seen_by(_tilted(s.camera, anchor, offset)) for s in silhouettes]
-    return float(np.mean([contradiction(cut_rays(moved, i)[1]) for i in range(len(moved))]))
+    return TurnedRays.of(moved).mean_square()
 
 
 def _tilted(camera: Camera, anchor: Float[np.ndarray, " 3"], offset: float) -> Camera:

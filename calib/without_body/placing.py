@@ -71,6 +71,7 @@ class Figures:
         self.alphas = [view.rgba[..., 3].astype(np.float32) / 255 for view in views]
         level = self.cameras(np.zeros(len(views)), 0.0)
         self.silhouettes = [Silhouette(*pair) for pair in zip(views, level, strict=True)]
+        self._apart: dict[tuple[bytes, float], Float[np.ndarray, " elevations"]] = {}
 
     def cameras(
         self, yaws: Float[np.ndarray, " views"], elevation: float, k: float = 0.0
@@ -88,6 +89,16 @@ class Figures:
             )
             for view, yaw, middle in zip(self.views, yaws, self.middles, strict=True)
         ]
+
+    def apart(
+        self, yaws: Float[np.ndarray, " views"], k: float = 0.0
+    ) -> Float[np.ndarray, " elevations"]:
+        """Return the contradiction of a turn under every one of `ELEVATIONS`, found once."""
+        key = yaws.tobytes(), k
+        if key not in self._apart:
+            cameras = (self.cameras(yaws, e, k) for e in ELEVATIONS)
+            self._apart[key] = np.array([self.contradiction(own) for own in cameras])
+        return self._apart[key]
 
     def contradiction(self, cameras: Sequence[Camera]) -> float:
         """Return how far outlines lie outside of the others' hull, RMS over the height."""
@@ -131,7 +142,7 @@ def place(
         )
     tried, worth = [], []
     for k, p_k in NEARNESS.items():
-        rough = np.array([figures.contradiction(figures.cameras(yaws, e, k)) for e in ELEVATIONS])
+        rough = figures.apart(yaws, k)
         likely = coherence_log_likelihood(rough, views) + prior
         for i in np.sort(np.argsort(-likely)[:TRIED]):
             cameras = figures.cameras(yaws, float(ELEVATIONS[i]), k)

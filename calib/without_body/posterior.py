@@ -95,8 +95,7 @@ def outlines_log_likelihood(figures: Figures, turns: TurnHypotheses) -> Float[np
     for pattern in np.unique(turns.pattern):
         rows = turns.pattern == pattern
         yaws = turns.yaws[rows][0]
-        apart = np.array([figures.contradiction(figures.cameras(yaws, e)) for e in ELEVATIONS])
-        likely = coherence_log_likelihood(apart, len(yaws), ROUGH)
+        likely = coherence_log_likelihood(figures.apart(yaws), len(yaws), ROUGH)
         found[rows] = logsumexp(likely + elevation_log_prior(ELEVATIONS))
     return found
 

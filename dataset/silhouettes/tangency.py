@@ -120,8 +120,8 @@ def touch(
 
 def pixels_of(camera: Camera, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 2"]:
     """Return the pixels of world points; points behind a camera land far outside."""
-    pixels, _, _ = camera.project(points)
-    return np.nan_to_num(pixels, nan=-1e4)
+    pixels, _, in_front = camera.project(points)
+    return pixels if in_front.all() else np.nan_to_num(pixels, nan=-1e4)
 
 
 def _best(

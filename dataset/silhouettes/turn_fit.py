@@ -15,11 +15,11 @@ motion", PAMI 2007, with distances instead of overlaps and a prior on every numb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.displacement import ShiftAndScale
@@ -86,8 +86,8 @@ def fit_turns(
     """
     views = len(outlines.views)
     flat = np.zeros(OWN * views + 1)
-    first = normal = _linearised(outlines, flat, None)
     deviation = _deviations(yaw_sigmas, k_sigma, tau)
+    first = normal = _linearised(outlines, flat, None, deviation > 0)
     idle = first.cost - _log_volume(first.matrix, deviation)
     if idle <= 0:  # even a perfect fit would not be worth its numbers
         apart = (first.apart, first.apart)
@@ -99,7 +99,8 @@ def fit_turns(
         own[:, PLACE] -= (body @ (shares @ own[:, PLACE].reshape(-1))).reshape(views, -1)
         if yaw_sigmas.all():
             own[:, YAW] -= np.average(own[:, YAW], weights=yaw_sigmas**-2)
-        normal = _linearised(outlines, flat, normal.along if round_ % AFRESH else None)
+        along = normal.along if round_ % AFRESH else None
+        normal = _linearised(outlines, flat, along, deviation > 0)
         if round_ >= SETTLED:
             tau = _learned(normal.matrix, deviation, flat, tau)
             deviation = _deviations(yaw_sigmas, k_sigma, tau)
@@ -161,16 +162,24 @@ def _log_volume(matrix: np.ndarray, deviation: np.ndarray) -> float:
 
 
 def _linearised(
-    outlines: Outlines, flat: np.ndarray, along: Sequence[np.ndarray] | None
+    outlines: Outlines,
+    flat: np.ndarray,
+    along: Sequence[np.ndarray] | None,
+    free: Bool[np.ndarray, " m"],
 ) -> _Normal:
-    """Return the normal equations at `flat`, near earlier points of the rays or anywhere."""
+    """Return the normal equations at `flat`, near earlier points of the rays or anywhere.
+
+    Numbers that are not free have no slope.
+    """
     own, log_k = flat[:-1].reshape(-1, OWN), float(flat[-1])
     views = tuple(
         replace(view, camera=camera_moved(view.camera, view.square, numbers, log_k))
         for view, numbers in zip(outlines.views, own, strict=True)
     )
+    moves = np.c_[free[:-1].reshape(-1, OWN), np.full(len(views), free[-1])]
     aside = [
-        _aside(view, numbers, log_k) for view, numbers in zip(outlines.views, own, strict=True)
+        _aside(view, numbers, log_k, movable)
+        for view, numbers, movable in zip(outlines.views, own, moves, strict=True)
     ]
     placed = Placed.of(replace(outlines, views=views), _PLACES, np.zeros((len(views), 3)))
     size = outlines.size_px
@@ -196,13 +205,18 @@ def _linearised(
     return _Normal(matrix, slope, cost, (squares / max(1, points)) ** 0.5, touched)
 
 
-Aside = list[tuple[Camera, Camera]]
+Aside = list[tuple[Camera, Camera] | None]
 
 
-def _aside(outline: Outline, own: np.ndarray, log_k: float) -> Aside:
-    """Return a camera a STEP ahead and behind in each of its numbers, log k last."""
-    pairs = []
+def _aside(
+    outline: Outline, own: np.ndarray, log_k: float, movable: Bool[np.ndarray, " 5"]
+) -> Aside:
+    """Return a camera a STEP ahead and behind in each number that may move, log k last."""
+    pairs: Aside = []
     for number in range(OWN + 1):
+        if not movable[number]:
+            pairs.append(None)
+            continue
         ahead, behind = (
             camera_moved(
                 outline.camera,
@@ -235,13 +249,21 @@ def _pair(
     across, points, pixels = np.stack(gradient, axis=-1)[off], found.points[off], found.pixels[off]
     depth = mine.project(points)[1]
 
-    def slope(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
-        return ((ahead - behind) * across).sum(axis=-1) / (2 * STEP)
+    def slope(
+        pair: tuple[Camera, Camera] | None, seen: Callable[[Camera], np.ndarray]
+    ) -> np.ndarray:
+        if pair is None:
+            return np.zeros(len(pixels))
+        ahead, behind = pair
+        return ((seen(ahead) - seen(behind)) * across).sum(axis=-1) / (2 * STEP)
 
-    here = [
-        slope(*(pixels_of(theirs, camera.unproject(pixels, depth)) for camera in pair))
-        for pair in aside[view]
-    ]
-    there = [slope(*(pixels_of(camera, points) for camera in pair)) for pair in aside[other]]
+    def moved_here(camera: Camera) -> np.ndarray:
+        return pixels_of(theirs, camera.unproject(pixels, depth))
+
+    def moved_there(camera: Camera) -> np.ndarray:
+        return pixels_of(camera, points)
+
+    here = [slope(pair, moved_here) for pair in aside[view]]
+    there = [slope(pair, moved_there) for pair in aside[other]]
     columns = [*here[:OWN], *there[:OWN], here[OWN] + there[OWN]]
     return distance[off], np.stack(columns, axis=-1)

@@ -56,7 +56,11 @@ class TurnedRays:
 
     def contradiction(self) -> float:
         """Return how far outlines lie outside of the others' hull, RMS over the height."""
-        return float(np.sqrt(np.mean([contradiction(each) for each in self._outside()])))
+        return float(np.sqrt(self.mean_square()))
+
+    def mean_square(self) -> float:
+        """Return the square of the contradiction."""
+        return float(np.mean([contradiction(each) for each in self._outside()]))
 
     def _outside(self) -> Iterator[Float[np.ndarray, " points"]]:
         """Yield of every view how deep rays come into the hull, 0 where they come into it."""
