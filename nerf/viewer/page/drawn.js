@@ -110,13 +110,51 @@ void main() {
   result = vec4(low, high, 0.0, 1.0);
 }`;
 
-/** The same look in one pass, while the figure turns: no votes around, no flooding. */
-const FAST = `${LOOK_UP}
-uniform sampler2D rays, coarse;
+/**
+ * Which drawing a place of a moving figure is read from, for every second pixel: the same steps
+ * without votes around.
+ */
+const CHOICE = `${LOOK_UP}
+uniform sampler2D rays;
 uniform Camera pair;
 uniform sampler2D flow;
 uniform bool flows;
-uniform float slack, sign, share, border, line;
+uniform float slack, sign, share;
+uniform float fine; // pixels of the rays per pixel of the view
+layout(location = 0) out vec4 result; // how far beside its place it is read, drawing, weight
+
+void main() {
+  int block = fine > 0.75 ? 2 : 1;
+  ivec2 at = block * ivec2(gl_FragCoord.xy), most = textureSize(depths, 0) - 1;
+  result = vec4(0.0);
+  for (int i = 1; i < 4 && block == 2 && texelFetch(rays, at, 0).a < 0.5; i++) {
+    at = min(2 * ivec2(gl_FragCoord.xy) + ivec2(i & 1, i >> 1), most);
+  }
+  if (texelFetch(rays, at, 0).a < 0.05) return;
+  vec3 point = point_at(camera, (vec2(at) + 0.5) / fine, texelFetch(depths, at, 0).r);
+  vec2 apart = vec2(0.0);
+  if (flows) {
+    vec2 place = seen_by(pair, point).xy;
+    apart = sign * textureLod(flow, place / vec2(textureSize(flow, 0)), 0.0).rg;
+  }
+  for (int tap = 0; tap < ${TAPS}; tap++) {
+    if (layers[tap] < 0 || (tap == 1 && result.w >= 1.0 - share) || (tap > 1 && result.w > 0.0)) continue;
+    vec3 seen = seen_by(views[tap], point);
+    ivec2 cell = ivec2(floor(seen.xy));
+    if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, sizes[tap]))) continue;
+    vec4 known = texelFetch(about, ivec3(cell, layers[tap]), 0);
+    if (known.b <= 0.5 || seen.z > far_in(known.r) + slack) continue;
+    float edge = known.g * 255.0 / edge_steps / 4.0;
+    float weight = (tap == 0 ? share : tap == 1 ? 1.0 - share : 1.0) * (1.0 - 0.9 * exp(-edge * edge));
+    float along = tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0;
+    if (weight > result.w) result = vec4(along * apart, float(tap), weight);
+  }
+}`;
+
+/** The same look while the figure turns: one drawing for every pixel, no flooding. */
+const FAST = `${LOOK_UP}
+uniform sampler2D rays, coarse, choice;
+uniform float border, line;
 uniform float fine; // pixels of the rays per pixel
 uniform bool shaped, shaded;
 uniform vec2 reaches; // of inner lines onto the near and the far side; 0: none
@@ -178,40 +216,18 @@ void main() {
     at = best;
   }
   vec3 point = point_at(camera, pixel, texelFetch(depths, at, 0).r);
-  vec2 apart = vec2(0.0);
-  if (flows) {
-    vec2 place = seen_by(pair, point).xy;
-    apart = sign * textureLod(flow, place / vec2(textureSize(flow, 0)), 0.0).rg;
-  }
-  vec3 color = vec3(0.0), best = vec3(0.0); // place and drawing
-  float heaviest = 0.0;
-  for (int tap = 0; tap < ${TAPS}; tap++) {
-    if (layers[tap] < 0 || (tap == 1 && heaviest >= 1.0 - share) || (tap > 1 && heaviest > 0.0)) continue;
-    vec3 seen = seen_by(views[tap], point);
-    vec2 place = seen.xy - 0.5;
-    ivec2 cell = ivec2(round(place));
-    if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, sizes[tap]))) continue;
-    vec4 known = texelFetch(about, ivec3(cell, layers[tap]), 0);
-    if (known.b <= 0.5 || seen.z > far_in(known.r) + slack) continue;
-    float edge = known.g * 255.0 / edge_steps / 4.0;
-    float weight = (tap == 0 ? share : tap == 1 ? 1.0 - share : 1.0) * (1.0 - 0.9 * exp(-edge * edge));
-    if (weight <= heaviest) continue;
-    heaviest = weight;
-    best = vec3(place + (tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0) * apart, float(tap));
-  }
-  if (heaviest > 0.0) {
-    int tap = int(best.z);
-    color = smooth_at(paint, tap, best.xy).rgb;
-    if (changed) {
-      ivec2 cell = clamp(ivec2(round(best.xy)), ivec2(0), sizes[tap] - 1);
+  vec4 chosen = texelFetch(choice, fine > 0.75 ? at / 2 : at, 0), seen = texelFetch(rays, at, 0);
+  int tap = int(chosen.z);
+  vec3 color;
+  if (chosen.w > 0.0 || shaped) {
+    vec2 place = seen_by(views[tap], point).xy - 0.5 + chosen.xy;
+    color = smooth_at(paint, tap, place).rgb;
+    if (changed && chosen.w > 0.0) {
+      ivec2 cell = clamp(ivec2(round(place)), ivec2(0), sizes[tap] - 1);
       int label = int(round(texelFetch(paint, ivec3(cell, layers[tap]), 0).a * 255.0));
       color = clamp(color + new_paints[label] - old_paints[label], 0.0, 1.0);
     }
-  }
-  vec4 seen = texelFetch(rays, at, 0);
-  if (heaviest == 0.0) {
-    color = shaped ? smooth_at(paint, 0, seen_by(views[0], point).xy - 0.5).rgb : clamp(seen.rgb / max(seen.a, 0.2), 0.0, 1.0);
-  }
+  } else color = clamp(seen.rgb / max(seen.a, 0.2), 0.0, 1.0);
   if (shaded && dot(seen.rgb * 2.0 - 1.0, shade_slope) + shade_level > 0.0) color *= shade_factor;
   if (reaches.x + reaches.y > 0.0) stroke = max(stroke, min(cover, inner_line(at)));
   result = vec4(color * (cover - stroke) + stroke * ink, cover);
@@ -593,6 +609,7 @@ export class DrawnLook {
     this.flood = new Program(gl, FLOOD);
     this.compose = new Program(gl, COMPOSE);
     this.coarse = new Program(gl, `#define CELL ${CELL}\n${COARSE}`);
+    this.choice = new Program(gl, CHOICE);
     this.fast = new Program(gl, `#define CELL ${CELL}\n${FAST}`);
     /** @type {Record<string, Target> | null} */
     this.targets = null;
@@ -621,6 +638,7 @@ export class DrawnLook {
       rim: make(gl.RGBA32F),
       flood: make(gl.RGBA32F),
       inside: make(bytes),
+      choice: makeTarget(gl, Math.ceil(width / 2), Math.ceil(height / 2), [gl.RGBA16F]),
       coarse: makeTarget(gl, Math.ceil(width / CELL), Math.ceil(height / CELL), [bytes], false, true),
     };
     return this.targets;
@@ -725,9 +743,11 @@ export class DrawnLook {
       const fine = seen.width / into.width > 0.75 ? 1 : 0.5;
       bind(targets.coarse, 1 / CELL);
       this.coarse.use({ rays: field, reach: line + 4 + CELL / 2, fine }).fill();
+      bind(targets.choice, 0.5);
+      this.choice.use({ ...common, rays: field, depths, fine }).fill();
       bind(into);
-      const coarse = targets.coarse.textures[0];
-      this.fast.use({ ...common, rays: field, depths, coarse, line, fine, ...this.styleOf(line) }).fill();
+      const [coarse, choice] = [targets.coarse.textures[0], targets.choice.textures[0]];
+      this.fast.use({ ...common, rays: field, depths, coarse, choice, line, fine, ...this.styleOf(line) }).fill();
       return null;
     }
     bind(targets.surface);
