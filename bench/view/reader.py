@@ -93,7 +93,7 @@ def reader_at(
     context = browser.new_context(**{"viewport": {"width": 480, "height": 640}, **options})
     page = context.new_page()
     reader = Reader(page, context.new_cdp_session(page))
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(300_000)  # a turntable takes long without a graphics card
     page.on("console", lambda message: reader.noise.append(f"console: {message.text}"))
     page.on("pageerror", lambda error: reader.noise.append(f"error: {error}"))
 
