@@ -22,7 +22,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Page
 
 # Sums depend in their last digits on how many threads share them. A process of its own has one
 # (`main` sees to it); here plugins have imported numpy before anything could be set.
@@ -310,3 +310,22 @@ def browser() -> Iterator[Browser]:
 
     with chromium() as browser:
         yield browser
+
+
+@pytest.fixture(scope="session")
+def barriers() -> Callable[[Page], list[str]]:
+    """Return a function that lists what axe-core finds wrong in an open page."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    off_by_default = (
+        "target-size",
+        "label-content-name-mismatch",
+    )  # one of WCAG 2.2, one tried out
+    rules = {name: {"enabled": True} for name in off_by_default}
+    options = {"resultTypes": ["violations"], "rules": rules}
+
+    def found(page: Page) -> list[str]:
+        broken = Axe().run(page, options=options).response["violations"]
+        return [f"{rule['id']}: {node['html'][:200]}" for rule in broken for node in rule["nodes"]]
+
+    return found

@@ -111,6 +111,7 @@ function createCard(model, index, poseShown, look) {
       for (const button of [flip, lock]) button.disabled = excluded || !view;
       lock.setAttribute("aria-pressed", String(!!said?.lock));
       exclude.textContent = excluded ? "Bring back" : "Leave out";
+      exclude.setAttribute("aria-label", `${exclude.textContent}: drawing ${number}`);
       forget.disabled = !said;
     },
   };

@@ -305,9 +305,10 @@ function corners(context, [x, y, wide, high], px, shade) {
 export function tag(context, [x, y], px, shade, text) {
   context.font = `600 ${12 * px}px system-ui, sans-serif`;
   const wide = context.measureText(text).width;
+  const top = Math.max(0, y - 17 * px); // over the box where there is room: it covers no face
   context.fillStyle = shade;
-  context.fillRect(x, y, wide + 8 * px, 17 * px);
+  context.fillRect(x, top, wide + 8 * px, 17 * px);
   context.fillStyle = "white";
   context.textBaseline = "top";
-  context.fillText(text, x + 4 * px, y + 2.5 * px);
+  context.fillText(text, x + 4 * px, top + 2.5 * px);
 }

@@ -60,7 +60,9 @@ export function radioGroup(name, words, choose) {
 
 /** @param {string} text a line for the reader, until the next one */
 export function say(text) {
-  part("message", HTMLElement).textContent = text;
+  const line = part("message", HTMLElement);
+  line.textContent = text;
+  line.tabIndex = line.scrollHeight > line.clientHeight ? 0 : -1; // keys reach what scrolls
 }
 
 /**

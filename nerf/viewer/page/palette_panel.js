@@ -14,7 +14,7 @@ import { sameColor, startState } from "./state.js";
  * @param {import("./state.js").Store} store
  */
 export function createPalettePanel(scene, store) {
-  const rows = scene.palette.map((paint) => swatchRow(paint.name, `${(paint.share * 100).toFixed(0)} %`));
+  const rows = scene.palette.map((paint) => swatchRow(paint.name, shareWords(paint.share)));
   const inkRow = scene.pen ? swatchRow("Lines", "") : null;
   const strip = scene.palette.map((paint) => stripe(paint.share));
   const undo = createUndo(store);
@@ -92,6 +92,12 @@ function swatchRow(name, share) {
       input.addEventListener("change", keep);
     },
   };
+}
+
+/** @param {number} share @returns {string} */
+function shareWords(share) {
+  if (!share) return "";
+  return share < 0.005 ? "< 1 %" : `${(share * 100).toFixed(0)} %`;
 }
 
 /** @param {number} share @returns {HTMLElement} */

@@ -7,6 +7,7 @@ import { VERDICTS, badge, reasonOf } from "./verdict.js";
 /** @typedef {import("./types.js").ViewRecord} ViewRecord */
 
 const THUMB = 144; // canvas pixels, of the longer side
+const HINT = "Choose a drawing to compare the figure with it.";
 
 /**
  * @param {Scene} scene
@@ -21,7 +22,7 @@ export function createTimeline(scene, store, pictures) {
   function tell(i) {
     const view = scene.views[i];
     const text = view ? element("bdi", {}, reasonOf(view)) : "";
-    line.replaceChildren(view ? `Drawing ${i + 1}: ` : "", text);
+    line.replaceChildren(view ? `Drawing ${i + 1}: ` : HINT, text);
   }
 
   buttons.forEach((button, i) => {
@@ -36,6 +37,7 @@ export function createTimeline(scene, store, pictures) {
     if (!list.contains(document.activeElement)) tell(snapped);
   });
   buttons.forEach((button, i) => button.setAttribute("aria-pressed", String(i === store.state.snapped)));
+  tell(store.state.snapped);
   part("timeline", HTMLElement).hidden = !buttons.length;
 }
 
@@ -71,7 +73,8 @@ function drawingButton(view, i, picture) {
  * @returns {string}
  */
 function angleWords({ yaw, sigma }) {
-  return sigma ? `${yaw.toFixed(0)}° ± ${sigma.yaw.toFixed(1)}°` : `${yaw.toFixed(0)}°`;
+  const angle = `${Math.round(yaw)}°`; // never "-0°", as toFixed would have it
+  return sigma ? `${angle} ± ${sigma.yaw.toFixed(1)}°` : angle;
 }
 
 /**

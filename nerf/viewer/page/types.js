@@ -16,7 +16,7 @@
 
 /** @typedef {{at: number, type: string, shape: number[]}} ArrayRecord where an array lies in the blob */
 
-/** @typedef {{name: string, rgb: number[], share: number}} Paint */
+/** @typedef {{name: string, rgb: number[], share: number}} Paint a share of 0 is not known */
 
 /**
  * @typedef {object} ViewRecord one drawing of the sheet

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Page
 
 from tests.cli.editor.conftest import Open
 from tests.cli.editor.page_under_test import BOXES, HEXES, HOSTILE, Editor
@@ -312,6 +314,23 @@ def test_names_that_mean_harm_on_a_phone(open_page: Open, scheme: str) -> None:
     editor.mode("Cameras")
     editor.card("Leave out", 1)
     assert editor.download()["sheet"]["name"] == HOSTILE
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(360, "light"), (1600, "dark")])
+def test_nothing_bars_the_way(
+    open_page: Open, barriers: Callable[[Page], list[str]], width: int, scheme: str
+) -> None:
+    editor = open_page(viewport={"width": width, "height": 740}, color_scheme=scheme)
+    editor.mode("Figures")
+    assert barriers(editor.page) == []
+    editor.mode("Cameras")
+    editor.card("Leave out", 1)
+    editor.card("Lock", 2)
+    assert barriers(editor.page) == []
+    editor.mode("Palette")
+    editor.choose(HEXES[1])
+    editor.click("Drop")
+    assert barriers(editor.page) == []
 
 
 def test_the_page_is_one_file(open_page: Open, tmp_path: Path) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
+from playwright.sync_api import Page
 
 from tests.cli.editor.conftest import Open
 from tests.cli.editor.page_under_test import Editor
@@ -113,11 +114,14 @@ def test_an_error_is_shown_and_undone(desk: Desk) -> None:
     fitted(editor)
 
 
-def test_an_address_that_was_used_is_refused(desk: Desk) -> None:
+def test_an_address_that_was_used_is_refused(
+    desk: Desk, barriers: Callable[[Page], list[str]]
+) -> None:
     used = desk.server.address
     desk.open()
     late = desk.open_at(used, desk.server.origin + "/")
     assert "This address was used already" in late.page.locator("#trouble").inner_text()
+    assert barriers(late.page) == []
     assert late.page.locator("#work").is_hidden()
     assert all("401" in noise for noise in late.noise)
     late.noise.clear()

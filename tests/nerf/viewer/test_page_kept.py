@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from PIL import Image
+from playwright.sync_api import Page
 
 from tests.nerf.viewer.conftest import Open
 from tests.nerf.viewer.page_under_test import COLORS, figure_scene
@@ -236,3 +238,31 @@ def test_what_is_touched_is_large_enough(open_page: Open) -> None:
       .filter(([, box]) => box.width && Math.min(box.width, box.height) < 24)
       .map(([name]) => name)"""
     assert viewer.page.evaluate(small) == []
+
+
+STATES = ("", "#cameras=1", "#view=2", "#view=1&compare=onion")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(360, "light"), (1600, "dark")])
+def test_nothing_bars_the_way(
+    open_page: Open, barriers: Callable[[Page], list[str]], width: int, scheme: str
+) -> None:
+    viewer = open_page(viewport={"width": width, "height": 740}, color_scheme=scheme)
+    for state in STATES:
+        viewer.page.evaluate("state => { location.hash = state; }", state)
+        viewer.drop("a.hex", b"no")  # a message shows
+        assert barriers(viewer.page) == [], state
+
+
+def test_nothing_bars_the_way_without_3d(
+    open_page: Open, barriers: Callable[[Page], list[str]]
+) -> None:
+    scene, _ = figure_scene()
+    many = {"field": None, "palette": 200 * scene["palette"]}
+    viewer = open_page("#view=2", scene=many, viewport={"width": 360, "height": 740})
+    viewer.page.evaluate("() => { navigator.clipboard.writeText = () => Promise.reject(); }")
+    viewer.page.get_by_role("button", name="Copy hex list").click()
+    message = viewer.page.locator("#message:not(:empty)")
+    message.focus()  # it is so long that it scrolls, by keys, too
+    assert "does not let the page copy" in message.inner_text()
+    assert barriers(viewer.page) == []
