@@ -110,18 +110,20 @@ void main() {
   result = vec4(low, high, 0.0, 1.0);
 }`;
 
-/**
- * Which drawing a place of a moving figure is read from, for every second pixel: the same steps
- * without votes around.
- */
-const CHOICE = `${LOOK_UP}
+/** Colours of a moving figure, for every second pixel: one drawing each, no votes around. */
+const COLORS = `${LOOK_UP}
 uniform sampler2D rays;
 uniform Camera pair;
 uniform sampler2D flow;
 uniform bool flows;
 uniform float slack, sign, share;
 uniform float fine; // pixels of the rays per pixel of the view
-layout(location = 0) out vec4 result; // how far beside its place it is read, drawing, weight
+uniform bool shaped, shaded;
+uniform float shade_level;
+uniform vec3 shade_slope, shade_factor;
+uniform vec3 old_paints[${MOST_PAINTS}], new_paints[${MOST_PAINTS}];
+uniform bool changed;
+layout(location = 0) out vec4 result;
 
 void main() {
   int block = fine > 0.75 ? 2 : 1;
@@ -130,15 +132,18 @@ void main() {
   for (int i = 1; i < 4 && block == 2 && texelFetch(rays, at, 0).a < 0.5; i++) {
     at = min(2 * ivec2(gl_FragCoord.xy) + ivec2(i & 1, i >> 1), most);
   }
-  if (texelFetch(rays, at, 0).a < 0.05) return;
+  vec4 ray = texelFetch(rays, at, 0);
+  if (ray.a < 0.05) return;
   vec3 point = point_at(camera, (vec2(at) + 0.5) / fine, texelFetch(depths, at, 0).r);
   vec2 apart = vec2(0.0);
   if (flows) {
     vec2 place = seen_by(pair, point).xy;
     apart = sign * textureLod(flow, place / vec2(textureSize(flow, 0)), 0.0).rg;
   }
+  vec3 best = vec3(seen_by(views[0], point).xy - 0.5, 0.0); // place and drawing
+  float heaviest = 0.0;
   for (int tap = 0; tap < ${TAPS}; tap++) {
-    if (layers[tap] < 0 || (tap == 1 && result.w >= 1.0 - share) || (tap > 1 && result.w > 0.0)) continue;
+    if (layers[tap] < 0 || (tap == 1 && heaviest >= 1.0 - share) || (tap > 1 && heaviest > 0.0)) continue;
     vec3 seen = seen_by(views[tap], point);
     ivec2 cell = ivec2(floor(seen.xy));
     if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, sizes[tap]))) continue;
@@ -146,22 +151,30 @@ void main() {
     if (known.b <= 0.5 || seen.z > far_in(known.r) + slack) continue;
     float edge = known.g * 255.0 / edge_steps / 4.0;
     float weight = (tap == 0 ? share : tap == 1 ? 1.0 - share : 1.0) * (1.0 - 0.9 * exp(-edge * edge));
-    float along = tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0;
-    if (weight > result.w) result = vec4(along * apart, float(tap), weight);
+    if (weight <= heaviest) continue;
+    heaviest = weight;
+    best = vec3(seen.xy - 0.5 + (tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0) * apart, float(tap));
   }
+  int tap = int(best.z);
+  vec3 color = clamp(ray.rgb / max(ray.a, 0.2), 0.0, 1.0);
+  if (shaped || heaviest > 0.0) color = smooth_at(paint, tap, best.xy).rgb;
+  if (changed && heaviest > 0.0) {
+    ivec2 cell = clamp(ivec2(round(best.xy)), ivec2(0), sizes[tap] - 1);
+    int label = int(round(texelFetch(paint, ivec3(cell, layers[tap]), 0).a * 255.0));
+    color = clamp(color + new_paints[label] - old_paints[label], 0.0, 1.0);
+  }
+  if (shaded && dot(ray.rgb * 2.0 - 1.0, shade_slope) + shade_level > 0.0) color *= shade_factor;
+  result = vec4(color, 1.0);
 }`;
 
-/** The same look while the figure turns: one drawing for every pixel, no flooding. */
-const FAST = `${LOOK_UP}
-uniform sampler2D rays, coarse, choice;
+/** The same look while the figure turns: its colours, and outlines without flooding. */
+const FAST = `
+uniform sampler2D rays, depths, coarse, colors;
 uniform float border, line;
 uniform float fine; // pixels of the rays per pixel
-uniform bool shaped, shaded;
 uniform vec2 reaches; // of inner lines onto the near and the far side; 0: none
-uniform float least_step, shade_level;
-uniform vec3 shade_slope, shade_factor;
-uniform vec3 ink, old_paints[${MOST_PAINTS}], new_paints[${MOST_PAINTS}];
-uniform bool changed;
+uniform float least_step;
+uniform vec3 ink;
 layout(location = 0) out vec4 result;
 
 float alpha_at(vec2 pixel) {
@@ -170,14 +183,15 @@ float alpha_at(vec2 pixel) {
 float inner_line(ivec2 at) {
   ivec2 most = textureSize(depths, 0) - 1;
   float own = texelFetch(depths, at, 0).r, line = 0.0;
-  for (int i = 0; i < 16; i++) {
+  for (int i = 0; i < 8; i++) {
     float turn = float(i >> 1) * 0.7854, reach = (i & 1) == 0 ? reaches.x : reaches.y;
     ivec2 way = ivec2(round(max(reach, 1.0) * vec2(cos(turn), sin(turn))));
-    float other = texelFetch(depths, clamp(at + way, ivec2(0), most), 0).r;
-    float back = texelFetch(depths, clamp(at - way, ivec2(0), most), 0).r;
-    if (other <= ${NOWHERE} || back <= ${NOWHERE}) continue;
-    float step_off = ((i & 1) == 0 ? other - own : own - other) - abs(own - back);
-    if (step_off > least_step) line = max(line, min(reach, 1.0));
+    vec2 sides = vec2(
+      texelFetch(depths, clamp(at + way, ivec2(0), most), 0).r,
+      texelFetch(depths, clamp(at - way, ivec2(0), most), 0).r);
+    if (min(sides.x, sides.y) <= ${NOWHERE}) continue;
+    vec2 off = (i & 1) == 0 ? sides - own : own - sides, step_off = off - abs(off.yx);
+    if (max(step_off.x, step_off.y) > least_step) line = max(line, min(reach, 1.0));
   }
   return line;
 }
@@ -203,34 +217,10 @@ void main() {
       stroke = min(cover, clamp(0.5 + 2.5 * (border - least), 0.0, 1.0));
     }
   }
-  if (stroke > 0.99) { result = vec4(ink, 1.0) * cover; return; }
-  ivec2 most = textureSize(depths, 0) - 1;
-  ivec2 at = ivec2(pixel * fine);
-  if (texelFetch(rays, at, 0).a < 0.5) {
-    ivec2 best = at;
-    for (int i = 0; i < 8; i++) {
-      ivec2 way = ivec2(i < 3 ? i - 1 : i < 5 ? 2 * i - 7 : i - 6, i < 3 ? -1 : i < 5 ? 0 : 1);
-      ivec2 other = clamp(at + way, ivec2(0), most);
-      if (texelFetch(rays, other, 0).a > texelFetch(rays, best, 0).a) best = other;
-    }
-    at = best;
-  }
-  vec3 point = point_at(camera, pixel, texelFetch(depths, at, 0).r);
-  vec4 chosen = texelFetch(choice, fine > 0.75 ? at / 2 : at, 0), seen = texelFetch(rays, at, 0);
-  int tap = int(chosen.z);
-  vec3 color;
-  if (chosen.w > 0.0 || shaped) {
-    vec2 place = seen_by(views[tap], point).xy - 0.5 + chosen.xy;
-    color = smooth_at(paint, tap, place).rgb;
-    if (changed && chosen.w > 0.0) {
-      ivec2 cell = clamp(ivec2(round(place)), ivec2(0), sizes[tap] - 1);
-      int label = int(round(texelFetch(paint, ivec3(cell, layers[tap]), 0).a * 255.0));
-      color = clamp(color + new_paints[label] - old_paints[label], 0.0, 1.0);
-    }
-  } else color = clamp(seen.rgb / max(seen.a, 0.2), 0.0, 1.0);
-  if (shaded && dot(seen.rgb * 2.0 - 1.0, shade_slope) + shade_level > 0.0) color *= shade_factor;
-  if (reaches.x + reaches.y > 0.0) stroke = max(stroke, min(cover, inner_line(at)));
-  result = vec4(color * (cover - stroke) + stroke * ink, cover);
+  vec4 color = textureLod(colors, 0.5 * pixel / vec2(textureSize(colors, 0)), 0.0);
+  color.rgb /= max(color.a, 1.0 / 255.0);
+  if (reaches.x + reaches.y > 0.0) stroke = max(stroke, min(cover, inner_line(ivec2(pixel * fine))));
+  result = vec4(color.rgb * (cover - stroke) + stroke * ink, cover);
 }`;
 
 /** Which of the drawings show a place. */
@@ -609,7 +599,7 @@ export class DrawnLook {
     this.flood = new Program(gl, FLOOD);
     this.compose = new Program(gl, COMPOSE);
     this.coarse = new Program(gl, `#define CELL ${CELL}\n${COARSE}`);
-    this.choice = new Program(gl, CHOICE);
+    this.colors = new Program(gl, COLORS);
     this.fast = new Program(gl, `#define CELL ${CELL}\n${FAST}`);
     /** @type {Record<string, Target> | null} */
     this.targets = null;
@@ -638,7 +628,7 @@ export class DrawnLook {
       rim: make(gl.RGBA32F),
       flood: make(gl.RGBA32F),
       inside: make(bytes),
-      choice: makeTarget(gl, Math.ceil(width / 2), Math.ceil(height / 2), [gl.RGBA16F]),
+      colors: makeTarget(gl, Math.ceil(width / 2), Math.ceil(height / 2), [bytes], false, true),
       coarse: makeTarget(gl, Math.ceil(width / CELL), Math.ceil(height / CELL), [bytes], false, true),
     };
     return this.targets;
@@ -743,11 +733,12 @@ export class DrawnLook {
       const fine = seen.width / into.width > 0.75 ? 1 : 0.5;
       bind(targets.coarse, 1 / CELL);
       this.coarse.use({ rays: field, reach: line + 4 + CELL / 2, fine }).fill();
-      bind(targets.choice, 0.5);
-      this.choice.use({ ...common, rays: field, depths, fine }).fill();
+      const moving = { ...common, depths, rays: field, fine, line, ...this.styleOf(line) };
+      bind(targets.colors, 0.5);
+      this.colors.use(moving).fill();
       bind(into);
-      const [coarse, choice] = [targets.coarse.textures[0], targets.choice.textures[0]];
-      this.fast.use({ ...common, rays: field, depths, coarse, choice, line, fine, ...this.styleOf(line) }).fill();
+      const [coarse, colors] = [targets.coarse.textures[0], targets.colors.textures[0]];
+      this.fast.use({ ...moving, coarse, colors }).fill();
       return null;
     }
     bind(targets.surface);
