@@ -52,7 +52,7 @@ ROLL_SIGMA, SCALE_SIGMA, SHIFT = np.radians(1.0), 0.01, 0.01  # the last of the 
 WEAK_APART, FAILED_APART = 0.03, 0.06  # of the height
 FEWEST_TO_CONFIRM = 3  # views
 MOST_AGAINST = 3.0  # nats by which drawings speak against a label
-ASK = "say which view is the front, such as --front 0"
+ASK = "say which view is the front (--front 0)"
 ONE = "are all of one character, in one pose and at one scale?"
 MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 4, 0.01
 

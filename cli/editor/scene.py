@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -70,13 +71,18 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
             "notes": list(sheet.warnings),
         },
         "leftOut": left_out_of(sheet),
-        "verdict": {"state": found.verdict, "reason": found.reason},
+        "verdict": {"state": found.verdict, "reason": for_page(found.reason)},
         "views": [
             _view(folder, view, said) for view, said in zip(sheet.views, found.views, strict=True)
         ],
         "mannequin": None if mesh is None else _mannequin(mesh),
         "palette": _palette(folder / PALETTE),
     }
+
+
+def for_page(reason: str) -> str:
+    """Return a reason without the command line's options in brackets: the page has buttons."""
+    return re.sub(r" \(--[^)]*\)", "", reason)
 
 
 def left_out_of(sheet: Sheet) -> list[dict[str, Any]]:
@@ -104,7 +110,7 @@ def _view(folder: Path, view: View, said: ViewRecord) -> dict[str, Any]:
         "box": list(view.figure_box),
         "crop": list(view.box),
         "verdict": said.verdict,
-        "reason": said.reason,
+        "reason": for_page(said.reason),
         "sigma": {"yaw": said.sigma.yaw_deg, "elevation": said.sigma.elevation_deg},
         "yaw": yaw,
         "elevation": elevation,

@@ -50,15 +50,15 @@ export function createFiguresTool(model, colorAt) {
     model.show({ selected: model.figures.length - 1, also: [] });
   }
 
-  /** @param {Point} [at] */
-  function cut(at) {
+  /** @param {Point} [at] @param {boolean} [other] way than the box is long */
+  function cut(at, other = false) {
     const box = model.figure?.box;
     if (!box) return;
     const [x, y, wide, high] = box;
     const [u, v] = at ?? [x + wide / 2, y + high / 2];
     if (Math.min(u - x, x + wide - u, v - y, y + high - v) < 1) return say("Click within the box.");
     const parts =
-      wide >= high * 0.6
+      wide >= high * 0.6 !== other
         ? [[x, y, u - x, high], [u, y, x + wide - u, high]]
         : [[x, y, wide, v - y], [x, v, wide, y + high - v]];
     const all = boxes().flatMap((one, i) => (i === model.selected ? parts : [one]));
@@ -94,7 +94,7 @@ export function createFiguresTool(model, colorAt) {
     armed = next;
     part("pick_paper", HTMLElement).setAttribute("aria-pressed", String(armed === "paper"));
     part("cut_box", HTMLElement).setAttribute("aria-pressed", String(armed === "cut"));
-    if (armed) say(armed === "paper" ? "Click the paper." : "Click where the box is to be cut; Enter cuts its middle.");
+    if (armed) say(armed === "paper" ? "Click the paper." : "Click where the box is to be cut, with Shift the other way; Enter cuts its middle.");
   }
 
   function leftOut() {
@@ -167,7 +167,7 @@ export function createFiguresTool(model, colorAt) {
       }
       const own = model.figure?.box;
       const grip = own && gripAt(own, at, GRIP * px);
-      if (armed === "cut" && own) return (cut(at), null);
+      if (armed === "cut" && own) return (cut(at, event.shiftKey), null);
       if (own && grip) return dragBox(own, (box, by) => resizedBox(box, grip, by), at);
       const hit = topmost(boxes(), at);
       if (hit < 0) return drawBox(at);
@@ -177,7 +177,7 @@ export function createFiguresTool(model, colorAt) {
     },
     key(event) {
       if (armed && event.key === "Escape") return (arm(""), true);
-      if (armed === "cut" && event.key === "Enter") return (cut(), true);
+      if (armed === "cut" && event.key === "Enter") return (cut(undefined, event.shiftKey), true);
       if (event.key === "Delete" || event.key === "Backspace") return (drop(), true);
       const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
       const box = model.figure?.box;

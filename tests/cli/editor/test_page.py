@@ -58,6 +58,13 @@ def test_boxes_are_merged_and_cut(open_page: Open) -> None:
     assert boxes[0] == pytest.approx([20, 40, 90, 120], abs=2)
     assert boxes[1] == pytest.approx([110, 40, 90, 120], abs=2)
     assert is_valid(editor)
+    editor.click("Undo")
+    editor.tap(110, 100)
+    editor.click("Cut")
+    editor.page.keyboard.down("Shift")
+    editor.tap(110, 100)
+    editor.page.keyboard.up("Shift")
+    assert editor.said["boxes"][0] == pytest.approx([20, 40, 180, 60], abs=2)
 
 
 def test_what_was_left_out_is_named_and_comes_back(open_page: Open) -> None:

@@ -16,12 +16,13 @@ from typing import Any
 
 import pytest
 
+from toonset.calib.without_body.find import ASK
 from toonset.cli.editor import opening
 from toonset.cli.editor import session as session_module
 from toonset.cli.editor.lock import locked
 from toonset.cli.editor.opening import folder_of, open_session
 from toonset.cli.editor.refit import CORRECTIONS, Changed, parts_changed
-from toonset.cli.editor.scene import PALETTE
+from toonset.cli.editor.scene import PALETTE, for_page
 from toonset.cli.editor.session import Session, StaleError
 from toonset.dataset.bundle.bundle import read_bundle
 from toonset.dataset.bundle.check import bundle_problems
@@ -193,6 +194,12 @@ def test_parts_that_change() -> None:
         True, True, True
     )
     assert parts_changed(said, said | {"palette": {"drop": []}}) == Changed(False, False, True)
+
+
+def test_reasons_on_the_page_name_no_options() -> None:
+    reason = f"the front is open; {ASK}"
+    assert "(--front 0)" in reason
+    assert for_page(reason) == "the front is open; say which view is the front"
 
 
 def test_what_is_no_bundle_is_refused(bundle: Path, tmp_path: Path) -> None:
