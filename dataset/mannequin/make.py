@@ -7,6 +7,7 @@ One closed surface, mirror symmetric to the last bit, 1.7 world units tall, feet
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -40,8 +41,9 @@ class Mannequin:
     landmarks: dict[str, Point]
 
 
+@cache
 def default_mannequin() -> Mannequin:
-    """Return the mannequin that stands in where nobody has given a mesh."""
+    """Return the mannequin that stands in where nobody has given a mesh, made once."""
     return make_mannequin(MannequinOptions())
 
 
