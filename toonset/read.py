@@ -89,7 +89,7 @@ def read_whole(
             raise error_type(f"{path}: is empty (0 bytes); export the {thing} again")
         if size > max_bytes:
             raise error_type(
-                f"{path}: {size / 2**20:.0f} MB, at most {max_bytes / 2**20:.0f} MB is read; "
+                f"{path}: {size / 2**20:.1f} MB, at most {max_bytes / 2**20:.0f} MB is read; "
                 f"make the {thing} smaller"
             )
         return path.read_bytes()

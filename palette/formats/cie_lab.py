@@ -1,4 +1,4 @@
-"""CIE L*a*b* as Adobe and Krita store it (white D50), to sRGB.
+"""CIE L*a*b* as Adobe stores it (white D50), to sRGB.
 
 Source: W3C, CSS Color Module Level 4, sections 9 to 11 and its sample code: Lab to XYZ, Bradford
 adaptation from D50 to D65, XYZ to linear sRGB.
@@ -35,10 +35,6 @@ def rgb_from_lab(lightness: float, a: float, b: float) -> RGB:
     roots = np.array([y + a / 500, y, y - b / 200])
     cubes = roots**3
     xyz = WHITE_D50 * np.where(cubes > EPSILON, cubes, (116 * roots - 16) / KAPPA)
-    return rgb_from_linear(LINEAR_FROM_D65 @ D65_FROM_D50 @ xyz)
-
-
-def rgb_from_linear(linear: np.ndarray) -> RGB:
-    """Return the 8-bit sRGB colour of three linear-light numbers, clipped to 0 to 1."""
+    linear = LINEAR_FROM_D65 @ D65_FROM_D50 @ xyz
     red, green, blue = np.rint(255 * srgb_from_linear(linear)).astype(int).tolist()
     return red, green, blue

@@ -18,9 +18,6 @@ from toonset.palette.formats.ase import ase_title, read_ase, to_ase
 from toonset.palette.formats.gpl import gpl_title, read_gpl, to_gpl
 from toonset.palette.formats.hex import is_color, read_hex, rgb_of_typed, to_hex
 from toonset.palette.formats.json import json_title, read_json, to_json
-from toonset.palette.formats.kpl import MAX_BYTES as MAX_KPL_BYTES
-from toonset.palette.formats.kpl import kpl_title, read_kpl
-from toonset.palette.formats.pal import read_pal
 from toonset.palette.formats.text import without_mark
 from toonset.palette.formats.tones import paints_of
 from toonset.palette.names import NamedColor, clean_name
@@ -28,6 +25,7 @@ from toonset.palette.palette import MAX_COLORS, Palette
 from toonset.read import describe, read_whole
 
 UNTITLED = "toonset"
+MAX_BYTES = 2**20  # of a file: thousands of colours fit
 SHOWN = 80  # characters of what was typed, in messages
 
 
@@ -40,7 +38,6 @@ class Format:
         magic: how its content begins, leading spaces left out; () where anything may.
         read: the colours of a file's bytes; the second argument names the file in messages.
         write: the bytes of a palette with a title; None where toonset does not write it.
-        max_bytes: a longer file is refused; thousands of colours fit.
         title: the palette's own name in a file's bytes; None where the format has none.
     """
 
@@ -48,7 +45,6 @@ class Format:
     magic: tuple[bytes, ...]
     read: Callable[[bytes, str], list[NamedColor]]
     write: Callable[[Palette, str], bytes] | None = None
-    max_bytes: int = 2**20
     title: Callable[[bytes], str] | None = None
 
 
@@ -66,13 +62,10 @@ FORMATS = (
     ),
     Format((".ase",), (b"ASEF",), read_ase, to_ase, title=ase_title),
     Format((".aco",), (b"\0\1", b"\0\2"), read_aco),
-    Format((".pal",), (b"JASC-PAL", b"RIFF"), read_pal),
-    Format((".kpl",), (b"PK\3\4",), read_kpl, max_bytes=MAX_KPL_BYTES, title=kpl_title),
     Format((".json",), (b"[", b"{"), read_json, _json_bytes, title=json_title),
     Format((".hex", ".txt"), (), read_hex, lambda palette, _: to_hex(palette).encode()),
 )
 EXTENSIONS = tuple(extension for kind in FORMATS for extension in kind.extensions)
-LONGEST = max(kind.max_bytes for kind in FORMATS)
 WRITTEN = tuple(kind.extensions[0] for kind in FORMATS if kind.write is not None)
 
 
@@ -178,7 +171,7 @@ def _read(path: Path) -> list[NamedColor]:
 
 def _whole(path: Path) -> tuple[bytes, Format]:
     """Return a palette file's bytes, and which format they have."""
-    data = without_mark(read_whole(path, "palette", PaletteError, LONGEST))
+    data = without_mark(read_whole(path, "palette", PaletteError, MAX_BYTES))
     kinds = [
         kind for kind in FORMATS if kind.magic and data.lstrip(b" \t\r\n").startswith(kind.magic)
     ]
@@ -188,11 +181,6 @@ def _whole(path: Path) -> tuple[bytes, Format]:
     if not kinds:
         raise PaletteError(
             f"{path}: is {describe(data)}; a palette file ({', '.join(EXTENSIONS)}) is needed"
-        )
-    if len(data) > kinds[0].max_bytes:
-        raise PaletteError(
-            f"{path}: {len(data) / 2**20:.1f} MB, at most {kinds[0].max_bytes / 2**20:.0f} MB is "
-            "read of this format; make the palette smaller"
         )
     return data, kinds[0]
 

@@ -126,7 +126,7 @@ def test_what_cannot_be_meant_is_named_with_its_key(content, words):
         (b'{"version": 1, "version": 1}', "the key 'version' is there twice"),
         (b'{"version": 1, "views": [NaN]}', "is nan, a finite number is needed"),
         (b'{"version": ' + b"[" * 2 * MAX_DEPTH + b"]" * 2 * MAX_DEPTH + b"}", "nested deeper"),
-        (b" " * (9 * 2**20), "9 MB, at most 8 MB is read"),
+        (b" " * (9 * 2**20), "9.0 MB, at most 8 MB is read"),
         (b"\x89PNG\r\n\x1a\n\xff", "is no UTF-8"),
     ],
 )
