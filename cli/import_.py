@@ -23,7 +23,7 @@ def import_(
         typer.Argument(
             metavar="FOLDER",
             help="A nerfstudio, instant-ngp, Blender-synthetic or COLMAP folder, an OpenCV "
-            "cameras.yml or .xml, or any folder of `toonset export`.",
+            "cameras.yml, or any folder of `toonset export`.",
         ),
     ],
     out: Annotated[

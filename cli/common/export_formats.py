@@ -27,7 +27,6 @@ class Format(StrEnum):
     blender = "blender"
     gltf = "gltf"
     opencv = "opencv"
-    opencv_xml = "opencv-xml"
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,5 +105,4 @@ TARGETS = {
     ),
     Format.gltf: Target("gltf:write_gltf", (*BESIDE, "scene.glb"), is_exact=True),
     Format.opencv: Target("opencv:write_opencv", (*BESIDE, "cameras.yml")),
-    Format.opencv_xml: Target("opencv:write_opencv", (*BESIDE, "cameras.xml"), fixed={"xml": True}),
 }

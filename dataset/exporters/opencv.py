@@ -1,4 +1,4 @@
-"""Writing cameras as OpenCV's YAML or XML (`cv2.FileStorage`).
+"""Writing cameras as OpenCV's YAML (`cv2.FileStorage`).
 
     cameras.yml        views: a list of maps with name, image (path), image_width, image_height,
                        camera_matrix, distortion_coefficients (0), rvec, R, tvec
@@ -27,28 +27,22 @@ VERSION = 1  # of the layout of the file
 
 
 def write_opencv(
-    folder: Path,
-    views: Sequence[ExportView],
-    mesh: Mesh | None = None,
-    *,
-    xml: bool = False,
-    force: bool = False,
+    folder: Path, views: Sequence[ExportView], mesh: Mesh | None = None, *, force: bool = False
 ) -> None:
-    """Write cameras.yml (or .xml) and pictures; the folder appears whole or not at all.
+    """Write cameras.yml and pictures; the folder appears whole or not at all.
 
     Raises:
         OutputError: the folder exists, or cannot be written.
     """
-    suffix = "xml" if xml else "yml"
     pictures = [f"images/{view.name}" for view in views]
-    text = _text(suffix, list(zip(views, pictures, strict=True)))
+    text = _text(list(zip(views, pictures, strict=True)))
     with new_folder(folder, force=force) as temporary:
-        write_bytes(temporary / f"cameras.{suffix}", text.encode())
-        write_views(temporary, "opencv-xml" if xml else "opencv", views, pictures, mesh)
+        write_bytes(temporary / "cameras.yml", text.encode())
+        write_views(temporary, "opencv", views, pictures, mesh)
 
 
-def _text(suffix: str, views: Sequence[tuple[ExportView, str]]) -> str:
-    storage = cv2.FileStorage(f".{suffix}", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+def _text(views: Sequence[tuple[ExportView, str]]) -> str:
+    storage = cv2.FileStorage(".yml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.write("version", VERSION)
     storage.startWriteStruct("views", cv2.FileNode_SEQ)
     for view, picture in views:

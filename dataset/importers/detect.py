@@ -2,7 +2,7 @@
 
 transforms.json, transforms_train.json ...    nerfstudio, instant-ngp, NeRF's synthetic scenes
 sparse/0, sparse, or a model's own folder     COLMAP (.bin or .txt, old or new layout)
-cameras.yml, cameras.xml                      OpenCV
+cameras.yml                                   OpenCV
 toonset.json                                  any export of toonset; its cameras are exact
 """
 
@@ -94,7 +94,7 @@ def _reader(
         raise BundleError(f"{path}: does not exist; give a folder of cameras and pictures")
     raise BundleError(
         f"{path}: holds no cameras that are known; transforms.json, transforms_train.json, "
-        "cameras.yml or .xml (OpenCV) or a COLMAP model (sparse/0) is needed; name that folder"
+        "cameras.yml (OpenCV) or a COLMAP model (sparse/0) is needed; name that folder"
     )
 
 

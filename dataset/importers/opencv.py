@@ -1,4 +1,4 @@
-"""Reading cameras from OpenCV's YAML or XML; `toonset.dataset.exporters.opencv` says what is in it.
+"""Reading cameras from OpenCV's YAML; `toonset.dataset.exporters.opencv` says what is in it.
 
 Of a view's `R` and `rvec` one is enough; what a view lacks (camera_matrix, image_width, ...) may
 stand once at the top of the file.
@@ -21,13 +21,14 @@ from toonset.dataset.importers.paths import ImportView, find_picture
 from toonset.errors import BundleError, CameraError
 from toonset.read import read_whole
 
-SUFFIXES = (".yml", ".yaml", ".xml")
+SUFFIXES = (".yml", ".yaml")
+HEAD = b"%YAML"  # OpenCV writes it; without it, it would read the file as XML or JSON
 MAX_BYTES = 32 * 2**20
 ORTHONORMAL = 1e-4  # of R R^T - 1: what six digits in a text file leave
 
 
 def opencv_file(path: Path) -> Path | None:
-    """Return the file of cameras that a path names: itself, or cameras.yml (.yaml, .xml) in it."""
+    """Return the file of cameras that a path names: itself, or cameras.yml (.yaml) in it."""
     if path.is_file():
         return path if path.suffix.lower() in SUFFIXES else None
     files = (path / f"cameras{suffix}" for suffix in SUFFIXES)
@@ -41,6 +42,8 @@ def read_opencv(file: Path) -> list[ImportView]:
         BundleError: it is damaged, a view is incomplete or no pinhole, or a picture is missing.
     """
     data = read_whole(file, "camera", BundleError, MAX_BYTES)
+    if not data.startswith(HEAD):
+        raise BundleError(f"{file}: is no OpenCV YAML (does not begin with %YAML); write it again")
     try:
         flags = cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY
         storage = cv2.FileStorage(data.decode(), flags)
@@ -54,7 +57,7 @@ def read_opencv(file: Path) -> list[ImportView]:
         return [_view(file, node, root, number) for number, node in enumerate(views)]
     except (cv2.error, UnicodeDecodeError, SystemError) as error:
         raise BundleError(
-            f"{file}: is no OpenCV YAML or XML ({_first_words(error)}); write it again"
+            f"{file}: is no OpenCV YAML ({_first_words(error)}); write it again"
         ) from error
 
 

@@ -198,11 +198,10 @@ def test_synthetic_scene_follows_from_one_angle(tmp_path: Path, k: float) -> Non
 
 
 @MODELS
-@pytest.mark.parametrize("xml", [False, True], ids=["yml", "xml"])
-def test_opencv_projects_to_the_same_pixels(tmp_path: Path, k: float, xml: bool) -> None:
+def test_opencv_projects_to_the_same_pixels(tmp_path: Path, k: float) -> None:
     views = views_all_round(k=k)
-    write_opencv(tmp_path / "out", views, xml=xml)
-    file = tmp_path / "out" / f"cameras.{'xml' if xml else 'yml'}"
+    write_opencv(tmp_path / "out", views)
+    file = tmp_path / "out" / "cameras.yml"
     storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
     listed = storage.getNode("views")
     assert listed.size() == len(views)
@@ -237,7 +236,7 @@ def test_ply_is_read_back_by_trimesh() -> None:
 
 FORMATS = [
     *("colmap", "nerfstudio", "instant-ngp", "blender-synthetic"),
-    *("blender", "gltf", "opencv", "opencv-xml"),
+    *("blender", "gltf", "opencv"),
 ]
 
 

@@ -33,7 +33,6 @@ WRITERS: dict[str, Writer] = {
     "blender": write_blender_script,
     "gltf": write_gltf,
     "opencv": write_opencv,
-    "opencv-xml": lambda out, views, mesh: write_opencv(out, views, mesh, xml=True),
 }
 OWN_CAMERAS = [name for name in WRITERS if name not in ("blender", "gltf")]
 

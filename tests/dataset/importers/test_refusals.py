@@ -50,6 +50,7 @@ def opencv(tmp_path: Path) -> Path:
         ("tvec: !!opencv", "t: !!opencv", "tvec is missing"),
         ("rows: 3", "rows: 9999999", "no OpenCV YAML"),
         ("%YAML 1.2", "hello", "no OpenCV YAML"),
+        ("%YAML 1.2", "<?xml version='1.0'?>", "no OpenCV YAML"),
         ("0., 0., 1. ]", ".Nan, 0., 1. ]", "not finite"),
         ("data: [ 185", "data: [ -185", "camera_matrix is not"),
         ("-\n      name", "name", "no OpenCV YAML"),
