@@ -1,12 +1,11 @@
 """`python -m bench.edit CASES`: how few corrections make doubtful sheets right, and how soon.
 
-Sheets are drawn sprites with the plain body, sheets of 3D characters with another character's
-mannequin, and the sprites in a row that begins elsewhere and runs the other way. Of those that come
-out wrong or ambiguous, ten are corrected by what a person sees: the drawing that is farthest off,
-or else the first that is ambiguous, gets the nearest of the compass's eight directions; where that
-was said already, the mannequin is dragged to the drawing's own angles, to 10 degrees. Every
-correction is what the page would send, and is fitted before the next. Truth is the cases' own; of
-sprites only yaw is known.
+Sheets are drawn sprites with the plain body, and sheets of 3D characters with another character's
+mannequin. Of those that come out wrong or ambiguous, ten are corrected by what a person sees: the
+drawing that is farthest off, or else the first that is ambiguous, gets the nearest of the
+compass's eight directions; where that was said already, the mannequin is dragged to the drawing's
+own angles, to 10 degrees. Every correction is what the page would send, and is fitted before the
+next. Truth is the cases' own; of sprites only yaw is known.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -28,15 +27,12 @@ import typer
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.cli.editor.opening import open_session
 from toonset.cli.editor.session import Session
-from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.errors import ToonsetError
 from toonset.frames import OPENGL_FROM_OPENCV
-from toonset.write import write_bytes
 
 RIGHT_DEG = 15.0
 MOST_ACTIONS, MOST_SHEETS = 5, 10
 DRAGGED_DEG = 10.0
-GAP = 24  # pixels between sprites of a row laid out anew
 WORDS = ("front", "front-left", "left", "back-left", "back", "back-right", "right", "front-right")
 OTHER_BODY = {  # whose mannequin a character's sheet is fitted with
     "kaykit_knight": "kaykit_rogue",
@@ -75,10 +71,16 @@ class Case:
     truth: tuple[Truth, ...]
 
 
-def cases(root: Path, place: Path) -> Iterator[Case]:
-    """Yield every case: sprites, characters, sprites that are begun at another drawing."""
-    sprites = list(_sprites(root))
-    yield from sprites
+def cases(root: Path) -> Iterator[Case]:
+    """Yield every case, sprites first."""
+    for folder in sorted((root / "turnarounds2d").iterdir()):
+        info = json.loads((folder / "info.json").read_text())
+        boxes, yaws = info.get("sheet_boxes_xywh"), info.get("yaw_deg")
+        if boxes and yaws:
+            truth = (
+                Truth(tuple(b), None, math.radians(y)) for b, y in zip(boxes, yaws, strict=True)
+            )
+            yield Case(folder.name, folder / "sheet.png", None, tuple(truth))
     for folder in sorted((root / "sheets").iterdir()):
         character, _, condition = folder.name.partition("-")
         if condition not in ("uneven", "artist", "generic", "drawn"):
@@ -88,34 +90,6 @@ def cases(root: Path, place: Path) -> Iterator[Case]:
         )
         sheet = next(folder.glob("sheet.*"))
         yield Case(folder.name, sheet, own / "mannequin.obj", tuple(_truth(folder / "gt.json")))
-    yield from (laid_out_anew(case, place) for case in sprites)
-
-
-def _sprites(root: Path) -> Iterator[Case]:
-    for folder in sorted((root / "turnarounds2d").iterdir()):
-        info = json.loads((folder / "info.json").read_text())
-        boxes, yaws = info.get("sheet_boxes_xywh"), info.get("yaw_deg")
-        if boxes and yaws:
-            truth = (
-                Truth(tuple(b), None, math.radians(y)) for b, y in zip(boxes, yaws, strict=True)
-            )
-            yield Case(folder.name, folder / "sheet.png", None, tuple(truth))
-
-
-def laid_out_anew(case: Case, place: Path) -> Case:
-    """Return a row of sprites that begins elsewhere and runs the other way, its sheet in a file."""
-    sheet = load_rgba(case.sheet)
-    order = np.roll(np.arange(len(case.truth)), 1 - len(case.truth) // 2)[::-1]
-    row = np.broadcast_to(sheet[0, 0], sheet.shape).copy()
-    left, truth = case.truth[0].box[0], []
-    for one in (case.truth[i] for i in order):
-        x, y, width, height = map(int, one.box)
-        row[y : y + height, left : left + width] = sheet[y : y + height, x : x + width]
-        truth.append(replace(one, box=(left, y, width, height)))
-        left += width + GAP
-    file = place / f"{case.name}.png"
-    write_bytes(file, encode_png(row))
-    return Case(f"{case.name}, begun elsewhere", file, None, tuple(truth))
 
 
 def _truth(file: Path) -> Iterator[Truth]:
@@ -219,7 +193,7 @@ def main(
     """Print what corrections make of sheets that are doubtful."""
     found: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as place:
-        for case in cases(root, Path(place)):
+        for case in cases(root):
             if not re.search(only, case.name) or len(found) == MOST_SHEETS:
                 continue
             folder = Path(place) / case.name

@@ -14,7 +14,7 @@ from toonset.cli.editor.refit import (
     CORRECTIONS,
     NOTHING,
     Changed,
-    Cut,
+    DrawnSheet,
     Subject,
     cut_sheet,
     find_palette,
@@ -110,7 +110,7 @@ def _session(
     """Return the session of a bundle that follows its corrections; its palette is found now."""
     if not (subject.folder / PALETTE).is_file():
         find_palette(subject.folder, corrections)
-    return Session(subject, Cut.of(sheet), corrections, corrections, tell)
+    return Session(subject, DrawnSheet.of(sheet), corrections, corrections, tell)
 
 
 def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile) -> Subject:

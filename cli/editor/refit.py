@@ -76,7 +76,7 @@ class Changed:
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class DrawnSheet:
     """A sheet's drawings, and what was found in them: both stay until they are cut anew.
 
     Attributes:
@@ -88,7 +88,7 @@ class Cut:
     cues: Cues
 
     @classmethod
-    def of(cls, sheet: Sheet) -> Cut:
+    def of(cls, sheet: Sheet) -> DrawnSheet:
         """Return drawings that nobody has looked at yet."""
         return cls(sheet, Cues(sheet.views))
 
@@ -136,9 +136,9 @@ def make_bundle(
     subject: Subject,
     corrections: dict[str, Any],
     changed: Changed,
-    before: Cut | None = None,
+    before: DrawnSheet | None = None,
     progress: Callable[[str, float], None] = lambda step, share: None,
-) -> tuple[Cut, Path]:
+) -> tuple[DrawnSheet, Path]:
     """Return the drawings, and a new bundle of them in the workshop.
 
     What is not made again goes along: corrections and page, and the palette of drawings that are
@@ -158,7 +158,7 @@ def make_bundle(
     shutil.rmtree(subject.workshop, ignore_errors=True)
     if before is None or before.sheet.options or changed.cut:
         sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
-        drawn = Cut.of(sheet)
+        drawn = DrawnSheet.of(sheet)
     else:
         file = subject.workshop / CORRECTIONS
         write_bytes(file, file_of(corrections))

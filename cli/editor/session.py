@@ -18,7 +18,7 @@ from typing import Any
 from toonset.cli.editor.refit import (
     CORRECTIONS,
     Changed,
-    Cut,
+    DrawnSheet,
     Subject,
     file_of,
     find_palette,
@@ -65,7 +65,7 @@ class Session:
     """
 
     subject: Subject
-    drawn: Cut
+    drawn: DrawnSheet
     fitted: dict[str, Any]
     corrections: dict[str, Any]
     tell: Callable[[str], None] = lambda text: None

@@ -129,6 +129,7 @@ void main() {
   int block = fine > 0.75 ? 2 : 1;
   ivec2 at = block * ivec2(gl_FragCoord.xy), most = textureSize(depths, 0) - 1;
   result = vec4(0.0);
+  // of a block, the first pixel that shows the figure
   for (int i = 1; i < 4 && block == 2 && texelFetch(rays, at, 0).a < 0.5; i++) {
     at = min(2 * ivec2(gl_FragCoord.xy) + ivec2(i & 1, i >> 1), most);
   }
