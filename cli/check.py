@@ -115,11 +115,9 @@ def _check_run(log: ProblemLog, run: Path) -> None:
     """Read a run as rendering would."""
     from toonset.json_file import read_json
     from toonset.nerf.run.folder import read_field
-    from toonset.nerf.run.manifest import check_manifest
 
     name = "" if run == log.root else f"{run.name}/"
     log.attempt(name, read_field, run)
-    log.attempt(f"{name}manifest.json", check_manifest, run)
     log.attempt(f"{name}metrics.json", read_json, run / "metrics.json")
 
 

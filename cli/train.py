@@ -17,7 +17,6 @@ from toonset.cli.common.output import (
     SeedOption,
     VerboseFlag,
 )
-from toonset.cli.common.train_place import Place
 from toonset.cli.common.train_run import Request, run
 from toonset.nerf.options import DeviceName, FieldName, PresetName
 from toonset.nerf.options import preset as preset_options
@@ -129,14 +128,6 @@ def train(
             rich_help_panel=WHILE_PANEL,
         ),
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume",
-            help="Go on with a training that was interrupted.",
-            rich_help_panel=WHILE_PANEL,
-        ),
-    ] = False,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit with 3 where the run is weak.")
     ] = False,
@@ -150,7 +141,7 @@ def train(
 
     Says at the end whether the run is ok or weak, and why. Exit code 3 when training went wrong and
     was cut short, and with --strict when the run is weak; the files are written then too. Ctrl-C
-    finishes the step, keeps what there is in RUN.unfinished and says how to go on.
+    finishes the step and writes the run as it stands; a second one leaves at once.
     """
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
     switches = {"fair": as_carved, "register": as_placed, "turn": as_turned}
@@ -161,12 +152,12 @@ def train(
     request = Request(
         bundle,
         test or _test_of(root),
-        Place(out or root / "run", force),
+        out or root / "run",
         {**preset_options(preset), **{k: v for k, v in given.items() if v is not None}},
         checked(threads),
         preview_every,
+        force=force,
         palette=not no_palette,
-        resume=resume,
         strict=strict,
     )
     code = run(request, Printer(as_json, quiet, verbose))

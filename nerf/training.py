@@ -24,9 +24,8 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.symmetry import with_all_mirrored
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.views import baked_of, keep, render
-from toonset.nerf.run.checkpoint import Checkpoint, check_scene, versions
-from toonset.nerf.run.manifest import WRITTEN
-from toonset.nerf.run.monitor import INTERRUPTED, Looking, Onlooker
+from toonset.nerf.run.folder import WRITTEN
+from toonset.nerf.run.monitor import Looking, Onlooker
 from toonset.nerf.run.report import preview, write_run
 from toonset.nerf.train.labelling import labelled, without_palette
 from toonset.nerf.train.memory import check_memory, memory_errors
@@ -112,7 +111,6 @@ def train(
     test: Scene | None = None,
     listener: Listener | None = None,
     looking: Looking | None = None,
-    resume: Checkpoint | None = None,
 ) -> Run:
     """Return a radiance field, and a classifier from its colours to the palette's.
 
@@ -127,12 +125,11 @@ def train(
         threads: of the CPU; None: as many as torch is set to use.
         test: held-out views to score.
         listener: told what a person should know, evidence, and where the work stands.
-        looking: what is looked at while the field is fitted: previews, checkpoints, a wish to stop.
-        resume: an interrupted training to go on with.
+        looking: what is looked at while the field is fitted: previews, a wish to stop.
 
     Raises:
         ToonsetError: fewer than two usable views, a picture that is opaque all over, cameras that
-            do not belong to the pictures, too little memory, or another scene than `resume`'s.
+            do not belong to the pictures, or too little memory.
         UsageError: an option or a number of threads that means nothing.
         SetupError: a GPU was asked for and there is none.
     """
@@ -156,15 +153,12 @@ def train(
         memory = check_memory(scene, options, device)
         told.detail(f"{memory}; {count} CPU thread{'s' * (count > 1)}")
         scene = _with_palette(scene, told) if palette else without_palette(scene)
-        onlooker = Onlooker(looking or Looking(test=test), scene, options)
-        if resume is not None:
-            _go_on(onlooker, resume, told)
+        onlooker = Onlooker(looking or Looking(test=test))
         for guess in guesses(with_all_mirrored(scene) if options.symmetric else scene):
             told.say(guess)
         training = fit_field(scene, options, told.progress, onlooker)
-        if training.stopped != INTERRUPTED:
-            told.progress("laying the drawings over the field")
-            training = replace(training, result=with_drawings(training, scene))
+        told.progress("laying the drawings over the field")
+        training = replace(training, result=with_drawings(training, scene))
     return Run(training.result, training, scene, test, onlooker.held_out, count)
 
 
@@ -191,21 +185,6 @@ def _with_palette(scene: Scene, told: Listener) -> Scene:
     for warning in found.warnings:
         told.say(f"palette: {warning}")
     return scene
-
-
-def _go_on(onlooker: Onlooker, checkpoint: Checkpoint, told: Listener) -> None:
-    """Let a training begin where its checkpoint stands.
-
-    Raises:
-        BundleError: the checkpoint is of another scene.
-    """
-    folder = onlooker.looking.folder
-    check_scene(checkpoint, onlooker.scene, folder or Path("checkpoint"))
-    onlooker.start = checkpoint.state
-    told.say(f"going on after step {checkpoint.state.steps} of {checkpoint.options.steps}")
-    if checkpoint.record.versions != versions():
-        was = ", ".join(f"{name} {number}" for name, number in checkpoint.record.versions.items())
-        told.say(f"begun with {was}: the last digits may differ from an unbroken training's")
 
 
 @contextmanager

@@ -35,7 +35,6 @@ from toonset.nerf.train.labelling import labelled, relabelled, without_palette
 from toonset.nerf.train.loop import Moment
 from toonset.nerf.train.loss import Model
 from toonset.nerf.train.result import Training
-from toonset.nerf.train.state import FitState
 from toonset.nerf.train.train import finest_cells, fit_field
 from toonset.view import over_white
 
@@ -186,18 +185,17 @@ class Snapshots:
         """Return the seconds and processor's seconds until now, without those of looking."""
         return time.perf_counter() - self.began, time.process_time() - self.cpu_began
 
-    def begin(self, trained: TrainedField) -> FitState | None:
+    def begin(self, trained: TrainedField) -> None:
         """Take the field that will be fitted, from its beginning."""
         self._trained = trained
         self._fits_from, self._next = self.spent()[0], self.first_look_s
-        return None
 
     def look(self, moment: Moment) -> str:
         """Keep a snapshot when its time has come."""
         before = self.spent()
         fitted_s = before[0] - self._fits_from
         if fitted_s >= self._next:
-            self.kept.append((before, _copied(moment.state().parameters)))
+            self.kept.append((before, _copied(dict(self._model().named_parameters()))))
             while self._next <= fitted_s:
                 self._next *= LOOK_FACTOR
             after = self.spent()  # what looking took is not the training's
@@ -205,10 +203,13 @@ class Snapshots:
             self.cpu_began += after[1] - before[1]
         return ""
 
+    def _model(self) -> Model:
+        return Model(self._trained.field, self._trained.classifier)
+
     def states(self) -> Iterator[tuple[tuple[float, float], TrainedField]]:
         """Yield each snapshot's seconds and itself as a field that can be rendered."""
         for spent, parameters in self.kept:
-            model = copy.deepcopy(Model(self._trained.field, self._trained.classifier)).to("cpu")
+            model = copy.deepcopy(self._model()).to("cpu")
             model.load_state_dict(parameters, strict=False)
             hull = self._trained.hull
             hull = hull if self.carved else without_empty_space(hull, model.field)

@@ -1,7 +1,7 @@
-"""While a field is fitted: what is said, and Ctrl-C, which finishes the step and saves.
+"""While a field is fitted: what is said, and Ctrl-C, which finishes the step and writes the run.
 
-Before the first step there is nothing to save, so the signal ends the program as everywhere else; a
-second one ends it at any time.
+Before the first step there is nothing to write, so the signal ends the program as everywhere else;
+a second one ends it at any time.
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ class Stopper:
         if self.signal or not self._running:
             raise KeyboardInterrupt
         self.signal = number
-        self._printer.say("stopping after this step; once more to leave at once")
+        self._printer.say(
+            "stopping after this step, to write the run as it stands; once more to leave at once"
+        )
 
 
 @dataclass

@@ -1,1 +1,1 @@
-"""A run on disk: write, read, watch, resume."""
+"""A run on disk: write, read, watch."""

@@ -8,10 +8,9 @@
     drawings.safetensors  their surface, and how far their paint lies apart
     history.csv         every step's losses
     preview.png         four views of the result
-    manifest.json       the SHA-256 of them all
 
 Nothing is pickled, and no file names a place: a run folder may be moved. Loading checks every name,
-shape, type and value before use, then that the files are those that were written.
+shape, type and value before use.
 """
 
 from __future__ import annotations
@@ -41,12 +40,15 @@ from toonset.nerf.run.drawings import (
     read_drawings,
     write_drawings,
 )
-from toonset.nerf.run.manifest import check_manifest
 from toonset.nerf.run.records import InkRecord, KeysRecord
 from toonset.nerf.run.tensors import packed, unpack
 from toonset.write import write_bytes
 
 CONFIG, MODEL = "config.json", "model.safetensors"
+WRITTEN = (
+    *(MODEL, CONFIG, "metrics.json", "history.csv", "preview.png", PICTURES, PAINT, SURFACES),
+    "manifest.json",  # of runs of before, which --force may replace
+)
 FORMAT = 4
 MOST_CELLS = 512  # along one side, of planes and hull alike
 
@@ -144,11 +146,8 @@ def read_field(folder: str | Path) -> TrainedField:
     trained = _empty(record)
     unpack(load_tensors(model_file), trained, str(model_file))
     if record.drawings is None:
-        check_manifest(folder, (CONFIG, MODEL))
         return trained
-    drawings = read_drawings(folder, record.drawings)
-    check_manifest(folder, (CONFIG, MODEL, PICTURES, PAINT, SURFACES))
-    return replace(trained, drawings=drawings)
+    return replace(trained, drawings=read_drawings(folder, record.drawings))
 
 
 def _record(file: Path) -> FieldRecord:

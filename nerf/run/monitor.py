@@ -1,7 +1,7 @@
-"""What looks on while a field is fitted: held-out views, previews, checkpoints, a wish to stop.
+"""What looks on while a field is fitted: held-out views, previews, a wish to stop.
 
-Each look is priced: held-out views and checkpoints may take a tenth of the time, so that a cheap
-look comes often and an expensive one seldom. None of it changes the training by a bit.
+Looking at held-out views may take a tenth of the time, so a cheap look comes often and an expensive
+one seldom. None of it changes the training by a bit.
 """
 
 from __future__ import annotations
@@ -13,30 +13,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.images.picture import encode_png
-from toonset.errors import BundleError
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.options import TrainOptions
 from toonset.nerf.render.layers import color_picture
 from toonset.nerf.render.views import render
-from toonset.nerf.run.checkpoint import write_checkpoint
 from toonset.nerf.run.report import preview
 from toonset.nerf.score.metrics import psnr_of
 from toonset.nerf.train.loop import Moment
 from toonset.nerf.train.loss import Model
 from toonset.nerf.train.progress import Status, status_of
 from toonset.nerf.train.result import HeldOut
-from toonset.nerf.train.state import FitState
 from toonset.view import over_white
 from toonset.write import write_bytes
 
 SHARE = 0.1  # of the training's seconds that looking at held-out views may take
 MOST_VIEWS, MOST_PX = 4, 200  # held-out views looked at in between, and their longest side
 FIRST_LOOK_S = 2.0  # of training: before, there is nothing to see
-CHECKPOINT_S = 30.0  # between checkpoints: what a killed training may lose
 INTERRUPTED = "interrupted"
 
 
@@ -48,7 +42,7 @@ class Looking:
         tell: called with the status after every step.
         stop: whether somebody wants the training to end.
         test: held-out views; None: none.
-        folder: where previews and checkpoints go; made with the first of them.
+        folder: where previews go; made with the first of them.
         preview_every_s: seconds of training between previews; None: none.
     """
 
@@ -65,37 +59,23 @@ class Onlooker:
 
     Attributes:
         looking: what to look at.
-        scene: what is trained on.
-        options: how.
-        start: state to go on from; None: from the beginning.
         held_out: what was seen of held-out views.
     """
 
     looking: Looking
-    scene: Scene
-    options: TrainOptions
-    start: FitState | None = None
     held_out: list[HeldOut] = field(default_factory=list)
 
-    def begin(self, trained: TrainedField) -> FitState | None:
-        """Take the field that will be fitted.
-
-        Raises:
-            BundleError: the state to go on from is another field's.
-        """
-        if self.start is not None:
-            _check_fits(self.start, trained)
-        begun = 0.0 if self.start is None else self.start.seconds
+    def begin(self, trained: TrainedField) -> None:
+        """Take the field that will be fitted."""
         self._trained = trained
         self._views = [] if self.looking.test is None else sample_of(self.looking.test)
-        self._test_at, self._preview_at, self._saved_at = begun + FIRST_LOOK_S, begun, begun
-        return self.start
+        self._test_at, self._preview_at = FIRST_LOOK_S, 0.0
 
     def look(self, moment: Moment) -> str:
         """Look at a training after a step; return why it should end, or nothing."""
         spent = moment.history[-1].seconds
         unfinished = len(moment.history) < moment.of
-        if self.looking.stop() and unfinished and self._save(moment):
+        if self.looking.stop() and unfinished:
             return INTERRUPTED
         if self._views and spent >= self._test_at:
             took = self._look_at_held_out(moment)
@@ -103,21 +83,9 @@ class Onlooker:
         every = self.looking.preview_every_s
         if every is not None and spent - self._preview_at >= every:
             self._show(moment)
-        if spent - self._saved_at >= CHECKPOINT_S:
-            self._save(moment)
         seen = self.held_out[-1] if self.held_out else None
         self.looking.tell(status_of(moment, seen))
         return ""
-
-    def _save(self, moment: Moment) -> bool:
-        """Write a checkpoint, unless something is wrong: the next step will tell."""
-        self._saved_at = moment.history[-1].seconds
-        state = moment.state()
-        if not all(bool(torch.isfinite(values).all()) for values in state.parameters.values()):
-            return False
-        if self.looking.folder is not None:
-            write_checkpoint(self.looking.folder, state, self.options, self.scene)
-        return True
 
     def _show(self, moment: Moment) -> None:
         self._preview_at = moment.history[-1].seconds
@@ -173,15 +141,3 @@ def _smaller(frame: Frame) -> Frame:
         camera, scale=camera.scale / block, center=camera.center / block, size_wh=(columns, rows)
     )
     return Frame(frame.name, camera, (mean + 0.5).clip(0, 255).astype(np.uint8))
-
-
-def _check_fits(state: FitState, trained: TrainedField) -> None:
-    model = Model(trained.field, trained.classifier)
-    wanted = {name: values.shape for name, values in model.named_parameters()}
-    for group in (state.parameters, state.means, state.squares):
-        shapes: dict[str, torch.Size] = {name: values.shape for name, values in group.items()}
-        if shapes != wanted:
-            raise BundleError(
-                "checkpoint: is of another field than this toonset trains; train again without "
-                "--resume"
-            )

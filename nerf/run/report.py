@@ -23,7 +23,6 @@ from toonset.nerf.render.layers import color_picture, default_layer
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import baked_of, render
 from toonset.nerf.run.folder import write_field
-from toonset.nerf.run.manifest import write_manifest
 from toonset.nerf.score.metrics import compare, means
 from toonset.nerf.score.verdict import verdict_of
 from toonset.nerf.train.result import HeldOut, Step, Training
@@ -62,15 +61,16 @@ def write_run(
         "verdict": verdict_of(training, scene, baked).to_json(),
     }
     write_bytes(folder / "preview.png", encode_png(preview(baked)))
-    _write_files(folder, training, scene, metrics)
+    about = {
+        "options": asdict(training.options),
+        "scene": {"views": [frame.name for frame in scene.frames]},
+        "versions": {"toonset": __version__, "torch": torch.__version__, "numpy": np.__version__},
+        "threads": threads_in_use(),
+    }
+    write_json(folder / "config.json", write_field(folder, training.result, about))
+    write_json(folder / "metrics.json", metrics)
+    write_bytes(folder / "history.csv", _csv(training.history).encode())
     return metrics
-
-
-def write_unfinished(
-    folder: Path, training: Training, scene: Scene, held_out: Sequence[HeldOut] = ()
-) -> None:
-    """Write a field as far as it has come, without rendering it: it can be looked at and moved."""
-    _write_files(folder, training, scene, {**_course(training, held_out), "train": None})
 
 
 def compared(source: TrainedField | Baked, scene: Scene) -> dict[str, float | None]:
@@ -101,6 +101,7 @@ def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
     return {
         "stopped": training.stopped,
         "steps": len(training.history),
+        "steps_asked": training.options.steps,
         "loss": None if last is None else last.loss,
         "held_out": [asdict(seen) for seen in held_out],
         "drawings": training.prepared.to_json(),
@@ -110,19 +111,6 @@ def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
         "counts": training.counts,
         "seconds": {k: round(v, 3) for k, v in training.seconds.items()},
     }
-
-
-def _write_files(folder: Path, training: Training, scene: Scene, metrics: dict[str, Any]) -> None:
-    about = {
-        "options": asdict(training.options),
-        "scene": {"views": [frame.name for frame in scene.frames]},
-        "versions": {"toonset": __version__, "torch": torch.__version__, "numpy": np.__version__},
-        "threads": threads_in_use(),
-    }
-    write_json(folder / "config.json", write_field(folder, training.result, about))
-    write_json(folder / "metrics.json", metrics)
-    write_bytes(folder / "history.csv", _csv(training.history).encode())
-    write_manifest(folder)
 
 
 def preview(source: TrainedField | Baked) -> np.ndarray:

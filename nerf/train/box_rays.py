@@ -122,13 +122,6 @@ class BoxRays:
     def after(self, step: int, model: Model) -> None:
         """Take note of nothing: samples are drawn anew for every step."""
 
-    def state(self) -> dict[str, Tensor]:
-        """Return nothing: a step's samples depend on its number alone."""
-        return {}
-
-    def restore(self, state: dict[str, Tensor]) -> None:
-        """Take back nothing."""
-
 
 def open_box(scene: Scene) -> Hull:
     """Return the box round the figure, full everywhere: no silhouette is carved."""

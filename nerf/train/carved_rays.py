@@ -1,7 +1,6 @@
 """The rays a training draws its steps from.
 
-A training asks for a step's batches by their number and by the step, tells when a step is done, and
-can put away and take back what changes on the way, so that an interrupted training goes on exactly.
+A training asks for a step's batches by their number and by the step, and tells when a step is done.
 """
 
 from __future__ import annotations
@@ -37,13 +36,6 @@ class TrainingRays(Protocol):
     def after(self, step: int, model: Model) -> None:
         """Take note that a step is done."""
 
-    def state(self) -> dict[str, Tensor]:
-        """Return what has changed since the start."""
-        ...
-
-    def restore(self, state: dict[str, Tensor]) -> None:
-        """Become what `state` was taken from."""
-
 
 class FixedRays:
     """Rays whose samples never move; once surfaces have formed, samples behind them are dropped.
@@ -60,7 +52,6 @@ class FixedRays:
             field: None: nothing is dropped nor laid out.
         """
         self._steps, self._field = list(steps), field
-        self._kept: list[Tensor] = []
 
     def __len__(self) -> int:
         """Return how many steps go through all rays once."""
@@ -74,26 +65,13 @@ class FixedRays:
     def after(self, step: int, model: Model) -> None:
         """Drop the samples that hardly any light reaches, once."""
         if step + 1 == PRUNE_AFTER and self._field is not None:
-            self._keep(side_by_side([partial(seen_samples, model, b) for b in self._all()]))
-
-    def state(self) -> dict[str, Tensor]:
-        """Return which samples were kept."""
-        return {f"kept.{i}": kept.to(torch.uint8) for i, kept in enumerate(self._kept)}
-
-    def restore(self, state: dict[str, Tensor]) -> None:
-        """Drop what was dropped when `state` was taken."""
-        if state:
-            self._keep([state[f"kept.{i}"].bool() for i in range(len(self._all()))])
+            kept = side_by_side([partial(seen_samples, model, b) for b in self._all()])
+            self._keep(kept, self._field)
 
     @torch.no_grad()
-    def _keep(self, kept: list[Tensor]) -> None:
-        assert self._field is not None
-        self._kept, field = [samples.cpu() for samples in kept], self._field
+    def _keep(self, kept: list[Tensor], field: Field) -> None:
         pairs = zip(self._all(), kept, strict=True)
-        tasks = [
-            partial(batch.kept, samples.to(batch.ray.device), field) for batch, samples in pairs
-        ]
-        left = iter(side_by_side(tasks))
+        left = iter(side_by_side([partial(batch.kept, samples, field) for batch, samples in pairs]))
         self._steps = [tuple(next(left) for _ in batches) for batches in self._steps]
 
     def _all(self) -> list[Batch]:

@@ -20,14 +20,12 @@ class LastGood:
     parameters that run away show as a loss that stays high.
     """
 
-    def __init__(self, model: nn.Module, losses: list[float]) -> None:
-        """Keep the model as it is after steps with these losses."""
+    def __init__(self, model: nn.Module) -> None:
+        """Keep the model as it is before the first step."""
         self._model = model
         self._losses: list[float] = []
-        self._first = losses[0] if losses else float("inf")
-        windows = (losses[i : i + WINDOW] for i in range(0, len(losses), WINDOW))
-        self._best = min((sum(part) / len(part) for part in windows), default=float("inf"))
-        self._kept, self._kept_step = _copied(model), len(losses)
+        self._first = self._best = float("inf")
+        self._kept, self._kept_step = _copied(model), 0
 
     def wrong(self, loss: Tensor, value: float, step: int) -> str:
         """Return why the training must end before this step's update, or nothing.

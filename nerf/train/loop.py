@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import torch
-from torch import Tensor
 
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.adam import Adam, Group
@@ -20,7 +19,6 @@ from toonset.nerf.train.divergence import LastGood
 from toonset.nerf.train.gradients import gradients_of
 from toonset.nerf.train.loss import Model, Weights
 from toonset.nerf.train.result import Step
-from toonset.nerf.train.state import FitState
 
 TABLES_RATE = 0.2
 BETAS = (0.9, 0.99)  # a few hundred steps are too few for a memory of a thousand
@@ -39,20 +37,18 @@ class Moment:
         history: every step so far.
         of: how many steps are asked for.
         progress: how much of the training is over, 0 to 1.
-        state: returns a copy of everything that the rest depends on.
     """
 
     history: list[Step]
     of: int
     progress: float
-    state: Callable[[], FitState]
 
 
 class Watch(Protocol):
     """What looks on while a field is fitted; the seconds it takes are not the training's."""
 
-    def begin(self, trained: TrainedField) -> FitState | None:
-        """Take the field that will be fitted; return the state to go on from, if any."""
+    def begin(self, trained: TrainedField) -> None:
+        """Take the field that will be fitted."""
 
     def look(self, moment: Moment) -> str:
         """Look at a training after each step; return why it should end, or nothing."""
@@ -66,7 +62,6 @@ def fit(
     options: TrainOptions,
     generator: torch.Generator,
     watch: Watch | None = None,
-    start: FitState | None = None,
     spent_s: float = 0.0,
 ) -> tuple[list[Step], str]:
     """Fit `model` in place; return the history and why it ended.
@@ -81,13 +76,10 @@ def fit(
         options: steps, which are chosen, and budget.
         generator: shuffles the batches.
         watch: looks on after every step, and may end the training.
-        start: go on from here; None: from the model as it is.
         spent_s: seconds of the budget that are over.
     """
     loop = _Loop(model, rays, weights, options, generator, spent_s)
-    if start is not None:
-        loop.restore(start)
-    good = LastGood(model, [step.loss for step in loop.history])
+    good = LastGood(model)
     stopped = "steps"
     while len(loop.history) < loop.of:
         if loop.out_of_time():
@@ -97,7 +89,7 @@ def fit(
             return loop.history, wrong
         if watch is not None:
             with loop.clock.stopped():
-                stopped = watch.look(Moment(loop.history, loop.of, loop.progress(), loop.state))
+                stopped = watch.look(Moment(loop.history, loop.of, loop.progress()))
             if stopped:
                 break
             stopped = "steps"
@@ -150,8 +142,7 @@ class _Loop:
         self._generator, self._spent_s = generator, spent_s
         tables = {id(values) for values in model.field.tables()}
         named = sorted(model.named_parameters(), key=lambda pair: id(pair[1]) not in tables)
-        self._parameters: dict[str, Tensor] = dict(named)  # tables first, as in the groups
-        values = list(self._parameters.values())
+        values = [parameter for _, parameter in named]  # tables first
         fast = Group(values[: len(tables)], TABLES_RATE)
         slow = Group(values[len(tables) :], model.field.decoder_rate)
         self._adam = Adam([fast, slow], BETAS)
@@ -194,40 +185,3 @@ class _Loop:
         self._rays.after(number, self._model)
         self.history.append(Step(number, value, photometric, entropy, self.clock.seconds))
         return ""
-
-    def state(self) -> FitState:
-        """Return a copy of everything that the rest of the training depends on."""
-        parameters, means, squares = (_copied(group) for group in self._groups())
-        return FitState(
-            tuple(self.history),
-            parameters,
-            means,
-            squares,
-            tuple(self._queue),
-            self._generator.get_state(),
-            torch.get_rng_state(),
-            _copied(self._rays.state()),
-        )
-
-    @torch.no_grad()
-    def restore(self, start: FitState) -> None:
-        """Become what `state` was taken from."""
-        given = (start.parameters, start.means, start.squares)
-        for group, values in zip(self._groups(), given, strict=True):
-            for name, tensor in group.items():
-                tensor.copy_(values[name])
-        self.history, self._queue = list(start.history), list(start.queue)
-        self._adam.count = start.steps
-        self._generator.set_state(start.generator)
-        torch.set_rng_state(start.torch_generator)
-        self._rays.restore(start.rays)
-        self.clock.began -= start.seconds
-
-    def _groups(self) -> tuple[dict[str, Tensor], dict[str, Tensor], dict[str, Tensor]]:
-        names, adam = list(self._parameters), self._adam
-        means = dict(zip(names, adam.first, strict=True))
-        return self._parameters, means, dict(zip(names, adam.second, strict=True))
-
-
-def _copied(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    return {name: values.detach().cpu().clone() for name, values in tensors.items()}

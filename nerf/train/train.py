@@ -116,9 +116,10 @@ def fit_field(
     rays, counts = _rays(scene, start, options, generator, device)
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)
-    begin = watch.begin(start) if watch else None
+    if watch:
+        watch.begin(start)
     spent_s = clock[-1] - clock[0]
-    history, stopped = fit(model, rays, weights, options, generator, watch, begin, spent_s)
+    history, stopped = fit(model, rays, weights, options, generator, watch, spent_s)
     model.to("cpu")
     seconds = dict(zip(PARTS, np.diff(clock).tolist(), strict=True))
     seconds["steps"] = history[-1].seconds if history else 0.0  # without what the watch has taken

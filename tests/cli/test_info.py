@@ -84,9 +84,8 @@ def test_info_and_check_of_a_run(run: Path, toonset):
     (run / "metrics.json").write_text('{"steps": NaN}')
     broken = toonset("check", run)
     assert broken.code == 2
-    assert [line.split()[0] for line in broken.out.splitlines()[:3]] == [
+    assert [line.split()[0] for line in broken.out.splitlines()[:2]] == [
         "model.safetensors",
-        "manifest.json",
         "metrics.json",
     ]
 

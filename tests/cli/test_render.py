@@ -113,15 +113,12 @@ def test_a_turn_in_layers(lined: Path, toonset, tmp_path: Path) -> None:
 def test_a_run_made_before_says_how_to_get_the_layer(lined: Path, toonset, tmp_path: Path) -> None:
     import shutil
 
-    from toonset.nerf.run.manifest import write_manifest
-
     old = Path(shutil.copytree(lined, tmp_path / "old"))
     config = json.loads((old / "config.json").read_text())
     del config["field"]["drawings"]
     (old / "config.json").write_text(json.dumps(config))
     for name in ("drawings.png", "drawings.safetensors"):
         (old / name).unlink()
-    write_manifest(old)
     turn = ("render", old, "--turntable", 1, "-o", tmp_path / "turn")
     assert "no drawn look; train again" in toonset(*turn, "--layer", "drawn").reason
     assert not (tmp_path / "turn").exists()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zlib
 from pathlib import Path
 
@@ -21,7 +20,6 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.run.manifest import check_manifest, write_manifest
 from toonset.nerf.run.tensors import packed, parameters_of, rows_near, unpack
 from toonset.nerf.train import memory
 from toonset.nerf.train.carved_rays import PRUNE_AFTER
@@ -129,30 +127,6 @@ def test_half_precision_is_idempotent_and_never_overflows() -> None:
     assert torch.equal(once, field.planes)
     assert torch.equal(once, once.half().float())
     assert torch.equal(decoder, field.hidden.weight)  # small parts stay as they are
-
-
-def test_a_manifest_notices_every_file(tmp_path: Path) -> None:
-    for name in ("a.json", "b.csv"):
-        (tmp_path / name).write_text(f"content of {name}")
-    write_manifest(tmp_path)
-    check_manifest(tmp_path)
-    for name in ("a.json", "b.csv"):
-        kept = (tmp_path / name).read_text()
-        (tmp_path / name).write_text(kept.replace("c", "k", 1))
-        with pytest.raises(BundleError, match=f"{name}: is not the file"):
-            check_manifest(tmp_path)
-        (tmp_path / name).unlink()
-        with pytest.raises(BundleError, match=f"{name}: no such file"):
-            check_manifest(tmp_path)
-        (tmp_path / name).write_text(kept)
-    check_manifest(tmp_path)
-    with pytest.raises(BundleError, match="is no file of a run"):
-        check_manifest(tmp_path, ["c.json"])
-    content = json.loads((tmp_path / "manifest.json").read_text())
-    content["files"]["../x"] = content["files"]["a.json"]
-    (tmp_path / "manifest.json").write_text(json.dumps(content))
-    with pytest.raises(BundleError, match=r"'\.\./x' is no file of a run"):
-        check_manifest(tmp_path)
 
 
 # ---- memory

@@ -34,7 +34,7 @@ def test_a_run_folder_renders_the_same_after_loading(run_folder: Path, training:
         np.testing.assert_array_equal(a.depth, b.depth)
         np.testing.assert_array_equal(a.labels, b.labels)
     names = {"model.safetensors", "config.json", "metrics.json", "history.csv", "preview.png"}
-    assert {file.name for file in run_folder.iterdir()} == {*names, "manifest.json"}
+    assert {file.name for file in run_folder.iterdir()} == names
     assert len((run_folder / "history.csv").read_text().splitlines()) == 1 + len(training.history)
     assert json.loads((run_folder / "metrics.json").read_text())["train"]["psnr"] > 24
 

@@ -12,7 +12,7 @@ from toonset.nerf.train.divergence import DIVERGED, WINDOW, LastGood
 def judged(losses: list[float]) -> tuple[str, float, int]:
     """Return what is said of these losses, the weight kept, and at which step it was said."""
     model = nn.Linear(1, 1, bias=False)
-    good = LastGood(model, [])
+    good = LastGood(model)
     for step, loss in enumerate(losses):
         with torch.no_grad():
             model.weight.fill_(step)
