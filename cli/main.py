@@ -21,11 +21,11 @@ from toonset.errors import ToonsetError, one_line
 
 VERBS = (  # in the order in which they are used
     *("split", "calibrate", "edit", "palette", "recolor", "train", "render", "view", "evaluate"),
-    *("mesh", "planes", "consistency", "info", "check", "export", "import", "mannequin", "synth"),
+    *("mesh", "consistency", "info", "check", "export", "import", "mannequin", "synth"),
 )
 
 # Where a verb shares another one's module:
-MODULES = {"consistency": "evaluate", "info": "check", "planes": "view", "recolor": "palette"}
+MODULES = {"consistency": "evaluate", "info": "check", "recolor": "palette"}
 
 INTERRUPTED, REFUSED = 130, 2
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name

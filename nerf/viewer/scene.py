@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+import torch
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.errors import BundleError
@@ -36,7 +37,6 @@ from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import SOFT
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.views import baked_of
-from toonset.nerf.run.planes import packed_plane, weights_record
 from toonset.nerf.run.tensors import rows_near
 from toonset.nerf.viewer.volume import BLOCK, packed_hull
 from toonset.view import premultiplied
@@ -106,8 +106,8 @@ def field_record(trained: TrainedField, blob: Blob) -> dict[str, Any]:
         "cell": triplane.cell,
         "shape": list(triplane.shape),
         "planes": {"texels": blob.add(texels), "axes": PLANES, "low": low, "step": step},
-        "hidden": weights_record(triplane.hidden),
-        "out": weights_record(triplane.out),
+        "hidden": _weights(triplane.hidden),
+        "out": _weights(triplane.out),
         "densityShift": DENSITY_SHIFT,
         "stepsPerCell": trained.step / triplane.cell,
         "hull": {
@@ -133,13 +133,36 @@ def _planes(
     masks = np.split(used, np.cumsum([image.shape[0] * image.shape[1] for image in images])[:-1])
     layers, lows, steps = [], [], []
     for image, mask in zip(images, masks, strict=True):
-        codes, low, step = packed_plane(image, mask.reshape(image.shape[:2]), CHANNELS)
-        tiles = codes.reshape(-1, *image.shape[:2], CHANNELS)
+        tiles, low, step = _packed(image, mask.reshape(image.shape[:2]))
         room = [(0, 0), (0, height - image.shape[0]), (0, width - image.shape[1]), (0, 0)]
         layers.append(np.pad(tiles, room, mode="edge"))
         lows.append(low)
         steps.append(step)
     return np.concatenate(layers), lows, steps
+
+
+def _packed(
+    values: Float[np.ndarray, "height width channels"], used: Bool[np.ndarray, "height width"]
+) -> tuple[UInt8[np.ndarray, "layers height width 4"], list[float], list[float]]:
+    """Return a plane's features as bytes, and low and step of every channel.
+
+    feature = low + step * byte. Texels that are never read (not `used`) are low everywhere.
+    """
+    height, width, channels = values.shape
+    chosen = values[used] if used.any() else values.reshape(-1, channels)
+    low = chosen.min(axis=0)
+    step = np.maximum(chosen.max(axis=0) - low, 1e-12) / 255
+    codes = np.where(used[..., None], ((values - low) / step + 0.5).clip(0, 255), 0)
+    padded = np.pad(codes.astype(np.uint8), ((0, 0), (0, 0), (0, -channels % CHANNELS)))
+    tiles = padded.reshape(height, width, -1, CHANNELS).transpose(2, 0, 1, 3)
+    return tiles, low.tolist(), step.tolist()
+
+
+def _weights(layer: torch.nn.Linear) -> dict[str, Any]:
+    """Return a layer's weights and biases, six digits each."""
+    digits = np.vectorize(lambda value: float(f"{value:.6g}"))
+    weight, bias = layer.weight.detach().double().numpy(), layer.bias.detach().double().numpy()
+    return {"weight": digits(weight).tolist(), "bias": digits(bias).tolist()}
 
 
 def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:

@@ -110,7 +110,6 @@ def test_broken_pictures_of_a_bundle(
     [
         ("render", ["--turntable", "1", "-o", "o"]),
         ("mesh", ["-o", "o.glb"]),
-        ("planes", ["-o", "o"]),
         ("evaluate", ["--test", "bundle"]),
     ],
 )

@@ -58,7 +58,6 @@ def test_an_output_that_cannot_be(
         (["train", "none"], "none: does not exist"),
         (["render", "none", "--turntable", "2"], "none/config.json: does not exist"),
         (["evaluate", "none", "--test", "none"], "none/config.json: does not exist"),
-        (["planes", "none"], "none/config.json: does not exist"),
         (["consistency", "none"], "none: does not exist"),
         (["export", "none", "--to", "gltf"], "none: does not exist"),
         (["import", "none"], "none: does not exist"),

@@ -1,4 +1,4 @@
-"""The lines that a user types to take a mesh or planes out of a run."""
+"""The lines that a user types to take a mesh out of a run."""
 
 from __future__ import annotations
 
@@ -76,12 +76,3 @@ def test_a_mesh_is_light_unless_asked_and_says_how_far_it_is(
     plain = " ".join(toonset("mesh", "-h").out.split())
     assert "[default: 8000; x>=100]" in plain
     assert "does not turn a PLY" in plain
-
-
-def test_planes_of_a_run(toonset: Callable[..., Any], run: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "planes"
-    assert toonset("planes", run, "-o", folder).code == 0
-    about = json.loads((folder / "planes.json").read_text())
-    assert all((folder / plane["picture"]).is_file() for plane in about["planes"])
-    assert "exists already" in toonset("planes", run, "-o", folder).reason
-    assert toonset("planes", run, "-o", folder, "--force").code == 0
