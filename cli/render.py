@@ -67,7 +67,7 @@ def render(
         bool, typer.Option("--nearest", help="Match --palette by likeness, not by order.")
     ] = False,
     lines: Annotated[
-        bool, typer.Option("--lines/--no-lines", help="Draw the sheet's contour lines.")
+        bool, typer.Option("--lines/--no-lines", help="Draw the outline of the drawn look.")
     ] = True,
     ink_width: Annotated[
         float | None,
@@ -76,10 +76,6 @@ def render(
     ink_color: Annotated[
         str | None, typer.Option("--ink-color", help="Of the drawn outline, e.g. '#402010'.")
     ] = None,
-    as_drawn: Annotated[
-        bool,
-        typer.Option("--as-drawn", help="Bend views as the nearest drawings were bent by hand."),
-    ] = False,
     formats: Annotated[
         str | None,
         typer.Option(
@@ -131,13 +127,11 @@ def render(
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
     wanted = layers or [default_layer(trained) if views else "rgb"]
     wanted = ["palette"] if repaint and wanted == ["rgb"] else wanted
-    trained = _style(trained, wanted, lines=lines, as_drawn=as_drawn)
+    trained = _style(trained, wanted, lines=lines)
     trained = with_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     check_output(out, [run, cameras], WRITTEN, force=force)
-    files = rendered_files(
-        trained, named, wanted, together, printer.progress, printer.say, as_drawn=as_drawn
-    )
+    files = rendered_files(trained, named, wanted, together, printer.progress, printer.say)
     sizes: dict[str, int] = {}
     with new_folder(out, force=force) as folder:
         for name, data in files:
@@ -170,31 +164,26 @@ def _formats(given: str | None, gif: bool | None, *, turning: bool) -> tuple[str
     return names if "gif" in names or not wanted else ("gif", *names)
 
 
-def _style(
-    trained: TrainedField, layers: list[str], *, lines: bool, as_drawn: bool
-) -> TrainedField:
-    """Return the field with the lines and bends that the pictures should have.
+def _style(trained: TrainedField, layers: list[str], *, lines: bool) -> TrainedField:
+    """Return the field with the lines that the pictures should have.
 
     Raises:
-        BundleError: an ink layer of drawings without lines, or --as-drawn of some that do not bend.
+        BundleError: an ink layer of drawings without lines, or a drawn one without drawings.
     """
     from dataclasses import replace
 
     from toonset.errors import BundleError
-    from toonset.nerf.fields.trained_field import NO_BENDS, NO_DRAWINGS, NO_LINES
+    from toonset.nerf.fields.trained_field import NO_DRAWINGS, NO_LINES
 
     drawings = trained.drawings
-    lined = trained.ink is not None or (drawings is not None and drawings.outline is not None)
+    lined = drawings is not None and drawings.outline is not None
     if "ink" in layers and not (lined and lines):
         raise BundleError(NO_LINES)
     if "drawn" in layers and drawings is None:
         raise BundleError(NO_DRAWINGS)
-    if as_drawn and trained.keys is None:
-        raise BundleError(NO_BENDS)
-    if lines:
+    if lines or drawings is None:
         return trained
-    bare = None if drawings is None else replace(drawings, pen=None)
-    return replace(trained, ink=None, drawings=bare)
+    return replace(trained, drawings=replace(drawings, pen=None))
 
 
 def _check_arguments(

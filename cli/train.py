@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -68,14 +68,6 @@ def train(
             "pixel; to compare with: mlp, voxel, hull (no training).",
         ),
     ] = None,
-    ink: Annotated[
-        Literal["paint", "redraw"],
-        typer.Option(
-            "--ink",
-            help="paint: contour lines are trained as colour; redraw: they are taken off and drawn "
-            "again in renderings, which may cost small eyes and mouths.",
-        ),
-    ] = "paint",
     no_mannequin: Annotated[
         bool,
         typer.Option(
@@ -147,7 +139,6 @@ def train(
     switches = {"fair": as_carved, "register": as_placed, "turn": as_turned}
     switches |= {"unbend": as_bent, "symmetric": one_sided, "mannequin": no_mannequin}
     given |= {name: False for name, off in switches.items() if off}
-    given |= {"ink": True} if ink == "redraw" else {}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle
     request = Request(
         bundle,

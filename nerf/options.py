@@ -71,8 +71,6 @@ class TrainOptions:
         unbend: bend drawings back that disagree with the others' outlines (off: --as-bent).
         symmetric: where drawings show that the body is its own mirror image, flip them for the side
             that no drawing shows (off: --one-sided).
-        ink: take contour lines off before, and draw them again in renderings (--ink redraw):
-            cleaner, but small eyes and mouths may go with the lines.
     """
 
     steps: int | None = None
@@ -91,7 +89,6 @@ class TrainOptions:
     turn: bool = True
     unbend: bool = True
     symmetric: bool = True
-    ink: bool = False
 
     def check(self) -> None:
         """Refuse what means nothing.

@@ -358,7 +358,7 @@ NO_OPTIONS = [
     ({"resolution": 0}, "resolution: 0"),
     ({"field": "bogus"}, "field: 'bogus' is none of auto, triplane"),
     ({"steps": 1.5}, "steps: 1.5 is out of range"),
-    ({"ink": "paint"}, "ink: 'paint' is neither True nor False"),
+    ({"fair": "no"}, "fair: 'no' is neither True nor False"),
     ({"device": "tpu"}, "device: 'tpu' is none of auto, cpu, cuda"),
 ]
 

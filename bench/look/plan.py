@@ -45,7 +45,7 @@ class Look:
 
 
 NO_MANNEQUIN = Recipe(TrainOptions(mannequin=False))
-FIELD, REDRAWN = "field only", "field, lines redrawn"
+FIELD = "field only"
 LOOKS: dict[str, Look] = {
     DEFAULT: Look(),
     "without the mannequin": Look(recipe=NO_MANNEQUIN),
@@ -55,7 +55,6 @@ LOOKS: dict[str, Look] = {
     FIELD: Look("rgb"),
     "field only, no mannequin": Look("rgb", NO_MANNEQUIN),
     "palette layer": Look("palette"),
-    REDRAWN: Look("rgb", Recipe(TrainOptions(ink=True))),
 }
 
 

@@ -86,7 +86,6 @@ METHODS: dict[str, Method] = {
     "without both": _without("alignment", register=False, unbend=False),
     "without symmetry": _without("symmetry", symmetric=False),
     "without hull": Method(TrainOptions(carve=False), first_seed_only=True, most_views_only=True),
-    "lines redrawn": Method(TrainOptions(ink=True), first_seed_only=True, most_views_only=True),
     "voxel": Method(TrainOptions(field="voxel"), first_seed_only=True, curve=True),
     "mlp": Method(TrainOptions(field="mlp"), first_seed_only=True, curve=True),
     **PAPER,

@@ -96,10 +96,6 @@ def _drawings(found: dict[str, Any], *, verbose: bool) -> list[str]:
         more = "" if step["applied"] or step["gain_nats"] <= 0 else ", not the best explanation"
         gain = f" ({step['gain_nats']:+.0f} nats{more})" if verbose else ""
         lines.append(f"{moved if step['applied'] else kept}{gain}")
-    if found["ink"]:
-        ink = found["ink"]
-        widths = f"{ink['outline_px']:.1f} px outside, {ink['inner_px']:.1f} px inside"
-        lines.append(f"contour lines taken off, to be drawn again: {widths}")
     return lines
 
 

@@ -13,9 +13,7 @@ from jaxtyping import UInt8
 from toonset.nerf.fields.base import Field
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.hull.hull import Hull
-from toonset.nerf.lines.remove import InkStyle
 from toonset.nerf.look.drawings import Drawings
-from toonset.nerf.prepare.warp_back import KeyWarps
 from toonset.notebook import MOST_PICTURES, Cell, table
 from toonset.palette.names import hex_of, name_of
 from toonset.view import small_png
@@ -27,7 +25,6 @@ NO_PALETTE = (
 )
 NO_LINES = "run: its drawings have no contour lines; leave --layer ink out"
 NO_DRAWINGS = "run: holds no drawings, so it has no drawn look; train again, or render --layer rgb"
-NO_BENDS = "run: its drawings were not bent; leave --as-drawn out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +40,6 @@ class TrainedField:
         palette: (colors, 3) sRGB; None without palette.
         k: 1 / distance of a typical training camera, 0 = orthographic; for turntables.
         size_px: longest side of the training pictures, for turntables.
-        ink: contour lines that were taken off the drawings; None: there were none.
-        keys: bends that were taken out of the drawings; None: there were none.
         drawings: what the drawn look is made of; None: the run holds none.
         kept: what renderings prepare for the next one; not part of the field.
     """
@@ -57,8 +52,6 @@ class TrainedField:
     palette: UInt8[np.ndarray, "colors 3"] | None
     k: float
     size_px: int
-    ink: InkStyle | None = None
-    keys: KeyWarps | None = None
     drawings: Drawings | None = None
     kept: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
 

@@ -232,3 +232,23 @@ def _spread(cover: Cover, reach: float) -> Cover:
     side = 2 * round(reach) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     return cv2.dilate(cover.astype(np.float32), disc)
+
+
+def step_edges(
+    depth: Float[np.ndarray, "height width"], jump: float
+) -> Bool[np.ndarray, "height width"]:
+    """Return the pixels at which depth steps by more than `jump` beyond the slopes on both sides.
+
+    A step may be spread over one mixed pixel. Where depth is not finite nothing is said.
+    """
+    return _row_steps(depth, jump) | _row_steps(depth.T, jump).T
+
+
+def _row_steps(depth: np.ndarray, jump: float) -> np.ndarray:
+    edges: np.ndarray = np.zeros(depth.shape, dtype=bool)
+    wide = depth[3:-1] - depth[1:-3]
+    before, after = depth[1:-3] - depth[:-4], depth[4:] - depth[3:-1]
+    slope = 2 * np.maximum(np.abs(before), np.abs(after))
+    with np.errstate(invalid="ignore"):
+        edges[2:-2] = np.abs(wide) - slope > jump
+    return edges

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
-from skimage.measure import perimeter
 from skimage.morphology import skeletonize
 
 from toonset.nerf.lines.nearest import depth_inside, nearest, parts
@@ -19,12 +18,7 @@ INK_QUANTILE = 0.2  # darkest part of the rim: the rest is mixed with what it su
 INK = 128  # coverage from which a pixel is a line's
 SOFT = 16  # coverage from which a pixel beside a line holds some of it
 FIGURE = 128  # alpha
-DIAGONAL = 1.1  # mean length of a skeleton's step over all directions
-IMPURE = 0.1  # of the way from ink to paint: a stroke's middle may be so far off
-LEVELS = 12  # levels that middles may be off the ink in any case
-CORE = 0.25  # quantile of a stroke's middle pixels that must be pure
 CLEAR = 60  # levels from paint to ink, Euclidean, for a pixel's share of ink to be told
-LONGER = 2.5  # times its width: a shorter stroke is a dot
 SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 
@@ -38,7 +32,6 @@ class Lines:
         outline: (height, width) the band along the rim that the outline takes.
         inner: (height, width) line pixels within the figure, drawn features too.
         figure: (height, width) what the figure covers by at least half.
-        rim: (height, width) its outermost pixels.
     """
 
     width_px: float
@@ -46,19 +39,6 @@ class Lines:
     outline: Bool[np.ndarray, "height width"]
     inner: Bool[np.ndarray, "height width"]
     figure: Bool[np.ndarray, "height width"]
-    rim: Bool[np.ndarray, "height width"]
-
-    def under(self, contour: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
-        """Return all pixels that hold ink of the outline or of `contour`, soft ones and crumbs too.
-
-        A crumb is a dot of other ink that touches them: where a line is a little wider.
-        """
-        ink = contour | self.outline
-        part = parts(self.inner & ~ink, connectivity=4)
-        dots = (np.bincount(part.ravel()) <= LONGER * max(self.width_px, 1.0))[part] & (part > 0)
-        touched = np.unique(part[_grown(ink) & dots])
-        ink = ink | (dots & np.isin(part, touched))
-        return ink | (_grown(ink) & (self.cover >= SOFT))
 
 
 def outline_width(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
@@ -84,7 +64,7 @@ def lines_of(rgba: UInt8[np.ndarray, "height width 4"], width_px: float) -> Line
     depth = depth_inside(figure)
     outline = (rgba[..., 3] > 0) & (depth < width_px + 0.5)
     inner = (cover >= INK) & figure & ~outline
-    return Lines(width_px, cover, outline, inner, figure, figure & (depth < 1))
+    return Lines(width_px, cover, outline, inner, figure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,18 +75,11 @@ class Strokes:
         number: (height, width) the stroke of every inner line pixel, 0 elsewhere.
         skeleton: (height, width) the strokes' middle lines.
         count: highest number + 1.
-        dots: (count,) which strokes belong to a spot no longer than a line is wide.
     """
 
     number: Int[np.ndarray, "height width"]
     skeleton: Bool[np.ndarray, "height width"]
     count: int
-    dots: Bool[np.ndarray, " count"]
-
-    def only(self, chosen: Bool[np.ndarray, " count"]) -> Strokes:
-        """Return the strokes without those not chosen; their numbers stay."""
-        kept = np.where(chosen[self.number], self.number, 0)
-        return Strokes(kept, self.skeleton & (kept > 0), self.count, self.dots)
 
 
 def strokes_of(lines: Lines) -> Strokes:
@@ -114,44 +87,12 @@ def strokes_of(lines: Lines) -> Strokes:
     skeleton = skeletonize(lines.inner)
     neighbours = cv2.filter2D(skeleton.astype(np.uint8), -1, SQUARE)
     middle = skeleton & (neighbours <= 3)  # itself and the two beside it
-    stroke, spot = parts(middle), parts(lines.inner)
+    stroke = parts(middle)
     count = int(stroke.max()) + 1
-    short = np.bincount(spot[skeleton], minlength=int(spot.max()) + 1) <= LONGER * lines.width_px
-    dots = np.zeros(count, dtype=bool)
-    dots[stroke[middle]] = short[spot[middle]]
     if middle.any():
         rows, columns = nearest(middle)
         stroke = np.where(lines.inner, stroke[rows, columns], 0)
-    return Strokes(stroke, middle, count, dots)
-
-
-def drawn_by_pen(
-    strokes: Strokes,
-    lines: Lines,
-    drawn: UInt8[np.ndarray, "height width 4"],
-    paint: UInt8[np.ndarray, "height width 4"],
-    ink: tuple[int, int, int],
-) -> Bool[np.ndarray, " count"]:
-    """Return which strokes are as dark in their middles as a line of the ink would be.
-
-    Args:
-        strokes: of the drawing.
-        lines: of the drawing.
-        drawn: the drawing.
-        paint: the drawing with paint under all its lines.
-        ink: the outline's colour.
-    """
-    pen = np.zeros(strokes.count, dtype=bool)
-    own = np.where(strokes.skeleton, strokes.number, 0)
-    covered = np.bincount(strokes.number.ravel(), lines.cover.ravel() / 255.0, strokes.count)
-    for number in range(1, strokes.count):
-        at = own == number
-        above = [(picture[at][:, :3].astype(float) - ink).max(axis=1) for picture in (drawn, paint)]
-        width = covered[number] / (DIAGONAL * at.sum())
-        thin = max(0.0, 1 - width)  # a thinner line fills no pixel
-        allowed = max(LEVELS, (IMPURE + thin) * float(np.median(above[1])))
-        pen[number] = np.quantile(above[0], CORE) <= allowed
-    return pen
+    return Strokes(stroke, middle, count)
 
 
 def mean_width(
@@ -183,17 +124,3 @@ def mean_width(
         told += float(alpha[clear].sum())
         area += float(alpha.sum())
     return inked / told * area / length_px if told and length_px else 0.0
-
-
-def rims_px(lines: Iterable[Lines]) -> float:
-    """Return the length of all silhouettes."""
-    return sum(float(perimeter(line.figure)) for line in lines)
-
-
-def strokes_px(strokes: Iterable[Bool[np.ndarray, "height width"]]) -> float:
-    """Return the length of all strokes."""
-    return sum(DIAGONAL * float(skeletonize(stroke).sum()) for stroke in strokes)
-
-
-def _grown(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
-    return cv2.dilate(mask.astype(np.uint8), SQUARE) > 0

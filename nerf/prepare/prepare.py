@@ -3,28 +3,23 @@
 Where the mannequin is the body that was drawn, drawings are bent to show it (`to_mannequin`). Else
 each only where the drawings ask for it: cameras that were estimated turn (`refine_yaw`), they
 follow drawings that were placed or sized off (`registration`), drawings that bend are unbent
-(`unwarp`). Contour lines are taken off (`toonset.nerf.lines.remove`). What was taken away is kept,
-to be given back to renderings.
+(`unwarp`).
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from toonset.dataset.bundle.scene import Scene
-from toonset.dataset.silhouettes.bounds import box_of_masks
-from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_fit import MannequinFit
 from toonset.nerf.hull.mannequin_shape import Shape
-from toonset.nerf.lines.remove import InkStyle, without_ink
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.refine_yaw import Turning, turned
 from toonset.nerf.prepare.registration import Registration, registered
 from toonset.nerf.prepare.to_mannequin import Posed, posed
 from toonset.nerf.prepare.unwarp import Unbending, unbent
-from toonset.nerf.prepare.warp_back import KeyWarps
 
 AGREE_PX = 0.1  # outlines this near agree (docs/decisions.md)
 
@@ -39,7 +34,6 @@ class Prepared:
         turning: how cameras turned; None: switched off, or they are known exactly.
         registration: how cameras moved; None: switched off.
         unbending: how drawings were bent; None: switched off.
-        ink: the contour lines that were taken off; None: there are none, or switched off.
         paint: what their paint said of bends and colours; None: drawings were not bent.
         mannequin: what speaks for the mannequin's shape; None: there is none, or switched off.
         shape: the mannequin's, where it is the character's; None: it is not.
@@ -50,7 +44,6 @@ class Prepared:
     turning: Turning | None
     registration: Registration | None
     unbending: Unbending | None
-    ink: InkStyle | None
     paint: PaintAgreement | None = None
     mannequin: MannequinFit | None = None
     shape: Shape | None = None
@@ -85,17 +78,6 @@ class Prepared:
         """
         return not self.bent and self.apart_px < AGREE_PX
 
-    @property
-    def keys(self) -> KeyWarps | None:
-        """Return the drawings' bends, to be given back to renderings; None: they did not bend."""
-        if self.unbending is None or not self.unbending.applied:
-            return None
-        cameras = tuple(frame.camera for frame in self.scene.frames)
-        masks = [mask_of(frame.rgba) for frame in self.scene.frames]
-        shown = [i for i, mask in enumerate(masks) if mask.any()]
-        box = box_of_masks([cameras[i] for i in shown], [masks[i] for i in shown])
-        return KeyWarps(cameras, self.unbending.warps, (box.low + box.high) / 2)
-
     def to_json(self) -> dict[str, Any]:
         """Return what was found and done, for a report."""
         turning, registration, unbending = self.turning, self.registration, self.unbending
@@ -105,7 +87,6 @@ class Prepared:
             "registration": None if registration is None else registration.to_json(),
             "unbending": None if unbending is None else unbending.to_json(),
             "paint": None if self.paint is None else self.paint.to_json(),
-            "ink": None if self.ink is None else asdict(self.ink),
         }
 
 
@@ -113,8 +94,8 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
     """Return the scene as `options` want it prepared.
 
     Args:
-        scene: posed drawings; without labels the contour lines stay.
-        options: its `mannequin`, `turn`, `register`, `unbend` and `ink` switch the steps.
+        scene: posed drawings.
+        options: its `mannequin`, `turn`, `register` and `unbend` switch the steps.
 
     Raises:
         MeshError: the mannequin lies in none of the pictures.
@@ -124,10 +105,7 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
     turning = registration = None
     if given.shape is None:
         straight, turning, registration, unbending = _agreeing(scene, options)
-    ink = None
-    if options.ink and scene.palette is not None:
-        straight, ink = without_ink(straight, given.drawn)
-    steps = (turning, registration, unbending, ink)
+    steps = (turning, registration, unbending)
     return Prepared(straight, given.drawn, *steps, None, given.fit, given.shape)
 
 

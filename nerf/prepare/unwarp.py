@@ -1,14 +1,12 @@
 """Bent drawings: a smooth displacement per drawing under which the outlines are one body's.
 
 corrected(x) = drawn(x + d(x)). The rays of the cameras stay; the drawing is resampled once, with
-its alpha and its labels. What a rendering must be given back to look drawn again is in
-`toonset.nerf.prepare.warp_back`.
+its alpha and its labels.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -51,31 +49,10 @@ class Warp:
         axes = self.square.axes(size_wh)
         return self.square.size * _limited(_BENDS.on_grid(*axes, self.numbers))
 
-    def back(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
-        """Return the inverse's displacement: where x + at(x) = y, it is x - y."""
-        move = np.zeros_like(pixels)
-        for _ in range(6):  # the displacement's slope is well below 1
-            move = -self.at(pixels + move)
-        return move
-
     @property
     def is_none(self) -> bool:
         """Return whether nothing is moved."""
         return not np.any(self.numbers)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the warp as plain numbers."""
-        return {
-            "low_px": self.square.low.tolist(),
-            "size_px": self.square.size,
-            "numbers": self.numbers.tolist(),
-        }
-
-    @classmethod
-    def from_json(cls, value: dict[str, Any]) -> Warp:
-        """Return the warp of `to_json`."""
-        square = Square(np.array(value["low_px"], dtype=float), float(value["size_px"]))
-        return cls(square, np.array(value["numbers"], dtype=float))
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,8 +29,6 @@ def rendered_files(
     formats: Sequence[str] = (),
     progress: Callable[[str], None] = lambda line: None,
     say: Callable[[str], None] = lambda line: None,
-    *,
-    as_drawn: bool = False,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of every file that `toonset render` writes.
 
@@ -41,14 +39,13 @@ def rendered_files(
         formats: names out of `nerf.options.FORMATS`: files of all views of the first layer.
         progress: told which view is rendered.
         say: told which view shows most that is in no drawing.
-        as_drawn: bend pictures as the drawings were.
 
     Raises:
         ToonsetError: see `Rendering.picture`, `turntable_files` and `encode_ora`.
     """
     in_layers: list[tuple[str, list[PaintLayer]]] = []
     if LAYERED in formats:
-        check_layered(layers[0], as_drawn=as_drawn)
+        check_layered(layers[0])
     baked, turning, depths = Baked.of(trained), [], []
     cameras = [camera for _, camera in named]
     levels = DepthLevels.of(trained.hull, cameras)
@@ -57,7 +54,7 @@ def rendered_files(
         progress(f"rendering {number + 1} of {len(named)}")
         view = render(baked, camera)
         for layer in layers:
-            data, picture = view.png(layer, as_drawn=as_drawn, levels=levels)
+            data, picture = view.png(layer, levels=levels)
             name = f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png"
             yield name, data
             depths += [name] if layer == "depth" else []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,18 +13,10 @@ from jaxtyping import Float, UInt8
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.errors import BundleError, OutputError, PaletteError, ToonsetError
-from toonset.nerf.fields.trained_field import (
-    NO_BENDS,
-    NO_DRAWINGS,
-    NO_LINES,
-    NO_PALETTE,
-    TrainedField,
-)
+from toonset.nerf.fields.trained_field import NO_DRAWINGS, NO_LINES, NO_PALETTE, TrainedField
 from toonset.nerf.look.blend import DrawnView, Geometry, drawn_view
 from toonset.nerf.options import LAYERS
-from toonset.nerf.prepare.warp_back import bends_back, give_back
 from toonset.nerf.render.depth_levels import DepthLevels
-from toonset.nerf.render.line_drawing import inked
 from toonset.nerf.render.normals import normal_picture
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.view import small_png
@@ -33,9 +24,6 @@ from toonset.write import write_bytes
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Layer = UInt8[np.ndarray, "height width *channels"]
-
-REACH = 2  # pixels beside a place that resampling reads
-BENT = ("drawn", "rgb", "palette", "labels")  # layers that can be bent as the drawings were
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +41,6 @@ class Rendering:
             (premultiplied by alpha); None without palette.
         camera: it is seen from.
         field: that was rendered.
-        render: returns another view of it.
-        ink: (height, width) share of a pixel that contour lines cover, already part of `rgb`; None
-            where the drawings have no lines.
-        ink_rgb: sRGB of the lines; None without.
     """
 
     rgb: Float[np.ndarray, "height width 3"]
@@ -66,9 +50,6 @@ class Rendering:
     shares: Float[np.ndarray, "height width colors"] | None
     camera: Camera
     field: TrainedField
-    render: Callable[[Camera], Rendering]
-    ink: Float[np.ndarray, "height width"] | None = None
-    ink_rgb: tuple[int, int, int] | None = None
 
     @cached_property
     def drawn(self) -> DrawnView:
@@ -82,15 +63,14 @@ class Rendering:
         view = Geometry(self.camera, self.alpha, self.depth, self.rgb, self.shares)
         return drawn_view(self.field.drawings, view)
 
-    def picture(self, layer: str = "rgb", *, as_drawn: bool = False) -> Layer:
+    def picture(self, layer: str = "rgb") -> Layer:
         """Return one layer as RGBA with straight alpha, or as a label map.
 
         Args:
             layer: one of `LAYERS`; "depth" is grey, the nearest point white.
-            as_drawn: bend it as the drawings were, which training had bent back.
 
         Raises:
-            ToonsetError: there is no such layer, or the run has no palette, lines or bends for it.
+            ToonsetError: there is no such layer, or the run has no palette or lines for it.
         """
         if layer not in LAYERS:
             raise ToonsetError(f"layer {layer!r} is none of {', '.join(LAYERS)}; choose one")
@@ -107,38 +87,21 @@ class Rendering:
                 self.depth, self.alpha, self.camera, in_camera=True
             ),
         }
-        if as_drawn and layer in BENT:
-            return self._as_drawn(layer)
         return made[layer]()
 
-    def _as_drawn(self, layer: str) -> Layer:
-        """Return a layer bent, with what bends move into the picture from beyond its edges."""
-        keys = self.field.keys
-        if keys is None:
-            raise BundleError(NO_BENDS)
-        width, height = self.camera.size_wh
-        moves = bends_back(self.camera.pixel_grid().reshape(-1, 2), self.camera, keys)
-        room = math.ceil(float(np.abs(moves).max())) + REACH
-        wide = self.camera.moved((-room, -room), (width + 2 * room, height + 2 * room))
-        shown = self if _is_whole(self.alpha) else self.render(wide)
-        bent = give_back({layer: shown.picture(layer)}, shown.camera, keys)[layer]
-        top, left = (bent.shape[0] - height) // 2, (bent.shape[1] - width) // 2
-        return bent[top : top + height, left : left + width]
-
     def png(
-        self, layer: str = "rgb", *, as_drawn: bool = False, levels: DepthLevels | None = None
+        self, layer: str = "rgb", *, levels: DepthLevels | None = None
     ) -> tuple[bytes, Picture]:
         """Return a layer as a PNG file, and as RGBA for a GIF.
 
         Args:
             layer: one of `LAYERS`. Labels are an indexed PNG, depth is grey of 16 bits.
-            as_drawn: see `picture`.
             levels: scale of depth; None: that of this view alone.
 
         Raises:
             ToonsetError: see `picture`.
         """
-        picture = self.picture(layer, as_drawn=as_drawn)
+        picture = self.picture(layer)
         if layer == "depth":
             levels = levels or DepthLevels.of(self.field.hull, [self.camera])
             return encode_grey_png(levels.picture(self.depth)), picture
@@ -153,7 +116,7 @@ class Rendering:
         """Return what people look at, for a notebook."""
         return small_png(self.picture(default_layer(self.field)))
 
-    def save(self, path: str | Path, layer: str = "rgb", *, as_drawn: bool = False) -> None:
+    def save(self, path: str | Path, layer: str = "rgb") -> None:
         """Write a layer as a PNG file; the file appears whole or not at all.
 
         Raises:
@@ -161,12 +124,7 @@ class Rendering:
         """
         if Path(path).suffix.lower() != ".png":
             raise OutputError(f"{path}: a rendering is a PNG; give a name that ends in .png")
-        write_bytes(Path(path), self.png(layer, as_drawn=as_drawn)[0])
-
-
-def _is_whole(alpha: Float[np.ndarray, "height width"]) -> bool:
-    """Return whether no edge of the picture cuts the figure."""
-    return not any(edge.any() for edge in (alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]))
+        write_bytes(Path(path), self.png(layer)[0])
 
 
 def default_layer(trained: TrainedField) -> str:
@@ -194,10 +152,7 @@ def palette_picture(
     """
     if rendering.shares is None or palette is None:
         raise PaletteError(NO_PALETTE)
-    color = rendering.shares @ (palette / 255.0)
-    if rendering.ink is not None and rendering.ink_rgb is not None:
-        color = inked(color, rendering.alpha, rendering.ink, rendering.ink_rgb)
-    return color_picture(color, rendering.alpha)
+    return color_picture(rendering.shares @ (palette / 255.0), rendering.alpha)
 
 
 def depth_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
@@ -216,20 +171,16 @@ def alpha_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
 
 
 def ink_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
-    """Return the contour lines alone, in their colour.
+    """Return the lines of the drawn look alone, in their colour.
 
     Raises:
         BundleError: the drawings have none.
     """
-    if rendering.ink is None and rendering.field.drawings is not None:
-        pen = rendering.field.drawings.pen
-        if pen is not None:
-            lines = rendering.drawn.ink
-            return color_picture(lines[..., None] * (np.array(pen.rgb) / 255.0), lines)
-    if rendering.ink is None or rendering.ink_rgb is None:
+    drawings = rendering.field.drawings
+    if drawings is None or drawings.pen is None:
         raise BundleError(NO_LINES)
-    color = np.array(rendering.ink_rgb) / 255.0
-    return color_picture(rendering.ink[..., None] * color, rendering.ink)
+    lines = rendering.drawn.ink
+    return color_picture(lines[..., None] * (np.array(drawings.pen.rgb) / 255.0), lines)
 
 
 def label_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width"]:

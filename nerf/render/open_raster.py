@@ -105,9 +105,9 @@ class _Look:
 
     Attributes:
         shown: its picture.
-        ink: share of every pixel that lines cover.
+        ink: share of every pixel that lines cover; 0 but in the drawn look.
         ink_rgb: their colour in [0, 1].
-        paint: colour under the lines; None: what is left when they are taken off.
+        paint: colour under the lines; None: there are none.
         labels: number of every pixel's paint.
         paints: colours of the paints, sRGB.
         inks: how many of them, the last, are no palette colours.
@@ -122,7 +122,7 @@ class _Look:
     inks: int = 0
 
 
-def check_layered(layer: str, *, as_drawn: bool) -> None:
+def check_layered(layer: str) -> None:
     """Refuse, before any work, what has no layers of paint.
 
     Raises:
@@ -133,8 +133,6 @@ def check_layered(layer: str, *, as_drawn: bool) -> None:
             f"layer {layer!r}: has no paints for turntable.ora; let the first layer be one of "
             f"{', '.join(PAINTED)}"
         )
-    if as_drawn:
-        raise UsageError("turntable.ora: its layers do not bend; leave --as-drawn or ora out")
 
 
 def layered(view: Rendering, layer: str, picture: Picture) -> list[PaintLayer]:
@@ -176,9 +174,7 @@ def _look(view: Rendering, layer: str, picture: Picture) -> _Look:
         ink_rgb = np.array(drawings.pen.rgb if drawings.pen else (0, 0, 0)) / 255.0
         labels, inks = drawn.labels.astype(np.int64), len(drawings.paints) - len(drawings.palette)
         return _Look(shown, drawn.ink, ink_rgb, drawn.paint, labels, drawings.new_paints, inks)
-    ink = np.zeros_like(alpha) if view.ink is None else view.ink
-    ink_rgb = np.array(view.ink_rgb or (0, 0, 0)) / 255.0
-    return _Look(shown, ink, ink_rgb, None, shares.argmax(axis=-1), palette)
+    return _Look(shown, np.zeros_like(alpha), np.zeros(3), None, shares.argmax(axis=-1), palette)
 
 
 def _lines(look: _Look) -> Share:

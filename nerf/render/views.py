@@ -7,7 +7,6 @@ folds, where one colour meets the next. Outlines are soft through the hull's occ
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import cv2
 import numpy as np
@@ -22,7 +21,6 @@ from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import cast
 from toonset.nerf.render.labels import NONE, labels_of, palette_shares
 from toonset.nerf.render.layers import Rendering
-from toonset.nerf.render.line_drawing import draw_ink, ink_scale, inked
 from toonset.nerf.render.rays import Sight
 from toonset.palette.pixels.labels import UNLABELLED
 
@@ -34,8 +32,6 @@ CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
     """Return the view of `camera`, orthographic or pinhole, of any size.
-
-    Contour lines that were taken off the drawings are drawn again, as wide as there.
 
     Args:
         source: a trained field; what is prepared for its first view is kept for the next ones.
@@ -62,7 +58,7 @@ def _render(baked: Baked, camera: Camera) -> Rendering:
         shares = palette_shares(baked.labels, baked.paints, seen[3], labels, chosen, more)
     seen[:, chosen] = more.mean(dim=2)
     means = seen.numpy(), None if shares is None else shares.numpy()
-    return _with_lines(_rendering(*means, camera, baked))
+    return _rendering(*means, camera, baked)
 
 
 def baked_of(field: TrainedField) -> Baked:
@@ -89,16 +85,6 @@ def _grid(height: int, width: int) -> Float[Tensor, "2 pixels"]:
     return torch.stack([u, v]).view(2, -1)
 
 
-def _with_lines(view: Rendering) -> Rendering:
-    style = view.field.ink
-    if style is None:
-        return view
-    ink = draw_ink(view.alpha, view.depth, view.shares, style, ink_scale(view.camera, style))
-    return replace(
-        view, rgb=inked(view.rgb, view.alpha, ink, style.rgb), ink=ink, ink_rgb=style.rgb
-    )
-
-
 def _rendering(
     mean: Float[np.ndarray, "5 height width"],
     shares: Float[np.ndarray, "height width colors"] | None,
@@ -112,8 +98,7 @@ def _rendering(
     if shares is not None:
         labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
     rgb = np.ascontiguousarray(np.moveaxis(mean[:3], 0, -1))
-    again = partial(_render, baked)
-    return Rendering(rgb, alpha, depth, labels, shares, camera, baked.trained, again)
+    return Rendering(rgb, alpha, depth, labels, shares, camera, baked.trained)
 
 
 def borders(

@@ -34,14 +34,17 @@ from toonset.nerf.lines.step_lines import StepLines
 from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.look.shade import Shade
-from toonset.nerf.run.records import MOST_VIEWS, Byte, Number, Width
 from toonset.palette.palette import Shadow
 from toonset.write import write_bytes
 
 PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
 MAX_BYTES = 512 * 2**20
-LONGEST_PX = 4096.0  # a displacement
+LONGEST_PX = 4096.0  # a displacement, or how wide a line is
+MOST_VIEWS = 4096
+Byte = Annotated[int, Field(ge=0, le=255)]
 Color = tuple[Byte, Byte, Byte]
+Width = Annotated[float, Field(ge=0, le=LONGEST_PX)]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0, lt=MOST_VIEWS)]
 

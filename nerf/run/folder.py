@@ -40,7 +40,6 @@ from toonset.nerf.run.drawings import (
     read_drawings,
     write_drawings,
 )
-from toonset.nerf.run.records import InkRecord, KeysRecord
 from toonset.nerf.run.tensors import packed, unpack
 from toonset.write import write_bytes
 
@@ -49,7 +48,7 @@ WRITTEN = (
     *(MODEL, CONFIG, "metrics.json", "history.csv", "preview.png", PICTURES, PAINT, SURFACES),
     "manifest.json",  # of runs of before, which --force may replace
 )
-FORMAT = 4
+FORMAT = 5
 MOST_CELLS = 512  # along one side, of planes and hull alike
 
 
@@ -69,8 +68,6 @@ class FieldRecord(BaseModel):
     palette: list[tuple[int, int, int]] | None = Field(default=None, max_length=255)
     k: float = Field(ge=0, le=1e9)
     size_px: int = Field(ge=1, le=16384)
-    ink: InkRecord | None = None
-    keys: KeysRecord | None = None
     drawings: DrawingsRecord | None = None
 
     @classmethod
@@ -93,8 +90,6 @@ class FieldRecord(BaseModel):
             palette=palette,
             k=trained.k,
             size_px=trained.size_px,
-            ink=None if trained.ink is None else InkRecord.of(trained.ink),
-            keys=None if trained.keys is None else KeysRecord.of(trained.keys),
             drawings=None if trained.drawings is None else DrawingsRecord.of(trained.drawings),
         )
 
@@ -174,14 +169,5 @@ def _empty(record: FieldRecord) -> TrainedField:
     palette = None if record.palette is None else np.array(record.palette, dtype=np.uint8)
     classifier = None if palette is None else PaletteClassifier(len(palette))
     return TrainedField(
-        field,
-        hull,
-        record.step,
-        record.samples,
-        classifier,
-        palette,
-        record.k,
-        record.size_px,
-        None if record.ink is None else record.ink.style,
-        None if record.keys is None else record.keys.keys(),
+        field, hull, record.step, record.samples, classifier, palette, record.k, record.size_px
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -41,8 +41,7 @@ def write_run(
 ) -> dict[str, Any]:
     """Write all files of a run into an existing folder; return the content of metrics.json.
 
-    Its figures of training views are those of the drawings as they were fitted: set right, and
-    without the lines that were taken off.
+    Its figures of training views are those of the drawings as they were fitted: set right.
 
     Args:
         folder: where to.
@@ -51,12 +50,10 @@ def write_run(
         test: held-out views, compared whole; None: none.
         held_out: what was seen of them on the way.
     """
-    drawn = training.prepared.scene
     baked = baked_of(training.result)
-    shown = pictures_of(replace(baked, trained=replace(training.result, ink=None)), drawn)
     metrics = {
         **_course(training, held_out),
-        "train": figures_of(shown, drawn),
+        "train": compared(baked, training.prepared.scene),
         "test": None if test is None else compared(baked, test),
         "verdict": verdict_of(training, scene, baked).to_json(),
     }

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy import ndimage
 
-from toonset.nerf.lines.explain import step_edges
 from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest, parts
+from toonset.nerf.lines.step_lines import step_edges
 from toonset.nerf.lines.strokes import SOFT, lines_of, strokes_of
 from toonset.nerf.look.drawings import SQUARE, Drawings, Texture
 
@@ -102,7 +102,7 @@ def _outlines(
     explained = np.bincount(number[near], minlength=count) >= EXPLAINED * size
     spots = _round((off <= 2 * INK_LIKE) & lines.figure & ~lines.outline)
     kept = distance_to(spots) <= 2 * BESIDE_PX
-    ink = (strokes.only(explained & (mean <= INK_LIKE)).number > 0) & ~kept
+    ink = (explained & (mean <= INK_LIKE))[number] & (number > 0) & ~kept
     ink = distance_to(ink) < BESIDE_PX
     ink |= (distance_to(ink) < BESIDE_PX) & (lines.cover >= SOFT)
     ink &= ~kept

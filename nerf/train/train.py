@@ -112,7 +112,7 @@ def fit_field(
     cells = choice.cells if choice else None
     clock.append(time.perf_counter())
     tell("laying out the rays")
-    start = replace(_untrained(scene, hull, options, cells), ink=ready.ink, keys=ready.keys)
+    start = _untrained(scene, hull, options, cells)
     rays, counts = _rays(scene, start, options, generator, device)
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)

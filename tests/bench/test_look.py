@@ -156,7 +156,7 @@ def short() -> Iterator[list[LookResult]]:
     quick = TrainOptions(steps=30, field="triplane")
     for name, look in known.items():
         own = look.recipe.options
-        options = replace(quick, ink=own.ink, mannequin=own.mannequin)
+        options = replace(quick, mannequin=own.mannequin)
         LOOKS[name] = replace(look, recipe=Recipe(options, look.recipe.paint))
     case, made = drawn_case(0, replace(DRAWN, cell_px=80, outline_px=1.2, views=6))
     case = replace(case, train=replace(case.train, mannequin=made.mesh))

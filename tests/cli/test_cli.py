@@ -107,7 +107,6 @@ def test_help_is_also_a_word(asked, shown, toonset):
         (["render", "r", "-o", "x", "--turntable", "2", "--layer", "palete"], ["mean 'palette'?"]),
         (["train", "--preset", "papre"], ["mean 'paper'?"]),
         (["train", "--field", "triplan"], ["mean 'triplane'?"]),
-        (["train", "--ink", "redrw"], ["mean 'redraw'?"]),
         (["export", "b", "-o", "x", "--to", "colmap", "--layout", "odl"], ["mean 'old'?"]),
         (["palette", "--method", "extcolor"], ["mean 'extcolors'?"]),
         (["calibrate", "a.png", "--lock", "elevatoin"], ["mean 'elevation'?"]),

@@ -206,7 +206,6 @@ def test_every_switch_switches_its_option(toonset, monkeypatch) -> None:
         ("--as-turned",): {"turn": False},
         ("--as-bent",): {"unbend": False},
         ("--one-sided",): {"symmetric": False},
-        ("--ink", "redraw"): {"ink": True},
     }
     for words in ((), *switches):
         assert toonset("train", *words).code == 0

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -36,6 +37,8 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.score.metrics_view import Judges
 from toonset.nerf.train import box_rays
 from toonset.nerf.train.labelling import without_palette
+from toonset.nerf.train.loop import Moment
+from toonset.nerf.train.loss import Model
 from toonset.nerf.train.train import fit_field
 
 # a grid in the whole box, of few rays a step: small scenes train in seconds
@@ -180,22 +183,25 @@ def test_snapshots_are_the_field_as_it_was_and_cost_no_training_time() -> None:
     assert times == sorted(times)
 
 
-@dataclass
-class Moment:
+class Watched(Snapshots):
     """Of a training whose parameters take a while to be copied."""
 
-    takes_s: float = 0.0
+    takes_s = 0.0
 
-    def state(self):
+    def _model(self) -> Model:
         time.sleep(self.takes_s)
-        return type("State", (), {"parameters": {}})
+        return cast(Model, torch.nn.Linear(1, 1))
+
+
+MOMENT = Moment([], 1, 0.0)
 
 
 def test_looking_stops_the_clock() -> None:
-    watch = Snapshots(time.perf_counter(), time.process_time(), first_look_s=1e-6)
+    watch = Watched(time.perf_counter(), time.process_time(), first_look_s=1e-6)
     watch.begin(None)  # type: ignore[arg-type]
     before = watch.spent()[0]
-    watch.look(Moment(takes_s=0.3))  # type: ignore[arg-type]
+    watch.takes_s = 0.3
+    watch.look(MOMENT)
     assert watch.spent()[0] - before < 0.2
     assert watch.kept[0][0][0] - before < 0.2
 
@@ -203,12 +209,12 @@ def test_looking_stops_the_clock() -> None:
 def test_the_first_look_comes_after_some_fitting_however_long_the_preparation() -> None:
     prepared_for_s = 10.0
     began, cpu_began = time.perf_counter() - prepared_for_s, time.process_time()
-    watch = Snapshots(began, cpu_began, first_look_s=5.0)
+    watch = Watched(began, cpu_began, first_look_s=5.0)
     watch.begin(None)  # type: ignore[arg-type]
-    watch.look(Moment())  # type: ignore[arg-type]
+    watch.look(MOMENT)
     assert watch.kept == []
     watch.began -= 5.0
-    watch.look(Moment())  # type: ignore[arg-type]
+    watch.look(MOMENT)
     assert watch.kept[0][0][0] > prepared_for_s + 5.0
 
 

@@ -64,7 +64,6 @@ def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
         ("render run --format webp,s", {"webp,sprites"}),
         ("train --field tri", {"triplane"}),
         ("train --preset ", {"fast", "paper"}),
-        ("train --ink r", {"redraw"}),
         ("train --device c", {"cpu", "cuda"}),
         ("palette --method e", {"extcolors"}),
         ("palette --space ", {"rgb", "oklab"}),

@@ -27,8 +27,7 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
                 "views": {"a.png": 0.01, "b.png": 0.027},
             },
         },
-        "drawings": dict.fromkeys(("mannequin", "turning", "registration", "unbending", "ink"))
-        | drawings,
+        "drawings": dict.fromkeys(("mannequin", "turning", "registration", "unbending")) | drawings,
     }
 
 

@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from tests.nerf.ellipsoids import PARTS, draw, train_scene
-from toonset.dataset.silhouettes.displacement import CONTROLS
-from toonset.dataset.silhouettes.outlines import Square
 from toonset.errors import PaletteError
-from toonset.nerf.prepare.unwarp import Warp
-from toonset.nerf.prepare.warp_back import KeyWarps
 from toonset.nerf.render.animation import encode_gif
 from toonset.nerf.render.layers import alpha_picture, color_picture, depth_picture, palette_picture
 from toonset.nerf.render.recolor import recolored
@@ -47,21 +43,6 @@ def test_layers_agree_with_the_geometry(training: Training) -> None:
     assert edge.any()
     near = np.abs(straight[edge][:, None, :3].astype(int) - [c for *_, c in PARTS]).max(-1).min(1)
     assert np.median(near) < 40  # straight colour: no halo of white or black on soft edges
-
-
-def test_a_bent_view_is_whole_in_a_picture_that_cuts_the_figure(training: Training) -> None:
-    camera = train_scene().frames[0].camera
-    numbers = np.full(2 * CONTROLS**2, -0.03)  # what is beyond the right edge moves in
-    warp = Warp(Square(np.zeros(2), float(max(camera.size_wh))), numbers)
-    keys = KeyWarps((camera,), (warp,), np.zeros(3))
-    field = replace(training.result, keys=keys)
-    tight = camera.moved((15, 20), (15, 20))
-    whole = render(field, camera).picture("rgb", as_drawn=True)
-    cut = render(field, tight).picture("rgb", as_drawn=True)
-    assert (cut[..., -1, 3] == 255).any()
-    np.testing.assert_allclose(cut.astype(int), whole[20:40, 15:30], atol=2)
-    straight = render(field, tight).picture("rgb")
-    assert np.abs(straight.astype(int) - cut).mean() > 1
 
 
 def test_recolor_replaces_one_colour_and_nothing_else(training: Training) -> None:
