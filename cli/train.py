@@ -77,9 +77,6 @@ def train(
     as_placed: Annotated[
         bool, typer.Option("--as-placed", help="Trust the cameras: do not register drawings.")
     ] = False,
-    as_turned: Annotated[
-        bool, typer.Option("--as-turned", help="Trust calibration's yaws: do not turn its cameras.")
-    ] = False,
     as_bent: Annotated[
         bool, typer.Option("--as-bent", help="Trust the outlines: do not unbend drawings.")
     ] = False,
@@ -136,7 +133,7 @@ def train(
     finishes the step and writes the run as it stands; a second one leaves at once.
     """
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
-    switches = {"fair": as_carved, "register": as_placed, "turn": as_turned}
+    switches = {"fair": as_carved, "register": as_placed}
     switches |= {"unbend": as_bent, "symmetric": one_sided, "mannequin": no_mannequin}
     given |= {name: False for name, off in switches.items() if off}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle

@@ -66,8 +66,6 @@ class TrainOptions:
         fair: take the fairest surface inside the hull instead of the hull with its corners
             (off: --as-carved).
         register: let cameras follow drawings that were placed or sized off (off: --as-placed).
-        turn: let cameras that calibration estimated turn, by its sigmas; `register` off keeps them
-            (off: --as-turned).
         unbend: bend drawings back that disagree with the others' outlines (off: --as-bent).
         symmetric: where drawings show that the body is its own mirror image, flip them for the side
             that no drawing shows (off: --one-sided).
@@ -86,7 +84,6 @@ class TrainOptions:
     carve: bool = True
     fair: bool = True
     register: bool = True
-    turn: bool = True
     unbend: bool = True
     symmetric: bool = True
 
@@ -136,7 +133,6 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
         carve=False,
         smoothness=0.0,
         register=False,
-        turn=False,
         unbend=False,
         symmetric=False,
     )

@@ -29,13 +29,13 @@ from toonset.dataset.silhouettes.turned_rays import TurnedRays
 from toonset.view import View
 
 ELEVATIONS = np.radians([0.0, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 37, 45])
-# 1 / distance in heights, and how usual it is: orthographic, a long lens, a common one
-NEARNESS = {0.0: 0.8, 0.2: 0.1, 0.45: 0.1}
+# 1 / distance in heights: orthographic, long lenses, a common one; all as likely
+NEARNESS = (0.0, 0.1, 0.2, 0.45)
 USUAL, SPREAD, P_STEEP = np.radians(5.0), np.radians(6.0), 0.3  # of elevations of sheets
 FLOOR = 0.003  # of the height: outlines that are drawn well are this far apart
 MEASUREMENTS = 2.0  # that count, per view: its outline errs together
-TRIED = 4  # elevations, per nearness, that are fitted
-SKETCH_ROUNDS, ROUNDS = 3, 6  # of Gauss-Newton
+TRIED = 3  # elevations, per nearness, that are fitted
+SKETCH_ROUNDS, ROUNDS = 4, 12  # of Gauss-Newton at most
 TAU = 0.01  # of the figure's square: first guess of how far a drawing is misplaced
 LEAST_SIGMA = np.radians(1.5)  # of the elevation
 
@@ -141,16 +141,15 @@ def place(
             tuple(figures.cameras(yaws, USUAL)), np.zeros(views), float(USUAL), float(SPREAD), 0.0
         )
     tried, worth = [], []
-    for k, p_k in NEARNESS.items():
+    fitted = None
+    for k in NEARNESS:
         rough = figures.apart(yaws, k)
         likely = coherence_log_likelihood(rough, views) + prior
         for i in np.sort(np.argsort(-likely)[:TRIED]):
-            cameras = figures.cameras(yaws, float(ELEVATIONS[i]), k)
+            cameras = _placed_as(fitted, figures.cameras(yaws, float(ELEVATIONS[i]), k))
             fitted = _fitted(figures, cameras, yaw_sigma, SKETCH_ROUNDS)
             tried.append((float(ELEVATIONS[i]), k))
-            worth.append(
-                coherence_log_likelihood(np.array(fitted.apart), views) + prior[i] + np.log(p_k)
-            )
+            worth.append(coherence_log_likelihood(np.array(fitted.apart), views) + prior[i])
     shares = np.exp(np.array(worth) - max(worth))
     shares /= shares.sum()
     elevations = np.array([elevation for elevation, _ in tried])
@@ -158,7 +157,8 @@ def place(
     of_k = np.array([nearness == k for _, nearness in tried]) * shares
     elevation = float(of_k @ elevations / of_k.sum())
     spread = float(np.sqrt(shares @ np.square(elevations - elevation)))
-    found = _fitted(figures, figures.cameras(yaws, elevation, k), yaw_sigma, ROUNDS)
+    cameras = _placed_as(fitted, figures.cameras(yaws, elevation, k))
+    found = _fitted(figures, cameras, yaw_sigma, ROUNDS)
     return replace(found, elevation=elevation, elevation_sigma=max(spread, float(LEAST_SIGMA)))
 
 
@@ -176,14 +176,22 @@ def size_of_figures(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[f
     return float(np.median(heights)), max(reach)
 
 
+def _placed_as(fitted: SheetCameras | None, cameras: list[Camera]) -> list[Camera]:
+    """Return cameras where others of the same sheet were found: that is near, boxes may be far."""
+    if fitted is None:
+        return cameras
+    pairs = zip(cameras, fitted.cameras, strict=True)
+    return [replace(camera, center=near.center, scale=near.scale) for camera, near in pairs]
+
+
 def _fitted(
     figures: Figures, cameras: list[Camera], yaw_sigma: Float[np.ndarray, " views"], rounds: int
 ) -> SheetCameras:
     outlines = outlines_of(cameras, figures.alphas)
     ratio = outlines.ratio(cameras[0])
-    fit = fit_turns(outlines, yaw_sigma, 0.0, TAU, rounds)
+    fit = fit_turns(outlines, yaw_sigma, TAU, rounds)
     moved = [
-        camera_moved(camera, Square(view.square.low / ratio, view.square.size / ratio), own, 0.0)
+        camera_moved(camera, Square(view.square.low / ratio, view.square.size / ratio), own)
         for camera, view, own in zip(cameras, outlines.views, fit.numbers, strict=True)
     ]
     apart = fit.apart_px[1] / ratio / figures.height_px

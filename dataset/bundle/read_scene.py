@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.bundle.transforms_read import (
     PosedPicture,
@@ -34,8 +31,8 @@ Labels = UInt8[np.ndarray, "height width"]
 def read_scene(path: Path) -> Scene:
     """Return the posed pictures of a bundle, a transforms.json, or a folder that holds one.
 
-    Labels and palette are read where the folder has `palette.json` and `labels/`, sigmas where it
-    has the `calibration.json` of these cameras, the mannequin where it has one.
+    Labels and palette are read where the folder has `palette.json` and `labels/`, the mannequin
+    where it has one.
 
     Raises:
         BundleError: a file is missing, broken, of another size than its camera says, or outside
@@ -48,14 +45,13 @@ def read_scene(path: Path) -> Scene:
     root = file.parent
     palette = read_palette_of(root)
     posed = read_frames(file, need_pictures=True)
-    sigmas = read_yaw_sigmas(root, posed)
     if palette is not None:
         check_label_names(file, posed)
     frames = []
-    for frame, sigma in zip(posed, sigmas, strict=True):
+    for frame in posed:
         rgba = read_picture(frame, file)
         labels = None if palette is None else read_labels(root, frame, len(palette.colors))
-        frames.append(Frame(Path(frame.file_path).name, frame.camera, rgba, labels, sigma))
+        frames.append(Frame(Path(frame.file_path).name, frame.camera, rgba, labels))
     mannequin = member(root, MANNEQUIN)
     mesh = None if mannequin is None else load_mesh(mannequin)
     colors, shadow = (None, None) if palette is None else (palette.rgb, palette.shadow)
@@ -70,33 +66,6 @@ def read_palette_of(root: Path) -> Palette | None:
     """
     file = member(root, "palette.json")
     return None if file is None else read_palette_json(file)
-
-
-def read_yaw_sigmas(root: Path, posed: Sequence[PosedPicture]) -> list[float | None]:
-    """Return each camera's sigma of yaw in radians, None where calibration.json has none for it.
-
-    A camera that was changed since is not the one that was calibrated.
-
-    Raises:
-        BundleError: calibration.json lies elsewhere, or is broken.
-    """
-    file = member(root, "calibration.json")
-    if file is None:
-        return [None] * len(posed)
-    found = {view.name: view for view in read_calibration(file).views}
-    sigmas: list[float | None] = []
-    for frame in posed:
-        view = found.get(Path(frame.file_path).name)
-        same = view is not None and _same(view.camera.camera(), frame.camera)
-        sigmas.append(math.radians(view.sigma.yaw_deg) if view is not None and same else None)
-    return sigmas
-
-
-def _same(camera: Camera, other: Camera) -> bool:
-    """Return whether cameras are equal but for rounding."""
-    ends = np.concatenate([np.eye(3), -np.eye(3)]) / max(camera.scale, 1e-9)
-    pixels, again = (c.project(camera.target + ends)[0] for c in (camera, other))
-    return camera.size_wh == other.size_wh and bool(np.allclose(pixels, again, atol=1e-3))
 
 
 def read_picture(frame: PosedPicture, file: Path) -> UInt8[np.ndarray, "height width 4"]:

@@ -21,14 +21,12 @@ class Frame:
         camera: where it was taken from; `camera.size_wh` is the picture's size.
         rgba: (height, width, 4) sRGB with straight alpha.
         labels: (height, width) palette index per pixel, 255 = unlabelled; None without palette.
-        yaw_sigma: one standard deviation of the camera's yaw, radians; None: it is known exactly.
     """
 
     name: str
     camera: Camera
     rgba: UInt8[np.ndarray, "height width 4"]
     labels: UInt8[np.ndarray, "height width"] | None = None
-    yaw_sigma: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

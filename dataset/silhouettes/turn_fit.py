@@ -1,9 +1,9 @@
 """Turning, placing and sizing a sheet's cameras until its outlines are those of one body.
 
-Minimised over each camera's shift, growth and yaw and the common perspective, by Gauss-Newton:
+Minimised over each camera's shift, growth and yaw, by Gauss-Newton:
 
     sum over rim points and other views of rho(r / sigma)^2 / CORRELATED
-      + |shift, 2 growth|^2 / tau^2 + (yaw / its sigma)^2 + (log k / its sigma)^2
+      + |shift, 2 growth|^2 / tau^2 + (yaw / its sigma)^2
 
 with r of `toonset.dataset.silhouettes.tangency`, noise and tau as in
 `toonset.dataset.silhouettes.register`. What outlines cannot tell is left as it was: the mean yaw,
@@ -25,7 +25,6 @@ from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.displacement import ShiftAndScale
 from toonset.dataset.silhouettes.outlines import Outline, Outlines, Square
 from toonset.dataset.silhouettes.register import (
-    AFRESH,
     CORRELATED,
     FOREIGN,
     LEAST,
@@ -39,86 +38,71 @@ from toonset.dataset.silhouettes.register import (
 from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
 
 PLACE, YAW, OWN = slice(0, 3), 3, 4  # a camera's numbers: shift x, shift y, growth; yaw
-STEP = 1e-3  # of central differences: of the square, radians, or log k
+STEP = 1e-3  # of central differences: of the square, or radians
+# As cameras move, best points slide along their rays, which takes away about half of a
+# disagreement's curvature: steps that hold the points are too short by as much
+LENGTHENED = 1.6
+ENOUGH = 0.98  # of the disagreement before a round: what gains no more is settled
 
 _PLACES = ShiftAndScale.expected()
 
 
 @dataclass(frozen=True, eq=False)
-class TurnFit(Fit):
-    """Turned cameras and what speaks for turning them.
-
-    `numbers` are shift x and y and growth in units of the squares, and yaw in radians.
-
-    Attributes:
-        log_k: by how much every camera's k grows.
-    """
-
-    log_k: float
-
-
-@dataclass(frozen=True, eq=False)
 class _Normal:
-    """Normal equations: H, gradient / 2, cost, disagreement, and where along the rays."""
+    """Normal equations: H, gradient / 2, cost and disagreement."""
 
     matrix: Float[np.ndarray, "m m"]
     slope: Float[np.ndarray, " m"]
     cost: float
     apart: float
-    along: list[Float[np.ndarray, " n"]]
 
 
 def fit_turns(
-    outlines: Outlines,
-    yaw_sigmas: Float[np.ndarray, " views"],
-    k_sigma: float,
-    tau: float,
-    rounds: int,
-) -> TurnFit:
+    outlines: Outlines, yaw_sigmas: Float[np.ndarray, " views"], tau: float, rounds: int
+) -> Fit:
     """Return the smallest moves of the cameras that make outlines agree.
+
+    Numbers are shift x and y and growth in units of the squares, and yaw in radians.
 
     Args:
         outlines: of three drawings or more.
         yaw_sigmas: radians; 0: that camera does not turn.
-        k_sigma: of log k; 0: the perspective stays.
         tau: first guess of the size of wrong places, of the square.
-        rounds: of Gauss-Newton.
+        rounds: of Gauss-Newton at most.
     """
     views = len(outlines.views)
-    flat = np.zeros(OWN * views + 1)
-    deviation = _deviations(yaw_sigmas, k_sigma, tau)
-    first = normal = _linearised(outlines, flat, None, deviation > 0)
+    flat = np.zeros(OWN * views)
+    deviation = _deviations(yaw_sigmas, tau)
+    first = normal = _linearised(outlines, flat, deviation > 0)
     idle = first.cost - _log_volume(first.matrix, deviation)
     if idle <= 0:  # even a perfect fit would not be worth its numbers
         apart = (first.apart, first.apart)
-        return TurnFit(flat[:-1].reshape(views, OWN), 0.0, idle / 2, apart, log_k=0.0)
+        return Fit(flat.reshape(views, OWN), 0.0, idle / 2, apart)
     body, shares = common(outlines, _PLACES)
     for round_ in range(1, rounds + 1):
         flat = _improved(normal, deviation, flat)
-        own = flat[:-1].reshape(views, OWN)  # a view of `flat`
+        own = flat.reshape(views, OWN)  # a view of `flat`
         own[:, PLACE] -= (body @ (shares @ own[:, PLACE].reshape(-1))).reshape(views, -1)
         if yaw_sigmas.all():
             own[:, YAW] -= np.average(own[:, YAW], weights=yaw_sigmas**-2)
-        along = normal.along if round_ % AFRESH else None
-        normal = _linearised(outlines, flat, along, deviation > 0)
+        before, normal = normal.apart, _linearised(outlines, flat, deviation > 0)
         if round_ >= SETTLED:
             tau = _learned(normal.matrix, deviation, flat, tau)
-            deviation = _deviations(yaw_sigmas, k_sigma, tau)
+            deviation = _deviations(yaw_sigmas, tau)
+            if normal.apart > ENOUGH * before:
+                break
     free = deviation > 0
     spent = normal.cost + float(((flat[free] / deviation[free]) ** 2).sum())
     gain = (first.cost - spent - _log_volume(normal.matrix, deviation)) / 2
     apart = (first.apart, normal.apart)
-    return TurnFit(flat[:-1].reshape(views, OWN), tau, gain, apart, log_k=float(flat[-1]))
+    return Fit(flat.reshape(views, OWN), tau, gain, apart)
 
 
-def camera_moved(
-    camera: Camera, square: Square, own: Float[np.ndarray, " 4"], log_k: float
-) -> Camera:
+def camera_moved(camera: Camera, square: Square, own: Float[np.ndarray, " 4"]) -> Camera:
     """Return the camera of a drawing after its numbers; `square` in the camera's pixels."""
     yaw, elevation, roll = camera.angles
     rotation = rotation_from_angles(yaw + float(own[YAW]), elevation, roll)
-    turned = replace(camera, rotation=rotation, k=camera.k * float(np.exp(log_k)))
-    return moved(turned, square, own[PLACE])
+    return moved(replace(camera, rotation=rotation), square, own[PLACE])
 
 
 def moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
@@ -129,27 +113,26 @@ def moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camer
     return replace(camera, center=center, scale=camera.scale * growth)
 
 
-def _deviations(
-    yaw_sigmas: Float[np.ndarray, " views"], k_sigma: float, tau: float
-) -> Float[np.ndarray, " m"]:
+def _deviations(yaw_sigmas: Float[np.ndarray, " views"], tau: float) -> Float[np.ndarray, " m"]:
     """Return every number's standard deviation before the outlines are looked at."""
     own = np.zeros((len(yaw_sigmas), OWN))
     own[:, PLACE] = tau * np.sqrt(np.diag(_PLACES.covariance))
     own[:, YAW] = yaw_sigmas
-    return np.append(own.reshape(-1), k_sigma)
+    return own.reshape(-1)
 
 
 def _improved(normal: _Normal, deviation: np.ndarray, flat: np.ndarray) -> np.ndarray:
     """Return the numbers after a step of Gauss-Newton, in units in which priors are standard."""
     unit = np.divide(flat, deviation, out=np.zeros_like(flat), where=deviation > 0)
     matrix = deviation[:, None] * normal.matrix * deviation + np.eye(len(flat))
-    return deviation * (unit - np.linalg.solve(matrix, deviation * normal.slope + unit))
+    step = np.linalg.solve(matrix, deviation * normal.slope + unit)
+    return deviation * (unit - LENGTHENED * step)
 
 
 def _learned(matrix: np.ndarray, deviation: np.ndarray, flat: np.ndarray, tau: float) -> float:
     """Return the size of wrong places that the numbers and their uncertainty speak for."""
     spread = np.linalg.inv(deviation[:, None] * matrix * deviation + np.eye(len(flat)))
-    place = np.arange(len(flat) - 1).reshape(-1, OWN)[:, PLACE].reshape(-1)
+    place = np.arange(len(flat)).reshape(-1, OWN)[:, PLACE].reshape(-1)
     unit = flat[place] / deviation[place]
     energy = float(unit @ unit + np.diag(spread)[place].sum())
     return float(np.clip(tau * np.sqrt(energy / len(place)), LEAST, MOST))
@@ -161,35 +144,25 @@ def _log_volume(matrix: np.ndarray, deviation: np.ndarray) -> float:
     return float(np.linalg.slogdet(whole)[1])
 
 
-def _linearised(
-    outlines: Outlines,
-    flat: np.ndarray,
-    along: Sequence[np.ndarray] | None,
-    free: Bool[np.ndarray, " m"],
-) -> _Normal:
-    """Return the normal equations at `flat`, near earlier points of the rays or anywhere.
-
-    Numbers that are not free have no slope.
-    """
-    own, log_k = flat[:-1].reshape(-1, OWN), float(flat[-1])
+def _linearised(outlines: Outlines, flat: np.ndarray, free: Bool[np.ndarray, " m"]) -> _Normal:
+    """Return the normal equations at `flat`; numbers that are not free have no slope."""
+    own = flat.reshape(-1, OWN)
     views = tuple(
-        replace(view, camera=camera_moved(view.camera, view.square, numbers, log_k))
+        replace(view, camera=camera_moved(view.camera, view.square, numbers))
         for view, numbers in zip(outlines.views, own, strict=True)
     )
-    moves = np.c_[free[:-1].reshape(-1, OWN), np.full(len(views), free[-1])]
     aside = [
-        _aside(view, numbers, log_k, movable)
-        for view, numbers, movable in zip(outlines.views, own, moves, strict=True)
+        _aside(view, numbers, movable)
+        for view, numbers, movable in zip(outlines.views, own, free.reshape(-1, OWN), strict=True)
     ]
     placed = Placed.of(replace(outlines, views=views), _PLACES, np.zeros((len(views), 3)))
     size = outlines.size_px
     sigma = max(NOISE * size, NOISE_PX)
     matrix, slope = np.zeros((len(flat), len(flat))), np.zeros(len(flat))
     cost = squares = 0.0
-    points, touched = 0, []
+    points = 0
     for view, outline in enumerate(views):
-        found = touch(placed, view, outline.rim, None if along is None else along[view])
-        touched.append(found.along)
+        found = touch(placed, view, outline.rim)
         points += len(found.pixels)
         for other in range(len(views)):
             if other == view:
@@ -197,43 +170,34 @@ def _linearised(
             residual, jacobian = _pair(views, aside, view, other, found)
             tame = 1 + (residual / (FOREIGN * size)) ** 2
             weight = 1 / (tame * sigma) ** 2 / CORRELATED
-            used = _columns(view, other, len(flat))
+            used = _columns(view, other)
             matrix[np.ix_(used, used)] += jacobian.T @ (weight[:, None] * jacobian)
             slope[used] += jacobian.T @ (weight * residual)
             cost += float((residual**2 / tame).sum()) / sigma**2 / CORRELATED
             squares += float((residual**2).sum())
-    return _Normal(matrix, slope, cost, (squares / max(1, points)) ** 0.5, touched)
+    return _Normal(matrix, slope, cost, (squares / max(1, points)) ** 0.5)
 
 
 Aside = list[tuple[Camera, Camera] | None]
 
 
-def _aside(
-    outline: Outline, own: np.ndarray, log_k: float, movable: Bool[np.ndarray, " 5"]
-) -> Aside:
-    """Return a camera a STEP ahead and behind in each number that may move, log k last."""
-    pairs: Aside = []
-    for number in range(OWN + 1):
-        if not movable[number]:
-            pairs.append(None)
-            continue
-        ahead, behind = (
-            camera_moved(
-                outline.camera,
-                outline.square,
-                own + sign * STEP * (np.arange(OWN) == number),
-                log_k + sign * STEP * (number == OWN),
-            )
-            for sign in (1, -1)
+def _aside(outline: Outline, own: np.ndarray, movable: Bool[np.ndarray, " 4"]) -> Aside:
+    """Return a camera a STEP ahead and behind in each number that may move."""
+    return [
+        (
+            camera_moved(outline.camera, outline.square, own + step),
+            camera_moved(outline.camera, outline.square, own - step),
         )
-        pairs.append((ahead, behind))
-    return pairs
+        if free
+        else None
+        for step, free in zip(STEP * np.eye(OWN), movable, strict=True)
+    ]
 
 
-def _columns(view: int, other: int, count: int) -> np.ndarray:
-    """Return where the numbers of a pair stand: `view`'s, `other`'s, log k."""
+def _columns(view: int, other: int) -> np.ndarray:
+    """Return where the numbers of a pair stand: `view`'s, then `other`'s."""
     own = np.arange(OWN)
-    return np.concatenate([OWN * view + own, OWN * other + own, [count - 1]])
+    return np.concatenate([OWN * view + own, OWN * other + own])
 
 
 def _pair(
@@ -265,5 +229,4 @@ def _pair(
 
     here = [slope(pair, moved_here) for pair in aside[view]]
     there = [slope(pair, moved_there) for pair in aside[other]]
-    columns = [*here[:OWN], *there[:OWN], here[OWN] + there[OWN]]
-    return distance[off], np.stack(columns, axis=-1)
+    return distance[off], np.stack([*here, *there], axis=-1)

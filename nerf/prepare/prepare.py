@@ -1,9 +1,8 @@
 """What happens to drawings before a field is fitted to them.
 
 Where the mannequin is the body that was drawn, drawings are bent to show it (`to_mannequin`). Else
-each only where the drawings ask for it: cameras that were estimated turn (`refine_yaw`), they
-follow drawings that were placed or sized off (`registration`), drawings that bend are unbent
-(`unwarp`).
+each only where the drawings ask for it: cameras follow drawings that were placed or
+sized off (`registration`), drawings that bend are unbent (`unwarp`).
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from toonset.nerf.hull.mannequin_fit import MannequinFit
 from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
-from toonset.nerf.prepare.refine_yaw import Turning, turned
 from toonset.nerf.prepare.registration import Registration, registered
 from toonset.nerf.prepare.to_mannequin import Posed, posed
 from toonset.nerf.prepare.unwarp import Unbending, unbent
@@ -31,7 +29,6 @@ class Prepared:
     Attributes:
         scene: the drawings that a field is fitted to.
         drawn: what they were made of: as drawn, perhaps with room round the figures.
-        turning: how cameras turned; None: switched off, or they are known exactly.
         registration: how cameras moved; None: switched off.
         unbending: how drawings were bent; None: switched off.
         paint: what their paint said of bends and colours; None: drawings were not bent.
@@ -41,7 +38,6 @@ class Prepared:
 
     scene: Scene
     drawn: Scene
-    turning: Turning | None
     registration: Registration | None
     unbending: Unbending | None
     paint: PaintAgreement | None = None
@@ -51,7 +47,7 @@ class Prepared:
     @property
     def apart_px(self) -> float:
         """Return by how much outlines still disagree, root mean square; 0: as exact as pixels."""
-        steps = (self.turning, self.registration, self.unbending)
+        steps = (self.registration, self.unbending)
         applied = [step for step in steps if step and step.applied]
         return applied[-1].apart_px[1] if applied else 0.0
 
@@ -61,7 +57,7 @@ class Prepared:
 
         They are compared here where all steps that would have done so are switched off.
         """
-        steps = [step for step in (self.turning, self.registration, self.unbending) if step]
+        steps = [step for step in (self.registration, self.unbending) if step]
         compared = steps[-1] if steps else registered(self.scene)[1]
         return self.apart_px or compared.apart_px[0]
 
@@ -80,10 +76,9 @@ class Prepared:
 
     def to_json(self) -> dict[str, Any]:
         """Return what was found and done, for a report."""
-        turning, registration, unbending = self.turning, self.registration, self.unbending
+        registration, unbending = self.registration, self.unbending
         return {
             "mannequin": None if self.mannequin is None else self.mannequin.to_json(),
-            "turning": None if turning is None else turning.to_json(),
             "registration": None if registration is None else registration.to_json(),
             "unbending": None if unbending is None else unbending.to_json(),
             "paint": None if self.paint is None else self.paint.to_json(),
@@ -95,18 +90,17 @@ def prepared(scene: Scene, options: TrainOptions) -> Prepared:
 
     Args:
         scene: posed drawings.
-        options: its `mannequin`, `turn`, `register` and `unbend` switch the steps.
+        options: its `mannequin`, `register` and `unbend` switch the steps.
 
     Raises:
         MeshError: the mannequin lies in none of the pictures.
     """
     given = posed(scene, unbend=options.unbend) if options.mannequin else Posed.left_alone(scene)
     straight, unbending = given.scene, given.unbending
-    turning = registration = None
+    registration = None
     if given.shape is None:
-        straight, turning, registration, unbending = _agreeing(scene, options)
-    steps = (turning, registration, unbending)
-    return Prepared(straight, given.drawn, *steps, None, given.fit, given.shape)
+        straight, registration, unbending = aligned(scene, options.register, options.unbend)
+    return Prepared(straight, given.drawn, registration, unbending, None, given.fit, given.shape)
 
 
 def with_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
@@ -124,30 +118,6 @@ def with_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
     scene, warps, found = agreed
     unbending = replace(unbending, warps=warps)
     return replace(ready, scene=scene, unbending=unbending, paint=found)
-
-
-def _agreeing(
-    scene: Scene, options: TrainOptions
-) -> tuple[Scene, Turning | None, Registration | None, Unbending | None]:
-    """Return the scene with its cameras and drawings set right, and what was found of each kind.
-
-    Cameras turn only where that explains the outlines better than places and sizes or bends do, and
-    leaves nothing to bends: where drawings bend, outlines say too little of yaws. (So bends are
-    asked about even where they are switched off.)
-    """
-    straight, registration, unbending = aligned(scene, options.register, options.unbend)
-    if not (options.turn and options.register):
-        return straight, None, registration, unbending
-    placed, turning = turned(scene)
-    if turning is None or not turning.applied:
-        return straight, turning, registration, unbending
-    rivals = (registration, unbending or unbent(straight)[1])
-    if turning.gain_nats <= sum(step.gain_nats for step in rivals if step and step.applied):
-        return straight, replace(turning, applied=False), registration, unbending
-    rest, moved, left = aligned(placed, options.register, options.unbend)
-    if (left or unbent(placed)[1]).applied:
-        return straight, replace(turning, applied=False), registration, unbending
-    return rest, turning, moved, left
 
 
 def aligned(

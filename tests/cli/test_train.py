@@ -203,7 +203,6 @@ def test_every_switch_switches_its_option(toonset, monkeypatch) -> None:
     switches = {
         ("--as-carved",): {"fair": False},
         ("--as-placed",): {"register": False},
-        ("--as-turned",): {"turn": False},
         ("--as-bent",): {"unbend": False},
         ("--one-sided",): {"symmetric": False},
     }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -61,19 +60,6 @@ def test_calibration_holds_line_widths_and_no_seconds(place: Path):
     assert [view.line_width_px for view in read_calibration(place / "calibration.json").views] == [
         1.5
     ] * 3
-
-
-def test_a_camera_has_its_sigma_until_it_is_another(place: Path):
-    sigmas = [frame.yaw_sigma for frame in read_scene(place).frames]
-    assert sigmas == pytest.approx([math.radians(0.5)] * 3)
-
-    def shift(content: dict[str, Any]) -> None:
-        content["views"][1]["camera"]["center_px"][0] += 1
-
-    edit(place, "calibration.json", shift)
-    assert [frame.yaw_sigma is None for frame in read_scene(place).frames] == [False, True, False]
-    (place / "calibration.json").unlink()
-    assert [frame.yaw_sigma for frame in read_scene(place).frames] == [None] * 3
 
 
 def test_contours_are_read_as_coverage(place: Path):
