@@ -25,8 +25,7 @@ from toonset.dataset.split_folder.places import IMAGES, OVERLAY, SPLIT_FILE
 from toonset.dataset.split_folder.views import Source, Split
 from toonset.errors import SheetError
 from toonset.json_file import SchemaProblems
-from toonset.palette.formats.hex import rgb_of_hex
-from toonset.palette.names import hex_of
+from toonset.palette.names import hex_of, rgb_of_hex
 from toonset.read import parse_json, read_whole, schema_version
 from toonset.write import new_folder, write_bytes, write_json
 
