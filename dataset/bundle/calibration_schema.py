@@ -1,9 +1,7 @@
 """calibration.json as a schema: what calibration found, how sure it is, and where it comes from.
 
 Angles are degrees, lengths world units or pixels of the view, as each name says. Unknown keys are
-ignored on reading (within a major version keys may be added), except in a camera. Version 1 had
-several shapes while it grew; `toonset.dataset.bundle.calibration_file` brings all of them to
-this one.
+ignored on reading (within a major version keys may be added), except in a camera.
 """
 
 from __future__ import annotations
