@@ -118,6 +118,7 @@ def open_gltf(data: bytes, path: Path, max_faces: int) -> GltfFile:
     for name in COMPRESSED:
         if name in description.get("extensionsRequired", []):
             raise MeshError(f"{path}: needs {name}; export it without compression")
+    check_counts(path, len(description.get("nodes", [])), 0, max_faces)
     buffers = description.get("buffers", [])
     found = tuple(_of_uri(one["uri"], path) if "uri" in one else binary for one in buffers)
     return GltfFile(description, found, path, max_faces)

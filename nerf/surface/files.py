@@ -206,12 +206,13 @@ def hex_colors(palette: UInt8[np.ndarray, "colors 3"]) -> list[str]:
 
 def encode_ply(surface: Surface) -> bytes:
     """Return the surface as binary PLY with vertex colours."""
-    import trimesh
+    from trimesh import Trimesh
+    from trimesh.exchange.ply import export_ply
 
     vertices, labels, faces = split_by_label(surface)
     colors = surface.palette[labels]
-    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=colors, process=False)
-    return trimesh.exchange.ply.export_ply(mesh, vertex_normal=False)
+    mesh = Trimesh(vertices, faces, vertex_colors=colors, process=False)
+    return bytes(export_ply(mesh, vertex_normal=False))
 
 
 def palette_texture(palette: UInt8[np.ndarray, "colors 3"]) -> UInt8[np.ndarray, "height width 3"]:

@@ -130,6 +130,11 @@ BAD_FILES: dict[str, tuple[str, bytes | str, str]] = {
         edited({"nodes": [{"mesh": 0, "children": [0]}]}),
         "its nodes form a loop",
     ),
+    "gltf strip": (
+        "a.gltf",
+        edited({"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}]}]}),
+        "node 0 has strips; export it as plain triangles",
+    ),
     "gltf no mesh": ("a.gltf", edited({"nodes": [{}]}), "and no faces"),
     "gltf missing key": ("a.gltf", edited({"meshes": [{}]}), "damaged or cut off .KeyError"),
     "gltf wrong type": ("a.gltf", edited({"nodes": 5}), "glTF file is damaged"),
