@@ -24,7 +24,7 @@ from toonset.errors import OutputError
 from toonset.mesh import split_by_face
 from toonset.nerf.options import ORIGINAL
 from toonset.palette.names import hex_of
-from toonset.write import write_bytes
+from toonset.write import check_new_file, write_bytes
 
 KINDS = (".glb", ".obj", ".ply")
 CELL_PX = 8  # of the palette's texture: neighbours do not bleed into a colour's middle
@@ -108,16 +108,9 @@ def check_mesh_files(path: Path, *, force: bool, variants: bool = False) -> None
         raise OutputError(f"{path}: is no mesh file's name; end -o in {', '.join(KINDS)}")
     if variants and kind != ".glb":
         raise OutputError(f"{path}: holds no variants; end -o in .glb for --variants")
-    if path.parent.is_file():
-        raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
     beside = companions(path) if kind == ".obj" else ()
     for file in (path, *(path.with_name(name) for name in beside)):
-        if file.is_dir():
-            raise OutputError(f"{file}: is a folder, a file is needed; choose another -o")
-        if file.exists() and not force:
-            raise OutputError(
-                f"{file}: exists already; pass --force to replace it, or choose another -o"
-            )
+        check_new_file(file, force=force)
 
 
 def write_mesh_files(files: dict[str, bytes], path: Path) -> None:
