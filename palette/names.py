@@ -65,6 +65,7 @@ _NAMES = tuple(NAMED)
 _PLACES = oklab_from_rgb(np.array(list(NAMED.values()), dtype=np.uint8))
 MAX_NAME = 64  # characters; a palette row in GIMP or a swatch's label holds no more anyway
 ROUNDING = 1e-3  # of a range: how far a float may lie outside it before it is no slip of rounding
+HEX = re.compile(r"#?([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 LEVEL = re.compile(r"\d{1,3}", re.ASCII)
 RGB = tuple[int, int, int]
 
@@ -78,6 +79,19 @@ def name_of(rgb: tuple[int, int, int]) -> str:
 def hex_of(rgb: tuple[int, int, int]) -> str:
     """Return "#rrggbb" of an 8-bit sRGB colour."""
     return "#{:02x}{:02x}{:02x}".format(*rgb)
+
+
+def rgb_of_hex(word: object, where: str) -> RGB:
+    """Return the colour of "#rrggbb" or "#rgb"; the # may be left out.
+
+    Raises:
+        PaletteError: anything else.
+    """
+    match = HEX.fullmatch(word) if isinstance(word, str) else None
+    if match is None:
+        raise PaletteError(f"{where}: {str(word)[:40]!r} is no colour; write it as #rrggbb or #rgb")
+    digits = match[1] if len(match[1]) == 6 else "".join(2 * digit for digit in match[1])
+    return int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:], 16)
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,46 @@
-"""What a palette is: named colours with their shares, and what was left out."""
+"""What a palette is: named colours with their shares, and what was left out.
+
+The annotations say what palette.json may hold, too, and how it is written: colours as hex, numbers
+with so many decimals. Within a version keys may be added (see `toonset.read`): give a new one a
+default here. Whatever would make an older reader draw a wrong conclusion needs the next version.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import UInt8
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer
 
 from toonset.errors import PaletteError
+from toonset.palette.names import RGB, clean_name, hex_of, one_line, rgb_of_hex
 
 MAX_COLORS = 255  # a label is one byte, and 255 means unlabelled
+
+
+def _of_hex(text: object) -> RGB:
+    try:
+        return rgb_of_hex(text, "hex")
+    except PaletteError as error:
+        raise ValueError(str(error)) from error
+
+
+def _decimals(digits: int) -> PlainSerializer:
+    return PlainSerializer(lambda number: round(number, digits))
+
+
+Hex = Annotated[RGB, BeforeValidator(_of_hex), PlainSerializer(hex_of)]
+Color = Annotated[Hex, Field(alias="hex")]
+Name = Annotated[str, AfterValidator(clean_name)]
+Line = Annotated[str, AfterValidator(one_line)]
+Share = Annotated[float, Field(ge=0, le=1), _decimals(6)]
+Factor = Annotated[float, Field(gt=0, le=1), _decimals(4)]
+Spread = Annotated[float, Field(ge=0), _decimals(4)]
+Cost = Annotated[float, Field(ge=0, alias="oklab_cost"), _decimals(6)]
+Bits = Annotated[float, _decimals(3)]
+Count = Annotated[int, Field(ge=0)]
 
 
 @dataclass(frozen=True)
@@ -21,8 +52,8 @@ class Tone:
         share: of the character's pixels over all pictures, 0 to 1.
     """
 
-    rgb: tuple[int, int, int]
-    share: float
+    rgb: Color
+    share: Share
 
 
 @dataclass(frozen=True)
@@ -36,9 +67,9 @@ class PaletteColor:
         tones: in light and in shadow, where the sheet has a shadow.
     """
 
-    rgb: tuple[int, int, int]
-    share: float
-    name: str
+    rgb: Color
+    share: Share
+    name: Name
     tones: tuple[Tone, ...] = ()
 
 
@@ -52,9 +83,9 @@ class Shadow:
         bits: that one direction of the light saves over all borders.
     """
 
-    factor: tuple[float, float, float]
-    spread: tuple[float, float, float]
-    bits: float
+    factor: tuple[Factor, Factor, Factor]
+    spread: tuple[Spread, Spread, Spread]
+    bits: Bits
 
 
 @dataclass(frozen=True)
@@ -66,8 +97,8 @@ class Place:
         box: (x, y, width, height) in its pixels.
     """
 
-    view: int
-    box: tuple[int, int, int, int]
+    view: Count
+    box: tuple[Count, Count, Count, Count]
 
 
 @dataclass(frozen=True)
@@ -82,10 +113,10 @@ class DroppedColor:
         place: its largest patch; None if unknown.
     """
 
-    rgb: tuple[int, int, int]
-    share: float
-    name: str
-    cost: float
+    rgb: Color
+    share: Share
+    name: Name
+    cost: Cost
     place: Place | None = None
 
 
@@ -100,10 +131,10 @@ class ContourColor:
         name: a plain name for people.
     """
 
-    rgb: tuple[int, int, int]
-    share: float
-    cloth: float
-    name: str
+    rgb: Color
+    share: Share
+    cloth: Share
+    name: Name
 
 
 @dataclass(frozen=True)
@@ -119,9 +150,9 @@ class Evidence:
         one_more: bits more with one colour more.
     """
 
-    colors: int
-    one_less: float
-    one_more: float
+    colors: Count
+    one_less: Bits
+    one_more: Bits
 
 
 @dataclass(frozen=True)
@@ -140,15 +171,15 @@ class Palette:
         title: what programs show as the palette's name; "": none was given yet.
     """
 
-    colors: tuple[PaletteColor, ...]
-    rule: str
+    colors: Annotated[tuple[PaletteColor, ...], Field(min_length=1, max_length=MAX_COLORS)]
+    rule: Line
     dropped: tuple[DroppedColor, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Line, ...] = ()
     contour: ContourColor | None = None
     evidence: Evidence | None = None
     shadow: Shadow | None = None
-    features: tuple[tuple[int, int, int], ...] = ()
-    title: str = ""
+    features: tuple[Hex, ...] = ()
+    title: Name = ""
 
     def __post_init__(self) -> None:
         """Refuse palettes that cannot label anything.

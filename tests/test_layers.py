@@ -20,8 +20,10 @@ OUTSIDE = ("bench", "tests", "examples")  # of the wheel: no stage imports them
 # folder. Rooms of one floor do not see each other, so there is no circle.
 FLOORS: dict[str, tuple[str, ...]] = {
     "palette": (
-        "@colors @palette",
-        "@names pixels",
+        "@colors",
+        "@names",
+        "@palette",
+        "pixels",
         "@corrections @swatch_image formats paints",
         "@extract",
         "@corrected @coverage @recolor",

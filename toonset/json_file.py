@@ -76,5 +76,6 @@ def _problems(error: ValidationError, most: int) -> list[str]:
 
 def _problem(path: tuple[object, ...], message: str) -> str:
     place = ".".join(str(part)[:60] for part in path)
-    plain = re.sub(r" or instance of \w+| after validation", "", message).replace("tuple", "list")
+    plain = re.sub(r" or instance of \w+| after validation|^Value error, ", "", message)
+    plain = re.sub("tuple|array", "list", plain.replace("Tuple", "List"))
     return one_line(f"field {place}: {plain}" if place else f"the whole: {plain}")

@@ -42,23 +42,29 @@ class Mesh:
         Raises:
             MeshError: no faces, a vertex that is not finite, an index out of range, no extent.
         """
+        where = self.path or self.name
         if len(self.faces) == 0:
-            raise MeshError(f"{self.name}: no faces; export the mesh with its triangles")
+            raise MeshError(
+                f"{where}: has {len(self.vertices)} vertices and no faces; export the mesh with "
+                "its triangles"
+            )
         bad = int((~np.isfinite(self.vertices)).any(axis=1).sum())
         if bad:
             raise MeshError(
-                f"{self.name}: {bad} of {len(self.vertices)} vertices are NaN or infinite; "
+                f"{where}: {bad} of {len(self.vertices)} vertices are NaN or infinite; "
                 "repair the mesh and export it again"
             )
-        if self.faces.min() < 0 or self.faces.max() >= len(self.vertices):
+        low, high = int(self.faces.min()), int(self.faces.max())
+        if low < 0 or high >= len(self.vertices):
             raise MeshError(
-                f"{self.name}: face index {int(self.faces.max())} but {len(self.vertices)} "
-                "vertices; the file is damaged, export it again"
+                f"{where}: a face refers to vertex {low if low < 0 else high} of "
+                f"{len(self.vertices)}, counted from 0; the file is damaged, export it again"
             )
-        extent = float(np.ptp(self.vertices, axis=0).max())
+        with np.errstate(over="ignore"):
+            extent = float(np.ptp(self.vertices, axis=0).max())
         if not 1e-4 <= extent <= 1e6:
             raise MeshError(
-                f"{self.name}: extent {extent:g} world units, 1e-4 to 1e6 is needed; rescale it"
+                f"{where}: extent {extent:g} world units, 1e-4 to 1e6 is needed; rescale it"
             )
 
     @property
@@ -80,3 +86,20 @@ class Mesh:
     def radius(self) -> float:
         """Return the distance from `middle` to the farthest vertex."""
         return float(np.linalg.norm(self.vertices - self.middle, axis=1).max())
+
+
+def split_by_face(
+    faces: Int[np.ndarray, "faces 3"], tags: Int[np.ndarray, " faces"]
+) -> tuple[Int[np.ndarray, " split"], Int[np.ndarray, " split"], Int[np.ndarray, "faces 3"]]:
+    """Return old number and tag of every new vertex, and the faces of these.
+
+    A vertex between faces of several tags comes once for each, at the same place, so that every
+    face keeps its own.
+
+    Args:
+        faces: vertex indices.
+        tags: of every face, 0 to 2^24 - 1.
+    """
+    keys = faces.astype(np.int64) << 24 | tags.astype(np.int64)[:, None]
+    unique, index = np.unique(keys, return_inverse=True)
+    return unique >> 24, unique & 0xFFFFFF, index.reshape(-1, 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from urllib.parse import quote
 
 from bench.view.reader import Reader
-from toonset.palette.formats.ase import to_ase
+from toonset.palette.formats.adobe import to_ase
 from toonset.palette.formats.gpl import to_gpl
 from toonset.palette.formats.hex import to_hex
 from toonset.palette.palette import Palette, PaletteColor

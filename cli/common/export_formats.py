@@ -99,7 +99,7 @@ TARGETS = {
     ),
     Format.blender: Target(
         "blender:write_blender_script",
-        (*BESIDE, "import_cameras.py"),
+        (*BESIDE, "import_cameras.py", "scene.glb"),
         is_exact=True,
         hint="run it: blender --python {out}/import_cameras.py",
     ),

@@ -25,7 +25,7 @@ from toonset.errors import PictureError
 from toonset.html_page import base64_text, data_url, html_page, json_text
 from toonset.mesh import Mesh
 from toonset.nerf.surface.decimate import decimated
-from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.formats.json import read_palette_json
 from toonset.palette.names import hex_of
 from toonset.palette.palette import DroppedColor, PaletteColor
 from toonset.read import read_whole

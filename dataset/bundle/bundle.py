@@ -43,7 +43,7 @@ from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.errors import BundleError, ToonsetError
 from toonset.mesh import Mesh
 from toonset.notebook import MOST_ROWS, Cell, picture_bytes, table
-from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
 from toonset.view import View, small_png
 from toonset.write import new_folder, write_bytes, write_json

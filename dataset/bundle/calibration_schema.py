@@ -1,9 +1,7 @@
 """calibration.json as a schema: what calibration found, how sure it is, and where it comes from.
 
 Angles are degrees, lengths world units or pixels of the view, as each name says. Unknown keys are
-ignored on reading (within a major version keys may be added), except in a camera. Version 1 had
-several shapes while it grew; `toonset.dataset.bundle.calibration_file` brings all of them to
-this one.
+ignored on reading (within a major version keys may be added), except in a camera.
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.camera_record import Pair, Rotation, Row, check_numbers, check_range
+from toonset.dataset.bundle.camera_record import NativeCamera, Pair, Rotation, Row
 from toonset.dataset.bundle.transforms_schema import MAX_FRAMES
 from toonset.errors import BundleError
 
@@ -56,15 +54,16 @@ class CalibratedCamera(_Record):
             CameraError, BundleError: it is none, none that can be computed with, or not as it is
                 described.
         """
-        rotation, target = np.array(self.camera_from_world_rotation), np.array(self.target)
-        lens = [self.scale_px_per_unit, self.k, self.pixel_aspect]
-        check_numbers([*rotation.flat, *self.target, *self.center_px, *lens])
-        scale, k, aspect = lens
-        center = np.array(self.center_px)
-        camera = Camera(rotation, target, scale, center, self.size_wh, k, aspect)
-        check_range(camera)
-        if camera.is_orthographic != (self.model == "orthographic"):
-            raise BundleError(f"camera: is called {self.model} but k is {self.k:g}")
+        camera = NativeCamera(
+            model=self.model,
+            rotation=self.camera_from_world_rotation,
+            target=self.target,
+            scale=self.scale_px_per_unit,
+            center=self.center_px,
+            k=self.k,
+            pixel_aspect=self.pixel_aspect,
+            size_wh=self.size_wh,
+        ).camera()
         said = np.array([self.yaw_deg, self.elevation_deg, self.roll_deg])
         off = (np.degrees(camera.angles) - said + 180) % 360 - 180
         if np.abs(off).max() > SAME_ANGLE_DEG:

@@ -20,7 +20,7 @@ from toonset.dataset.images.picture import load_indexed_png, load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError
 from toonset.palette.extract import IN_LIGHT, IN_SHADOW
-from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import UNLABELLED
 

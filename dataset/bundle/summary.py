@@ -17,8 +17,7 @@ from toonset.dataset.bundle.problem_log import ProblemLog
 from toonset.dataset.bundle.read_scene import MANNEQUIN, label_name, member
 from toonset.dataset.bundle.transforms_read import PosedPicture, read_frames, transforms_file
 from toonset.dataset.mesh.load import load_mesh
-from toonset.palette.formats.json import to_json
-from toonset.palette.formats.schema import read_palette_json
+from toonset.palette.formats.json import read_palette_json, to_json
 
 RUN_FILES = ("config.json", "model.safetensors")
 

@@ -6,7 +6,9 @@ what is seen (`toonset.dataset.bundle.transforms_camera` refuses it).
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -18,18 +20,21 @@ from toonset.read import schema_version
 SCHEMA, VERSION = "toonset-transforms", 1
 MAX_FRAMES = 10_000
 
+Focal = Annotated[float, Field(gt=0)]
+Row = tuple[float, float, float, float]
+
 
 class Intrinsics(BaseModel):
     """What a frame may say of its lens, or the file for all frames; pixels."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
-    w: float | None = None
-    h: float | None = None
-    fl_x: float | None = None
-    fl_y: float | None = None
+    w: int | None = None
+    h: int | None = None
+    fl_x: Focal | None = None
+    fl_y: Focal | None = None
     cx: float | None = None
     cy: float | None = None
-    camera_angle_x: float | None = None
+    camera_angle_x: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
     camera_model: str | None = None
 
 
@@ -37,7 +42,7 @@ class FrameRecord(Intrinsics):
     """One picture and its camera."""
 
     file_path: str
-    transform_matrix: list[list[float]]
+    transform_matrix: tuple[Row, Row, Row, Row]
     toonset: NativeCamera | None = None
 
 

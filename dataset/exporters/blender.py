@@ -1,8 +1,8 @@
 """Writing a Python script that rebuilds cameras, mannequin and drawings inside Blender.
 
     import_cameras.py    run it in Blender: blender --python import_cameras.py, or Scripting > Open
+    scene.glb            the mannequin, and every drawing on a plane behind it
     images/000.png       the drawings, RGBA
-    mannequin.obj        the mannequin
     toonset.json         the exact cameras
 
 Blender has orthographic cameras and lens shift: every view is exact. A scene has one render size:
@@ -21,6 +21,7 @@ from toonset import __version__
 from toonset import frames as conventions
 from toonset.dataset.exporters.blender_script import SCRIPT
 from toonset.dataset.exporters.common import ExportView, write_views
+from toonset.dataset.exporters.gltf import SCENE, add_mannequin, add_plane
 from toonset.dataset.exporters.view_planes import (
     clip_range,
     plane_corners,
@@ -28,6 +29,7 @@ from toonset.dataset.exporters.view_planes import (
     stand,
     window_wh,
 )
+from toonset.dataset.mesh.gltf_write import Gltf
 from toonset.mesh import Mesh
 from toonset.write import new_folder, write_bytes
 
@@ -47,19 +49,21 @@ def write_blender_script(
     """
     written = scene_views(views)
     pictures = [f"images/{view.name}" for view in written]
-    records = [_record(v, p, written, mesh) for v, p in zip(written, pictures, strict=True)]
+    records = [_record(view, written, mesh) for view in written]
+    file = Gltf()
+    file.roots += [] if mesh is None else [add_mannequin(file, mesh)]
+    file.roots += [add_plane(file, view, plane_corners(view, written, mesh)) for view in written]
     text = SCRIPT.replace("@VERSION@", __version__)
     text = text.replace("@WINDOW@", repr(window_wh(written)))
     text = text.replace("@VIEWS@", json.dumps(records, indent=1, allow_nan=False))
     with new_folder(folder, force=force) as temporary:
         write_bytes(temporary / SCRIPT_NAME, text.encode())
+        write_bytes(temporary / SCENE, file.encode({}))
         write_views(temporary, "blender", written, pictures, mesh)
     return written
 
 
-def _record(
-    view: ExportView, picture: str, views: Sequence[ExportView], mesh: Mesh | None
-) -> dict[str, Any]:
+def _record(view: ExportView, views: Sequence[ExportView], mesh: Mesh | None) -> dict[str, Any]:
     camera, window = view.camera, window_wh(views)
     width, height = camera.size_wh
     near, far = clip_range(view, views, mesh)
@@ -68,12 +72,10 @@ def _record(
     up = (float(camera.center[1]) - height / 2) / window[0]
     return {
         "name": view.name,
-        "picture": picture,
         "orthographic": camera.is_orthographic,
         "world_from_camera": conventions.opengl_pose_from_opencv(stand(view, mesh)).tolist(),
         "width_world": window[0] / camera.scale,
         "focal_widths": 0.0 if camera.is_orthographic else float(camera.K[0, 0]) / window[0],
         "shift": [right, up],
         "clip": [near, far],
-        "plane": plane_corners(view, views, mesh).tolist(),
     }

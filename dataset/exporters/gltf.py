@@ -36,7 +36,7 @@ from toonset.dataset.exporters.view_planes import (
 )
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
-from toonset.mesh import Mesh
+from toonset.mesh import Mesh, split_by_face
 from toonset.palette.colors import linear_from_srgb
 from toonset.write import new_folder, write_bytes
 
@@ -160,7 +160,5 @@ def _vertex_colored(
     if mesh.face_colors is None:
         return mesh.vertices, mesh.faces, None
     palette, color = np.unique(mesh.face_colors, axis=0, return_inverse=True)
-    pairs = np.stack([mesh.faces.ravel(), np.repeat(color.ravel(), 3)], axis=1)
-    unique, index = np.unique(pairs, axis=0, return_inverse=True)
-    linear = linear_from_srgb(palette / 255.0)[unique[:, 1]]
-    return mesh.vertices[unique[:, 0]], index.reshape(-1, 3), linear
+    vertex, color, faces = split_by_face(mesh.faces, color.ravel())
+    return mesh.vertices[vertex], faces, linear_from_srgb(palette / 255.0)[color]

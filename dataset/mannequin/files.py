@@ -10,7 +10,7 @@ from toonset.dataset.mannequin.landmark_formats import SCHEMA
 from toonset.dataset.mannequin.make import Mannequin
 from toonset.dataset.mesh.load import save_obj
 from toonset.errors import OutputError
-from toonset.write import write_bytes, write_json
+from toonset.write import check_new_file, write_bytes, write_json
 
 
 def landmarks_path(mesh_path: Path) -> Path:
@@ -31,15 +31,8 @@ def check_files(mesh_path: Path, *, force: bool) -> None:
     """
     if mesh_path.suffix.lower() != ".obj":
         raise OutputError(f"{mesh_path}: a mannequin is written as .obj; choose another -o")
-    if mesh_path.parent.is_file():
-        raise OutputError(f"{mesh_path}: {mesh_path.parent} is a file; choose another -o")
     for path in (mesh_path, landmarks_path(mesh_path)):
-        if path.is_dir():
-            raise OutputError(f"{path}: is a folder, a file is needed; choose another -o")
-        if path.exists() and not force:
-            raise OutputError(
-                f"{path}: exists already; pass --force to replace it, or choose another -o"
-            )
+        check_new_file(path, force=force)
 
 
 def write_mannequin(mannequin: Mannequin, mesh_path: Path) -> None:

@@ -1,12 +1,17 @@
 """glTF 2.0 and GLB, self-contained: triangles of the default scene in world coordinates.
 
-Read: node transforms, skins in their rest pose (as every viewer shows them), triangle lists,
-strips and fans, vertex colours, base colour and base colour texture. Refused by name: buffers in
-other files, sparse accessors, compressed geometry. Source: Khronos glTF 2.0 specification.
+Read: node transforms, skins in their rest pose (as every viewer shows them), vertex colours, base
+colour and base colour texture. Refused by name: other files, sparse or compressed data, strips.
+
+Our own reader: trimesh knows no skins and keeps base colours as 8 bits of linear light.
+Source: Khronos glTF 2.0 specification.
 """
 
 from __future__ import annotations
 
+import base64
+import json
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,25 +20,62 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from toonset.dataset.images.picture import decode_rgba
-from toonset.dataset.mesh.color import face_colors_from_texture
-from toonset.dataset.mesh.gltf_file import GltfFile, data_of_uri, open_gltf
-from toonset.dataset.mesh.validate import Soup, check_counts
-from toonset.errors import MeshError, PictureError
+from toonset.dataset.mesh.soup import Soup, check_counts, face_colors_from_texture
+from toonset.errors import MeshError
 from toonset.palette.colors import linear_from_srgb, srgb_from_linear
 
-MAX_DEPTH = 200  # of the node tree
-TRIANGLES, STRIP, FAN = 4, 5, 6
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+TRIANGLES = 4  # what is below are points and lines
 Matrix = Float[np.ndarray, "4 4"]
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
-    """One primitive in world coordinates."""
+class GltfFile:
+    """An opened file.
 
-    vertices: np.ndarray
-    faces: np.ndarray
-    colors: np.ndarray | None
-    name: str
+    Attributes:
+        json: its description.
+        buffers: its binary data.
+        path: for messages.
+        max_faces: three times as many items are read of an accessor.
+    """
+
+    json: dict[str, Any]
+    buffers: tuple[bytes, ...]
+    path: Path
+    max_faces: int
+
+    def array(self, index: int) -> np.ndarray:
+        """Return an accessor as (count, width); normalised integers become floats.
+
+        Raises:
+            MeshError: sparse, compressed or too long.
+            TypeError, ValueError: data that ends too early.
+        """
+        accessor = self.json["accessors"][index]
+        count, width = int(accessor["count"]), WIDTHS[accessor["type"]]
+        check_counts(self.path, count, 0, self.max_faces)
+        if "sparse" in accessor or "bufferView" not in accessor:
+            raise MeshError(
+                f"{self.path}: sparse or compressed glTF data is not supported; export it plain"
+            )
+        dtype = np.dtype(DTYPES[accessor["componentType"]])
+        stride = self.json["bufferViews"][accessor["bufferView"]].get("byteStride")
+        strides = (stride or dtype.itemsize * width, dtype.itemsize)
+        data, start = self.view(accessor["bufferView"]), accessor.get("byteOffset", 0)
+        raw = np.ndarray((count, width), dtype, data, start, strides)
+        if accessor.get("normalized") and dtype.kind != "f":
+            return np.maximum(raw.astype(np.float64) / np.iinfo(dtype).max, -1.0)
+        return raw
+
+    def view(self, index: int) -> bytes:
+        """Return the bytes of a buffer view; fewer where the buffer is cut off."""
+        view = self.json["bufferViews"][index]
+        start = view.get("byteOffset", 0)
+        return self.buffers[view["buffer"]][start : start + view["byteLength"]]
 
 
 def read_gltf(data: bytes, path: Path, max_faces: int) -> Soup:
@@ -41,66 +83,157 @@ def read_gltf(data: bytes, path: Path, max_faces: int) -> Soup:
 
     Raises:
         MeshError: damaged, cut off, too large, or of a kind named in the module's docstring.
+        PictureError: a texture that cannot be read.
     """
     try:
-        file = open_gltf(data, path, max_faces)
-        return _soup(_pieces(file, path, max_faces))
-    except (MeshError, PictureError):
-        raise
-    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        return _joined(_pieces(open_gltf(data, path, max_faces)))
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        RecursionError,
+        struct.error,
+    ) as error:
         words = " ".join(str(error).split())[:80]
         raise MeshError(
-            f"{path}: the glTF file is damaged ({type(error).__name__}: {words}); export it again"
+            f"{path}: the glTF file is damaged or cut off ({type(error).__name__}: {words}); "
+            "export it again"
         ) from error
 
 
-def _pieces(file: GltfFile, path: Path, max_faces: int) -> list[_Piece]:
-    world = _world_matrices(file, path)
-    pieces: list[_Piece] = []
-    total = 0
-    for index, matrix in world.items():
+def open_gltf(data: bytes, path: Path, max_faces: int) -> GltfFile:
+    """Return the opened file.
+
+    Raises:
+        MeshError: cut off, of another version, needs other files or compression.
+        Exception: damaged; see `read_gltf` for what Python says then.
+    """
+    text, binary = _chunks(data, path) if data.startswith(b"glTF") else (data, b"")
+    description = json.loads(text.removeprefix(b"\xef\xbb\xbf"))
+    if not isinstance(description, dict) or "asset" not in description:
+        raise MeshError(f"{path}: is JSON but no glTF; export the mesh again")
+    if str(description["asset"].get("version", "2")).split(".")[0] != "2":
+        raise MeshError(f"{path}: is glTF 1; export it as glTF 2 (.glb)")
+    for name in COMPRESSED:
+        if name in description.get("extensionsRequired", []):
+            raise MeshError(f"{path}: needs {name}; export it without compression")
+    check_counts(path, len(description.get("nodes", [])), 0, max_faces)
+    buffers = description.get("buffers", [])
+    found = tuple(_of_uri(one["uri"], path) if "uri" in one else binary for one in buffers)
+    return GltfFile(description, found, path, max_faces)
+
+
+def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes]:
+    """Return the JSON and the binary chunk of a GLB."""
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise MeshError(f"{path}: is GLB version {version}; export it as glTF 2")
+    if length > len(data):
+        raise MeshError(
+            f"{path}: the GLB file is cut off ({len(data)} of {length} bytes); export it again"
+        )
+    found: dict[int, bytes] = {}
+    position = 12
+    while position + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, position)
+        found.setdefault(kind, data[position + 8 : position + 8 + size])
+        position += 8 + size
+    return found[JSON_CHUNK], found.get(BINARY_CHUNK, b"")
+
+
+def _of_uri(uri: str, path: Path) -> bytes:
+    if not uri.startswith("data:"):
+        raise MeshError(
+            f"{path}: refers to another file ({uri[:40]}); export it in one piece, as .glb"
+        )
+    return base64.b64decode(uri.partition(",")[2])
+
+
+def _world_matrices(file: GltfFile) -> dict[int, Matrix]:
+    """Return world_from_node of every node below the default scene, in file order of the tree."""
+    nodes = file.json.get("nodes", [])
+    if scenes := file.json.get("scenes"):
+        roots = scenes[file.json.get("scene", 0)].get("nodes", [])
+    else:
+        held = {child for node in nodes for child in node.get("children", [])}
+        roots = [index for index in range(len(nodes)) if index not in held]
+    world: dict[int, Matrix] = {}
+
+    def place(index: int, parent: Matrix) -> None:
+        if index in world:
+            raise MeshError(f"{file.path}: its nodes form a loop; export it again")
+        world[index] = parent @ _local_matrix(nodes[index])
+        for child in nodes[index].get("children", []):
+            place(child, world[index])
+
+    for root in roots:
+        place(root, np.eye(4))
+    return world
+
+
+def _local_matrix(node: dict[str, Any]) -> Matrix:
+    from trimesh.transformations import quaternion_matrix, translation_matrix
+
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", (0, 0, 0, 1))
+    turned = quaternion_matrix((w, x, y, z)) @ np.diag([*node.get("scale", (1, 1, 1)), 1.0])
+    return np.asarray(translation_matrix(node.get("translation", (0, 0, 0))) @ turned)
+
+
+def _pieces(file: GltfFile) -> list[Soup]:
+    """Return every primitive in world coordinates."""
+    world = _world_matrices(file)
+    pieces: list[Soup] = []
+    vertices = faces = 0
+    for index in world:
         node = file.json["nodes"][index]
         if "mesh" not in node:
             continue
         mesh = file.json["meshes"][node["mesh"]]
         name = str(node.get("name") or mesh.get("name") or f"node {index}")
         for primitive in mesh["primitives"]:
-            faces = _faces(file, primitive)
-            total += len(faces)
-            check_counts(path, 0, total, max_faces)
-            if len(faces):
-                pieces.append(_piece(file, node, primitive, faces, (world, matrix), name))
+            mode = primitive.get("mode", TRIANGLES)
+            if mode > TRIANGLES:
+                raise MeshError(f"{file.path}: {name} has strips; export it as plain triangles")
+            if mode == TRIANGLES:
+                pieces.append(_piece(file, index, primitive, world, name))
+                vertices += len(pieces[-1].vertices)
+                faces += len(pieces[-1].faces)
+                check_counts(file.path, vertices, faces, file.max_faces)
     return pieces
 
 
 def _piece(
-    file: GltfFile,
-    node: dict[str, Any],
-    primitive: dict[str, Any],
-    faces: np.ndarray,
-    places: tuple[dict[int, Matrix], Matrix],
-    name: str,
-) -> _Piece:
-    world, matrix = places
-    vertices = file.array(primitive["attributes"]["POSITION"]).astype(np.float64).reshape(-1, 3)
-    if not 0 <= faces.min() <= faces.max() < len(vertices):
+    file: GltfFile, index: int, primitive: dict[str, Any], world: dict[int, Matrix], name: str
+) -> Soup:
+    node, attributes = file.json["nodes"][index], primitive["attributes"]
+    vertices = file.array(attributes["POSITION"]).astype(np.float64).reshape(-1, 3)
+    corners = np.arange(len(vertices))
+    if "indices" in primitive:
+        corners = file.array(primitive["indices"]).astype(np.int64).ravel()
+    faces = corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    if faces.max(initial=-1) >= len(vertices):
         raise MeshError(
             f"{file.path}: a face of {name} refers to vertex {int(faces.max())}, but it has "
             f"{len(vertices)}; the file is damaged, export it again"
         )
-    colors = primitive_colors(file, primitive, faces)
-    if "skin" in node and "JOINTS_0" in primitive["attributes"]:
-        return _Piece(_skinned(file, node["skin"], primitive, vertices, world), faces, colors, name)
-    if not np.array_equal(matrix, np.eye(4)):  # identity keeps every bit of the coordinates
-        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    mirrored = np.linalg.det(matrix[:3, :3]) < 0
-    return _Piece(vertices, faces[:, ::-1] if mirrored else faces, colors, name)
+    colors, matrix = _colors(file, primitive, faces), world[index]
+    if "skin" in node and "JOINTS_0" in attributes:
+        vertices = _skinned(file, node["skin"], attributes, vertices, world)
+    else:
+        if not np.array_equal(matrix, np.eye(4)):  # identity keeps every bit of the coordinates
+            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        if np.linalg.det(matrix[:3, :3]) < 0:
+            faces = faces[:, ::-1]
+    return Soup(vertices, faces, colors, None, (name,))
 
 
 def _skinned(
     file: GltfFile,
     skin_index: int,
-    primitive: dict[str, Any],
+    attributes: dict[str, int],
     vertices: np.ndarray,
     world: dict[int, Matrix],
 ) -> np.ndarray:
@@ -110,10 +243,9 @@ def _skinned(
     if "inverseBindMatrices" in skin:
         inverse = file.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
         places = places @ inverse[: len(places)]
-    joints = file.array(primitive["attributes"]["JOINTS_0"]).astype(np.int64)
-    weights = file.array(primitive["attributes"]["WEIGHTS_0"]).astype(np.float64)
-    total = weights.sum(axis=1, keepdims=True)
-    weights = np.divide(weights, total, out=np.zeros_like(weights), where=total > 0)
+    joints = file.array(attributes["JOINTS_0"]).astype(np.int64)
+    weights = file.array(attributes["WEIGHTS_0"]).astype(np.float64)
+    weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-30)
     padded = np.concatenate([vertices, np.ones((len(vertices), 1))], axis=1)
     result = np.zeros((len(vertices), 4))
     for column in range(joints.shape[1]):
@@ -122,95 +254,10 @@ def _skinned(
     return result[:, :3]
 
 
-def _faces(file: GltfFile, primitive: dict[str, Any]) -> np.ndarray:
-    """Return the triangles of a primitive; none for points and lines."""
-    mode = primitive.get("mode", TRIANGLES)
-    if mode not in (TRIANGLES, STRIP, FAN):
-        return np.zeros((0, 3), dtype=np.int64)
-    if "indices" in primitive:
-        corners = file.array(primitive["indices"]).astype(np.int64).ravel()
-    else:
-        corners = np.arange(file.count(primitive["attributes"]["POSITION"]))
-    if mode == TRIANGLES:
-        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
-    if len(corners) < 3:
-        return np.zeros((0, 3), dtype=np.int64)
-    if mode == FAN:
-        first = np.full(len(corners) - 2, corners[0])
-        return np.stack([first, corners[1:-1], corners[2:]], axis=1)
-    strip = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-    strip[1::2] = strip[1::2, ::-1]  # every other triangle of a strip turns the other way
-    return strip
-
-
-def _world_matrices(file: GltfFile, path: Path) -> dict[int, Matrix]:
-    """Return world_from_node of every node below the default scene, in file order of the tree."""
-    nodes = file.json.get("nodes", [])
-    scenes = file.json.get("scenes")
-    roots = scenes[file.json.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
-    world: dict[int, Matrix] = {}
-    stack = [(root, np.eye(4), 0) for root in reversed(roots)]
-    while stack:
-        index, parent, depth = stack.pop()
-        if index in world and not scenes:
-            continue
-        if index in world or depth > MAX_DEPTH:
-            raise MeshError(f"{path}: its nodes form a loop; the file is damaged, export it again")
-        world[index] = parent @ _local_matrix(nodes[index])
-        children = nodes[index].get("children", [])
-        stack += [(child, world[index], depth + 1) for child in reversed(children)]
-    return world
-
-
-def _local_matrix(node: dict[str, Any]) -> Matrix:
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    x, y, z, w = (float(value) for value in node.get("rotation", (0, 0, 0, 1)))
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
-    matrix[:3, 3] = node.get("translation", (0, 0, 0))
-    return matrix
-
-
-def _soup(pieces: list[_Piece]) -> Soup:
-    if not pieces:
-        return Soup(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-    starts = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
-    names = tuple(dict.fromkeys(piece.name for piece in pieces))
-    colors = None
-    if any(piece.colors is not None for piece in pieces):
-        white = np.uint8(255)  # glTF's default material
-        colors = np.concatenate(
-            [np.full((len(p.faces), 3), white) if p.colors is None else p.colors for p in pieces]
-        )
-    parts = [np.full(len(piece.faces), names.index(piece.name)) for piece in pieces]
-    return Soup(
-        vertices=np.concatenate([piece.vertices for piece in pieces]),
-        faces=np.concatenate(
-            [piece.faces + start for piece, start in zip(pieces, starts[:-1], strict=True)]
-        ),
-        colors=colors,
-        parts=np.concatenate(parts) if len(names) > 1 else None,
-        part_names=names,
-    )
-
-
-def primitive_colors(
+def _colors(
     file: GltfFile, primitive: dict[str, Any], faces: Int[np.ndarray, "faces 3"]
 ) -> UInt8[np.ndarray, "faces 3"] | None:
-    """Return the sRGB base colour of every face; None without material and vertex colours.
-
-    Raises:
-        MeshError: damaged data.
-        PictureError: a texture that cannot be read.
-    """
+    """Return the sRGB base colour of every face; None without material and vertex colours."""
     attributes = primitive["attributes"]
     if "material" not in primitive and "COLOR_0" not in attributes:
         return None
@@ -227,21 +274,36 @@ def primitive_colors(
 
 
 def _texture_colors(
-    file: GltfFile, reference: dict[str, Any], attributes: dict[str, Any], faces: np.ndarray
+    file: GltfFile, reference: dict[str, Any], attributes: dict[str, int], faces: np.ndarray
 ) -> np.ndarray:
     """Return the texture's linear colour at the middle of every face."""
     channel = f"TEXCOORD_{reference.get('texCoord', 0)}"
     source = file.json["textures"][reference["index"]].get("source")
-    white = np.full((len(faces), 3), 255, dtype=np.uint8)
     if source is None or channel not in attributes:
-        return linear_from_srgb(white / 255)
-    uvs = file.array(attributes[channel]).astype(np.float64)
-    uvs = np.stack([uvs[:, 0], 1 - uvs[:, 1]], axis=1)  # glTF counts v from the upper edge
-    texture = decode_rgba(_image_bytes(file, file.json["images"][source]), file.path)
+        return np.ones((len(faces), 3))
+    image = file.json["images"][source]
+    data = _of_uri(image["uri"], file.path) if "uri" in image else file.view(image["bufferView"])
+    uvs = file.array(attributes[channel]).astype(np.float64) * [1, -1] + [0, 1]  # v runs down
+    white = np.full((len(faces), 3), 255, dtype=np.uint8)
+    texture = decode_rgba(data, file.path)
     return linear_from_srgb(face_colors_from_texture(texture, uvs, faces, white) / 255)
 
 
-def _image_bytes(file: GltfFile, image: dict[str, Any]) -> bytes:
-    if "uri" in image:
-        return data_of_uri(image["uri"], file.path)
-    return file.view(image["bufferView"])[0]
+def _joined(pieces: list[Soup]) -> Soup:
+    if not pieces:
+        return Soup(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    starts = np.cumsum([0] + [len(piece.vertices) for piece in pieces[:-1]])
+    names = list(dict.fromkeys(piece.part_names[0] for piece in pieces))
+    numbers = [names.index(piece.part_names[0]) for piece in pieces]
+    colors = [
+        # white is glTF's default material
+        np.full(piece.faces.shape, 255, np.uint8) if piece.colors is None else piece.colors
+        for piece in pieces
+    ]
+    return Soup(
+        vertices=np.concatenate([piece.vertices for piece in pieces]),
+        faces=np.concatenate([p.faces + start for p, start in zip(pieces, starts, strict=True)]),
+        colors=np.concatenate(colors) if any(p.colors is not None for p in pieces) else None,
+        parts=np.repeat(numbers, [len(p.faces) for p in pieces]) if len(names) > 1 else None,
+        part_names=tuple(names),
+    )

@@ -17,9 +17,9 @@ import numpy as np
 from toonset.dataset.mesh.gltf import read_gltf
 from toonset.dataset.mesh.obj import read_obj
 from toonset.dataset.mesh.ply_stl_off import read_scan
-from toonset.dataset.mesh.validate import Soup, mesh_of_soup
+from toonset.dataset.mesh.soup import mesh_of_soup
 from toonset.errors import MeshError
-from toonset.mesh import Mesh
+from toonset.mesh import Mesh, split_by_face
 from toonset.read import describe, read_whole
 
 MAX_BYTES = 256 * 2**20
@@ -45,8 +45,14 @@ def load_mesh(path: str | Path, max_bytes: int = MAX_BYTES, max_faces: int = MAX
     """
     path = Path(path)
     data = read_whole(path, "mesh", MeshError, max_bytes)
-    mesh = mesh_of_soup(_read(data, path, max_faces), path)
-    return replace(mesh, sha256=sha256(data).hexdigest())
+    kind = _kind(data, path)
+    if kind == "obj":
+        soup = read_obj(data, path, max_faces)
+    elif kind in ("glb", "gltf"):
+        soup = read_gltf(data, path, max_faces)
+    else:
+        soup = read_scan(data, kind, path, max_faces)
+    return replace(mesh_of_soup(soup, path), sha256=sha256(data).hexdigest())
 
 
 def save_obj(mesh: Mesh) -> bytes:
@@ -55,27 +61,20 @@ def save_obj(mesh: Mesh) -> bytes:
     Face colours become vertex colours (`v x y z r g b`): a vertex between two colours is written
     once for each, at the same place, so that every face keeps its own.
     """
-    vertices, faces, colors = _split_by_color(mesh)
+    rgb = np.zeros((len(mesh.faces), 3)) if mesh.face_colors is None else mesh.face_colors
+    old, code, faces = split_by_face(mesh.faces, rgb.astype(np.int64) @ [1 << 16, 1 << 8, 1])
+    shown = np.stack([code >> 16, code >> 8 & 255, code & 255], axis=1) / 255
     lines = ["# toonset"]
-    for row in range(len(vertices)):
-        numbers = [repr(float(x)) for x in vertices[row]]
-        if colors is not None:
-            numbers += [f"{channel / 255:.6f}" for channel in colors[row]]
+    for place, color in zip(mesh.vertices[old].tolist(), shown.tolist(), strict=True):
+        numbers = [repr(x) for x in place]
+        if mesh.face_colors is not None:
+            numbers += [f"{channel:.6f}" for channel in color]
         lines.append("v " + " ".join(numbers))
     parts = mesh.face_parts if mesh.face_parts is not None else np.zeros(len(faces), dtype=int)
     for part in np.unique(parts):
-        lines.append(f"o {_word(mesh.part_names[part])}")
+        lines.append(f"o {'_'.join(mesh.part_names[part].split()) or 'part'}")
         lines += [f"f {a} {b} {c}" for a, b, c in (faces[parts == part] + 1).tolist()]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _read(data: bytes, path: Path, max_faces: int) -> Soup:
-    kind = _kind(data, path)
-    if kind == "obj":
-        return read_obj(data, path, max_faces)
-    if kind in ("glb", "gltf"):
-        return read_gltf(data, path, max_faces)
-    return read_scan(data, kind, path, max_faces)
 
 
 def _kind(data: bytes, path: Path) -> str:
@@ -92,20 +91,3 @@ def _kind(data: bytes, path: Path) -> str:
         f"{path}: is {found}, no mesh that can be read; export the mesh as "
         f"{', '.join(KINDS[:-1])} or {KINDS[-1]}"
     )
-
-
-def _split_by_color(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Return vertices, faces and vertex colours such that a vertex has one colour only."""
-    if mesh.face_colors is None:
-        return mesh.vertices, mesh.faces, None
-    r, g, b = mesh.face_colors.astype(np.int64).T
-    color = np.repeat((r << 16) | (g << 8) | b, 3)
-    key = mesh.faces.astype(np.int64).ravel() << 24 | color
-    corners, faces = np.unique(key, return_inverse=True)
-    code = corners & 0xFFFFFF
-    colors = np.stack([code >> 16, code >> 8 & 255, code & 255], axis=1)
-    return mesh.vertices[corners >> 24], faces.reshape(-1, 3), colors
-
-
-def _word(name: str) -> str:
-    return "_".join(name.split()) or "part"

@@ -1,38 +1,75 @@
 """Wavefront OBJ: vertices with colours, polygons, objects and groups, material colours.
 
-Our own reader, because groups, exact line numbers in messages and "no file outside the folder"
-matter more here than OBJ's rarer records, which are skipped.
+Our own reader: trimesh takes index 0 for the first vertex, counts negative indices from the file's
+end, and names parts by their materials.
 """
 
 from __future__ import annotations
 
-import itertools
+import os
 from dataclasses import dataclass, field
+from itertools import pairwise, takewhile
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import UInt8
 
-from toonset.dataset.mesh.color import Material, face_colors_from_texture, read_materials
-from toonset.dataset.mesh.validate import Soup, check_counts
+from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.mesh.soup import Soup, check_counts, face_colors_from_texture
 from toonset.errors import MeshError, printable
+from toonset.read import read_whole
+
+UNKNOWN_COLOR = (204, 204, 204)  # a face whose material is not described; trimesh's and Blender's
+MAX_LIBRARY_BYTES = 4 * 2**20
+LINES_BETWEEN = 100_000  # of two looks at how much it has become
 
 
 @dataclass
 class _Lists:
-    """What the lines add up to. Corners are (vertex, texture) indices from 0; -1 = none."""
+    """What the lines add up to. Faces are vertices, then texture corners, from 0; -1 = none."""
 
-    vertices: list[tuple[float, ...]] = field(default_factory=list)
-    colors: list[tuple[float, ...] | None] = field(default_factory=list)
-    uvs: list[tuple[float, ...]] = field(default_factory=list)
-    faces: list[tuple[int, int, int]] = field(default_factory=list)
-    face_uvs: list[tuple[int, int, int]] = field(default_factory=list)
-    face_parts: list[int] = field(default_factory=list)
-    face_materials: list[str] = field(default_factory=list)
-    parts: dict[str, int] = field(default_factory=dict)
+    vertices: list[list[float]] = field(default_factory=list)
+    colors: list[list[float]] = field(default_factory=list)
+    uvs: list[list[float]] = field(default_factory=list)
+    faces: list[tuple[int, ...]] = field(default_factory=list)
+    parts: list[str] = field(default_factory=list)
+    materials: list[str] = field(default_factory=list)
     libraries: list[str] = field(default_factory=list)
+    part: str = ""
     object_name: str = ""
-    group_name: str = ""
     material: str = ""
+
+    def read(self, line: list[str]) -> None:
+        """Take the words of one line in; a ValueError says what is wrong with them."""
+        key, *words = line
+        if key == "v":
+            numbers = _numbers(words, 3)
+            self.vertices.append(numbers[:3])
+            self.colors.append(numbers[3:] if len(numbers) == 6 else [])
+        elif key == "vt":
+            self.uvs.append([*_numbers(words, 1), 0.0][:2])
+        elif key == "f":
+            corners = [self._corner(word) for word in words]
+            if len(corners) < 3:
+                raise ValueError(f"a face with {len(corners)} corners, 3 are needed")
+            v, t = corners[0]
+            self.faces += [(v, a[0], b[0], t, a[1], b[1]) for a, b in pairwise(corners[1:])]
+            self.parts += [self.part] * (len(corners) - 2)
+            self.materials += [self.material] * (len(corners) - 2)
+        elif key == "o":
+            self.part = self.object_name = " ".join(words)
+        elif key == "g":
+            self.part = " ".join(words) or self.object_name
+        elif key == "usemtl":
+            self.material = " ".join(words)
+        elif key == "mtllib":
+            self.libraries.append(" ".join(words))
+
+    def _corner(self, word: str) -> tuple[int, int]:
+        vertex, _, rest = word.partition("/")
+        texture = rest.partition("/")[0]
+        known = _index(texture, len(self.uvs)) if texture else -1
+        return _index(vertex, len(self.vertices)), known
 
 
 def read_obj(data: bytes, path: Path, max_faces: int) -> Soup:
@@ -42,81 +79,48 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> Soup:
         MeshError: a number or index that cannot be read, with its line; too many faces.
     """
     lists = _Lists()
-    for number, line in enumerate(text_of(data).split("\n"), start=1):
-        words = list(itertools.takewhile(lambda word: word[0] != "#", line.split()))
+    for number, line in enumerate(_text(data).split("\n"), start=1):
+        words = list(takewhile(lambda word: word[0] != "#", line.split()))
         if not words:
             continue
         try:
-            _read_line(words, lists)
-        except (ValueError, IndexError) as error:
+            lists.read(words)
+        except ValueError as error:
             shown = printable(" ".join(words)[:40])
             raise MeshError(
                 f"{path}: line {number}: '{shown}': {error}; the file is damaged, export it again"
             ) from error
-        if len(lists.faces) > max_faces:
-            check_counts(path, 0, len(lists.faces), max_faces)
+        if number % LINES_BETWEEN == 0:
+            check_counts(path, len(lists.vertices), len(lists.faces), max_faces)
+    check_counts(path, len(lists.vertices), len(lists.faces), max_faces)
     if not lists.vertices:
         raise MeshError(f"{path}: has no vertices; is it really an OBJ mesh? export it again")
-    return _soup(lists, path)
+    faces = np.array(lists.faces, dtype=np.int64).reshape(-1, 6)
+    names = list(dict.fromkeys(lists.parts)) or [""]
+    numbers = {name: number for number, name in enumerate(names)}
+    return Soup(
+        vertices=np.array(lists.vertices, dtype=np.float64),
+        faces=faces[:, :3],
+        colors=_colors(lists, faces, path),
+        parts=np.array([numbers[name] for name in lists.parts]) if len(names) > 1 else None,
+        part_names=tuple(name or "body" for name in names),
+    )
 
 
-def text_of(data: bytes) -> str:
+def _text(data: bytes) -> str:
     """Return text of any 8-bit encoding with plain line ends; a byte order mark is dropped."""
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        text = data.decode("utf-16", errors="replace")
-    else:
-        text = data.removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace")
+    wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+    text = data.decode("utf-16" if wide else "utf-8-sig", errors="replace")
     return text.replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
 
 
-def _read_line(words: list[str], lists: _Lists) -> None:
-    key, rest = words[0], words[1:]
-    if key == "v":
-        numbers = _numbers(rest, 3)
-        lists.vertices.append(numbers[:3])
-        lists.colors.append(numbers[3:6] if len(numbers) == 6 else None)
-    elif key == "vt":
-        lists.uvs.append((*_numbers(rest, 1), 0.0)[:2])
-    elif key == "f":
-        _read_face(rest, lists)
-    elif key == "o":
-        lists.object_name, lists.group_name = " ".join(rest), ""
-    elif key == "g":
-        lists.group_name = " ".join(rest)
-    elif key == "usemtl":
-        lists.material = " ".join(rest)
-    elif key == "mtllib":
-        lists.libraries.append(" ".join(rest))
-
-
-def _numbers(words: list[str], least: int) -> tuple[float, ...]:
+def _numbers(words: list[str], least: int) -> list[float]:
     if len(words) < least:
         raise ValueError(f"{len(words)} numbers, {least} are needed")
     try:
-        return tuple([float(word) for word in words])
+        return [float(word) for word in words]
     except ValueError:
         raise ValueError("not a number (decimals need a point)") from None
-
-
-def _read_face(words: list[str], lists: _Lists) -> None:
-    corners = [_corner(word, lists) for word in words]
-    if len(corners) < 3:
-        raise ValueError(f"a face with {len(corners)} corners, 3 are needed")
-    name = lists.group_name or lists.object_name
-    part = lists.parts.setdefault(name, len(lists.parts))
-    first = corners[0]
-    for second, third in itertools.pairwise(corners[1:]):
-        lists.faces.append((first[0], second[0], third[0]))
-        lists.face_uvs.append((first[1], second[1], third[1]))
-        lists.face_parts.append(part)
-        lists.face_materials.append(lists.material)
-
-
-def _corner(word: str, lists: _Lists) -> tuple[int, int]:
-    fields = word.split("/")
-    vertex = _index(fields[0], len(lists.vertices))
-    has_uv = len(fields) > 1 and fields[1] != ""
-    return vertex, _index(fields[1], len(lists.uvs)) if has_uv else -1
 
 
 def _index(word: str, count: int) -> int:
@@ -132,48 +136,75 @@ def _index(word: str, count: int) -> int:
     return index - 1 if index > 0 else count + index
 
 
-def _soup(lists: _Lists, path: Path) -> Soup:
-    names = tuple(name or "body" for name in lists.parts) or ("body",)
-    return Soup(
-        vertices=np.array(lists.vertices, dtype=np.float64),
-        faces=np.array(lists.faces, dtype=np.int64).reshape(-1, 3),
-        colors=_colors(lists, path),
-        parts=np.array(lists.face_parts, dtype=np.int64) if len(names) > 1 else None,
-        part_names=names,
-    )
-
-
-def _colors(lists: _Lists, path: Path) -> np.ndarray | None:
-    """Return vertex colours where every vertex has one, else the materials' colours."""
-    if any(color is not None for color in lists.colors):
-        return _vertex_colors(lists)
-    materials = read_materials(lists.libraries, path) if any(lists.face_materials) else {}
-    if not materials:
+def _colors(lists: _Lists, faces: np.ndarray, path: Path) -> np.ndarray | None:
+    """Return vertex colours where a vertex has one, else the materials' colours."""
+    if any(lists.colors):
+        return _vertex_colors(lists, faces[:, :3])
+    found = _read_materials(lists.libraries, path) if any(lists.materials) else {}
+    if not found:
         return None
-    used = sorted(set(lists.face_materials))
-    of_face = np.array([used.index(name) for name in used])[
-        np.searchsorted(used, lists.face_materials)
-    ]
-    table = [materials.get(name, Material()) for name in used]
-    colors = np.array([material.rgb for material in table], dtype=np.uint8)[of_face]
-    for number, material in enumerate(table):
+    names, of_face = np.unique(lists.materials, return_inverse=True)
+    colors = np.full((len(faces), 3), UNKNOWN_COLOR, dtype=np.uint8)
+    uvs = np.array(lists.uvs, dtype=np.float64).reshape(-1, 2)
+    for number, name in enumerate(names.tolist()):
         chosen = of_face == number
-        if material.texture is not None and chosen.any():
-            uvs = np.array(lists.uvs, dtype=np.float64).reshape(-1, 2)
-            corners = np.array(lists.face_uvs, dtype=np.int64)[chosen]
+        rgb, texture = found.get(name, (UNKNOWN_COLOR, None))
+        colors[chosen] = rgb
+        if texture is not None:
             colors[chosen] = face_colors_from_texture(
-                material.texture, uvs, corners, colors[chosen]
+                texture, uvs, faces[chosen, 3:], colors[chosen]
             )
     return colors
 
 
-def _vertex_colors(lists: _Lists) -> np.ndarray | None:
-    white = (1.0, 1.0, 1.0)
-    values = np.array([white if color is None else color for color in lists.colors])
-    values = np.nan_to_num(values)
+def _vertex_colors(lists: _Lists, faces: np.ndarray) -> np.ndarray | None:
+    values = np.nan_to_num(np.array([color or [1.0] * 3 for color in lists.colors]))
     scale = 255.0 if values.max() <= 1 else 1.0  # some programs write 0 to 255
-    faces = np.array(lists.faces, dtype=np.int64).reshape(-1, 3)
     if not len(faces) or faces.max() >= len(values):
         return None  # the check of the faces says what is wrong
-    mean = values[faces].mean(axis=1) * scale
-    return np.clip(np.rint(mean), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(values[faces].mean(axis=1) * scale), 0, 255).astype(np.uint8)
+
+
+def _read_materials(
+    libraries: list[str], mesh_path: Path
+) -> dict[str, tuple[tuple[int, ...], UInt8[np.ndarray, "height width 4"] | None]]:
+    """Return colours and textures of MTL files beside the mesh; others are not opened.
+
+    A library or texture that is missing leaves its faces without that colour.
+
+    Raises:
+        MeshError, PictureError: a file that is there but cannot be read.
+    """
+    found: dict[str, tuple[tuple[int, ...], UInt8[np.ndarray, "height width 4"] | None]] = {}
+    for library in libraries:
+        file = _beside(mesh_path, library)
+        data = b"" if file is None else read_whole(file, "material", MeshError, MAX_LIBRARY_BYTES)
+        name = ""
+        for line in data.decode("utf-8", errors="replace").splitlines():
+            key, *words = line.split() or [""]
+            rgb, texture = found.get(name, (UNKNOWN_COLOR, None))
+            if key == "newmtl":
+                name = " ".join(words)
+                found[name] = (UNKNOWN_COLOR, None)
+            elif key == "Kd":
+                found[name] = (_rgb(words), texture)
+            elif key == "map_Kd" and words:
+                picture = _beside(mesh_path, words[-1])
+                found[name] = (rgb, None if picture is None else load_rgba(picture))
+    return found
+
+
+def _beside(mesh_path: Path, name: str) -> Path | None:
+    """Return the file `name` in the mesh's own folder; None if it is elsewhere or missing."""
+    folder = os.path.realpath(mesh_path.parent)
+    file = os.path.realpath(os.path.join(folder, name.replace("\\", "/")))
+    inside = os.path.commonpath([folder, file]) == folder
+    return Path(file) if inside and os.path.isfile(file) else None
+
+
+def _rgb(words: list[str]) -> tuple[int, ...]:
+    try:
+        red, green, blue = (round(255 * min(max(float(word), 0.0), 1.0)) for word in words[:3])
+    except ValueError:  # too few, no numbers, or NaN
+        return UNKNOWN_COLOR
+    return red, green, blue

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from toonset.dataset.mesh.validate import Soup, check_counts
+from toonset.dataset.mesh.soup import Soup, check_counts
 from toonset.errors import MeshError
 from toonset.read import describe
 
@@ -27,8 +27,6 @@ def read_scan(data: bytes, kind: str, path: Path, max_faces: int) -> Soup:
     Raises:
         MeshError: damaged, cut off, too large.
     """
-    if kind != "stl":
-        data = data.removeprefix(b"\xef\xbb\xbf")
     counts = _announced(data, kind)
     check_counts(path, *counts, max_faces)
     if kind == "stl" and len(data) < STL_HEADER_BYTES + STL_FACE_BYTES * counts[1]:
@@ -36,16 +34,16 @@ def read_scan(data: bytes, kind: str, path: Path, max_faces: int) -> Soup:
             f"{path}: the STL file is cut off ({len(data)} bytes for {counts[1]} faces); export "
             "it again"
         )
-    loaded = _parse(data, kind, path)
-    faces = np.asarray(getattr(loaded, "faces", ()), dtype=np.int64).reshape(-1, 3)
-    vertices = np.asarray(getattr(loaded, "vertices", ()), dtype=np.float64).reshape(-1, 3)
+    mesh = _parse(data, kind, path)
+    faces = np.asarray(getattr(mesh, "faces", ()), dtype=np.int64).reshape(-1, 3)
+    vertices = np.asarray(getattr(mesh, "vertices", ()), dtype=np.float64).reshape(-1, 3)
     check_counts(path, len(vertices), len(faces), max_faces)
     if len(vertices) < counts[0] or len(faces) < counts[1]:
         raise MeshError(
             f"{path}: has {len(vertices)} vertices and {len(faces)} faces, its header announces "
             f"{counts[0]} and {counts[1]}; the file is cut off, export it again"
         )
-    return Soup(vertices, faces, _colors(loaded) if len(faces) else None)
+    return Soup(vertices, faces, _colors(mesh, faces) if len(faces) else None)
 
 
 def _announced(data: bytes, kind: str) -> tuple[int, int]:
@@ -76,11 +74,10 @@ def _parse(data: bytes, kind: str, path: Path) -> Any:
         ) from error
 
 
-def _colors(loaded: Any) -> np.ndarray | None:
-    visual: Any = getattr(loaded, "visual", None)
-    if getattr(visual, "kind", None) not in ("vertex", "face"):
+def _colors(mesh: Any, faces: np.ndarray) -> np.ndarray | None:
+    if mesh.visual.kind == "face":
+        return np.asarray(mesh.visual.face_colors)[:, :3].astype(np.uint8)
+    if mesh.visual.kind != "vertex":
         return None
-    if visual.kind == "face":
-        return np.asarray(visual.face_colors)[:, :3].astype(np.uint8)
-    corners = np.asarray(visual.vertex_colors)[:, :3].astype(np.float64)[loaded.faces]
+    corners = np.asarray(mesh.visual.vertex_colors)[:, :3].astype(np.float64)[faces]
     return np.rint(corners.mean(axis=1)).astype(np.uint8)

@@ -6,9 +6,11 @@ The cost grows with the number of pixels, plus a little per figure.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Bool, UInt8
+from pydantic import Field
 
 from toonset.dataset.silhouettes.line_width import contour_width_px
 from toonset.dataset.split.background import Background, find_background, flattened, is_transparent
@@ -22,6 +24,9 @@ from toonset.dataset.split.warnings import border_doubts, figure_doubts
 from toonset.errors import SheetError
 from toonset.view import Box, View
 
+Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]  # pixels, as split.json may have them
+Place = Annotated[int, Field(strict=True, ge=0, le=10**6)]
+InSheet = tuple[Place, Place, Length, Length]
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
 
 NAMES = {
@@ -66,8 +71,8 @@ class LeftOut:
             (an arrow, a rule) or "speck".
     """
 
-    box: Box
-    kind: str
+    box: InSheet
+    kind: Annotated[str, Field(max_length=40)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
 from toonset.errors import PictureError, SheetError, UsageError
-from toonset.palette.formats.hex import rgb_of_hex
+from toonset.palette.names import rgb_of_hex
 from toonset.read import read_whole
 from toonset.view import SHEET, InputFile, Origin, View
 

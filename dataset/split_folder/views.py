@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from typing import Annotated
 
-from toonset.dataset.split.sheet import LeftOut, Segmentation
+from pydantic import Field
+
+from toonset.dataset.split.sheet import LeftOut, Length, Segmentation
+from toonset.palette.palette import Hex
 from toonset.view import View
 
 DROPPED = "dropped"  # what was left out by hand
@@ -14,7 +18,7 @@ DROPPED = "dropped"  # what was left out by hand
 
 @dataclass(frozen=True)
 class Source:
-    """A picture that views were cut from.
+    """A picture that views were cut from, as split.json has it, too.
 
     Attributes:
         name: its file name.
@@ -27,9 +31,9 @@ class Source:
     """
 
     name: str
-    sha256: str
-    size_wh: tuple[int, int]
-    background: tuple[int, int, int] | None = None
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    size_wh: tuple[Length, Length]
+    background: Hex | None = None
     warnings: tuple[str, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     remarks: tuple[str, ...] = ()

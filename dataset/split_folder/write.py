@@ -16,45 +16,24 @@ from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import UInt8
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from toonset import __version__
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.split.sheet import LeftOut
+from toonset.dataset.split.sheet import InSheet
 from toonset.dataset.split_folder.places import IMAGES, OVERLAY, SPLIT_FILE
 from toonset.dataset.split_folder.views import Source, Split
 from toonset.errors import SheetError
 from toonset.json_file import SchemaProblems
-from toonset.palette.formats.hex import rgb_of_hex
-from toonset.palette.names import hex_of
 from toonset.read import parse_json, read_whole, schema_version
 from toonset.write import new_folder, write_bytes, write_json
 
 NAME, VERSION = "toonset-split", 1
 MAX_JSON_BYTES = 8 * 2**20
 
-_Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]
-_Place = Annotated[int, Field(strict=True, ge=0, le=10**6)]
-_Box = tuple[_Place, _Place, _Length, _Length]
-
 
 class SplitProblems(SchemaProblems, SheetError):
     """A split.json that does not fit its schema; all that is wrong is in `problems`."""
-
-
-class _LeftOutRecord(BaseModel):
-    kind: Annotated[str, Field(max_length=40)]
-    box: _Box
-
-
-class _SourceRecord(BaseModel):
-    name: str
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    size_wh: tuple[_Length, _Length]
-    background: Annotated[str, Field(pattern="^#[0-9a-f]{6}$")] | None = None
-    warnings: list[str] = []
-    remarks: list[str] = []
-    left_out: list[_LeftOutRecord] = []
 
 
 class ViewRecord(BaseModel):
@@ -72,16 +51,19 @@ class ViewRecord(BaseModel):
 
     name: str
     sheet: Annotated[int, Field(strict=True, ge=0)]
-    box: _Box
-    crop: _Box
+    box: InSheet
+    crop: InSheet
     line_width_px: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     label: Annotated[str, Field(max_length=40, pattern="^[^,]*$")] | None = None
     sha256: str = ""
 
 
 class _SplitFile(BaseModel):
-    sheets: list[_SourceRecord]
-    views: list[ViewRecord]
+    sheets: tuple[Source, ...]
+    views: tuple[ViewRecord, ...]
+
+
+_SOURCES = TypeAdapter(tuple[Source, ...])
 
 
 def split_dict(split: Split, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -89,7 +71,7 @@ def split_dict(split: Split, options: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "schema": f"{NAME}/{VERSION}",
         "toonset": __version__,
-        "sheets": [_source_dict(source) for source in split.sources],
+        "sheets": _SOURCES.dump_python(split.sources, mode="json"),
         "views": [
             {
                 "name": view.name,
@@ -135,19 +117,6 @@ def write_split(
         write_bytes(temporary / OVERLAY, encode_png(overlay))
 
 
-def _source_dict(source: Source) -> dict[str, Any]:
-    background = source.background
-    return {
-        "name": source.name,
-        "sha256": source.sha256,
-        "size_wh": list(source.size_wh),
-        "background": None if background is None else hex_of(background),
-        "warnings": list(source.warnings),
-        "remarks": list(source.remarks),
-        "left_out": [{"kind": left.kind, "box": list(left.box)} for left in source.left_out],
-    }
-
-
 def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ...]]:
     """Return what split.json says of the sheets and of the views.
 
@@ -172,20 +141,4 @@ def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ..
                 f"{file}: {view.name} is of sheet {view.sheet}, but there are "
                 f"{len(found.sheets)} (numbered from 0); correct it"
             )
-    return tuple(_source(record) for record in found.sheets), tuple(found.views)
-
-
-def _source(record: _SourceRecord) -> Source:
-    background = None
-    if record.background is not None:
-        background = rgb_of_hex(record.background, "background")
-    left_out = tuple(LeftOut(left.box, left.kind) for left in record.left_out)
-    return Source(
-        record.name,
-        record.sha256,
-        record.size_wh,
-        background,
-        tuple(record.warnings),
-        left_out,
-        tuple(record.remarks),
-    )
+    return found.sheets, found.views

@@ -21,9 +21,10 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
 from toonset.errors import OutputError
+from toonset.mesh import split_by_face
 from toonset.nerf.options import ORIGINAL
 from toonset.palette.names import hex_of
-from toonset.write import write_bytes
+from toonset.write import check_new_file, write_bytes
 
 KINDS = (".glb", ".obj", ".ply")
 CELL_PX = 8  # of the palette's texture: neighbours do not bleed into a colour's middle
@@ -86,8 +87,10 @@ def mesh_files(surface: Surface, path: Path) -> dict[str, bytes]:
     if kind == ".ply":
         return {path.name: encode_ply(surface)}
     material, texture = companions(path)
+    count = len(surface.palette)
+    labels = np.repeat(surface.labels[:, None], 3, axis=1)
     return {
-        path.name: _obj(surface, material),
+        path.name: obj_text(surface, _uv(np.arange(count), count), labels, material, "palette"),
         material: material_text("palette", texture),
         texture: encode_png(palette_texture(surface.palette)),
     }
@@ -105,16 +108,9 @@ def check_mesh_files(path: Path, *, force: bool, variants: bool = False) -> None
         raise OutputError(f"{path}: is no mesh file's name; end -o in {', '.join(KINDS)}")
     if variants and kind != ".glb":
         raise OutputError(f"{path}: holds no variants; end -o in .glb for --variants")
-    if path.parent.is_file():
-        raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
     beside = companions(path) if kind == ".obj" else ()
     for file in (path, *(path.with_name(name) for name in beside)):
-        if file.is_dir():
-            raise OutputError(f"{file}: is a folder, a file is needed; choose another -o")
-        if file.exists() and not force:
-            raise OutputError(
-                f"{file}: exists already; pass --force to replace it, or choose another -o"
-            )
+        check_new_file(file, force=force)
 
 
 def write_mesh_files(files: dict[str, bytes], path: Path) -> None:
@@ -134,13 +130,26 @@ def encode_glb(surface: Surface) -> bytes:
     palettes = [surface.palette, *(one.palette for one in surface.variants)]
     materials = add_variants(file, surface, "palette", [palette_texture(p) for p in palettes])
     uv = _uv(labels, len(surface.palette)) * [1, -1] + [0, 1]  # glTF's v runs down
-    attributes = {"POSITION": file.add_array(vertices), "TEXCOORD_0": file.add_array(uv)}
+    add_mesh(file, NAME, materials, vertices, faces, TEXCOORD_0=uv)
+    return file.encode({"palette": hex_colors(surface.palette)})
+
+
+def add_mesh(
+    file: Gltf,
+    name: str,
+    materials: list[int],
+    vertices: Float[np.ndarray, "v 3"],
+    faces: Int[np.ndarray, "f 3"],
+    **more: np.ndarray,
+) -> None:
+    """Add a mesh to the scene, with its own look's material and that of every variant."""
+    arrays = {"POSITION": vertices, **more}
+    attributes = {kind: file.add_array(array) for kind, array in arrays.items()}
     indices = file.add_array(faces.ravel(), ELEMENT_ARRAY_BUFFER)
     primitive = {"attributes": attributes, "indices": indices, "material": materials[0]}
     primitive |= file.mappings(materials)
-    mesh = file.add("meshes", name=NAME, primitives=[primitive])
-    file.roots.append(file.add("nodes", name=NAME, mesh=mesh))
-    return file.encode({"palette": hex_colors(surface.palette)})
+    mesh = file.add("meshes", name=name, primitives=[primitive])
+    file.roots.append(file.add("nodes", name=name, mesh=mesh))
 
 
 def add_variants(
@@ -190,19 +199,13 @@ def hex_colors(palette: UInt8[np.ndarray, "colors 3"]) -> list[str]:
 
 def encode_ply(surface: Surface) -> bytes:
     """Return the surface as binary PLY with vertex colours."""
+    from trimesh import Trimesh
+    from trimesh.exchange.ply import export_ply
+
     vertices, labels, faces = split_by_label(surface)
-    header = (
-        "ply\nformat binary_little_endian 1.0\ncomment toonset\n"
-        f"element vertex {len(vertices)}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    points = np.zeros(len(vertices), dtype=[("place", "<f4", 3), ("color", "u1", 3)])
-    points["place"], points["color"] = vertices, surface.palette[labels]
-    rows = np.zeros(len(faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
-    rows["count"], rows["corners"] = 3, faces
-    return header.encode() + points.tobytes() + rows.tobytes()
+    colors = surface.palette[labels]
+    mesh = Trimesh(vertices, faces, vertex_colors=colors, process=False)
+    return bytes(export_ply(mesh, vertex_normal=False))
 
 
 def palette_texture(palette: UInt8[np.ndarray, "colors 3"]) -> UInt8[np.ndarray, "height width 3"]:
@@ -214,9 +217,8 @@ def split_by_label(
     surface: Surface,
 ) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, " v"], Int[np.ndarray, "f 3"]]:
     """Return vertices, their labels, and faces: a vertex of two labels comes twice."""
-    keys = surface.faces * np.int64(256) + surface.labels[:, None]
-    unique, index = np.unique(keys, return_inverse=True)
-    return surface.vertices[unique // 256], unique % 256, index.reshape(-1, 3)
+    vertex, label, faces = split_by_face(surface.faces, surface.labels)
+    return surface.vertices[vertex], label, faces
 
 
 def material_text(name: str, texture: str) -> bytes:
@@ -230,14 +232,20 @@ def companions(path: Path) -> tuple[str, str]:
     return f"{word}.mtl", f"{word}.png"
 
 
-def _obj(surface: Surface, material: str) -> bytes:
-    lines = ["# toonset", f"mtllib {material}", f"o {NAME}"]
+def obj_text(
+    surface: Surface,
+    uv: Float[np.ndarray, "t 2"],
+    uv_faces: Int[np.ndarray, "f 3"],
+    library: str,
+    material: str,
+) -> bytes:
+    """Return a surface as OBJ; `uv_faces` says where on the picture each face's corners lie."""
+    lines = ["# toonset", f"mtllib {library}", f"o {NAME}"]
     lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in surface.vertices.tolist()]
-    count = len(surface.palette)
-    lines += [f"vt {u:.7g} {v:.7g}" for u, v in _uv(np.arange(count), count).tolist()]
-    lines.append("usemtl palette")
-    corners = np.column_stack([surface.faces, surface.labels]) + 1
-    lines += [f"f {a}/{t} {b}/{t} {c}/{t}" for a, b, c, t in corners.tolist()]
+    lines += [f"vt {u:.7g} {v:.7g}" for u, v in uv.tolist()]
+    lines.append(f"usemtl {material}")
+    corners = np.dstack([surface.faces, uv_faces]).reshape(-1, 6) + 1
+    lines += [f"f {a}/{i} {b}/{j} {c}/{k}" for a, i, b, j, c, k in corners.tolist()]
     return ("\n".join(lines) + "\n").encode()
 
 

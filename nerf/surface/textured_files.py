@@ -16,18 +16,20 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.mesh.gltf_write import ELEMENT_ARRAY_BUFFER, Gltf
+from toonset.dataset.mesh.gltf_write import Gltf
 from toonset.errors import OutputError
 from toonset.nerf.surface.color import neighbour_mean, vertex_normals
 from toonset.nerf.surface.files import (
     NAME,
     Surface,
     add_material,
+    add_mesh,
     add_variants,
     check_mesh_files,
     companions,
     hex_colors,
     material_text,
+    obj_text,
     write_mesh_files,
 )
 from toonset.nerf.surface.unwrap import Atlas
@@ -106,8 +108,9 @@ def textured_files(textured: TexturedSurface, path: Path) -> dict[str, bytes]:
     if path.suffix.lower() == ".glb":
         return {path.name: encode_textured_glb(textured)}
     material, picture = companions(path)
+    uv = textured.atlas.uv / textured.atlas.size_wh * [1, -1] + [0, 1]  # OBJ's v runs up
     return {
-        path.name: _obj(textured, material),
+        path.name: obj_text(textured.surface, uv, textured.atlas.faces, material, "drawn"),
         material: material_text("drawn", picture),
         picture: encode_png(textured.picture),
     }
@@ -121,13 +124,13 @@ def encode_textured_glb(textured: TexturedSurface) -> bytes:
     drawn = add_variants(file, surface, "drawn", pictures, doubleSided=False)
     half = 0.0 if textured.pen is None else textured.pen.width / 2
     body = _moved(surface.vertices, surface.faces, -half)[atlas.vertex]
-    _add_mesh(file, NAME, drawn, body, atlas.faces, TEXCOORD_0=atlas.uv / atlas.size_wh)
+    add_mesh(file, NAME, drawn, body, atlas.faces, TEXCOORD_0=atlas.uv / atlas.size_wh)
     if textured.pen is not None:
         ink = linear_from_srgb(np.array(textured.pen.rgb) / 255).tolist()
         color: dict[str, object] = {"baseColorFactor": [*ink, 1.0]}
         outline = [add_material(file, "outline", color, doubleSided=False)] * len(drawn)
         hull = _moved(_smooth(surface.vertices, surface.faces), surface.faces, half)
-        _add_mesh(file, "outline", outline, hull, surface.faces[:, ::-1])
+        add_mesh(file, "outline", outline, hull, surface.faces[:, ::-1])
     return file.encode({"palette": hex_colors(surface.palette)})
 
 
@@ -149,32 +152,3 @@ def _smooth(
         for share in (INWARDS, OUTWARDS):
             vertices = vertices + share * (mean @ vertices - vertices)
     return vertices
-
-
-def _add_mesh(
-    file: Gltf,
-    name: str,
-    materials: list[int],
-    vertices: Float[np.ndarray, "v 3"],
-    faces: Int[np.ndarray, "f 3"],
-    **more: np.ndarray,
-) -> None:
-    arrays = {"POSITION": vertices, **more}
-    attributes = {kind: file.add_array(array) for kind, array in arrays.items()}
-    indices = file.add_array(faces.ravel(), ELEMENT_ARRAY_BUFFER)
-    primitive = {"attributes": attributes, "indices": indices, "material": materials[0]}
-    primitive |= file.mappings(materials)
-    mesh = file.add("meshes", name=name, primitives=[primitive])
-    file.roots.append(file.add("nodes", name=name, mesh=mesh))
-
-
-def _obj(textured: TexturedSurface, material: str) -> bytes:
-    surface, atlas = textured.surface, textured.atlas
-    lines = ["# toonset", f"mtllib {material}", f"o {NAME}"]
-    lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in surface.vertices.tolist()]
-    uv = atlas.uv / atlas.size_wh * [1, -1] + [0, 1]  # OBJ's v runs up
-    lines += [f"vt {u:.7g} {v:.7g}" for u, v in uv.tolist()]
-    lines.append("usemtl drawn")
-    corners = np.dstack([surface.faces, atlas.faces]).reshape(-1, 6) + 1
-    lines += [f"f {a}/{i} {b}/{j} {c}/{k}" for a, i, b, j, c, k in corners.tolist()]
-    return ("\n".join(lines) + "\n").encode()

@@ -11,27 +11,12 @@ from __future__ import annotations
 
 import re
 
-from toonset.errors import PaletteError
 from toonset.palette.formats.text import lines_of
-from toonset.palette.names import RGB, NamedColor
+from toonset.palette.names import HEX, RGB, NamedColor, rgb_of_hex
 from toonset.palette.palette import Palette
 
-HEX = re.compile(r"#?([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 WITH_ALPHA = re.compile(r"#?([0-9a-fA-F]{2})([0-9a-fA-F]{6})")
 WORDS = {"white": (255, 255, 255), "black": (0, 0, 0)}
-
-
-def rgb_of_hex(word: object, where: str) -> RGB:
-    """Return the colour of "#rrggbb" or "#rgb"; the # may be left out.
-
-    Raises:
-        PaletteError: anything else.
-    """
-    match = HEX.fullmatch(word) if isinstance(word, str) else None
-    if match is None:
-        raise PaletteError(f"{where}: {str(word)[:40]!r} is no colour; write it as #rrggbb or #rgb")
-    digits = match[1] if len(match[1]) == 6 else "".join(2 * digit for digit in match[1])
-    return int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:], 16)
 
 
 def read_hex(data: bytes, where: str) -> list[NamedColor]:

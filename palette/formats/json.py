@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
-from toonset.errors import PaletteError
-from toonset.palette.formats.hex import rgb_of_hex
-from toonset.palette.formats.tones import SUFFIX
-from toonset.palette.names import NamedColor, clean_name, hex_of
-from toonset.palette.palette import Palette, Tone
-from toonset.read import parse_json
+from pydantic import TypeAdapter, ValidationError
 
-NAME, VERSION = "toonset-palette", 1  # toonset.palette.formats.schema says what may change
+from toonset.errors import PaletteError
+from toonset.json_file import validation_reason
+from toonset.palette.formats.tones import SUFFIX
+from toonset.palette.names import NamedColor, clean_name, rgb_of_hex
+from toonset.palette.palette import Palette
+from toonset.read import parse_json, read_whole, schema_version
+
+NAME, VERSION = "toonset-palette", 1  # toonset.palette.palette says what may change
+MAX_BYTES = 2**20
+PALETTE = TypeAdapter(Palette)
 
 
 def read_json(data: bytes, where: str) -> list[NamedColor]:
@@ -42,56 +48,35 @@ def json_title(data: bytes) -> str:
 
 def to_json(palette: Palette) -> dict[str, Any]:
     """Return the content of palette.json."""
-    contour, evidence = palette.contour, palette.evidence
-    return {
-        "schema": f"{NAME}/{VERSION}",
-        **({"title": palette.title} if palette.title else {}),
-        "colors": [
-            {
-                **_record(color.rgb, color.share, color.name),
-                **({"tones": [_tone(tone) for tone in color.tones]} if color.tones else {}),
-            }
-            for color in palette.colors
-        ],
-        "rule": palette.rule,
-        "dropped": [
-            {
-                **_record(color.rgb, color.share, color.name),
-                "oklab_cost": round(color.cost, 6),
-                "place": color.place and {"view": color.place.view, "box": list(color.place.box)},
-            }
-            for color in palette.dropped
-        ],
-        "warnings": list(palette.warnings),
-        "contour": contour
-        and {**_record(contour.rgb, contour.share, contour.name), "cloth": round(contour.cloth, 6)},
-        "evidence": evidence
-        and {
-            "colors": evidence.colors,
-            "one_less": round(evidence.one_less, 3),
-            "one_more": round(evidence.one_more, 3),
-        },
-        **_shaded_keys(palette),
-    }
+    content: dict[str, Any] = PALETTE.dump_python(palette, mode="json", by_alias=True)
+    return {"schema": f"{NAME}/{VERSION}", **content}
 
 
-def _shaded_keys(palette: Palette) -> dict[str, Any]:
-    """Return what only shaded sheets and those with features have."""
-    shadow = palette.shadow
-    keys: dict[str, Any] = {}
-    if shadow is not None:
-        keys["shadow"] = {
-            "factor": [round(value, 4) for value in shadow.factor],
-            "spread": [round(value, 4) for value in shadow.spread],
-            "bits": round(shadow.bits, 3),
-        }
-    if palette.features:
-        keys["features"] = [hex_of(rgb) for rgb in palette.features]
-    return keys
+def read_palette_json(path: Path) -> Palette:
+    """Return the palette of a palette.json.
+
+    Raises:
+        PaletteError: the file is missing, damaged, of another schema or of a newer toonset.
+    """
+    data = read_whole(path, "palette", PaletteError, MAX_BYTES)
+    return palette_of(parse_json(data, str(path), PaletteError), str(path))
 
 
-def _tone(tone: Tone) -> dict[str, Any]:
-    return {"hex": hex_of(tone.rgb), "share": round(tone.share, 6)}
+def palette_of(content: Any, where: str) -> Palette:
+    """Return the palette that the content of a palette.json states.
+
+    Raises:
+        PaletteError: of another schema, of a newer toonset, or not fitting its schema.
+    """
+    if schema_version(content, NAME, VERSION, where, PaletteError) is None:
+        raise PaletteError(
+            f"{where}: states no schema, '{NAME}/{VERSION}' is needed; write it again with "
+            "`toonset palette`"
+        )
+    try:
+        return PALETTE.validate_json(json.dumps(content), strict=True)
+    except ValidationError as error:
+        raise PaletteError(f"{where}: {validation_reason(error)}") from error
 
 
 def _swatches(entry: Any, where: str) -> list[NamedColor]:
@@ -105,7 +90,3 @@ def _swatches(entry: Any, where: str) -> list[NamedColor]:
         rgb = rgb_of_hex(tone.get("hex") if isinstance(tone, dict) else tone, where)
         found.append(NamedColor(rgb, name + SUFFIX))
     return found
-
-
-def _record(rgb: tuple[int, int, int], share: float, name: str) -> dict[str, Any]:
-    return {"hex": hex_of(rgb), "share": round(share, 6), "name": name}

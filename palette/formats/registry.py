@@ -13,8 +13,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
-from toonset.palette.formats.aco import read_aco
-from toonset.palette.formats.ase import ase_title, read_ase, to_ase
+from toonset.palette.formats.adobe import ase_title, read_aco, read_ase, to_ase
 from toonset.palette.formats.gpl import gpl_title, read_gpl, to_gpl
 from toonset.palette.formats.hex import is_color, read_hex, rgb_of_typed, to_hex
 from toonset.palette.formats.json import json_title, read_json, to_json

@@ -156,10 +156,10 @@ def test_an_odd_sheet_gives_the_plain_ones_bundle(name, drawn, single, toonset, 
 
 
 BAD_MESHES: dict[str, tuple[str | bytes, str]] = {
-    "points.obj": (TRIANGLE, "3 vertices but no faces (a point cloud); export"),
+    "points.obj": (TRIANGLE, "3 vertices and no faces; export"),
     "cloud.ply": (
         PLY.format(kind="ascii", count=3) + "end_header\n0 0 0\n1 0 0\n0 1 0\n",
-        "no faces (a point cloud)",
+        "vertices and no faces",
     ),
     "nan.obj": (TRIANGLE.replace("v 1", "v nan") + "f 1 2 3\n", "1 of 3 vertices are NaN or inf"),
     "inf.obj": (TRIANGLE.replace("v 1", "v inf") + "f 1 2 3\n", "1 of 3 vertices are NaN or inf"),

@@ -112,46 +112,10 @@ def test_coverage_is_checked_like_labels(place: Path):
 # ---- versions
 
 
-def as_first(content: dict[str, Any]) -> None:
-    """Turn a calibration into the shape that the first toonset wrote."""
-    content["schema"] = "toonset-calibration/1"
-    content["seconds"] = {"search": 1.0}
-    content["inputs"] = {one["name"]: one["sha256"] for one in content["inputs"]}
-    content["outline_noise_of_height"] = content.pop("drawing_error_of_height")["white"]
-    del content["drawings_contradiction_of_height"]
-    content["camera_model"] = {
-        "chosen": "orthographic",
-        "distance_heights": None,
-        "bic_gain_of_perspective": -5.7,
-        "bic_margin": 6.0,
-        "effective_samples": 200.0,
-    }
-    for view in content["views"]:
-        del view["line_width_px"]
-
-
-def as_second(content: dict[str, Any]) -> None:
-    """Turn a calibration into the shape in between: a list of models under one margin."""
-    content["schema"] = "toonset-calibration/1"
-    content["seconds"] = {"search": 1.0}
-    for one in content["inputs"]:
-        del one["role"]
-    for rung in content["camera_model"]["tried"]:
-        del rung["margin"]
-    content["camera_model"]["bic_margin"] = 6.0
-
-
-@pytest.mark.parametrize("older", [as_first, as_second])
-def test_calibrations_of_version_1_are_read(older, place: Path):
-    new = read_calibration(place / "calibration.json")
-    edit(place, "calibration.json", older)
-    old = read_calibration(place / "calibration.json")
-    assert problems(place) == []
-    assert [view.camera for view in old.views] == [view.camera for view in new.views]
-    assert old.camera_model.tried[0].margin == 6.0
-    assert len(old.camera_model.distance_heights) == 3
-    assert old.drawing_error_of_height.white == new.drawing_error_of_height.white
-    assert [one.sha256 for one in old.inputs] == ["0" * 64]
+def test_a_calibration_of_version_1_is_refused_by_name(place: Path):
+    edit(place, "calibration.json", lambda c: c.update(schema="toonset-calibration/1"))
+    (said,) = problems(place)
+    assert "states 'toonset-calibration/1', 'toonset-calibration/2' is needed" in said
 
 
 @pytest.mark.parametrize(

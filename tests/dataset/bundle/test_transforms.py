@@ -85,7 +85,7 @@ def turn(content):
         (turn, "disagree; remove the `toonset` key"),
         (lambda c: c["frames"][1].update(fl_x=7.0), "disagree"),
         (lambda c: c.update(camera_model="EQUIRECTANGULAR"), "'EQUIRECTANGULAR' is not supported"),
-        (lambda c: c["frames"][0].update(fl_y=0), "must be positive"),
+        (lambda c: c["frames"][0].update(fl_y=0), "fl_y: Input should be greater than 0"),
         (lambda c: c["frames"][0].update(k1=0.1), "lens distortion k1"),
         (lambda c: c["frames"][0].update(file_path="../../x.png"), "outside of the folder"),
         (lambda c: c["frames"][0].update(file_path="images/9.png"), "does not exist"),

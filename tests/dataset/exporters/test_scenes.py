@@ -25,7 +25,7 @@ from tests.dataset.exporters.exported_views import (
 )
 from toonset.dataset.exporters.blender import write_blender_script
 from toonset.dataset.exporters.gltf import write_gltf
-from toonset.dataset.mesh.gltf_file import open_gltf
+from toonset.dataset.mesh.gltf import open_gltf
 
 
 def world_matrix(node: dict) -> np.ndarray:
@@ -162,7 +162,7 @@ def test_blender_script_holds_every_view(tmp_path: Path, k: float) -> None:
         assert off_px(pixels + np.array(view.camera.size_wh) / 2, view.camera) < 1e-6
         near, far = record["clip"]
         assert near < -local[:, 2].max() < -local[:, 2].min() < far
-        assert (tmp_path / "out" / record["picture"]).is_file()
+        assert (tmp_path / "out" / "images" / record["name"]).is_file()
 
 
 def test_blender_script_shows_a_scene_of_its_own(
@@ -176,5 +176,6 @@ def test_blender_script_shows_a_scene_of_its_own(
     monkeypatch.setitem(sys.modules, "mathutils", MagicMock())
     runpy.run_path(str(tmp_path / "out" / "import_cameras.py"))
     assert blender.context.window.scene is own
-    own.collection.children.link.assert_called_once_with(blender.data.collections.new.return_value)
+    scene = str(tmp_path / "out" / "scene.glb")
+    blender.ops.import_scene.gltf.assert_called_once_with(filepath=scene)
     assert started_with.mock_calls == []

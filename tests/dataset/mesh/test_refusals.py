@@ -47,19 +47,15 @@ BAD_FILES: dict[str, tuple[str, bytes | str, str]] = {
     "picture": ("a.obj", b"\x89PNG\r\n\x1a\n" + bytes(50), "is a PNG picture"),
     "unknown extension": ("a.dae", "<COLLADA>", "is text, no mesh that can be read"),
     "text": ("a.obj", "hello\n" * 5, "has no vertices; is it really an OBJ"),
-    "point cloud": ("a.obj", TRIANGLE, r"has 3 vertices but no faces \(a point cloud\)"),
-    "lines": ("a.obj", TRIANGLE + "l 1 2\n", "but no faces"),
+    "point cloud": ("a.obj", TRIANGLE, "and no faces"),
+    "lines": ("a.obj", TRIANGLE + "l 1 2\n", "and no faces"),
     "nan": ("a.obj", "v nan 0 0\n" + TRIANGLE + "f 1 2 3\n", "1 of 4 vertices are NaN"),
     "inf": ("a.obj", "v 0 inf 0\n" + TRIANGLE + "f 2 3 4\n", "1 of 4 vertices are NaN or inf"),
     "overflow": ("a.obj", "v 1e999 0 0\n" + TRIANGLE + "f 2 3 4\n", "1 of 4 vertices are NaN"),
-    "huge": (
-        "a.obj",
-        "v 1e308 0 0\nv -1e308 0 0\nv 0 1 0\nf 1 2 3\n",
-        r"coordinates up to 1e\+308 world units",
-    ),
+    "huge": ("a.obj", "v 1e308 0 0\nv -1e308 0 0\nv 0 1 0\nf 1 2 3\n", "extent inf world units"),
     "far": ("a.obj", TRIANGLE + "v 1e7 0 0\nf 1 2 4\nf 1 2 3\n", "extent 1e.07 world units"),
     "index 0": ("a.obj", TRIANGLE + "f 0 1 2\n", "line 4: 'f 0 1 2': face index 0, but OBJ counts"),
-    "index high": ("a.obj", TRIANGLE + "f 1 2 9\n", "refers to vertex 8, but the file has 3"),
+    "index high": ("a.obj", TRIANGLE + "f 1 2 9\n", "refers to vertex 8 of 3"),
     "index low": ("a.obj", TRIANGLE + "f -9 1 2\n", "line 4: .* face index -9, but only 3 came"),
     "index word": ("a.obj", TRIANGLE + "f a b c\n", "line 4: 'f a b c': not a face index"),
     "two corners": ("a.obj", TRIANGLE + "f 1 2\n", "a face with 2 corners"),
@@ -67,30 +63,30 @@ BAD_FILES: dict[str, tuple[str, bytes | str, str]] = {
     "short": ("a.obj", "v 1 0\n", "line 1: .*2 numbers, 3 are needed"),
     "cut obj": ("a.obj", (TRIANGLE + "f 1 2 3\nv 1 2")[:], "line 5: .*2 numbers"),
     "degenerate": ("a.obj", TRIANGLE + "f 1 1 2\n", "every face is a line or a point"),
-    "flat point": ("a.obj", "v 0 0 0\n" * 3 + "f 1 2 3\n", "every face is a line or a point"),
+    "flat point": ("a.obj", "v 0 0 0\n" * 3 + "f 1 2 3\n", "extent 0 world units"),
     "huge ply": ("a.ply", HUGE_PLY, "announces 2,000,000,000 vertices, at most 15,000,000"),
     "cut ply": ("a.ply", PLY[: len(PLY) // 2], "PLY file is damaged or cut off"),
     "cut ascii ply": ("a.ply", ASCII_PLY[: len(ASCII_PLY) // 2], "cut off"),
-    "cloud ply": ("a.ply", exported(CLOUD, "ply"), "but no faces"),
-    "empty ply": ("a.ply", "ply\n", "PLY file is damaged|has no faces"),
+    "cloud ply": ("a.ply", exported(CLOUD, "ply"), "and no faces"),
+    "empty ply": ("a.ply", "ply\n", "PLY file is damaged|and no faces"),
     "cut stl": ("a.stl", STL[:500], r"STL file is cut off \(500 bytes for 48 faces\)"),
     "short stl": ("a.stl", STL[:60], "STL file is cut off"),
-    "text stl": ("a.stl", "hello\n" * 40, "has no faces"),
+    "text stl": ("a.stl", "hello\n" * 40, "and no faces"),
     "ascii stl without faces": ("a.stl", "solid a\nendsolid a\n", "STL|no faces"),
     "huge off": ("a.off", "OFF\n2000000000 5 0\n0 0 0\n", "announces 2,000,000,000 vertices"),
     "cut off file": ("a.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n", "OFF file is damaged|cut off"),
     "text off": ("a.off", "hello", "OFF file is damaged"),
     "cut glb": ("a.glb", GLB[: len(GLB) // 2], "GLB file is cut off"),
-    "cut glb header": ("a.glb", GLB[:10], "GLB file is cut off"),
+    "cut glb header": ("a.glb", GLB[:10], "damaged or cut off"),
     "glb 1": ("a.glb", b"glTF\1\0\0\0" + bytes(40), "GLB version 1"),
     "glb without json": (
         "a.glb",
         struct.pack("<4sII", b"glTF", 2, 20) + bytes(8),
-        "has no description",
+        "damaged or cut off .KeyError",
     ),
     "json": ("a.gltf", "[1, 2]", "is JSON but no glTF"),
-    "not json": ("a.gltf", "{", "its glTF description is damaged"),
-    "deep json": ("a.gltf", "[" * 100_000, "description is damaged"),
+    "not json": ("a.gltf", "{", "damaged or cut off .JSONDecodeError"),
+    "deep json": ("a.gltf", "[" * 100_000, "damaged or cut off .RecursionError"),
     "gltf 1": ("a.gltf", edited({"asset": {"version": "1.0"}}), "is glTF 1"),
     "gltf buffer file": (
         "a.gltf",
@@ -110,10 +106,14 @@ BAD_FILES: dict[str, tuple[str, bytes | str, str]] = {
     "gltf huge count": (
         "a.gltf",
         edited({}, {"count": 2_000_000_000}),
-        "announces 2000000000 items",
+        "announces 2,000,000,000 vertices",
     ),
-    "gltf long count": ("a.gltf", edited({}, {"count": 1000}), "glTF data is cut off"),
-    "gltf negative offset": ("a.gltf", edited({}, {"byteOffset": -8}), "glTF data is cut off"),
+    "gltf long count": ("a.gltf", edited({}, {"count": 1000}), "damaged or cut off .ValueError"),
+    "gltf negative offset": (
+        "a.gltf",
+        edited({}, {"byteOffset": -8}),
+        "damaged or cut off .ValueError",
+    ),
     "gltf sparse": ("a.gltf", edited({}, {"sparse": {}}), "sparse or compressed"),
     "gltf bad index": (
         "a.gltf",
@@ -130,8 +130,13 @@ BAD_FILES: dict[str, tuple[str, bytes | str, str]] = {
         edited({"nodes": [{"mesh": 0, "children": [0]}]}),
         "its nodes form a loop",
     ),
-    "gltf no mesh": ("a.gltf", edited({"nodes": [{}]}), "has no faces"),
-    "gltf missing key": ("a.gltf", edited({"meshes": [{}]}), "glTF file is damaged .KeyError"),
+    "gltf strip": (
+        "a.gltf",
+        edited({"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}]}]}),
+        "node 0 has strips; export it as plain triangles",
+    ),
+    "gltf no mesh": ("a.gltf", edited({"nodes": [{}]}), "and no faces"),
+    "gltf missing key": ("a.gltf", edited({"meshes": [{}]}), "damaged or cut off .KeyError"),
     "gltf wrong type": ("a.gltf", edited({"nodes": 5}), "glTF file is damaged"),
 }
 
@@ -156,7 +161,7 @@ def test_nan_in_ply(tmp_path: Path) -> None:
 def test_caps(tmp_path: Path) -> None:
     file = tmp_path / "a.obj"
     file.write_bytes(exported(CUBE, "obj"))
-    with pytest.raises(MeshError, match="announces 11 faces, at most 10 are read"):
+    with pytest.raises(MeshError, match="announces 48 faces, at most 10 are read"):
         load_mesh(file, max_faces=10)
     with pytest.raises(MeshError, match="at most 0 MB is read"):
         load_mesh(file, max_bytes=100)

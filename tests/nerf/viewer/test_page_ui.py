@@ -9,7 +9,7 @@ import pytest
 
 from tests.nerf.viewer.conftest import Open
 from tests.nerf.viewer.page_under_test import COLORS, PEN, SIZE_WH, Viewer, figure_scene
-from toonset.palette.formats.ase import read_ase, to_ase
+from toonset.palette.formats.adobe import read_ase, to_ase
 from toonset.palette.formats.gpl import to_gpl
 from toonset.palette.formats.hex import to_hex
 from toonset.palette.palette import Palette, PaletteColor

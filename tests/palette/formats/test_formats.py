@@ -7,9 +7,7 @@ import pytest
 from PIL import Image, ImageCms
 
 from toonset.errors import PaletteError
-from toonset.palette.formats.aco import read_aco
-from toonset.palette.formats.ase import read_ase, to_ase
-from toonset.palette.formats.cie_lab import rgb_from_lab
+from toonset.palette.formats.adobe import read_aco, read_ase, rgb_from_lab, to_ase
 from toonset.palette.formats.gpl import read_gpl, to_gpl
 from toonset.palette.names import NamedColor
 from toonset.palette.palette import Palette, PaletteColor
@@ -116,8 +114,8 @@ REFUSED: list[tuple[Callable[[bytes, str], list[NamedColor]], bytes, str]] = [
     (read_ase, ase(1, ASE_RGB.replace(b"\x3f\x80", b"\x7f\xc0")), "value nan, 0 to 1 is needed"),
     (read_ase, ase(1, ASE_RGB.replace(b"\x3f\x80", b"\x40\x00")), "value 2, 0 to 1 is needed"),
     (read_ase, b"\x80\x01\0\0\xe0\xa5\1\0" + bytes(120), "is an Aseprite picture, not a palette"),
-    (read_aco, aco_section(1, ACO_RGB)[:-1], "is cut off in swatch 1"),
-    (read_aco, aco_section(2, ACO_RGB + "FFFFFFFF"), "is cut off in swatch 1"),
+    (read_aco, aco_section(1, ACO_RGB)[:-1], "swatch 1: is cut off"),
+    (read_aco, aco_section(2, ACO_RGB + "FFFFFFFF"), "swatch 1: is cut off"),
     (read_aco, aco_section(1, ACO_CMYK), "swatch 1: is CMYK"),
     (read_aco, aco_section(2, "0003" + 16 * "0" + ACO_NAME), r"'Hi': is of colour space 3 \(Pan"),
     (

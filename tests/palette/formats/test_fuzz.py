@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from toonset.errors import PaletteError
+from toonset.palette.formats.json import read_palette_json
 from toonset.palette.formats.registry import encode_palette, parse_named_colors
-from toonset.palette.formats.schema import read_palette_json
 from toonset.palette.palette import MAX_COLORS, ContourColor, DroppedColor, Palette, PaletteColor
 
 PALETTE = Palette(

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toonset.errors import PaletteError
-from toonset.palette.formats.json import to_json
+from toonset.palette.formats.json import palette_of, read_palette_json, to_json
 from toonset.palette.formats.registry import parse_colors
-from toonset.palette.formats.schema import palette_of, read_palette_json
 from toonset.palette.palette import (
     ContourColor,
     DroppedColor,
@@ -89,12 +88,15 @@ def test_foreign_text_prints_as_one_line() -> None:
         (GOOD | {"schema": "toonset-palette/9"}, "'toonset-palette/9' is newer than this toonset"),
         (
             {k: v for k, v in GOOD.items() if k != "colors"},
-            "colors: Field required; write it again",
+            "field colors: Field required; correct the file",
         ),
         (GOOD | {"colors": []}, "colors: List should have at least 1 item"),
         (GOOD | {"colors": [COLOR] * 256}, "colors: List should have at most 255 items"),
-        (GOOD | {"colors": 5}, r"colors: Input should be a valid list \(found 5\)"),
-        (GOOD | {"colors": [COLOR, COLOR | {"hex": "#12"}]}, r"colors\.1\.hex: .* \(found '#12'\)"),
+        (GOOD | {"colors": 5}, "colors: Input should be a valid list"),
+        (
+            GOOD | {"colors": [COLOR, COLOR | {"hex": "#12"}]},
+            r"colors\.1\.hex: hex: '#12' is no colour",
+        ),
         (
             GOOD | {"colors": [COLOR | {"share": 7}]},
             r"colors\.0\.share: .* less than or equal to 1",
@@ -103,7 +105,7 @@ def test_foreign_text_prints_as_one_line() -> None:
         (GOOD | {"colors": [COLOR | {"share": True}]}, r"colors\.0\.share: .* valid number"),
         (GOOD | {"dropped": [COLOR]}, r"dropped\.0\.oklab_cost: Field required"),
         (GOOD | {"contour": COLOR}, r"contour\.cloth: Field required"),
-        (GOOD | {"rule": None}, r"rule: Input should be a valid string \(found None\)"),
+        (GOOD | {"rule": None}, "rule: Input should be a valid string"),
     ],
 )
 def test_bad_palette_json(content: object, fragment: str, tmp_path: Path) -> None:

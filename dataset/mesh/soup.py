@@ -11,7 +11,6 @@ from jaxtyping import Float, Int, UInt8
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
 
-FARTHEST = 1e9  # world units; beyond, a sum of squares loses the figure
 VERTICES_PER_FACE = 3  # a soup of unconnected triangles has no more
 
 
@@ -38,35 +37,12 @@ def mesh_of_soup(soup: Soup, path: Path) -> Mesh:
     """Return the checked mesh: vertices at the same place are one, unused ones dropped.
 
     Raises:
-        MeshError: no faces, vertices that are not finite, indices out of range, no extent.
+        MeshError: what `Mesh` refuses, and faces that are all lines or points.
     """
-    vertices, faces = soup.vertices, soup.faces
-    count = len(vertices)
-    if len(faces) == 0:
-        found = f"{count} vertices but no faces (a point cloud)" if count else "no faces"
-        raise MeshError(f"{path}: has {found}; export the mesh with its triangles")
-    bad = int((~np.isfinite(vertices)).any(axis=1).sum())
-    if bad:
-        raise MeshError(
-            f"{path}: {bad} of {count} vertices are NaN or infinite; repair the mesh and export "
-            "it again"
-        )
-    largest = float(np.abs(vertices).max())
-    if largest > FARTHEST:
-        raise MeshError(
-            f"{path}: coordinates up to {largest:g} world units, at most {FARTHEST:g} are read; "
-            "rescale the mesh"
-        )
-    low, high = int(faces.min()), int(faces.max())
-    if low < 0 or high >= count:
-        raise MeshError(
-            f"{path}: a face refers to vertex {low if low < 0 else high}, but the file has {count} "
-            "(counted from 0); the file is damaged, export it again"
-        )
-    welded = _weld(vertices)[faces]
+    vertices = soup.vertices
+    Mesh(vertices, soup.faces, path=path)  # refuses what could not be welded
+    welded = _weld(vertices)[soup.faces]
     keep = (welded != np.roll(welded, 1, axis=1)).all(axis=1)  # three different corners
-    if not keep.any():
-        raise MeshError(f"{path}: every face is a line or a point; export the mesh's triangles")
     corners = vertices[welded[keep]]
     edges = corners[:, 1:] - corners[:, :1]
     if not np.cross(edges[:, 0], edges[:, 1]).any():
@@ -100,12 +76,36 @@ def check_counts(path: Path, vertices: int, faces: int, max_faces: int) -> None:
             )
 
 
+def face_colors_from_texture(
+    texture: UInt8[np.ndarray, "height width 4"],
+    uvs: Float[np.ndarray, "uvs 2"],
+    corners: Int[np.ndarray, "faces 3"],
+    fallback: UInt8[np.ndarray, "faces 3"],
+) -> UInt8[np.ndarray, "faces 3"]:
+    """Return the texture's colour at the middle of every face.
+
+    Args:
+        texture: sRGB picture; v = 0 is its lower edge.
+        uvs: texture coordinates, repeated outside [0, 1].
+        corners: index into `uvs` per face corner; out of range = the face has none.
+        fallback: colour of faces without usable coordinates.
+    """
+    usable = ((corners >= 0) & (corners < len(uvs))).all(axis=1)
+    colors = fallback.copy()
+    middle = uvs[corners[usable]].mean(axis=1)
+    finite = np.isfinite(middle).all(axis=1)
+    height, width = texture.shape[:2]
+    u, v = np.nan_to_num(middle).T % 1.0
+    column = np.minimum((u * width).astype(int), width - 1)
+    row = np.minimum(((1 - v) * height).astype(int), height - 1)
+    colors[usable] = np.where(finite[:, None], texture[row, column, :3], fallback[usable])
+    return colors
+
+
 def _weld(vertices: Float[np.ndarray, "vertices 3"]) -> Int[np.ndarray, " vertices"]:
     """Return for every vertex the first vertex at exactly the same place."""
-    order = np.lexsort(vertices.T)
-    ordered = vertices[order]
-    starts = np.concatenate([[True], (ordered[1:] != ordered[:-1]).any(axis=1)])
-    first = np.minimum.reduceat(order, np.flatnonzero(starts))
-    result = np.empty(len(vertices), dtype=np.int64)
-    result[order] = first[np.cumsum(starts) - 1]
-    return result
+    place = np.zeros(len(vertices), dtype=np.int64)
+    for values in vertices.T:  # axis by axis: ten times as fast as rows at once
+        number = np.unique(values, return_inverse=True)[1]
+        place = np.unique(place * len(vertices) + number, return_inverse=True)[1]
+    return np.unique(place, return_index=True)[1][place]
