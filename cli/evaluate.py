@@ -26,7 +26,6 @@ COLUMNS = {  # of the table: heading, number format
     "flip": ("FLIP", "{:.4f}"),
     "sharpness": ("sharp", "{:.2f}"),
     "dirt": ("dirt", "{:.2f}"),
-    "haarpsi": ("HaarPSI", "{:.4f}"),
     "lpips": ("LPIPS", "{:.4f}"),
     "silhouette_iou": ("outline", "{:.1%}"),
     "label_accuracy": ("labels", "{:.1%}"),

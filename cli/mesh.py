@@ -74,7 +74,8 @@ def mesh(
         raise typer.BadParameter("--outline belongs to --texture")
     if nearest and not variants:
         raise typer.BadParameter("--nearest belongs to --variants")
-    from toonset.nerf.kernels.threads import use_threads
+    import torch
+
     from toonset.nerf.render.recolor import recolored, variants_of
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
@@ -88,7 +89,8 @@ def mesh(
     else:
         check_mesh_files(out, force=force, variants=bool(variants))
     others = variants_of(trained, variants or [], nearest=nearest)
-    use_threads(threads)
+    if threads is not None:
+        torch.set_num_threads(threads)
 
     def progress(step: str, done: float) -> None:
         printer.progress(f"{step} {done:.0%}")

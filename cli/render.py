@@ -111,7 +111,8 @@ def render(
     if cameras is not None and (elevation is not None or size is not None):
         raise typer.BadParameter("--elevation and --size belong to --turntable")
 
-    from toonset.nerf.kernels.threads import use_threads
+    import torch
+
     from toonset.nerf.render.animation import check_mp4
     from toonset.nerf.render.files import rendered_files
     from toonset.nerf.render.layers import default_layer
@@ -122,7 +123,8 @@ def render(
     together = _formats(formats, gif, turning=views is not None)
     if "mp4" in together:
         check_mp4()
-    use_threads(threads)
+    if threads is not None:
+        torch.set_num_threads(threads)
     trained = recolored(read_field(run), recolor or [])
     trained = repainted(trained, palette, nearest=nearest) if palette else trained
     wanted = layers or [default_layer(trained) if views else "rgb"]

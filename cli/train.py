@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.common.host import AUTO, checked
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -96,8 +95,8 @@ def train(
         DeviceName, typer.Option("--device", help="auto: a GPU where there is one.")
     ] = "auto",
     threads: Annotated[
-        str, typer.Option("--threads", help="CPU threads, or auto: as many as make it faster here.")
-    ] = AUTO,
+        int | None, typer.Option("--threads", min=1, max=1024, help="CPU threads (default: two).")
+    ] = None,
     test: Annotated[
         Path | None,
         typer.Option(
@@ -142,7 +141,7 @@ def train(
         test or _test_of(root),
         out or root / "run",
         {**preset_options(preset), **{k: v for k, v in given.items() if v is not None}},
-        checked(threads),
+        threads,
         preview_every,
         force=force,
         palette=not no_palette,

@@ -28,7 +28,6 @@ from toonset.nerf.run.folder import WRITTEN
 from toonset.nerf.run.monitor import Looking, Onlooker
 from toonset.nerf.run.report import preview, write_run
 from toonset.nerf.train.labelling import labelled, without_palette
-from toonset.nerf.train.memory import check_memory, memory_errors
 from toonset.nerf.train.result import HeldOut, Training
 from toonset.nerf.train.train import device_of, fit_field
 from toonset.palette.names import hex_of
@@ -36,6 +35,7 @@ from toonset.view import small_png
 from toonset.write import check_output, new_folder
 
 PREVIEW_PX = 960  # wide, in a notebook
+OUT_OF_MEMORY = ("can't allocate memory", "out of memory", "not enough memory")
 
 
 class Listener(Protocol):
@@ -82,7 +82,7 @@ class Run:
 
     def _repr_png_(self) -> bytes:
         """Return four views side by side, for a notebook."""
-        with working_threads(self.threads), memory_errors():
+        with working_threads(self.threads), _memory_errors():
             shown = preview(baked_of(self.field))
         return small_png(np.dstack([shown, np.full(shown.shape[:2], 255, np.uint8)]), PREVIEW_PX)
 
@@ -97,7 +97,7 @@ class Run:
         with (
             new_folder(Path(folder), force=force) as place,
             working_threads(self.threads),
-            memory_errors(),
+            _memory_errors(),
         ):
             return write_run(place, self.training, self.scene, self.test, self.held_out)
 
@@ -122,15 +122,16 @@ def train(
         scene: posed drawings, as `read_bundle` or `write_bundle` returns them.
         options: of the training.
         palette: train labels, too; a palette is extracted where the scene has none.
-        threads: of the CPU; None: as many as torch is set to use.
+        threads: of the CPU; None: two, or one if torch is set to use no more.
         test: held-out views to score.
         listener: told what a person should know, evidence, and where the work stands.
         looking: what is looked at while the field is fitted: previews, a wish to stop.
 
     Raises:
         ToonsetError: fewer than two usable views, a picture that is opaque all over, cameras that
-            do not belong to the pictures, or too little memory.
+            do not belong to the pictures.
         UsageError: an option or a number of threads that means nothing.
+        MemoryError: torch found no more.
         SetupError: a GPU was asked for and there is none.
     """
     options.check()
@@ -143,15 +144,14 @@ def train(
     for frame in scene.frames:
         if not has_figure(frame):
             told.say(f"{frame.name} shows no figure")
-    device = device_of(options.device)  # refused before anything is computed or said
+    device_of(options.device)  # refused before anything is computed or said
     with (
         working_threads(threads) as count,
         threadpool_limits(1, user_api="blas"),
         _own_random_numbers(),
-        memory_errors(),
+        _memory_errors(),
     ):
-        memory = check_memory(scene, options, device)
-        told.detail(f"{memory}; {count} CPU thread{'s' * (count > 1)}")
+        told.detail(f"{count} CPU thread{'s' * (count > 1)}")
         scene = _with_palette(scene, told) if palette else without_palette(scene)
         onlooker = Onlooker(looking or Looking(test=test))
         for guess in guesses(with_all_mirrored(scene) if options.symmetric else scene):
@@ -195,3 +195,18 @@ def _own_random_numbers() -> Iterator[None]:
         yield
     finally:
         torch.set_rng_state(state)
+
+
+@contextmanager
+def _memory_errors() -> Iterator[None]:
+    """Turn torch's ways to say that memory ran out into a `MemoryError` of one line."""
+    try:
+        yield
+    except RuntimeError as error:
+        message = str(error)
+        if not isinstance(error, torch.OutOfMemoryError) and not any(
+            words in message for words in OUT_OF_MEMORY
+        ):
+            raise
+        where = "the GPU" if isinstance(error, torch.OutOfMemoryError) else "this machine"
+        raise MemoryError(f"training asked for more than {where} has") from error

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
+import torch
 from jaxtyping import Bool, UInt8
 
 from bench.atlas.scenes import DrawnScene, draw_scene
@@ -28,7 +29,6 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.silhouettes.mask import figure_px
 from toonset.errors import ToonsetError
-from toonset.nerf.kernels.threads import use_threads
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.consistency import consistency_of
 from toonset.nerf.render.layers import default_layer
@@ -101,7 +101,7 @@ def _base_tried(seed: int) -> tuple[Tried, bytes]:
 def _tried(draw: Callable[[], DrawnScene], seed: int) -> tuple[Tried, bytes]:
     began = time.perf_counter()
     keep_freed_memory()
-    use_threads(1)  # figures must not depend on the machine's cores
+    torch.set_num_threads(1)  # figures must not depend on the machine's cores
     scene: DrawnScene | None = None
     try:
         scene = draw()

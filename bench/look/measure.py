@@ -9,6 +9,7 @@ from functools import partial
 from itertools import groupby
 
 import numpy as np
+import torch
 
 from bench.charts.chart import DEFAULT
 from bench.look.cases import LookCase
@@ -19,7 +20,6 @@ from toonset.camera import Camera
 from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.kernels.threads import use_threads
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.paint_flow import pair_flows
@@ -82,7 +82,7 @@ def bench_look(
 ) -> list[LookResult]:
     """Return what every look of every case is worth, case by case."""
     keep_freed_memory()  # as the command does: seconds count
-    use_threads(1)  # neither figures nor CPU seconds may depend on the machine's cores
+    torch.set_num_threads(1)  # neither figures nor CPU seconds may depend on the machine's cores
     judges = load_judges()
     found = []
     for case in cases:

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf.kernels.threads import SIDES, use_threads
+from toonset.nerf.kernels.threads import SIDES, working_threads
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.train.memory import needed_bytes
 from toonset.nerf.train.train import fit_field
 
 
@@ -26,7 +25,6 @@ class Growth:
         counts, seconds: of the training.
         cpu: seconds, which hardly depend on what else the machine does.
         peak: most bytes in use over those before the training.
-        estimate: what `needed_bytes` says of it.
     """
 
     px: int
@@ -35,27 +33,27 @@ class Growth:
     seconds: dict[str, float]
     cpu: float
     peak: int
-    estimate: int
 
 
 def growths(scenes: Mapping[int, Scene], options: TrainOptions) -> Iterator[Growth]:
     """Train on scenes of some sizes, each in a process of its own, with the threads of `train`."""
     context = multiprocessing.get_context("spawn")
     for px, scene in scenes.items():
-        with context.Pool(1, _two_threads) as pool:
+        with context.Pool(1) as pool:
             yield pool.apply(growth, (scene, px, options))
 
 
 def growth(scene: Scene, px: int, options: TrainOptions) -> Growth:
     """Train in this process, which should have done nothing else, and return what it took."""
-    estimate, before = needed_bytes(scene, options), _resident_bytes("VmRSS")
-    began = time.process_time()
-    training = fit_field(scene, options)
+    keep_freed_memory()
+    before, began = _resident_bytes("VmRSS"), time.process_time()
+    with working_threads(SIDES):
+        training = fit_field(scene, options)
     cpu = time.process_time() - began
     peak = _resident_bytes("VmHWM") - before
     opaque = sum(int((frame.rgba[..., 3] > 127).sum()) for frame in scene.frames)
     voxels = {"voxels": training.result.hull.support.numel()}
-    return Growth(px, opaque, training.counts | voxels, training.seconds, cpu, peak, estimate)
+    return Growth(px, opaque, training.counts | voxels, training.seconds, cpu, peak)
 
 
 def _resident_bytes(which: str) -> int:
@@ -67,8 +65,8 @@ def _resident_bytes(which: str) -> int:
 def print_growth(rows: Iterable[Growth]) -> None:
     """Print trainings as a table, each as soon as it is done."""
     print("| px | figure, px | rays | samples | voxels |", end="")
-    print(" hull, s | rays, s | steps, s | whole, s | CPU, s | GB | said |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print(" hull, s | rays, s | steps, s | whole, s | CPU, s | GB |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
     for row in rows:
         numbers = [row.px, row.figure_px, *(row.counts[k] for k in ("rays", "samples", "voxels"))]
         stages = [
@@ -76,11 +74,5 @@ def print_growth(rows: Iterable[Growth]) -> None:
             sum(row.seconds.values()),
             row.cpu,
         ]
-        sizes = " | ".join(f"{size / 1e9:.2f}" for size in (row.peak, row.estimate))
         print(f"| {' | '.join(map(str, numbers))} |", end="")
-        print(f" {' | '.join(f'{s:.1f}' for s in stages)} | {sizes} |", flush=True)
-
-
-def _two_threads() -> None:
-    keep_freed_memory()
-    use_threads(SIDES, SIDES)
+        print(f" {' | '.join(f'{s:.1f}' for s in stages)} | {row.peak / 1e9:.2f} |", flush=True)

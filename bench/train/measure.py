@@ -176,8 +176,6 @@ COLUMNS = (
     _quality("PSNR, 2 px tolerated", "psnr_shift", "+-2 px", "{:.2f}", "dB"),
     _quality("SSIM", "ssim", "SSIM", "{:.3f}"),
     _quality("FLIP", "flip", "FLIP", "{:.4f}", lower=True),
-    _quality("HaarPSI", "haarpsi", "HaarPSI", "{:.3f}"),
-    _quality("GMSD", "gmsd", "", "", lower=True),
     _quality("LPIPS", "lpips", "", "", lower=True),
     _quality("outline IoU", "silhouette_iou", "outline", "{:.3f}"),
     _quality("lines F1", "ink_f1", "lines", "{:.2f}"),

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+import torch
 from jaxtyping import UInt8
 from torch import Tensor
 
@@ -22,7 +23,6 @@ from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError, ToonsetError
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.kernels.threads import use_threads
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.render.layers import color_picture
 from toonset.nerf.render.views import render
@@ -94,7 +94,7 @@ def run_job(job: Job, judges: Judges, look: Look = lambda *_: None) -> RunResult
     """Return what training and rendering of one job gives; a refusal is a result, too."""
     case, method = subset(job.case, job.views), job.way
     keep_freed_memory()  # as the command does: seconds count
-    use_threads(1)  # neither figures nor CPU seconds may depend on the machine's cores
+    torch.set_num_threads(1)  # neither figures nor CPU seconds may depend on the machine's cores
     try:
         if job.peer is not None:
             done = run_peer(job.peer, case.train, case.test)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from toonset.cli.common.host import keep_freed_memory, threads_of
+from toonset.cli.common.host import keep_freed_memory
 from toonset.cli.common.output import Printer
 from toonset.cli.common.train_summary import summary
 from toonset.cli.common.train_watch import Stopper, Voice
@@ -27,7 +27,7 @@ class Request:
         test: held-out views; None: none.
         run: the folder to write.
         options: of training, those that were given.
-        threads: "auto" or a number.
+        threads: of the CPU; None: the usual number.
         preview_every: seconds; None: no previews.
         force: replace an earlier run.
         palette: train labels, too.
@@ -38,7 +38,7 @@ class Request:
     test: Path | None
     run: Path
     options: dict[str, Any]
-    threads: str
+    threads: int | None
     preview_every: float | None
     force: bool
     palette: bool
@@ -72,7 +72,7 @@ def run(request: Request, printer: Printer) -> int:
             scene,
             TrainOptions(**request.options),
             palette=request.palette,
-            threads=threads_of(request.threads),
+            threads=request.threads,
             test=test,
             listener=printer,
             looking=looking,

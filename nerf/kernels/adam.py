@@ -1,11 +1,12 @@
-"""Adam by torch's fused kernel, which goes through memory once.
+"""Adam in public tensor operations.
 
-`torch.optim` would call the same, but imports torch's compiler, `torch._dynamo`, as soon as an
-optimiser is made. The state is plain tensors.
+`torch.optim` has the same, but imports torch's compiler, `torch._dynamo`, as soon as an optimiser
+is made (docs/decisions.md).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -36,12 +37,12 @@ class Adam:
 
     def __init__(self, groups: Sequence[Group], betas: tuple[float, float] = (0.9, 0.99)) -> None:
         """Begin with zero moments."""
-        self.groups = tuple(groups)
-        self.betas = betas
-        self.count = 0
-        parameters = [p for group in self.groups for p in group.parameters]
-        self.first = [torch.zeros_like(p) for p in parameters]
-        self.second = [torch.zeros_like(p) for p in parameters]
+        self._betas, self._count = betas, 0
+        self._moments = [
+            (values, group.rate, torch.zeros_like(values), torch.zeros_like(values))
+            for group in groups
+            for values in group.parameters
+        ]
 
     @torch.no_grad()
     def step(self, factor: float = 1.0) -> None:
@@ -50,36 +51,13 @@ class Adam:
         Args:
             factor: of all learning rates.
         """
-        self.count += 1
-        slow, fast = self.betas
-        moments = iter(zip(self.first, self.second, strict=True))
-        for group in self.groups:
-            for parameter in group.parameters:
-                first, second = next(moments)
-                if parameter.grad is None:
-                    continue
-                gradient = _laid_out_as(parameter, parameter.grad)
-                count = torch.full((), float(self.count), device=parameter.device)
-                torch._fused_adam_(
-                    [parameter],
-                    [gradient],
-                    [first],
-                    [second],
-                    [],
-                    [count],
-                    lr=factor * group.rate,
-                    beta1=slow,
-                    beta2=fast,
-                    weight_decay=0.0,
-                    eps=EPSILON,
-                    amsgrad=False,
-                    maximize=False,
-                )
-                parameter.grad = None
-
-
-def _laid_out_as(parameter: Tensor, gradient: Tensor) -> Tensor:
-    """Return the gradient with the parameter's strides: the kernel walks memory and asks nobody."""
-    if gradient.stride() == parameter.stride():
-        return gradient
-    return torch.empty_like(parameter).copy_(gradient)
+        self._count += 1
+        slow, fast = self._betas
+        mean_of, root_of = 1 - slow**self._count, math.sqrt(1 - fast**self._count)
+        for values, rate, mean, square in self._moments:
+            gradient, values.grad = values.grad, None
+            if gradient is not None:
+                mean.lerp_(gradient, 1 - slow)
+                square.mul_(fast).addcmul_(gradient, gradient, value=1 - fast)
+                spread = square.sqrt().div_(root_of).add_(EPSILON)
+                values.addcdiv_(mean, spread, value=-factor * rate / mean_of)

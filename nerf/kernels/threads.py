@@ -30,25 +30,6 @@ class _Team(threading.local):
 _TEAM = _Team()
 
 
-def use_threads(count: int | None, sides: int = 1) -> None:
-    """Let torch use `count` threads; None leaves its choice (all cores).
-
-    Args:
-        count: of threads.
-        sides: 1: they share torch's operations; SIDES: where there are as many, what the calling
-            thread asks for runs side by side, and each side has its share of them.
-    """
-    if _TEAM.pool is not None:
-        _TEAM.pool.shutdown()
-        _TEAM.pool = None
-    if count is None:
-        return
-    sides = min(sides, count)
-    torch.set_num_threads(count // sides)
-    if sides > 1:
-        _TEAM.pool = ThreadPoolExecutor(sides - 1)
-
-
 @contextmanager
 def working_threads(count: int | None = None) -> Iterator[int]:
     """Let so many threads work within the block, side by side where there are two; yield how many.
@@ -56,10 +37,10 @@ def working_threads(count: int | None = None) -> Iterator[int]:
     Afterwards torch has as many as before.
 
     Args:
-        count: of threads; None: as many as torch is set to use.
+        count: of threads; None: two, or one if torch is set to use no more.
     """
     before, pool = torch.get_num_threads(), _TEAM.pool
-    count = count or before
+    count = count or min(SIDES, before)
     sides = min(SIDES, count)
     torch.set_num_threads(count // sides)
     _TEAM.pool = ThreadPoolExecutor(sides - 1) if sides > 1 else None

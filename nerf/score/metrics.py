@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from skimage.metrics import structural_similarity
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.view import over_white
 
 BEST_PSNR = 120.0  # reported for identical pictures, which have no finite value
 MOST_SHIFT_PX = 2  # of the whole picture that the shift-tolerant PSNR forgives
-SSIM_WINDOW, SSIM_SIGMA = 11, 1.5  # Wang et al. 2004
-SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
+SSIM_WINDOW, SSIM_SIGMA = 11, 1.5  # px, of a Gaussian: Wang et al. 2004
 
 Figures = dict[str, float | None]  # by metric; None where it cannot be said
 
@@ -80,44 +80,31 @@ def silhouette_iou(
 
 
 def ssim(
-    a: Float[np.ndarray, "height width 3"], b: Float[np.ndarray, "height width 3"]
-) -> float | None:
-    """Return the mean of `ssim_map`, None where a picture is smaller than the window."""
-    return None if min(a.shape[:2]) < SSIM_WINDOW else float(ssim_map(a, b).mean())
-
-
-def ssim_inside(
     a: Float[np.ndarray, "height width 3"],
     b: Float[np.ndarray, "height width 3"],
-    mask: Bool[np.ndarray, "height width"],
+    mask: Bool[np.ndarray, "height width"] | None = None,
 ) -> float | None:
-    """Return the mean of `ssim_map` over the mask's pixels whose window fits, None without any."""
+    """Return the mean structural similarity of the channels, where the Gaussian window fits.
+
+    Args:
+        a: a picture in [0, 1].
+        b: another one.
+        mask: count its pixels alone.
+
+    None where the window fits nowhere, or nowhere in the mask.
+    """
     if min(a.shape[:2]) < SSIM_WINDOW:
         return None
-    rim = SSIM_WINDOW // 2
-    inner = mask[rim:-rim, rim:-rim]
-    return float(ssim_map(a, b)[inner].mean()) if inner.any() else None
-
-
-def ssim_map(
-    a: Float[np.ndarray, "height width 3"], b: Float[np.ndarray, "height width 3"]
-) -> Float[np.ndarray, "h w 3"]:
-    """Return the structural similarity per channel, Gaussian window of 11 px, where it fits.
-
-    Source: Wang, Bovik, Sheikh, Simoncelli, "Image quality assessment", 2004, equation 13.
-    """
-    mean_a, mean_b = _blurred(a), _blurred(b)
-    variance_a, variance_b = _blurred(a * a) - mean_a**2, _blurred(b * b) - mean_b**2
-    covariance = _blurred(a * b) - mean_a * mean_b
-    light = (2 * mean_a * mean_b + SSIM_C1) / (mean_a**2 + mean_b**2 + SSIM_C1)
-    structure = (2 * covariance + SSIM_C2) / (variance_a + variance_b + SSIM_C2)
-    return light * structure
-
-
-def _blurred(image: Float[np.ndarray, "height width 3"]) -> Float[np.ndarray, "h w 3"]:
-    """Return the Gaussian average around every pixel whose window fits."""
-    offsets = np.arange(SSIM_WINDOW) - SSIM_WINDOW // 2
-    kernel = np.exp(-0.5 * (offsets / SSIM_SIGMA) ** 2)
-    kernel /= kernel.sum()
-    rows = np.lib.stride_tricks.sliding_window_view(image, SSIM_WINDOW, axis=0) @ kernel
-    return np.lib.stride_tricks.sliding_window_view(rows, SSIM_WINDOW, axis=1) @ kernel
+    alike = structural_similarity(
+        a,
+        b,
+        data_range=1,
+        channel_axis=2,
+        gaussian_weights=True,
+        sigma=SSIM_SIGMA,
+        use_sample_covariance=False,
+        full=True,
+    )[1]
+    fits = (slice(SSIM_WINDOW // 2, -(SSIM_WINDOW // 2)),) * 2
+    inner = alike[fits] if mask is None else alike[fits][mask[fits]]
+    return float(inner.mean()) if inner.size else None

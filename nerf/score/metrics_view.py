@@ -12,8 +12,7 @@ from toonset.nerf.score.appearance import block_psnr, dirt, sharpness
 from toonset.nerf.score.flip import FlipMap, load_flip
 from toonset.nerf.score.lines import line_f1
 from toonset.nerf.score.lpips import Lpips, load_lpips
-from toonset.nerf.score.metrics import Figures, compare, shifted_psnr, silhouette_iou, ssim_inside
-from toonset.nerf.score.structure import gmsd, haarpsi
+from toonset.nerf.score.metrics import Figures, compare, shifted_psnr, silhouette_iou, ssim
 from toonset.view import over_white
 
 
@@ -57,7 +56,7 @@ def figures_of(
         flip, flip_inside = float(error.mean()), float(error[mask].mean()) if mask.any() else None
     figures = {
         **quick,
-        "ssim_mask": ssim_inside(a, b, mask),
+        "ssim_mask": ssim(a, b, mask),
         "psnr_shift": shifted,
         "psnr_shift_mask": shifted_inside,
         "psnr_blocks": block_psnr(a, b),
@@ -65,10 +64,6 @@ def figures_of(
         "dirt": dirt(a, b, mask_of(drawn)),
         "flip": flip,
         "flip_mask": flip_inside,
-        "haarpsi": haarpsi(a, b),
-        "haarpsi_mask": haarpsi(a, b, mask),
-        "gmsd": gmsd(a, b),
-        "gmsd_mask": gmsd(a, b, mask),
         "lpips": None if isinstance(judges.lpips, str) else judges.lpips(a, b),
         "silhouette_iou": silhouette_iou(rendered, drawn),
         "ink_f1": line_f1(rendered, drawn),

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import shutil
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 import torch
 
-from toonset.cli.common import host
-from toonset.cli.common.host import measured
 from toonset.cli.common.train_watch import LOG_S, Pace, Stopper
-from toonset.nerf.kernels.threads import use_threads
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
 RUN_FILES = {
@@ -99,7 +93,7 @@ def test_held_out_views_are_looked_at_and_reported(bundle: Path, toonset, tmp_pa
     flags = ("--json", "--no-palette", "--verbose")
     without = toonset("train", bundle, "-o", tmp_path / "o", *FAST, *flags)
     assert without.json["test"] is not None  # found beside the bundle's pictures
-    assert "memory: about" in without.err
+    assert "1 CPU thread" in without.err
 
 
 def test_a_weak_run_says_why_and_is_a_failure_only_to_the_strict(bundle: Path, toonset, tmp_path):
@@ -121,62 +115,30 @@ def test_a_training_that_went_wrong_is_written_with_its_reason(bundle: Path, too
     assert toonset("check", bundle / "run").code == 0
 
 
-def test_too_little_memory_is_said_before_anything_is_done(
-    bundle: Path, toonset, monkeypatch, snapshot
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to"), "this machine"),
+        (torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"), "the GPU"),
+    ],
+)
+def test_running_out_of_memory_is_one_line(
+    bundle: Path, toonset, monkeypatch, snapshot, error: RuntimeError, said: str
 ):
     before = snapshot(bundle)
-    with monkeypatch.context() as patch:
-        patch.setattr("toonset.nerf.train.memory.free_bytes", lambda: 10**6)
-        reason = toonset("train", bundle, *FAST).reason.splitlines()[-1]
-    assert "GB of memory, 0.0 GB are free; end other programs" in reason
-    assert snapshot(bundle) == before
 
     def full(*_: object, **__: object) -> None:
-        raise RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 9")
+        raise error
 
     monkeypatch.setattr("toonset.nerf.train.train.make_batches", full)
     done = toonset("train", bundle, *FAST, "-q")
-    assert done.reason.startswith("out of memory (training asked for more than this machine has)")
+    assert done.reason.startswith(f"out of memory (training asked for more than {said} has)")
     assert snapshot(bundle) == before
 
 
-@pytest.mark.parametrize("text", ["0", "-1", "two", "1.5", "², "])
-def test_threads_are_a_number_or_auto(text: str, toonset, bundle: Path):
-    said = toonset("train", bundle, f"--threads={text}").reason
-    assert "is neither auto nor a number" in said
-
-
-def test_auto_is_a_thread_per_side_where_there_are_cores_and_tries_nothing(monkeypatch):
-    monkeypatch.setattr(host, "_rate", lambda _: pytest.fail("nothing to try"))
-    with _threads_as_before():
-        assert [measured(most) for most in (1, 2, 3)] == [1, 2, 2]
-
-
-@pytest.mark.parametrize(
-    ("rates", "threads"),
-    [({2: 130, 4: 140, 8: 300}, 2), ({2: 130, 4: 180, 8: 200}, 4), ({2: 130, 4: 180, 8: 240}, 8)],
-)
-def test_auto_doubles_further_threads_while_that_pays(
-    monkeypatch: pytest.MonkeyPatch, rates: dict[int, float], threads: int
-) -> None:
-    disturbed = itertools.cycle([0.5, 1, 1, 1, 1, 0.5, 1])  # another program, now and then
-    monkeypatch.setattr(host, "_rate", lambda count: rates[count] * next(disturbed))
-    with _threads_as_before():
-        assert measured(8) == threads
-
-
-def test_further_threads_are_really_tried() -> None:
-    with _threads_as_before():
-        assert measured(4) in (2, 4)
-
-
-@contextmanager
-def _threads_as_before() -> Iterator[None]:
-    count = torch.get_num_threads()
-    try:
-        yield
-    finally:
-        use_threads(count)
+@pytest.mark.parametrize("text", ["0", "-1", "auto", "1.5", "2000"])
+def test_threads_are_a_number(text: str, toonset, bundle: Path):
+    assert "--threads" in toonset("train", bundle, f"--threads={text}").reason
 
 
 def test_a_log_gets_a_line_now_and_then_and_a_terminal_a_live_one():

@@ -1,28 +1,20 @@
-"""What is written of a field and checked when it is read, and what memory a training may take."""
+"""What is written of a field and checked when it is read."""
 
 from __future__ import annotations
 
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from safetensors.torch import save
 
-from bench.cases.cases import train_cases
-from bench.train.growth import growths
-from toonset.camera import Camera
-from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.errors import BundleError
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
-from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.tensors import packed, parameters_of, rows_near, unpack
-from toonset.nerf.train import memory
-from toonset.nerf.train.carved_rays import PRUNE_AFTER
 from toonset.nerf.train.loop import store_in_half
 from toonset.nerf.train.loss import Model
 
@@ -127,67 +119,3 @@ def test_half_precision_is_idempotent_and_never_overflows() -> None:
     assert torch.equal(once, field.planes)
     assert torch.equal(once, once.half().float())
     assert torch.equal(decoder, field.hidden.weight)  # small parts stay as they are
-
-
-# ---- memory
-
-
-def discs(side: int, views: int) -> Scene:
-    camera = Camera.looking_at(np.zeros(3), 0.0, 0.0, side / 3, (side, side))
-    away = np.hypot(*(camera.pixel_grid() - side / 2).transpose(2, 0, 1))
-    rgba = np.full((side, side, 4), 255, np.uint8)
-    rgba[away > side / 3, 3] = 0
-    return Scene(tuple(Frame(f"{i}.png", camera, rgba) for i in range(views)), None, "discs")
-
-
-def test_the_estimate_grows_with_pictures_and_is_held_against_what_is_free(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    sizes = [
-        memory.needed_bytes(discs(side, views), TrainOptions())
-        for side, views in ((60, 4), (60, 8), (120, 8))
-    ]
-    assert sizes == sorted(sizes)
-    assert sizes[0] < sizes[1] < sizes[2] < 4e9
-    cpu = torch.device("cpu")
-    monkeypatch.setattr(memory, "free_bytes", lambda: sizes[0] - 1)
-    with pytest.raises(BundleError, match=r"discs: training needs about .* GB of memory, .* free"):
-        memory.check_memory(discs(60, 4), TrainOptions(), cpu)
-    monkeypatch.setattr(memory, "free_bytes", lambda: sizes[0])
-    assert "are free" in memory.check_memory(discs(60, 4), TrainOptions(), cpu)
-    monkeypatch.setattr(memory, "free_bytes", lambda: None)
-    assert "free" not in memory.check_memory(discs(60, 4), TrainOptions(), cpu)
-
-
-def test_a_control_group_with_less_than_the_machine_counts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    group = tmp_path / "batch" / "job"
-    group.mkdir(parents=True)
-    for folder, limit in ((group, "max"), (group.parent, "3000000")):
-        (folder / "memory.max").write_text(limit)
-        (folder / "memory.current").write_text("2500000")
-        (folder / "memory.stat").write_text("anon 1\ninactive_file 400000\n")
-    monkeypatch.setattr(memory, "CGROUP", tmp_path)
-    assert memory._cgroup_free(group) == []
-    assert memory._cgroup_free(group.parent) == [900_000]
-    monkeypatch.setattr(memory, "_cgroups_free", lambda: [900_000])
-    assert memory.free_bytes() == 900_000
-
-
-def test_running_out_of_memory_is_told_apart_from_other_errors() -> None:
-    with pytest.raises(MemoryError, match="more than this machine has"), memory.memory_errors():
-        torch.empty(2**60, dtype=torch.uint8)
-    with pytest.raises(MemoryError, match="more than the GPU has"), memory.memory_errors():
-        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB")
-    with pytest.raises(RuntimeError, match="mat1 and mat2"), memory.memory_errors():
-        torch.mm(torch.ones(2, 3), torch.ones(2, 3))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("carve", [True, False])
-def test_the_estimate_is_near_the_real_peak(carve: bool) -> None:
-    (case,) = train_cases(None, 0, 1)
-    options = TrainOptions(steps=PRUNE_AFTER + 2, device="cpu", carve=carve)
-    (row,) = growths({150: case.train}, options)
-    assert 0.7 * row.peak < row.estimate < 1.4 * row.peak

@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from skimage.metrics import structural_similarity
 
 from toonset.nerf.score import lpips as lpips_metric
 from toonset.nerf.score.flip import load_flip
@@ -23,11 +22,9 @@ from toonset.nerf.score.metrics import (
     psnr_of,
     shifted_psnr,
     silhouette_iou,
-    ssim_inside,
-    ssim_map,
+    ssim,
 )
 from toonset.nerf.score.metrics_view import Judges, figures_of
-from toonset.nerf.score.structure import gmsd, haarpsi
 from toonset.view import over_white
 
 NO_JUDGES = Judges("no flip here", "no lpips here")
@@ -50,63 +47,18 @@ def figure(outline: bool = True, at: int = 20) -> np.ndarray:
     return rgba
 
 
-# piq 0.8.0: haarpsi and gmsd with their defaults on the same pictures in float64
-@pytest.mark.parametrize(
-    ("height", "width", "haar", "deviation"),
-    [
-        (40, 52, 0.3635712635861629, 0.1696769495152422),
-        (41, 37, 0.39718788524843435, 0.17627401411949242),
-        (64, 64, 0.354763120377796, 0.17457871567168926),
-    ],
-)
-def test_haarpsi_and_gmsd_as_piq_has_them(
-    height: int, width: int, haar: float, deviation: float
-) -> None:
-    a, b = pattern(height, width)
-    assert haarpsi(a, b) == pytest.approx(haar, rel=1e-9)
-    assert gmsd(a, b) == pytest.approx(deviation, rel=1e-9)
-
-
-def test_haarpsi_and_gmsd_of_equal_small_and_masked_pictures() -> None:
-    a, b = pattern(40, 40)
-    assert haarpsi(a, a) == pytest.approx(1)
-    assert gmsd(a, a) == 0
-    assert haarpsi(np.zeros((20, 20, 3)), np.zeros((20, 20, 3))) == 1
-    assert haarpsi(a[:15], b[:15]) is None
-    everything, nothing = np.ones((40, 40), dtype=bool), np.zeros((40, 40), dtype=bool)
-    assert haarpsi(a, b, everything) == pytest.approx(haarpsi(a, b))
-    assert gmsd(a, b, everything) == pytest.approx(gmsd(a, b))
-    assert haarpsi(a, b, nothing) is None
-    assert gmsd(a, b, nothing) is None
-    # wrong on the left half alone: the right half, away from the border, is found to be right
-    half = np.where(np.arange(40)[None, :, None] < 20, b, a)
-    right = np.zeros((40, 40), dtype=bool)
-    right[:, 32:] = True
-    inside, whole = haarpsi(a, half, right), haarpsi(a, half)
-    assert inside is not None
-    assert whole is not None
-    assert inside == pytest.approx(1)
-    assert whole < 0.9
-    assert gmsd(a, half, right) == pytest.approx(0)
-
-
-def test_ssim_as_scikit_image_has_it() -> None:
+def test_ssim_of_alike_flat_and_masked_pictures() -> None:
     a, b = pattern(48, 40)
-    known = structural_similarity(
-        a,
-        b,
-        data_range=1,
-        channel_axis=2,
-        gaussian_weights=True,
-        sigma=1.5,
-        use_sample_covariance=False,
-        full=True,
-    )[1]
-    np.testing.assert_allclose(ssim_map(a, b), known[5:-5, 5:-5], atol=1e-9)
-    mask = np.zeros((48, 40), dtype=bool)
-    mask[10:30, 8:20] = True
-    assert ssim_inside(a, b, mask) == pytest.approx(known[10:30, 8:20].mean())
-    assert ssim_inside(a, b, ~np.ones_like(mask)) is None
+    everything, nothing = np.ones((48, 40), dtype=bool), np.zeros((48, 40), dtype=bool)
+    assert ssim(a, a) == pytest.approx(1)
+    assert ssim(a, b) == ssim(b, a) == pytest.approx(ssim(a, b, everything))
+    assert ssim(a, b, nothing) is None
+    dark, light = np.full((20, 20, 3), 0.2), np.full((20, 20, 3), 0.6)
+    known = (2 * 0.2 * 0.6 + 1e-4) / (0.2**2 + 0.6**2 + 1e-4)  # no structure: means alone
+    assert ssim(dark, light) == pytest.approx(known)
+    half = np.where(np.arange(40)[None, :, None] < 20, b, a)  # wrong on the left alone
+    assert ssim(a, half, everything & (np.arange(40) >= 25)) == pytest.approx(1)
+    assert ssim(a, half) < 0.9
 
 
 # flip-evaluator 1.7 (the authors'), 67 pixels per degree
@@ -269,7 +221,7 @@ def test_all_figures_of_a_view() -> None:
     nothing, _ = figures_of(figure(), blank, NO_JUDGES)
     assert [name for name, value in nothing.items() if value is None] == [
         *("psnr_mask", "ssim_mask", "psnr_shift_mask", "sharpness", "dirt", "flip", "flip_mask"),
-        *("haarpsi_mask", "gmsd_mask", "lpips", "ink_f1"),
+        *("lpips", "ink_f1"),
     ]
     assert all(math.isfinite(value) for value in nothing.values() if value is not None)
     judged, error = figures_of(blank, figure(), Judges(lambda d, r: (d - r)[..., 2] * 0 + 0.25, ""))
@@ -281,7 +233,7 @@ def test_figures_of_a_single_pixel() -> None:
     dot = np.full((1, 1, 4), 200, dtype=np.uint8)
     figures, _ = figures_of(dot, dot, NO_JUDGES)
     assert figures["psnr"] == BEST_PSNR
-    assert figures["ssim"] is figures["haarpsi"] is None
+    assert figures["ssim"] is None
 
 
 def test_means_leave_out_what_is_missing() -> None:
