@@ -18,7 +18,7 @@ from toonset.nerf.train.batches import MOST_RAYS
 from toonset.nerf.train.box_rays import BINS, RAYS_PER_STEP
 from toonset.nerf.train.train import MOST_SAMPLES
 
-# Measured by `python -m bench.train.floor`: peak resident memory over that before.
+# Peak resident memory over that before, as tests/nerf/run/test_files.py measures it.
 CARVED_BYTES = 40  # of a voxel of the hull's grid, while it is carved and faired
 VOXEL_BYTES = 12  # and later
 SAMPLE_BYTES = 140  # its place; interpolation both ways of the half that is left
