@@ -34,23 +34,24 @@ from toonset.dataset.split_folder.view_labels import Label
 NAMED = math.radians(45.0)  # people name directions in steps of this
 UNJUDGED = ""
 COLUMNS = (
-    Column("rotation error", "error, deg", "{:.2f}", "median"),
-    Column("rotation error", "p95", "{:.2f}", "p95"),
-    Column("rotation error modulo twin", "twin p95", "{:.2f}", "p95"),
-    Column("within 5 deg", "<5 deg %", "{:.0f}", scale=100),
-    Column("flipped views", "flips", "{:.0f}"),
-    Column("wrong but ok", "wrong ok", "{:.0f}"),
-    Column("wrong and announced", "said %", "{:.0f}", scale=100),
-    Column("yaw z-score", "yaw z", "{:.2f}"),
-    *(Column(name, name[:5], "{:.0f}", scale=100) for name in SEVERITY),
+    Column("rotation error", "deg", "{:.2f}", "median"),
+    Column("rotation error", "p95", "{:.1f}", "p95"),
+    Column("rotation error modulo twin", "twin", "{:.1f}", "p95"),
+    Column("within 5 deg", "<5 deg", "{:.0f}", scale=100),
+    Column("flipped views", "flip", "{:.0f}"),
+    Column("wrong but ok", "bad", "{:.0f}"),
+    Column("wrong and announced", "said", "{:.0f}", scale=100),
+    Column("yaw z-score", "z", "{:.2f}"),
+    *(Column(name, name[:4], "{:.0f}", scale=100) for name in SEVERITY),
     Column(NOT_PLACED, "lost", "{:.0f}"),
     Column("seconds", "s", "{:.2f}"),
-    Column(CPU_SECONDS, "CPU s", "{:.2f}"),
+    Column(CPU_SECONDS, "CPU", "{:.2f}"),
 )
 LEGEND = """
-twin: modulo the mirror twin. flips: more than 15 deg off, and the twin is less. wrong ok: more than
-15 deg off with verdict ok; said: of such, how many are not ok. yaw z: spread of error / sigma, 1 is
-right. Verdicts in %. lost: views without a camera. Seconds per sheet."""
+deg, p95: rotation error, median and 95th percentile. twin: p95 modulo the mirror twin. <5 deg: %.
+flip: views over 15 deg off, their twin less. bad: views over 15 deg off with verdict ok. said: % of
+views so far off that are not ok. z: spread of yaw error / sigma, 1 is right. ok to fail: verdicts,
+%. lost: views without a camera. s, CPU: seconds per sheet."""
 
 
 @dataclass(frozen=True)

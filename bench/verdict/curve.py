@@ -33,7 +33,7 @@ def table(sheets: Sequence[Judged]) -> str:
     Sheets between FINE and BAD count as neither.
     """
     ordered = sorted(sheets, key=lambda sheet: sheet.worst_look)
-    looks = [(100 * s.off, 100 * float(np.nanmean(s.look)), 100 * s.worst_look) for s in ordered]
+    looks = [(100 * s.off, 100 * float(np.mean(s.look)), 100 * s.worst_look) for s in ordered]
     rows = [
         (sheet.name, *(f"{value:.2f}" for value in own), sheet.verdict)
         for sheet, own in zip(ordered, looks, strict=True)

@@ -38,7 +38,7 @@ class Judged:
         verdict: "ok" or "weak".
         reasons: of it.
         off: the worst drawing, share of the figure's height (see `toonset.nerf.score.left_out`).
-        look: per held-out view, share of the figure's height; nan where no pixel counts.
+        look: per held-out view where pixels count, share of the figure's height.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Judged:
     @property
     def worst_look(self) -> float:
         """Return the look of the worst held-out view."""
-        return float(np.nanmax(self.look))
+        return max(self.look)
 
 
 def judge(
@@ -79,7 +79,8 @@ def judge(
         truth, seen = over_white(frame.rgba), over_white(shown)
         counted = where[number] if where else np.ones(truth.shape[:2], dtype=bool)
         per_px = float(by_pixel(flip, truth)[counted].sum()) * max(figure_px(frame), 1)
-        looks.append(float(flip(truth, seen)[counted].sum()) / per_px if per_px else np.nan)
+        if per_px:
+            looks.append(float(flip(truth, seen)[counted].sum()) / per_px)
         tiles.append(np.concatenate([truth, seen]))
     judged = Judged(name, found.verdict, found.reasons, found.off, tuple(looks))
     return judged, encode_png((np.concatenate(tiles, axis=1) * 255 + 0.5).astype(np.uint8))

@@ -93,7 +93,7 @@ def sheet() -> DrawnSheet:
 
 
 def test_a_refused_and_a_crashed_sheet_are_results(sheet: DrawnSheet, monkeypatch) -> None:
-    for error, verdict in ((SheetError("too faint"), "failed"), (KeyError("k"), "crashed")):
+    for error, voice in ((SheetError("too faint"), "failed"), (KeyError("k"), "crashed")):
 
         def broken(*_arguments, error=error):
             raise error
@@ -101,7 +101,7 @@ def test_a_refused_and_a_crashed_sheet_are_results(sheet: DrawnSheet, monkeypatc
         monkeypatch.setattr(cameras, "find_cameras", broken)
         trials, picture = cameras.try_cameras(lambda: sheet, 0)
         assert picture.startswith(b"\x89PNG")
-        assert [(one.voice, one.value) for one in trials] == [(verdict, 180.0)] * 3
+        assert [(one.voice, one.value) for one in trials] == [(voice, 180.0)] * 3
         assert trials[0].words in ("too faint", "KeyError: 'k'")
 
 
