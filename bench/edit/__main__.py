@@ -129,33 +129,30 @@ def state_of(case: Case, session: Session) -> State:
     return State(wrong, max(errors), session.scene["verdict"]["state"], both[number])
 
 
-def corrected(case: Case, session: Session) -> tuple[bool, list[tuple[float, float]]]:
-    """Correct a sheet, and print what was done; return whether it is right, and seconds of fits.
-
-    Seconds are by the clock, and of the processor.
-    """
+def corrected(case: Case, session: Session) -> tuple[bool, list[float]]:
+    """Correct a sheet, and print what was done; return whether it is right, and its fits' CPU s."""
     entries: list[dict[str, Any]] = []
     actions: list[str] = []
-    seconds: list[tuple[float, float]] = []
+    seconds: list[float] = []
     start = now = state_of(case, session)
     while not now.right and len(actions) < MOST_ACTIONS:
         view, truth = now.next
         known = next((one for one in entries if one["box"] == view["box"]), None)
         entry, word = _next_said(view, truth, known)
         entries = [*(one for one in entries if one is not known), entry]
-        began, worked = time.monotonic(), time.process_time()
+        began = time.process_time()
         session.save({"version": 1, "views": entries}, session.revision)
         fitted = session.state()
         while fitted["busy"]:
             fitted = session.state(after=fitted["number"], wait_s=60)
-        seconds.append((time.monotonic() - began, time.process_time() - worked))
+        seconds.append(time.process_time() - began)
         actions.append(f"{view['name'].removesuffix('.png')} {word}")
         now = state_of(case, session)
-    times = ", ".join(f"{clock:.1f} ({worked:.1f})" for clock, worked in seconds)
+    times = ", ".join(f"{one:.1f}" for one in seconds)
     print(
         f"{case.name}: {start.verdict} -> {now.verdict}; views off by > {RIGHT_DEG:.0f} deg "
         f"{start.wrong} -> {now.wrong}, worst {start.most_deg:.0f} -> {now.most_deg:.0f} deg; "
-        f"{len(actions)} actions ({'; '.join(actions)}); {times} s",
+        f"{len(actions)} actions ({'; '.join(actions)}); {times} CPU s",
         flush=True,
     )
     return now.right, seconds
@@ -182,7 +179,7 @@ def main(
     only: Annotated[str, typer.Option(help="Cases whose name matches this.")] = "",
 ) -> None:
     """Print what corrections make of sheets that are doubtful."""
-    found: list[tuple[bool, list[tuple[float, float]]]] = []
+    found: list[tuple[bool, list[float]]] = []
     with tempfile.TemporaryDirectory() as place:
         for case in (case for case in cases(root) if re.search(only, case.name)):
             if len(found) == MOST_SHEETS:
@@ -207,8 +204,8 @@ def main(
     right = sum(own for own, _ in found)
     print(f"{right} of {len(found)} sheets right, not ambiguous, with {MOST_ACTIONS} actions")
     seconds = [one for _, own in found for one in own]
-    for name, times in zip(("clock", "processor"), zip(*seconds, strict=True), strict=False):
-        print(f"fits, {name}: median {np.median(times):.1f} s, most {max(times):.1f} s")
+    if seconds:
+        print(f"fits: median {np.median(seconds):.1f} CPU s, most {max(seconds):.1f}")
 
 
 if __name__ == "__main__":

@@ -31,6 +31,7 @@ OTHERS = tuple(color for color in COLORS if color != VERMILION)  # than the defa
 DISCS, STAR = ("o", "s", "^", "D", "v", "P", "X"), "*"
 FEW = 5.0  # high over low, up to which ticks are evenly apart in value
 CAPTION_WIDTH = 150  # characters
+LEGEND: dict[str, Any] = {"loc": "outside right upper", "fontsize": 8, "frameon": False}
 # text stays text, element names do not depend on the run, no date
 DRAWN: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "toonset"}
 WITHOUT_DATE: dict[Form, dict[str, Any]] = {
@@ -99,7 +100,7 @@ def draw_chart(chart: Chart, form: Form = "png") -> bytes:
     unit = f", {chart.unit}" if chart.unit else ""
     axes.set_ylabel(f"{chart.merit}{unit} ({better} is better)", fontsize=9.5)
     _plain(axes)
-    figure.legend(loc="outside right upper", fontsize=8, frameon=False)
+    figure.legend(**LEGEND)
     caption = "\n".join(textwrap.fill(note, CAPTION_WIDTH) for note in chart.notes)
     figure.supxlabel(caption, x=0.01, ha="left", fontsize=7.5, color=DARK)
     return figure_bytes(figure, form)
@@ -155,13 +156,7 @@ def draw_panels(
         _plain(axes)
     for axes in places[len(panels) :]:
         axes.set_axis_off()
-    figure.legend(
-        handles=list(handles.values()),
-        labels=list(handles),
-        loc="outside right upper",
-        fontsize=8,
-        frameon=False,
-    )
+    figure.legend(list(handles.values()), list(handles), **LEGEND)
     figure.supxlabel(axis[0], fontsize=8.5, color=DARK)
     figure.supylabel(axis[1], fontsize=9)
     return figure_bytes(figure, form)
@@ -229,14 +224,8 @@ def draw_steps(pages: Sequence[Steps], caption: str = "", form: Form = "png") ->
         for axes in (values, shares):
             _plain(axes)
     handles, labels = frames.ravel()[0].axes[1].get_legend_handles_labels()
-    figure.legend(
-        handles=handles,
-        labels=labels,
-        loc="outside upper left",
-        ncols=min(5, 2 * columns),
-        fontsize=8,
-        frameon=False,
-    )
+    place = {"loc": "outside upper left", "ncols": min(5, 2 * columns)}
+    figure.legend(handles, labels, **LEGEND | place)
     told = f"Diamonds: medians; bars: to the 95th percentile. {caption}"
     figure.supxlabel(textwrap.fill(told, 60 * columns), fontsize=8)
     return figure_bytes(figure, form)

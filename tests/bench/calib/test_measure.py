@@ -245,7 +245,7 @@ def test_the_table_has_a_row_per_method_and_fits_a_terminal() -> None:
         assert sum(line.startswith(f"{method}  ") for line in lines) == 1
     assert lines[0] == "another body"
     (default,) = [line for line in lines if line.startswith("default ")]
-    assert default.split()[:5] == ["default", "121", "179.00", "179.00", "88.00"]
+    assert default.split()[:5] == ["default", "121", "179.00", "179.0", "88.0"]
 
 
 # ---- the command
