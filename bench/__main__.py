@@ -13,11 +13,12 @@ from typing import Annotated
 
 import typer
 
-from bench.commands.charts import REPORT, result_files
-from bench.commands.charts import WRITTEN as RESULTS
 from bench.commands.check import check
-from bench.commands.chosen import Baseline, Chosen, Subject
-from bench.commands.measure import FACES, LOOK_VIEWS, LOOKS, WRONG_SPLITS, measure
+from bench.commands.chosen import Chosen, Subject
+from bench.commands.measure import WRITTEN as PICTURES
+from bench.commands.measure import measure
+from bench.commands.results import REPORT, result_files
+from bench.commands.results import WRITTEN as RESULTS
 from toonset.cli.common.help import Verb
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
@@ -30,8 +31,7 @@ from toonset.cli.common.output import (
 from toonset.cli.main import run
 from toonset.write import check_output
 
-LOOK = (f"{LOOKS}.png", f"{LOOKS}.svg", f"{LOOK_VIEWS}-*.png", f"{FACES}-*.png")
-WRITTEN = (*RESULTS, WRONG_SPLITS, *LOOK)
+WRITTEN = (*RESULTS, *PICTURES)
 
 app = typer.Typer(
     pretty_exceptions_enable=False,
@@ -62,7 +62,6 @@ def bench(
             "--count",
             min=1,
             help="Synthetic cases per condition (without --cases); default 4. "
-            "Paper: characters; default 8, with --quick 3. "
             "Stability: sheets per step; default 8 (training: 3), with --quick 2 (1). "
             "Split: sheets per difficulty, 15 times as many mixtures; with --quick 1.",
         ),
@@ -70,20 +69,6 @@ def bench(
     half: Annotated[
         bool, typer.Option("--half", help="Train on the cases' pictures at half size.")
     ] = False,
-    baseline: Annotated[
-        Baseline | None,
-        typer.Option("--baseline", help="Calib: also run COLMAP, structure from motion; slow."),
-    ] = None,
-    peer: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--peer",
-            metavar="NAME=COMMAND",
-            help="Train: run another program, too, its CPU seconds counted from outside as "
-            "toonset's own beside it; {data}: folder with transforms.json and pictures, {test}: "
-            "held-out cameras, {out}: where to write their pictures. May be given several times.",
-        ),
-    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer settings or cases.")] = False,
     against_committed: Annotated[
         bool,
@@ -102,14 +87,12 @@ def bench(
 ) -> None:
     """Measure one stage: seconds against accuracy, per setting, beside a baseline.
 
-    Prints a table and writes records.json, report.html and, for `calib`, `train`, `look` and
-    `palette`, a chart of seconds against accuracy per condition (PNG, SVG, CSV). `split` draws the
+    Prints a table and writes records.json and report.html, with a chart of seconds against accuracy
+    per condition (PNG, SVG, CSV), and what is known of a default that loses. `split` draws the
     wrongly split sheets. `look` says how new views of drawn sheets look, leaving out every part of
-    the drawn look in turn, and counts whole eyes. `stability` sweeps what a sheet may have wrong,
-    to where it fails; `train` draws held-out PSNR against seconds; `paper` makes the plain method's
-    table and figure, for hours, and
-    says whether palettes help it. Of these three, the same command again continues a stopped run,
-    or draws all that is there.
+    the drawn look in turn. `stability` sweeps what a sheet may have wrong, to where it fails;
+    `train` draws held-out PSNR against seconds. Of these two, the same command again continues a
+    stopped run, or draws all that is there.
     `--check` runs a quick bench of every stage and ends with 3 where one has got worse.
     """
     from bench.records.record import as_dicts, machine
@@ -117,22 +100,19 @@ def bench(
 
     printer = Printer(as_json, quiet)
     if against_committed or renew:
-        others = (subject, cases, sprites, only, count, half, baseline, quick, force, peer)
+        others = (subject, cases, sprites, only, count, half, quick, force)
         if any(others) or (against_committed and renew):
             raise typer.BadParameter("--check and --renew stand alone, without a subject")
         check(seed, printer, renew=renew)
         return
     if subject is None:
         raise typer.BadParameter(f"say what to measure: {', '.join(Subject)}; or --check")
-    peers = tuple(peer or ())
-    chosen = Chosen(subject, cases, sprites, only, count, half, baseline, quick, seed, peers)
+    chosen = Chosen(subject, cases, sprites, only, count, half, quick, seed)
     chosen.check()
-    if subject in (Subject.stability, Subject.train, Subject.paper):
+    if subject in (Subject.stability, Subject.train):
         with resumable(printer):
-            if subject is Subject.stability:
-                _stability(out, only, seed, count, quick, force, printer)
-            else:
-                _training(out, chosen, force, printer)
+            into = _stability if subject is Subject.stability else _training
+            into(out, chosen, force, printer)
         return
     check_output(out, [cases, sprites], WRITTEN, force=force)
     measured = measure(chosen, printer)
@@ -156,29 +136,20 @@ def resumable(printer: Printer) -> Iterator[None]:
 
 
 def _training(out: Path, chosen: Chosen, force: bool, printer: Printer) -> None:
-    from bench.commands.paper import paper_into
     from bench.commands.train import train_into
-    from bench.records.record import machine
 
-    into = paper_into if chosen.subject is Subject.paper else train_into
-    text, found = into(out, chosen, printer, force=force)
-    printer.say(f"machine: {machine()}, seeds from {chosen.seed}; pictures in {out}")
+    text, found = train_into(out, chosen, printer, force=force)
+    printer.say(f"seeds from {chosen.seed}; look at {out / REPORT}")
     printer.result(found, text)
 
 
-def _stability(
-    out: Path, only: str, seed: int, count: int | None, quick: bool, force: bool, printer: Printer
-) -> None:
-    from dataclasses import asdict
+def _stability(out: Path, chosen: Chosen, force: bool, printer: Printer) -> None:
+    from bench.stability.run import sweep_into
+    from bench.stability.trials import as_plain, summary_text
 
-    from bench.atlas.figures import as_plain, summary_text
-    from bench.commands.stability import sweep_into
-
-    progress = printer.progress
-    rows, pages = sweep_into(out, only, seed, count, quick=quick, force=force, progress=progress)
-    printer.say(f"seed {seed}; look at {out / REPORT}")
-    plain = {"rows": [asdict(row) for row in rows], "pages": as_plain(pages)}
-    printer.result({"folder": out, **plain}, summary_text(pages))
+    pages = sweep_into(out, chosen, force=force, progress=printer.progress)
+    printer.say(f"seeds from {chosen.seed}; look at {out / REPORT}")
+    printer.result({"folder": out, "pages": as_plain(pages)}, summary_text(pages))
 
 
 def main() -> None:

@@ -12,9 +12,7 @@ tracker", 1990.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from zlib import crc32
 
@@ -37,43 +35,13 @@ REACHES = (0.1, 0.05, 0.03, 0.015)  # of the figure's height, that it looks away
 MARGIN = 0.25  # of the figure's height, round the tracker's picture
 
 Rotation = Float[np.ndarray, "3 3"]
-
-
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """What a baseline makes of a sheet.
-
-    Attributes:
-        rotations: camera_from_world of every view; None: it found none.
-        seconds: wall time.
-        cpu_seconds: of this process.
-    """
-
-    rotations: tuple[Rotation | None, ...]
-    seconds: float
-    cpu_seconds: float
-
-
-Baseline = Callable[[CalibCase, int], Placed]  # of a sheet and a seed
-
-
-def timed(place: Callable[[], list[Rotation | None]]) -> Placed:
-    """Return what `place` finds, and the time that it takes."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    rotations = tuple(place())
-    return Placed(rotations, time.perf_counter() - wall, time.process_time() - cpu)
+Baseline = Callable[[CalibCase, int], list[Rotation | None]]  # of a sheet and a seed
 
 
 def nominal_rotations(views: int) -> list[Rotation]:
     """Return the rotations of who takes the drawings for even turns, a little from above."""
     turns = (2 * math.pi * i / views for i in range(views))
     return [rotation_from_angles(turn, NOMINAL_ELEVATION, 0.0) for turn in turns]
-
-
-def nominal_cameras(case: CalibCase) -> list[Camera]:
-    """Return orthographic cameras at the nominal angles; the mesh stands in each figure's box."""
-    turns = nominal_rotations(len(case.views))
-    return [boxed(case.mesh, view, turn) for view, turn in zip(case.views, turns, strict=True)]
 
 
 def boxed(mesh: Mesh, view: View, rotation: Rotation) -> Camera:
@@ -101,7 +69,7 @@ def spread_vertices(mesh: Mesh, count: int, rng: np.random.Generator) -> Int[np.
     return np.array(chosen)
 
 
-def by_landmarks(case: CalibCase, seed: int, *, noise: float) -> Placed:
+def by_landmarks(case: CalibCase, seed: int, *, noise: float) -> list[Rotation | None]:
     """Return PnP's rotations from clicked landmarks.
 
     The points are the mannequin's; they are clicked where the drawn body has them. Where that body
@@ -124,7 +92,7 @@ def by_landmarks(case: CalibCase, seed: int, *, noise: float) -> Placed:
         clicks.append(
             camera.project(seen)[0] + rng.normal(scale=noise * BODY_PX, size=(LANDMARKS, 2))
         )
-    return timed(lambda: [solved(known, pixels, lens) for pixels in clicks])
+    return [solved(known, pixels, lens) for pixels in clicks]
 
 
 def solved(
@@ -141,18 +109,15 @@ def solved(
     return _before_camera(turn, offset, points)
 
 
-def tracked(case: CalibCase, seed: int) -> Placed:
+def tracked(case: CalibCase, seed: int) -> list[Rotation | None]:
     """Return OpenCV's contour tracker's rotations, from the nominal angles on; nothing is random.
 
     Its lens is far, its first place and size are those of the figure's box.
     """
     del seed
-    starts = nominal_cameras(case)
-    return timed(
-        lambda: [
-            track(case.mesh, view, start) for view, start in zip(case.views, starts, strict=True)
-        ]
-    )
+    turns = nominal_rotations(len(case.views))
+    pairs = zip(case.views, turns, strict=True)
+    return [track(case.mesh, view, boxed(case.mesh, view, turn)) for view, turn in pairs]
 
 
 def track(mesh: Mesh, view: View, start: Camera) -> Rotation | None:
@@ -192,6 +157,7 @@ def _before_camera(
 
 
 BASELINES: Mapping[str, Baseline] = {
+    "nominal angles": lambda case, _: [*nominal_rotations(len(case.views))],
     "PnP, landmarks 1 % off": partial(by_landmarks, noise=0.01),
     "PnP, landmarks 2 % off": partial(by_landmarks, noise=0.02),
     "PnP, landmarks 4 % off": partial(by_landmarks, noise=0.04),

@@ -1,9 +1,8 @@
 """What is measured: folders with ground truth, or synthetic turnarounds with fresh seeds.
 
 A case folder holds `sheet.png`, `mannequin.obj` and `gt.json` (world_from_camera, OpenGL axes) for
-calibration; `views/` and `test/` with a transforms.json each for training, where a `mannequin.obj`
-in the frame of their cameras is one more baseline. The condition is the part of its name after the
-last hyphen.
+calibration; `views/` and `test/` with a transforms.json each for training. The condition is the
+part of its name after the last hyphen.
 """
 
 from __future__ import annotations
@@ -91,16 +90,12 @@ class TrainCase:
         group: condition.
         train: the drawings.
         test: held-out views, for the figures alone.
-        mannequin: a body that stands where the drawn one does; None: there is none. Another body's,
-            as users have it, or in some folders the character's own mesh, without its colours:
-            views of that one are an upper bound of what a mannequin can show, no rival.
     """
 
     name: str
     group: str
     train: Scene
     test: Scene
-    mannequin: Mesh | None = None
 
 
 def calib_cases(folder: Path | None, seed: int, count: int, only: str = "") -> Iterator[CalibCase]:
@@ -151,22 +146,19 @@ def train_cases(
             body = random_body(seed + i)
             drawn = SynthOptions(cell_px=px, outline_px=0, elevation_deg=8)
             held_out = replace(drawn, views=16)
-            train = _scene(make_turnaround(body, drawn, seed + i))
-            test = _scene(make_turnaround(body, held_out, seed + i))
+            made, true = (make_turnaround(body, options, seed + i) for options in (drawn, held_out))
+            test = scene_of(true, true.palette)
             odd = replace(test, frames=test.frames[1::2])  # between the training views
-            other = _as_tall(_stranger(seed + i), body)
-            yield TrainCase(f"body {seed + i}", "clean", train, odd, other)
+            yield TrainCase(f"body {seed + i}", "clean", scene_of(made, made.palette), odd)
         return
     for case in case_folders(folder, "views/transforms.json"):
         train, test = read_scene(case / "views"), read_scene(case / "test")
         if half:
-            train, test = _halved(train), _halved(test)
-        mesh = case / MANNEQUIN_FILE
-        mannequin = load_mesh(mesh) if mesh.is_file() else None
-        yield TrainCase(case.name, _group(case), train, test, mannequin)
+            train, test = halved(train), halved(test)
+        yield TrainCase(case.name, _group(case), train, test)
 
 
-def _halved(scene: Scene) -> Scene:
+def halved(scene: Scene) -> Scene:
     """Return the scene at half size: area average of premultiplied colour."""
     halves = []
     for frame in scene.frames:
@@ -181,12 +173,11 @@ def _halved(scene: Scene) -> Scene:
     return Scene(tuple(halves), scene.palette, scene.name)
 
 
-def _scene(turnaround: Turnaround) -> Scene:
-    made = tuple(
-        Frame(view.name, camera, view.rgba)
-        for view, camera in zip(turnaround.views, turnaround.cameras, strict=True)
-    )
-    return Scene(made, turnaround.palette, turnaround.mesh.name)
+def scene_of(made: Turnaround, palette: np.ndarray | None = None) -> Scene:
+    """Return the drawings of a turnaround with their true cameras."""
+    frames = zip(made.views, made.cameras, strict=True)
+    drawn = tuple(Frame(view.name, camera, view.rgba) for view, camera in frames)
+    return Scene(drawn, palette, made.mesh.name)
 
 
 def _synthetic_calib(name: str, group: str, condition: Condition, seed: int) -> CalibCase:
@@ -196,20 +187,8 @@ def _synthetic_calib(name: str, group: str, condition: Condition, seed: int) -> 
     rotations = np.stack([camera.rotation for camera in made.cameras])
     if len(views) != len(rotations):
         raise BundleError(f"synthetic {name}: split into {len(views)} views")
-    other = _stranger(seed) if condition.other_body else body
+    other = random_body(seed + STRANGER, symmetric=True) if condition.other_body else body
     return CalibCase(name, group, views, other, rotations, body)
-
-
-def _stranger(seed: int) -> Mesh:
-    """Return the mannequin that somebody has who draws the body of this seed."""
-    return random_body(seed + STRANGER, symmetric=True)
-
-
-def _as_tall(mannequin: Mesh, drawn: Mesh) -> Mesh:
-    """Return the mannequin scaled to the drawn body's height, on the same ground."""
-    vertices = mannequin.vertices * (drawn.height / mannequin.height)
-    vertices[:, 1] += drawn.bounds[0, 1] - vertices[:, 1].min()
-    return replace(mannequin, vertices=vertices)
 
 
 def case_folders(folder: Path, needed: str) -> list[Path]:

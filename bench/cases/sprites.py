@@ -11,22 +11,21 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
 
-from bench.calib.figures import Recorder, angle_between, seconds_record
+from bench.calib.figures import angle_between, seconds_record, verdict_records
 from bench.calib.measure import named_directions, own_cache
-from bench.records.record import Record
+from bench.records.record import Column, Record, Recorder, methods_table
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.known import Known
 from toonset.calib.outline.occluding_contour import prepare_surface
-from toonset.calib.result import Calibration
+from toonset.calib.result import SEVERITY, Calibration
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.rival import without_body_if_better
@@ -43,6 +42,20 @@ OWN_MESH, MANNEQUIN = "rendered sprites, own mesh", "drawn sprites, default mann
 SHADOW_BELOW = 200  # alpha of a cast shadow, where the sheet's description speaks of one
 NO_BODY = "no body"  # as laid out, and then: where it starts instead, and which way round
 ANEW = {"": (False, 1), ", rolled": (True, 1), ", reversed": (False, -1), ", both": (True, -1)}
+COLUMNS = (
+    Column("yaw error", "yaw, deg", "{:.2f}", "median"),
+    Column("yaw error", "p95", "{:.2f}", "p95"),
+    Column("within 3 deg", "<3 deg %", "{:.0f}", scale=100),
+    Column("right 45 deg bin", "right %", "{:.0f}", scale=100),
+    Column("wrong but ok", "wrong ok", "{:.0f}"),
+    *(Column(name, name[:5], "{:.0f}", scale=100) for name in SEVERITY),
+    Column("ok sheets", "sheets ok %", "{:.0f}", scale=100),
+    Column("seconds", "s", "{:.2f}"),
+)
+LEGEND = """
+right: yaw less than 22.5 deg off. wrong ok: in a wrong bin with verdict ok. Verdicts in %. Seconds
+per sheet."""
+Measured = tuple[str, list[float], Sequence[str], float]  # name, yaw errors, verdicts, seconds
 EXACT, BIN = math.radians(3.0), math.radians(22.5)
 
 
@@ -55,16 +68,6 @@ class SpriteCase:
     views: tuple[View, ...]
     mesh: Mesh
     yaws: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class MeasuredSprites:
-    """A character's name, its views' yaw errors (radians) and verdicts, and the seconds taken."""
-
-    case: str
-    yaw_errors: tuple[float, ...]
-    verdicts: tuple[str, ...]
-    seconds: float
 
 
 def sprite_cases(folder: Path, only: str = "") -> Iterator[SpriteCase]:
@@ -95,18 +98,29 @@ def bench_sprites(
     cases: Iterable[SpriteCase], seed: int, progress: Callable[[str], None] = lambda text: None
 ) -> list[Record]:
     """Return records of yaw errors, verdicts and seconds: with the mesh, without, with labels."""
-    found: dict[tuple[str, str], list[MeasuredSprites]] = {}
+    found: dict[tuple[str, str], list[Measured]] = {}
     for case in cases:
         with own_cache():
             load_bank(prepare_surface(case.mesh))  # fills the cache
-            for method, calibrated in _methods(case).items():
+            for method, (laid, calibrated) in _methods(case).items():
                 progress(f"{case.name}: {method}")
-                found.setdefault((case.group, method), []).append(calibrated())
+                began = time.perf_counter()
+                views = calibrated(laid).views
+                pairs = zip(views, laid.yaws, strict=True)
+                errors = [abs(angle_between(v.camera.angles[0], yaw)) for v, yaw in pairs]
+                measured = (case.name, errors, [v.verdict for v in views])
+                one = (*measured, time.perf_counter() - began)
+                found.setdefault((case.group, method), []).append(one)
     return [
         record
         for (group, method), sheets in found.items()
         for record in _records(sheets, Recorder(method, group, seed))
     ]
+
+
+def sprites_table(records: Sequence[Record]) -> str:
+    """Return the table of `python -m bench calib --sprites`."""
+    return f"{methods_table(records, COLUMNS)}\n{LEGEND}"
 
 
 def laid_out_anew(case: SpriteCase, *, rolled: bool, way: int) -> SpriteCase:
@@ -117,28 +131,25 @@ def laid_out_anew(case: SpriteCase, *, rolled: bool, way: int) -> SpriteCase:
     )
 
 
-def _methods(case: SpriteCase) -> dict[str, Callable[[], MeasuredSprites]]:
-    """Return how a case is calibrated, by name."""
+def _methods(case: SpriteCase) -> dict[str, tuple[SpriteCase, Callable[[SpriteCase], Calibration]]]:
+    """Return how a case is laid out and calibrated, by name."""
     labels = Known(labels=named_directions(case.yaws))
     front = min(range(len(case.yaws)), key=lambda i: abs(angle_between(case.yaws[i], 0.0)))
     hint = Known(labels=tuple((0.0,) if i == front else () for i in range(len(case.yaws))))
 
-    def with_mesh(known: Known) -> MeasuredSprites:
-        return _measured(case, lambda: _with_mesh(case, known))
-
-    def alone(laid: SpriteCase, known: Known) -> MeasuredSprites:
-        return _measured(laid, lambda: calibrate_without_body(laid.views, known))
+    def alone(known: Known) -> Callable[[SpriteCase], Calibration]:
+        return lambda laid: calibrate_without_body(laid.views, known)
 
     anew = {
-        f"{NO_BODY}{name}": partial(alone, laid_out_anew(case, rolled=rolled, way=way), Known())
+        f"{NO_BODY}{name}": (laid_out_anew(case, rolled=rolled, way=way), alone(Known()))
         for name, (rolled, way) in ANEW.items()
     }
     return {
-        "default": partial(with_mesh, Known()),
-        "labels": partial(with_mesh, labels),
+        "default": (case, lambda laid: _with_mesh(laid, Known())),
+        "labels": (case, lambda laid: _with_mesh(laid, labels)),
         **anew,
-        f"{NO_BODY}, front": partial(alone, case, hint),
-        f"{NO_BODY}, labels": partial(alone, case, labels),
+        f"{NO_BODY}, front": (case, alone(hint)),
+        f"{NO_BODY}, labels": (case, alone(labels)),
     }
 
 
@@ -153,22 +164,11 @@ def _with_mesh(case: SpriteCase, known: Known) -> Calibration:
     return better or found
 
 
-def _measured(case: SpriteCase, calibrated: Callable[[], Calibration]) -> MeasuredSprites:
-    start = time.perf_counter()
-    result = calibrated()
-    seconds = time.perf_counter() - start
-    errors = tuple(
-        abs(angle_between(view.camera.angles[0], yaw))
-        for view, yaw in zip(result.views, case.yaws, strict=True)
-    )
-    return MeasuredSprites(case.name, errors, tuple(view.verdict for view in result.views), seconds)
-
-
-def _records(sheets: list[MeasuredSprites], recorder: Recorder) -> list[Record]:
-    errors = [error for sheet in sheets for error in sheet.yaw_errors]
-    verdicts = [verdict for sheet in sheets for verdict in sheet.verdicts]
+def _records(sheets: list[Measured], recorder: Recorder) -> list[Record]:
+    errors = [error for _, own, _, _ in sheets for error in own]
+    verdicts = [verdict for _, _, own, _ in sheets for verdict in own]
     silent = [e > BIN and v == "ok" for e, v in zip(errors, verdicts, strict=True)]
-    medians = {s.case: math.degrees(float(np.median(s.yaw_errors))) for s in sheets}
+    medians = {name: math.degrees(float(np.median(own))) for name, own, _, _ in sheets}
     exact = [
         recorder.samples("yaw error", [math.degrees(e) for e in errors], by_case=medians),
         *recorder.share("within 3 deg", [e < EXACT for e in errors]),
@@ -177,9 +177,9 @@ def _records(sheets: list[MeasuredSprites], recorder: Recorder) -> list[Record]:
         *(exact if recorder.group == OWN_MESH else []),
         *recorder.share("right 45 deg bin", [e < BIN for e in errors]),
         recorder.total("wrong but ok", silent),
-        *recorder.verdicts(verdicts),
-        *recorder.share("ok sheets", [set(sheet.verdicts) == {"ok"} for sheet in sheets]),
-        seconds_record([(sheet.case, sheet.seconds) for sheet in sheets], recorder),
+        *verdict_records(verdicts, recorder),
+        *recorder.share("ok sheets", [set(own) == {"ok"} for _, _, own, _ in sheets]),
+        seconds_record([(name, seconds) for name, _, _, seconds in sheets], recorder),
     ]
 
 

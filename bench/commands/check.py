@@ -29,12 +29,7 @@ WORSE = 3
 
 
 def check(seed: int, printer: Printer, *, renew: bool) -> None:
-    """Print what has got worse; exit code 3 if anything has.
-
-    Args:
-        seed: of everything random; that of the committed figures.
-        printer: of table and progress.
-        renew: write the figures instead of comparing them.
+    """Print what has got worse, exit code 3 if anything has; or renew the committed figures.
 
     Raises:
         ToonsetError: the committed figures cannot be read, or written.
@@ -69,38 +64,28 @@ def measured(seed: int, printer: Printer) -> list[Guard]:
     for subject, count in SUBJECTS.items():
         printer.say(f"{subject.value} ...")
         yard_s = yardstick_s()
-        guards += guards_of(subject.value, _records(_chosen(subject, count, seed), printer), yard_s)
+        chosen = Chosen(subject, count=count, quick=True, seed=seed)
+        guards += guards_of(subject.value, _records(chosen, printer), yard_s)
     return guards
 
 
-def _chosen(subject: Subject, count: int | None, seed: int) -> Chosen:
-    return Chosen(subject, None, None, "", count, half=False, baseline=None, quick=True, seed=seed)
-
-
 def _records(chosen: Chosen, printer: Printer) -> list[Record]:
+    from bench.records.record import DEFAULT
+
     if chosen.subject is Subject.train:
-        return _training(chosen, printer)
+        from bench.commands.train import jobs_of
+        from bench.train.measure import records_of, run_jobs
+
+        jobs = [job for job in jobs_of(chosen) if job.method == DEFAULT]
+        return records_of([found for _, found in run_jobs(jobs, printer.progress)], chosen.seed)
     if chosen.subject is Subject.look:
-        return _look(chosen, printer)
+        from bench.look.cases import look_cases
+        from bench.look.measure import bench_look
+        from bench.look.measure import records_of as records_of_looks
+
+        cases = look_cases(None, chosen.seed, chosen.count or 1, quick=True)
+        results = bench_look(cases, chosen.seed, (DEFAULT,), printer.progress)
+        return [r for r in records_of_looks(results, chosen.seed) if r.metric in LOOK_METRICS]
     from bench.commands.measure import measure
 
     return measure(chosen, printer).records
-
-
-def _training(chosen: Chosen, printer: Printer) -> list[Record]:
-    from bench.charts.chart import DEFAULT
-    from bench.commands.train import jobs_of
-    from bench.train.measure import records_of, run_jobs
-
-    jobs = [job for job in jobs_of(chosen) if job.method == DEFAULT]
-    return records_of([found for _, found in run_jobs(jobs, printer.progress)], chosen.seed)
-
-
-def _look(chosen: Chosen, printer: Printer) -> list[Record]:
-    from bench.charts.chart import DEFAULT
-    from bench.look.cases import look_cases
-    from bench.look.measure import bench_look, records_of
-
-    cases = look_cases(None, chosen.seed, chosen.count or 1, quick=True)
-    results = bench_look(cases, chosen.seed, (DEFAULT,), printer.progress)
-    return [r for r in records_of(results, chosen.seed) if r.metric in LOOK_METRICS]

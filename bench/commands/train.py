@@ -1,4 +1,4 @@
-"""`bench train`: trainings in a folder that a later run continues; `paper` runs them, too.
+"""`bench train`: trainings in a folder that a later run continues.
 
 runs.json in the output folder is rewritten after every training. A run of the same version takes
 finished trainings from it: the same case, views, method, options and seed; table, records and
@@ -8,18 +8,19 @@ pictures show those that were asked for. Who has changed the code in between sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.commands.charts import WRITTEN as RESULTS
-from bench.commands.charts import file_name, result_files
 from bench.commands.chosen import DEFAULT_COUNT, Chosen
+from bench.commands.results import WRITTEN as RESULTS
+from bench.commands.results import file_name, result_files
+from bench.records.kept import keep_rows, kept_rows
 from toonset import __version__
 from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
-from toonset.write import check_output
+from toonset.write import write_bytes
 
 if TYPE_CHECKING:
     from bench.cases.cases import TrainCase
@@ -28,9 +29,10 @@ if TYPE_CHECKING:
     from toonset.nerf.fields.trained_field import TrainedField
     from toonset.nerf.score.evaluate import ScoredView
 
-RUNS, CURVES, VIEWS = "runs.json", "train", "views"
-WRITTEN = (RUNS, *RESULTS, f"{CURVES}.png", f"{CURVES}.svg", VIEWS)
-QUICK_COUNT = 1
+    Done = list[tuple[dict[str, Any], RunResult]]  # with the jobs' identities
+
+RUNS, VIEWS = "runs.json", "views"
+WRITTEN = (RUNS, *RESULTS, VIEWS)
 
 
 def train_into(
@@ -44,17 +46,22 @@ def train_into(
         ToonsetError: no training of that name, or a folder that may not be written or continued.
     """
     from bench.records.record import as_dicts
-    from bench.train.choice import choices_of, choices_text
-    from bench.train.measure import records_of, table_of
+    from bench.train.measure import records_of, run_jobs, table_of
 
     jobs = jobs_of(chosen)
-    runs = run_into(folder, jobs, chosen, printer, WRITTEN, _views_into(folder), force=force)
-    choices = choices_of(runs)
-    parts = [table_of(runs), choices_text(choices)]
-    return "\n\n".join(part for part in parts if part), {
-        "records": as_dicts(records_of(runs, chosen.seed)),
-        "planes": [asdict(choice) for choice in choices],
-    }
+    kept, key = folder / RUNS, {"version": __version__}
+    done = kept_rows(kept, key, _read, WRITTEN, force=force)
+    known = [identity for identity, _ in done]
+    lacking = [job for job in jobs if job.identity not in known]
+    printer.say(f"{len(lacking)} trainings, {len(jobs) - len(lacking)} are there already")
+    try:
+        for job, found in run_jobs(lacking, printer.progress, _views_into(folder)):
+            done.append((job.identity, found))
+            keep_rows(kept, key, _plain(done))
+    finally:  # what a stopped run has found so far is worth a look, too
+        runs = _of_jobs(done, jobs)
+        _write(folder, runs, chosen)
+    return table_of(runs), {"records": as_dicts(records_of(runs, chosen.seed))}
 
 
 def jobs_of(chosen: Chosen) -> list[Job]:
@@ -63,21 +70,9 @@ def jobs_of(chosen: Chosen) -> list[Job]:
     Raises:
         BundleError: there is no training of that name.
     """
-    from bench.train.peers import parse_peers
     from bench.train.plan import SCOPES, plan
 
-    peers = parse_peers(chosen.peers)  # refused before anything is drawn
-    count = QUICK_COUNT if chosen.quick else DEFAULT_COUNT
-    scope = SCOPES[chosen.subject.value, chosen.quick]
-    return some(plan(cases_of(chosen, count), chosen.seed, chosen.only, scope, peers), chosen)
-
-
-def some(jobs: list[Job], chosen: Chosen) -> list[Job]:
-    """Return the jobs.
-
-    Raises:
-        BundleError: there is none.
-    """
+    jobs = plan(_cases_of(chosen), chosen.seed, chosen.only, SCOPES[chosen.quick])
     if not jobs:
         raise BundleError(
             f"no training's name contains {chosen.only!r}; names are like "
@@ -86,55 +81,13 @@ def some(jobs: list[Job], chosen: Chosen) -> list[Job]:
     return jobs
 
 
-def run_into(
-    folder: Path,
-    jobs: list[Job],
-    chosen: Chosen,
-    printer: Printer,
-    written: tuple[str, ...],
-    look: Look = lambda *_: None,
-    write: Callable[[list[RunResult]], None] = lambda runs: None,
-    *,
-    force: bool,
-) -> list[RunResult]:
-    """Return the jobs' results, after running those that the folder lacks.
-
-    Args:
-        folder: of earlier results and these.
-        jobs: what is asked for.
-        chosen: the command line.
-        printer: told what is run.
-        written: what the folder may hold.
-        look: is shown the fields and their held-out views.
-        write: writes further files of the results, those of a stopped run too.
-        force: start afresh.
-    """
-    from bench.train.files import missing
-    from bench.train.measure import run_jobs
-
-    done = _finished(folder, chosen, written, force=force)
-    lacking = missing(jobs, done)
-    earlier = [found for _, found in done]
-    printer.say(f"{len(lacking)} trainings, {len(jobs) - len(lacking)} are there already")
-    try:
-        for job, found in run_jobs(lacking, printer.progress, look, earlier):
-            done.append((job.identity, found))
-            _keep(folder, done)
-    finally:  # what a stopped run has found so far is worth a look, too
-        runs = _of_jobs(done, jobs)
-        _write(folder, runs, chosen)
-        write(runs)
-    return runs
-
-
 def _views_into(folder: Path) -> Look:
     """Return what draws a default training's held-out views beside the truth."""
 
-    def look(job: Job, _: TrainCase, trained: TrainedField, views: Sequence[ScoredView]) -> None:
-        from bench.charts.chart import DEFAULT
+    def look(job: Job, _: TrainedField, views: Sequence[ScoredView]) -> None:
+        from bench.records.record import DEFAULT
         from toonset.dataset.images.picture import encode_png
         from toonset.nerf.score.evaluation_picture import contact_sheet
-        from toonset.write import write_bytes
 
         if job.method == DEFAULT:
             heading = f"{job.name}, seed {job.seed}, held-out views"
@@ -145,16 +98,11 @@ def _views_into(folder: Path) -> Look:
     return look
 
 
-def cases_of(chosen: Chosen, count: int) -> list[TrainCase]:
-    """Return the cases; a folder's in half size, then whole, unless half is asked for.
-
-    Args:
-        chosen: what the command line asks for.
-        count: of synthetic cases, unless it says how many.
-    """
+def _cases_of(chosen: Chosen) -> list[TrainCase]:
+    """Return the cases; a folder's in half size, then whole, unless half is asked for."""
     from bench.cases.cases import train_cases
 
-    count = chosen.count or count
+    count = chosen.count or (1 if chosen.quick else DEFAULT_COUNT)
     if chosen.cases is None:
         return list(train_cases(None, chosen.seed, count))
     sizes = (True,) if chosen.half or chosen.quick else (True, False)
@@ -163,7 +111,7 @@ def cases_of(chosen: Chosen, count: int) -> list[TrainCase]:
     ]
 
 
-def _of_jobs(done: list[tuple[dict[str, Any], RunResult]], jobs: list[Job]) -> list[RunResult]:
+def _of_jobs(done: Done, jobs: list[Job]) -> list[RunResult]:
     """Return the results of the chosen jobs, in the jobs' order."""
     found = []
     for job in jobs:
@@ -171,46 +119,22 @@ def _of_jobs(done: list[tuple[dict[str, Any], RunResult]], jobs: list[Job]) -> l
     return found
 
 
-def _finished(
-    folder: Path, chosen: Chosen, written: tuple[str, ...], *, force: bool
-) -> list[tuple[dict[str, Any], RunResult]]:
-    """Return the trainings of an earlier run in `folder`; none if it is new or to be replaced."""
-    from bench.train.files import from_plain
-    from toonset.json_file import read_json
-
-    kept = folder / RUNS
-    if kept.is_file() and not force:
-        return from_plain(read_json(kept), __version__, str(kept))
-    check_output(folder, [chosen.cases], written, force=force)
-    _keep(folder, [])
-    return []
+def _plain(done: Done) -> list[dict[str, Any]]:
+    return [{"job": identity, "found": asdict(found)} for identity, found in done]
 
 
-def _keep(folder: Path, done: list[tuple[dict[str, Any], RunResult]]) -> None:
-    from bench.train.files import as_plain
-    from toonset.write import write_json
+def _read(row: Any) -> tuple[dict[str, Any], RunResult]:
+    from bench.train.run import RunResult
 
-    write_json(folder / RUNS, as_plain(done, __version__))
+    return dict(row["job"]), RunResult(**row["found"])
 
 
 def _write(folder: Path, runs: list[RunResult], chosen: Chosen) -> None:
-    """Write all that is made of the runs: records, charts, curves, the page of them."""
-    from bench.charts.figure import FORMS
-    from bench.records.record import machine
-    from bench.records.report import Picture
-    from bench.train.chart import draw_curves
-    from bench.train.measure import in_order, records_of
-    from toonset.write import write_bytes
+    """Write all that is made of the runs: records, charts, the page of them."""
+    from bench.train.measure import records_of
 
-    files, pictures = {}, []
     numbers = sorted({run.seed for run in runs})
     seeds = f"seed{'s' * (len(numbers) != 1)} {', '.join(map(str, numbers))}"
-    if in_order(runs):
-        caption = f"Mean of 4 held-out views; {seeds}; {machine()}."
-        files = {f"{CURVES}.{form}": draw_curves(runs, caption, form) for form in FORMS}
-        shows = "Held-out PSNR while the training goes on"
-        pictures = [Picture(files[f"{CURVES}.svg"], shows)]
-    records = records_of(runs, chosen.seed)
-    files |= result_files(chosen.subject.value, records, seeds, pictures)
+    files = result_files(chosen.subject.value, records_of(runs, chosen.seed), seeds)
     for name, content in files.items():
         write_bytes(folder / name, content)

@@ -24,7 +24,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from toonset.camera import rotation_distance, rotation_from_angles
+from toonset.camera import angles_from_rotation, rotation_distance, rotation_from_angles
 from toonset.cli.editor.opening import open_session
 from toonset.cli.editor.session import Session
 from toonset.errors import ToonsetError
@@ -77,24 +77,20 @@ def cases(root: Path) -> Iterator[Case]:
         info = json.loads((folder / "info.json").read_text())
         boxes, yaws = info.get("sheet_boxes_xywh"), info.get("yaw_deg")
         if boxes and yaws:
-            truth = (
-                Truth(tuple(b), None, math.radians(y)) for b, y in zip(boxes, yaws, strict=True)
-            )
-            yield Case(folder.name, folder / "sheet.png", None, tuple(truth))
+            pairs = zip(boxes, yaws, strict=True)
+            truth = tuple(Truth(tuple(box), None, math.radians(yaw)) for box, yaw in pairs)
+            yield Case(folder.name, folder / "sheet.png", None, truth)
     for folder in sorted((root / "sheets").iterdir()):
         character, _, condition = folder.name.partition("-")
         if condition not in ("uneven", "artist", "generic", "drawn"):
             continue
-        own = (
-            folder if condition == "generic" else root / "sheets" / f"{OTHER_BODY[character]}-drawn"
-        )
+        other = root / "sheets" / f"{OTHER_BODY[character]}-drawn"
+        own = folder if condition == "generic" else other
         sheet = next(folder.glob("sheet.*"))
         yield Case(folder.name, sheet, own / "mannequin.obj", tuple(_truth(folder / "gt.json")))
 
 
 def _truth(file: Path) -> Iterator[Truth]:
-    from toonset.camera import angles_from_rotation
-
     said = json.loads(file.read_text())
     for box, pose in zip(said["boxes"], said["world_from_camera"], strict=True):
         world_from_camera = np.array(pose)[:3, :3] @ OPENGL_FROM_OPENCV[:3, :3]
@@ -102,87 +98,79 @@ def _truth(file: Path) -> Iterator[Truth]:
         yield Truth((box["sheet_x"], box["sheet_y"], box["w"], box["h"]), angles, angles[0])
 
 
-def pairs(case: Case, scene: dict[str, Any]) -> list[tuple[dict[str, Any], Truth]]:
-    """Return every view with the truth of the cell that its middle lies in."""
-    found = []
-    for view in scene["views"]:
-        x, y, width, height = view["box"]
-        at = (x + width / 2, y + height / 2)
-        near = min(
-            case.truth,
-            key=lambda one: math.dist(
-                at, (one.box[0] + one.box[2] / 2, one.box[1] + one.box[3] / 2)
-            ),
-        )
-        found.append((view, near))
-    return found
+@dataclass(frozen=True)
+class State:
+    """How a sheet stands: views that are wrong, the worst, the verdict, what is corrected next."""
+
+    wrong: int
+    most_deg: float
+    verdict: str
+    next: tuple[dict[str, Any], Truth]
+
+    @property
+    def right(self) -> bool:
+        """Return whether nothing is left to correct."""
+        return not self.wrong and self.verdict != "ambiguous"
 
 
-def corrected(case: Case, session: Session) -> dict[str, Any]:
-    """Correct a sheet; return what was done and how it came out."""
-    said: dict[str, Any] = {"version": 1}
+def state_of(case: Case, session: Session) -> State:
+    """Return how a sheet stands; every view has the truth of the cell that is nearest."""
+
+    def apart(view: dict[str, Any], truth: Truth) -> float:
+        middles = [(x + w / 2, y + h / 2) for x, y, w, h in (view["box"], truth.box)]
+        return math.dist(*middles)
+
+    views = session.scene["views"]
+    both = [(view, min(case.truth, key=lambda t: apart(view, t))) for view in views]
+    errors = [truth.error_deg(view) for view, truth in both]
+    doubtful = [i for i, (view, _) in enumerate(both) if view["verdict"] == "ambiguous"]
+    wrong = sum(error > RIGHT_DEG for error in errors)
+    number = int(np.argmax(errors)) if wrong else (*doubtful, 0)[0]
+    return State(wrong, max(errors), session.scene["verdict"]["state"], both[number])
+
+
+def corrected(case: Case, session: Session) -> tuple[bool, list[float]]:
+    """Correct a sheet, and print what was done; return whether it is right, and its fits' CPU s."""
+    entries: list[dict[str, Any]] = []
     actions: list[str] = []
-    seconds: list[tuple[float, float]] = []  # by the clock, of the processor
-    start = _state(case, session)
-    state = start
-    while not state["right"] and len(actions) < MOST_ACTIONS:
-        view, truth = state["next"]
-        entry = next((one for one in said.get("views", []) if one["box"] == view["box"]), None)
-        entry, word = _next_said(view, truth, entry)
-        others = [one for one in said.get("views", []) if one["box"] != view["box"]]
-        said = {"version": 1, "views": [*others, entry]}
-        began, worked = time.monotonic(), time.process_time()
-        session.save(said, session.revision)
+    seconds: list[float] = []
+    start = now = state_of(case, session)
+    while not now.right and len(actions) < MOST_ACTIONS:
+        view, truth = now.next
+        known = next((one for one in entries if one["box"] == view["box"]), None)
+        entry, word = _next_said(view, truth, known)
+        entries = [*(one for one in entries if one is not known), entry]
+        began = time.process_time()
+        session.save({"version": 1, "views": entries}, session.revision)
         fitted = session.state()
         while fitted["busy"]:
             fitted = session.state(after=fitted["number"], wait_s=60)
-        seconds.append((time.monotonic() - began, time.process_time() - worked))
+        seconds.append(time.process_time() - began)
         actions.append(f"{view['name'].removesuffix('.png')} {word}")
-        state = _state(case, session)
-    return {
-        "name": case.name,
-        "views": len(session.scene["views"]),
-        "verdict": f"{start['verdict']} -> {state['verdict']}",
-        "wrong": f"{len(start['wrong'])} -> {len(state['wrong'])}",
-        "worst_deg": f"{start['most']:.0f} -> {state['most']:.0f}",
-        "actions": actions,
-        "seconds": seconds,
-        "right": state["right"],
-    }
-
-
-def _state(case: Case, session: Session) -> dict[str, Any]:
-    both = pairs(case, session.scene)
-    errors = [truth.error_deg(view) for view, truth in both]
-    doubtful = [i for i, (view, _) in enumerate(both) if view["verdict"] == "ambiguous"]
-    number = int(np.argmax(errors)) if max(errors) > RIGHT_DEG else (*doubtful, 0)[0]
-    wrong = [error for error in errors if error > RIGHT_DEG]
-    verdict = session.scene["verdict"]["state"]
-    right = not wrong and verdict != "ambiguous"
-    told = {"wrong": wrong, "most": max(errors), "verdict": verdict, "right": right}
-    return {"next": both[number], **told}
+        now = state_of(case, session)
+    times = ", ".join(f"{one:.1f}" for one in seconds)
+    print(
+        f"{case.name}: {start.verdict} -> {now.verdict}; views off by > {RIGHT_DEG:.0f} deg "
+        f"{start.wrong} -> {now.wrong}, worst {start.most_deg:.0f} -> {now.most_deg:.0f} deg; "
+        f"{len(actions)} actions ({'; '.join(actions)}); {times} CPU s",
+        flush=True,
+    )
+    return now.right, seconds
 
 
 def _next_said(
     view: dict[str, Any], truth: Truth, entry: dict[str, Any] | None
 ) -> tuple[dict[str, Any], str]:
     """Return what a person says next of a drawing, and in a word."""
-    yaw = math.degrees(truth.yaw)
     if entry is None:
-        word = WORDS[round(yaw / 45) % 8]
+        word = WORDS[round(math.degrees(truth.yaw) / 45) % 8]
         return {"box": view["box"], "label": word}, word
     angles = truth.angles or (truth.yaw, math.radians(view["elevation"]), 0.0)
-    rounded = [round(math.degrees(one) / DRAGGED_DEG) * DRAGGED_DEG for one in angles[:2]]
-    camera = view["camera"]
-    placed = {
-        "yaw": rounded[0],
-        "elevation": rounded[1],
-        "roll": 0.0,
-        "scale": camera["scale"],
-        "middle": camera["center"],
-    }
+    yaw, elevation = (round(math.degrees(a) / DRAGGED_DEG) * DRAGGED_DEG for a in angles[:2])
+    place = {"scale": view["camera"]["scale"], "middle": view["camera"]["center"]}
+    placed = {"yaw": yaw, "elevation": elevation, "roll": 0.0, **place}
     lock = {"lock": True} if "camera" in entry else {}
-    word = "lock" if lock else f"drag to {rounded[0]:.0f}, {rounded[1]:.0f}"
+    word = "lock" if lock else f"drag to {yaw:.0f}, {elevation:.0f}"
     return {"box": view["box"], "camera": placed, **lock}, word
 
 
@@ -191,11 +179,11 @@ def main(
     only: Annotated[str, typer.Option(help="Cases whose name matches this.")] = "",
 ) -> None:
     """Print what corrections make of sheets that are doubtful."""
-    found: list[dict[str, Any]] = []
+    found: list[tuple[bool, list[float]]] = []
     with tempfile.TemporaryDirectory() as place:
-        for case in cases(root):
-            if not re.search(only, case.name) or len(found) == MOST_SHEETS:
-                continue
+        for case in (case for case in cases(root) if re.search(only, case.name)):
+            if len(found) == MOST_SHEETS:
+                break
             folder = Path(place) / case.name
             try:
                 session = open_session(case.sheet, folder, case.mesh, lambda text: None)
@@ -203,36 +191,21 @@ def main(
                 print(f"{case.name}: {error}")
                 continue
             try:
-                if len(session.scene["views"]) != len(case.truth):
-                    print(
-                        f"{case.name}: {len(session.scene['views'])} of {len(case.truth)} drawings"
-                    )
-                elif not _state(case, session)["right"]:
-                    found.append(corrected(case, session))
-                    _tell(found[-1])
+                seen, verdict = len(session.scene["views"]), session.scene["verdict"]["state"]
+                if seen != len(case.truth):
+                    print(f"{case.name}: {seen} of {len(case.truth)} drawings")
+                elif state_of(case, session).right:
+                    print(f"{case.name}: right at once, {verdict}")
                 else:
-                    print(f"{case.name}: right at once, {session.scene['verdict']['state']}")
+                    found.append(corrected(case, session))
             finally:
                 session.stop()
                 shutil.rmtree(folder, ignore_errors=True)
-    seconds = [one for each in found for one in each["seconds"]]
-    right = sum(each["right"] for each in found)
-    print(
-        f"{right} of {len(found)} sheets right, not ambiguous, with {MOST_ACTIONS} actions at most"
-    )
-    for name, times in zip(("clock", "processor"), zip(*seconds, strict=True), strict=False):
-        print(f"fits, {name}: median {np.median(times):.1f} s, most {max(times):.1f} s")
-
-
-def _tell(each: dict[str, Any]) -> None:
-    times = ", ".join(f"{clock:.1f} ({worked:.1f})" for clock, worked in each["seconds"])
-    done = "; ".join(each["actions"])
-    print(
-        f"{each['name']}: {each['verdict']}; views off by > {RIGHT_DEG:.0f} deg {each['wrong']}, "
-        f"worst {each['worst_deg']} deg; {len(each['actions'])} actions ({done}); "
-        f"{times} s",
-        flush=True,
-    )
+    right = sum(own for own, _ in found)
+    print(f"{right} of {len(found)} sheets right, not ambiguous, with {MOST_ACTIONS} actions")
+    seconds = [one for _, own in found for one in own]
+    if seconds:
+        print(f"fits: median {np.median(seconds):.1f} CPU s, most {max(seconds):.1f}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Drawn sheets with held-out views that are true: what the look bench is measured on.
 
 Synthetic bodies with eyes, outlines, the errors of a hand and their own mesh as mannequin, or case
-folders as in `bench.cases.cases`, where an `eyes.json` may say where the character's eyes are.
-Every sheet comes twice: with its true cameras, and with those that calibration finds on it.
+folders as in `bench.cases.cases`. Every sheet comes twice: with its true cameras, and with those
+that calibration finds on it.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bench.cases.bodies import random_body
-from bench.cases.cases import MANNEQUIN_FILE, case_folders
-from bench.look.eyes import EYES_FILE, Eye, eyes_of_body, marked_eyes, read_eyes
+from bench.cases.cases import MANNEQUIN_FILE, case_folders, scene_of
 from bench.stability.bodies import with_eyes
 from toonset.calib.calibrate import calibrate
 from toonset.calib.write_bundle import write_bundle
 from toonset.dataset.bundle.read_scene import read_scene
-from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.load import split_sheet
@@ -47,7 +46,6 @@ class LookCase:
         train: the drawings.
         test: held-out views without drawing error.
         turn: consecutive views of a turn, as they should look; None: they are not known.
-        eyes: of the character; none: they are not known.
     """
 
     name: str
@@ -55,7 +53,6 @@ class LookCase:
     train: Scene
     test: Scene
     turn: Scene | None = None
-    eyes: tuple[Eye, ...] = ()
 
 
 def look_cases(
@@ -97,16 +94,15 @@ def drawn_case(seed: int, options: SynthOptions = DRAWN) -> tuple[LookCase, Turn
     body = random_body(seed)
     body = with_eyes(body, EYE_RADIUS * body.height)
     made = make_turnaround(body, options, seed)
-    test = _scene(make_turnaround(body, _true(options, HELD_OUT), seed))
+    test = scene_of(make_turnaround(body, _true(options, HELD_OUT), seed))
     between = replace(test, frames=test.frames[1::2])
-    eyes = eyes_of_body(body)
-    return LookCase(f"body {seed}", SYNTHETIC, _scene(made), between, None, eyes), made
+    return LookCase(f"body {seed}", SYNTHETIC, scene_of(made), between), made
 
 
 def _synthetic(seed: int, *, calibrated: bool, px: int) -> LookCase:
     options = replace(DRAWN, cell_px=px, outline_px=DRAWN.outline_px * px / DRAWN.cell_px)
     case, made = drawn_case(seed, options)
-    turn = _scene(make_turnaround(made.mesh, _true(options, TURN), seed))
+    turn = scene_of(make_turnaround(made.mesh, _true(options, TURN), seed))
     train = replace(case.train, mannequin=made.mesh)
     case = replace(case, train=train, turn=replace(turn, frames=turn.frames[:SHOWN]))
     if not calibrated:
@@ -124,8 +120,7 @@ def _from_folder(place: Path, group: str, *, calibrated: bool) -> LookCase:
         mesh = load_mesh(place / MANNEQUIN_FILE)
         train = _calibrated(split_sheet(sheets[0]).views, mesh)
     name = place.name.removesuffix(f"-{group}")
-    eyes = read_eyes(place / EYES_FILE) or marked_eyes(name)
-    return LookCase(name, group + CALIBRATED * calibrated, train, test, None, eyes)
+    return LookCase(name, group + CALIBRATED * calibrated, train, test)
 
 
 def _calibrated(views: tuple[View, ...], mesh: Mesh) -> Scene:
@@ -137,11 +132,3 @@ def _calibrated(views: tuple[View, ...], mesh: Mesh) -> Scene:
 def _true(options: SynthOptions, views: int) -> SynthOptions:
     """Return the options without what a hand does wrong."""
     return replace(options, views=views, warp_percent=0, yaw_jitter_deg=0, scale_error_percent=0)
-
-
-def _scene(made: Turnaround) -> Scene:
-    frames = tuple(
-        Frame(view.name, camera, view.rgba)
-        for view, camera in zip(made.views, made.cameras, strict=True)
-    )
-    return Scene(frames, None, made.mesh.name)

@@ -59,7 +59,17 @@ def cartoon_cast(
     floats: bool,
     heads: bool,
 ) -> Cast:
-    """Return a flat cartoon character's turnaround; arguments as of `solids.solid_cast`."""
+    """Return a flat cartoon character's turnaround.
+
+    Args:
+        number: which character.
+        views: drawings, at even turns.
+        figure_px: about how tall they are.
+        outline_px: width of the contour line, 0 = none.
+        colors: sRGB of skin, hair, shirt, trousers, shoes and extras.
+        floats: hat and hands hang in the air.
+        heads: draw heads alone, too.
+    """
     parts = _character(np.random.default_rng(number), colors, floats)
     head = [part for part in parts if part.group != "body"]
     yaws = [2 * math.pi * i / views for i in range(views)]

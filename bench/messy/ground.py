@@ -1,18 +1,14 @@
-"""What lies under and over the figures of a messy sheet: paper, shadows, JPEG noise."""
+"""What lies under the figures of a messy sheet: paper and shadows."""
 
 from __future__ import annotations
 
 import colorsys
-import io
-from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
-from PIL import Image
+from jaxtyping import Float
 
 from bench.messy.figure import Rgb
-from toonset.dataset.images.picture import decode_rgba
 
 WHITE: Rgb = (255, 255, 255)
 CONTRAST = 45  # in some channel: what a painter leaves between a figure and its ground
@@ -95,15 +91,6 @@ def shadow(
     cv2.ellipse(layer, center, (int(half_w), int(half_h)), 0, 0, 360, 1.0, -1, cv2.LINE_AA)
     strength = float(rng.uniform(0.15, 0.5))
     return strength * cv2.GaussianBlur(layer, (0, 0), blur), center
-
-
-def through_jpeg(
-    rgba: UInt8[np.ndarray, "height width 4"], quality: int
-) -> UInt8[np.ndarray, "height width 4"]:
-    """Return an opaque sheet after saving it as JPEG, colours at half resolution as usual."""
-    buffer = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(rgba[..., :3])).save(buffer, "JPEG", quality=quality)
-    return decode_rgba(buffer.getvalue(), Path("sheet.jpg"))
 
 
 def _tint(rng: np.random.Generator, value: float) -> Rgb:

@@ -14,15 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import UInt8
 
-from bench.messy.canvas import Canvas
-from bench.messy.cast import brief_of, cast_of
-from bench.messy.figure import Rgb, tight_window
-from bench.messy.ground import DARK, ground_colors, ground_picture, luma, shadow, through_jpeg
+from bench.cases.jpeg import through_jpeg
+from bench.messy.cast import brief_of, cast_of, compose_rows
+from bench.messy.figure import Canvas, Rgb, tight_window
+from bench.messy.ground import DARK, ground_colors, ground_picture, luma, shadow
 from bench.messy.layout import Layout, Placed, lay_out
-from bench.messy.margins import Margins, furnish, plan_margins
+from bench.messy.margins import Margins, furnish, plan_margins, rule_lines
 from bench.messy.options import GROUNDS, MessyOptions, checked, in_order, mixture
-from bench.messy.rows import compose_rows
-from bench.messy.rules import rule_lines
 from toonset.view import Box
 
 JPEG_QUALITY = (60, 95)
@@ -37,16 +35,12 @@ class MessySheet:
         boxes: (x, y, width, height) of every figure in reading order, just around what shows.
         alphas: per figure (height, width) of its box: its visible coverage, 0 to 255.
         what: names of the difficulties.
-        seed: as given.
-        options: as given.
     """
 
     rgba: UInt8[np.ndarray, "height width 4"]
     boxes: tuple[Box, ...]
     alphas: tuple[UInt8[np.ndarray, "h w"], ...]
     what: tuple[str, ...]
-    seed: int
-    options: MessyOptions
 
 
 def make_messy_sheet(
@@ -86,7 +80,7 @@ def make_messy_sheet(
     if "jpeg" in chosen:
         rgba = through_jpeg(rgba, int(painting.integers(JPEG_QUALITY[0], JPEG_QUALITY[1] + 1)))
     boxes, alphas = _truth(layout)
-    return MessySheet(rgba, boxes, alphas, in_order(chosen), seed, options)
+    return MessySheet(rgba, boxes, alphas, in_order(chosen))
 
 
 def _paint(

@@ -7,7 +7,6 @@ paints, half of them near relations of another one.
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from bench.cases.bodies import random_body
+from bench.cases.jpeg import through_jpeg
 from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.dataset.synthetic.options import SynthOptions
@@ -151,13 +151,7 @@ def _truth(drawn: Turnaround) -> tuple[UInt8[np.ndarray, "colors 3"], Float[np.n
 
 def _as_jpeg(drawn: Turnaround) -> Images:
     """Return the views cut from the sheet's JPEG, along the true silhouettes."""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(drawn.sheet[..., :3])).save(
-        buffer, "JPEG", quality=JPEG_QUALITY
-    )
-    sheet = np.asarray(Image.open(buffer).convert("RGB"))
+    sheet = through_jpeg(drawn.sheet, JPEG_QUALITY)[..., :3]
     images = []
     for view in drawn.views:
         x, y, width, height = view.box

@@ -1,9 +1,9 @@
 """Labels and contours, measured against drawings whose truth is known.
 
 Right: of the pixels that are one colour, how many got it; one that was marked mixed counts as
-wrong. Mixed: pixels whose bytes are no colour's own. "Rim" counts the silhouette's soft pixels too,
-cut out without alpha. A contour's pixel is one that ink covers by half or more. Border: how far off
-the coverage of paints is where several cover a pixel, in % of it, mean per drawing.
+wrong. Mixed: pixels whose bytes are no colour's own. A contour's pixel is one that ink covers by
+half or more. Border: how far off the coverage of paints is where several cover a pixel, in % of it,
+mean per drawing.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from bench.palette.labels_cases import LabelCase, label_cases, with_hard_rim
-from bench.records.record import Record, summarise, table
+from bench.palette.labels_cases import LabelCase, label_cases
+from bench.records.record import CPU_SECONDS, Column, Record, Recorder, methods_table
 from toonset.palette.coverage import coverage_map
 from toonset.palette.extract import paint_maps
 from toonset.palette.paints.extract import pick_palette
@@ -41,9 +41,18 @@ COVERAGES: dict[str, Callable[[LabelCase], np.ndarray]] = {
     "nearest colour": lambda case: _whole(nearest_labels(case.rgba, case.palette), case),
 }
 HALF = 128
-LOWER = ("seconds", "border")
 REPEATS = 3
 TIMED_WH = (2048, 1024)
+WAYS = "recall", "precision"
+COLUMNS = (
+    Column("right", "right %", "{:.2f}"),
+    Column("right of those labelled", "of labelled", "{:.2f}"),
+    *(Column(f"mixed, {way}", f"mixed {way[:6]}", "{:.1f}") for way in WAYS),
+    *(Column(f"contour {way}", f"line {way[:6]}", "{:.1f}") for way in WAYS),
+    Column("border, off", "border off %", "{:.2f}"),
+    Column(CPU_SECONDS, "CPU s/MP", "{:.3f}"),
+    Column(f"{CPU_SECONDS}, contour", "contour s/MP", "{:.3f}"),
+)
 
 Samples = dict[tuple[str, str, str], list[float]]  # by group, method, metric
 
@@ -78,19 +87,13 @@ def bench_labels(
                 _score_contour(samples, case, name, contour(case))
     assert last is not None
     _time(samples, last)
-    records = [
-        summarise(
-            values,
-            method=method,
-            metric=metric,
-            unit="s/MP" if metric.startswith("seconds") else "%",
-            direction="lower" if metric.startswith(LOWER) else "higher",
-            seed=seed,
-            group=group,
-        )
-        for (group, method, metric), values in samples.items()
-    ]
-    return records, table(records)
+    records = []
+    for (group, method, metric), values in samples.items():
+        unit = "s/MP" if metric.startswith(CPU_SECONDS) else "%"
+        lower = metric.startswith((CPU_SECONDS, "border"))
+        recorder = Recorder(method, group, seed)
+        records.append(recorder.samples(metric, values, unit, "lower" if lower else "higher"))
+    return records, methods_table(records, COLUMNS)
 
 
 def _score_labels(samples: Samples, case: LabelCase, method: str, labeller: Labeller) -> None:
@@ -102,19 +105,11 @@ def _score_labels(samples: Samples, case: LabelCase, method: str, labeller: Labe
     samples[case.group, method, "right"].append(_percent(pure & right, pure))
     labelled = pure & (found != UNLABELLED)
     samples[case.group, method, "right of those labelled"].append(_percent(right, labelled))
-    _score_mixed(samples, case, method, found, "mixed")
-    hard = with_hard_rim(case)
-    _score_mixed(samples, hard, method, labeller(hard.rgba, hard.palette), "mixed with rim")
-
-
-def _score_mixed(
-    samples: Samples, case: LabelCase, method: str, found: np.ndarray, metric: str
-) -> None:
     opaque = case.rgba[..., 3] >= OPAQUE
-    marked, mixed = opaque & (found == UNLABELLED), opaque & (case.truth == UNLABELLED)
-    samples[case.group, method, f"{metric}, recall"].append(_percent(marked & mixed, mixed))
+    marked, mixed = opaque & (found == UNLABELLED), opaque & ~pure
+    samples[case.group, method, "mixed, recall"].append(_percent(marked & mixed, mixed))
     if marked.any():
-        samples[case.group, method, f"{metric}, precision"].append(_percent(marked & mixed, marked))
+        samples[case.group, method, "mixed, precision"].append(_percent(marked & mixed, marked))
 
 
 def _score_contour(samples: Samples, case: LabelCase, method: str, found: np.ndarray) -> None:
@@ -172,8 +167,8 @@ def _time(samples: Samples, case: LabelCase) -> None:
             start = time.process_time()
             labeller(sheet, case.palette)
             taken = (time.process_time() - start) / (width * height / 1e6)
-            samples[group, name, "seconds, labels"].append(taken)
+            samples[group, name, CPU_SECONDS].append(taken)
         start = time.process_time()
         find_contour(sheet, max(case.outline_px, 1.0))
         taken = (time.process_time() - start) / (width * height / 1e6)
-        samples[group, "default", "seconds, contour"].append(taken)
+        samples[group, "default", f"{CPU_SECONDS}, contour"].append(taken)

@@ -5,7 +5,6 @@ The first colour of every second character is painted black: cloth that a contou
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
@@ -13,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from PIL import Image
 
+from bench.cases.jpeg import through_jpeg
 from bench.palette.cases import characters
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, flat_palette, make_turnaround
@@ -142,19 +141,4 @@ def _as_jpeg(rgba: UInt8[np.ndarray, "cell cell 4"], quality: int) -> np.ndarray
     """Return the drawing after it was saved on white paper as JPEG, with its true alpha."""
     alpha = rgba[..., 3:] / 255
     paper = np.rint(rgba[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
-    buffer = io.BytesIO()
-    Image.fromarray(paper).save(buffer, "JPEG", quality=quality)
-    return np.dstack([np.asarray(Image.open(buffer).convert("RGB")), rgba[..., 3]])
-
-
-def with_hard_rim(case: LabelCase) -> LabelCase:
-    """Return the case cut out by a yes or no: soft pixels of its rim are opaque, blent with white.
-
-    Their truth stays 255: they are mixed with the paper.
-    """
-    alpha = case.rgba[..., 3:] / 255
-    soft = np.rint(case.rgba[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
-    solid = np.where(case.rgba[..., 3] >= 128, 255, 0).astype(np.uint8)
-    colors = case.rgba[..., :3] if "jpeg" in case.group else soft
-    truth = np.where(solid > 0, case.truth, UNLABELLED).astype(np.uint8)
-    return replace(case, rgba=np.dstack([colors, solid]), truth=truth)
+    return np.dstack([through_jpeg(paper, quality)[..., :3], rgba[..., 3]])

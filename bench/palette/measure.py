@@ -17,25 +17,31 @@ from jaxtyping import UInt8
 
 from bench.palette.cases import PaletteCase, palette_cases
 from bench.palette.methods import LEAST_SHARE, METHODS, RGB
-from bench.records.record import CPU_SECONDS, Direction, Record, summarise
+from bench.records.record import CPU_SECONDS, Column, Record, Recorder, methods_table
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 
 SHEETS_WH = ((150, 150), (1200, 600), (4096, 2048))
 TIMED_CONDITION = "lines, png"
 REPEATS = 3  # the least counts; once for what takes over a second
 SLOW_S = 1.0
+COLUMNS = (
+    Column("F1 of colours", "F1", "{:.3f}", "mean"),
+    Column("F1 of all", "F1", "{:.3f}"),
+    Column("missing, in all", "missed", "{:.0f}"),
+    Column("spurious, in all", "false", "{:.0f}"),
+    Column("missing colours", "missed", "{:.1f}"),
+    Column("spurious colours", "false", "{:.1f}"),
+    Column("colour error", "error", "{:.4f}"),
+    Column("colour error", "p95", "{:.4f}", "p95"),
+    Column(CPU_SECONDS, "CPU s", "{:.3f}"),
+)
 
 
 @dataclass(frozen=True)
 class Score:
-    """One character's colours under one method.
+    """One character's colours under one method: counts of those of 5 % and more.
 
-    Attributes:
-        case: the character's name.
-        found: true colours of 5 % and more that were found.
-        missing: those that were not.
-        spurious: found colours that are not there.
-        errors: distance in OKLab of every found colour to its true one.
+    And the distance in OKLab of every found colour to its true one.
     """
 
     case: str
@@ -72,19 +78,10 @@ def bench_palette(
             scores.setdefault((case.group, name), []).append(result)
     seconds = _all_seconds(timed, SHEETS_WH[: 2 if quick else None], progress)
     records = [r for (group, name), of in scores.items() for r in _records(of, name, group, seed)]
-    records += [
-        summarise(
-            times,
-            method=name,
-            metric=CPU_SECONDS,
-            unit="s",
-            direction="lower",
-            seed=seed,
-            group=size,
-        )
-        for (size, name), times in seconds.items()
-    ]
-    return records, f"{_accuracy_table(scores)}\n\n{_seconds_table(seconds)}"
+    records += _pooled(scores, seed)
+    for (size, name), times in seconds.items():
+        records.append(Recorder(name, size, seed).samples(CPU_SECONDS, times, "s"))
+    return records, methods_table(records, COLUMNS)
 
 
 def score(found: Sequence[RGB], case: PaletteCase) -> Score:
@@ -121,13 +118,7 @@ def sheet_of_size(
 def _all_seconds(
     timed: dict[int, PaletteCase], sizes: Sequence[tuple[int, int]], progress: Callable[[str], None]
 ) -> dict[tuple[str, str], list[float]]:
-    """Return processor seconds per sheet and method, from a decoded picture on.
-
-    Args:
-        timed: a character by the size of its cells; the largest that fit make a sheet.
-        sizes: of the sheets.
-        progress: told what is measured.
-    """
+    """Return processor seconds per sheet and method; the largest cells that fit make a sheet."""
     seconds = {}
     for width, height in sizes:
         case = timed[max(size for size in timed if size <= height)]
@@ -144,53 +135,30 @@ def _all_seconds(
     return seconds
 
 
-def _records(scores: Sequence[Score], method: str, group: str, seed: int) -> list[Record]:
-    def record(samples: Sequence[float], metric: str, unit: str, *, higher: bool = False) -> Record:
-        direction: Direction = "higher" if higher else "lower"
-        return summarise(
-            samples,
-            method=method,
-            metric=metric,
-            unit=unit,
-            direction=direction,
-            seed=seed,
-            group=group,
-        )
-
-    errors = [error for one in scores for error in one.errors]
-    return [
-        replace(
-            record([f1([one]) for one in scores], "F1 of colours", "", higher=True),
-            by_case={one.case: f1([one]) for one in scores},
-        ),
-        record([float(one.missing) for one in scores], "missing colours", ""),
-        record([float(one.spurious) for one in scores], "spurious colours", ""),
-        *([record(errors, "colour error", "OKLab")] if errors else []),
-    ]
-
-
-def _accuracy_table(scores: dict[tuple[str, str], list[Score]]) -> str:
-    head = f"{'group':28s} {'method':22s} {'F1':>6s} {'found':>6s} {'missing':>8s} {'spurious':>9s}"
-    lines = [f"{head} {'error':>7s} {'p95':>7s} {'n':>3s}"]
+def _pooled(scores: dict[tuple[str, str], list[Score]], seed: int) -> list[Record]:
+    """Return the F1 of all pictures together, and how many colours were missed and invented."""
     everything: dict[str, list[Score]] = {}
     for (_, name), some in scores.items():
         everything.setdefault(name, []).extend(some)
-    rows = [*scores.items(), *((("all", name), some) for name, some in everything.items())]
-    for (group, name), some in rows:
-        errors = [error for one in some for error in one.errors] or [float("nan")]
-        counts = [
-            sum(getattr(one, what) for one in some) for what in ("found", "missing", "spurious")
-        ]
-        lines.append(
-            f"{group:28s} {name:22s} {f1(some):6.3f} {counts[0]:6d} {counts[1]:8d} {counts[2]:9d} "
-            f"{np.median(errors):7.4f} {np.percentile(errors, 95):7.4f} {len(some):3d}"
+    records = []
+    for name, some in everything.items():
+        recorder = Recorder(name, "all pictures", seed)
+        totals = [(what, [getattr(one, what) for one in some]) for what in ("missing", "spurious")]
+        records.append(
+            replace(recorder.samples("F1 of all", [f1(some)], "", "higher"), n=len(some))
         )
-    return "\n".join(lines)
+        records += [recorder.samples(f"{w}, in all", [float(sum(n))], "") for w, n in totals]
+    return records
 
 
-def _seconds_table(seconds: dict[tuple[str, str], list[float]]) -> str:
-    lines = [f"{'sheet':14s} {'method':22s} {'s':>8s} {'times ours':>11s}"]
-    for (size, name), times in seconds.items():
-        ratio = times[0] / max(seconds[size, "default"][0], 1e-9)
-        lines.append(f"{size:14s} {name:22s} {times[0]:8.3f} {ratio:11.1f}")
-    return "\n".join(lines)
+def _records(scores: Sequence[Score], method: str, group: str, seed: int) -> list[Record]:
+    recorder = Recorder(method, group, seed)
+    by_case = {one.case: f1([one]) for one in scores}
+    each = [f1([one]) for one in scores]
+    errors = [error for one in scores for error in one.errors]
+    return [
+        recorder.samples("F1 of colours", each, "", "higher", by_case),
+        recorder.samples("missing colours", [float(one.missing) for one in scores], ""),
+        recorder.samples("spurious colours", [float(one.spurious) for one in scores], ""),
+        *([recorder.samples("colour error", errors, "OKLab")] if errors else []),
+    ]

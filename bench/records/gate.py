@@ -15,8 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bench.charts.chart import DEFAULT
-from bench.records.record import Direction, Record, aligned
+from bench.records.record import DEFAULT, Direction, Record, aligned
 from toonset.errors import BundleError
 
 FORMAT = 1
@@ -32,20 +31,7 @@ HEAD = ("", "subject", "group", "metric", "committed", "now", "may lose", "unit"
 
 @dataclass(frozen=True)
 class Guard:
-    """A figure, and how much worse it may get.
-
-    Attributes:
-        subject: of the bench: "calib", "train", ...
-        group: condition.
-        metric: what was measured, of the default setting.
-        value: the figure.
-        unit: of it.
-        direction: which is better, "lower" or "higher".
-        tolerance: what may be lost, in the same unit.
-        n: samples behind it.
-        seed: of everything random.
-        machine: processor and cores.
-    """
+    """A figure of a subject's default setting, as its record has it, and how much may be lost."""
 
     subject: str
     group: str
@@ -106,13 +92,7 @@ def yardstick_s() -> float:
 
 
 def guards_of(subject: str, records: Sequence[Record], yard_s: float) -> list[Guard]:
-    """Return the guards of a bench's default setting.
-
-    Args:
-        subject: of the bench.
-        records: of all methods.
-        yard_s: what `yardstick_s` took in the same run.
-    """
+    """Return the guards of a bench's default setting; `yard_s` is `yardstick_s` of the same run."""
     own = [record for record in records if record.method == DEFAULT]
     kept = [r for r in own if r.unit not in SECONDS or r.metric.startswith(CPU)]
     return [_guard(subject, record, yard_s) for record in kept]
@@ -126,7 +106,9 @@ def compared(committed: Sequence[Guard], now: Sequence[Guard]) -> list[Compared]
 
 def as_text(rows: Sequence[Compared]) -> str:
     """Return what failed, worst first, and a line that counts."""
-    failed = sorted((row for row in rows if row.fails), key=_excess, reverse=True)
+    failed = sorted(
+        (row for row in rows if row.fails), key=lambda row: -row.lost / row.committed.tolerance
+    )
     better = sum(row.lost < -row.committed.tolerance for row in rows)
     counts = f"{len(rows)} figures: {len(failed)} worse, {better} better than they may vary"
     if not failed:
@@ -161,22 +143,9 @@ def _guard(subject: str, record: Record, yard_s: float) -> Guard:
         value, unit = value / yard_s, YARDS
     spared = min(LOSS[unit], SMALL * abs(value)) if unit == "1" else LOSS.get(unit, 0.0)
     share = SHARE.get(unit, 0.0 if unit in LOSS else ANY_SHARE)
-    return Guard(
-        subject=subject,
-        group=record.group,
-        metric=record.metric,
-        value=value,
-        unit=unit,
-        direction=record.direction,
-        tolerance=max(spared + share * abs(value), ROUNDING),
-        n=record.n,
-        seed=record.seed,
-        machine=record.machine,
-    )
-
-
-def _excess(row: Compared) -> float:
-    return row.lost / max(row.committed.tolerance, 1e-9)
+    tolerance = max(spared + share * abs(value), ROUNDING)
+    about = (record.direction, tolerance, record.n, record.seed, record.machine)
+    return Guard(subject, record.group, record.metric, value, unit, *about)
 
 
 def _cells(row: Compared) -> tuple[str, ...]:

@@ -22,14 +22,7 @@ LEAST_AREA = 0.1  # of the largest patch
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a method makes of a sheet.
-
-    Attributes:
-        figures: in the method's order.
-        warned: it says that something may be wrong, or refuses the sheet.
-        left_out: boxes of what it saw and shows, but does not take for a figure.
-        seconds: of processor time.
-    """
+    """What a method makes of a sheet: figures in its order, whether it warns, what it left out."""
 
     figures: tuple[Drawn, ...]
     warned: bool

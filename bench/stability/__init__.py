@@ -1,1 +1,1 @@
-"""Sweeps of what a sheet may have wrong."""
+"""Sweeps of what sheets and cameras may have wrong, and whether the tool says so."""

@@ -17,7 +17,7 @@ EARS = ("left ear", "right ear")
 EYES = ("left eye", "right eye")
 EAR_DEPTH = 0.3  # of its radius
 EYE_DEPTH = 0.5
-BLACK, WHITE = (20, 20, 24), (250, 250, 250)
+BLACK = (20, 20, 24)
 VASE = ((0, 0), (0.35, 0), (0.2, 0.15), (0.45, 0.9), (0.5, 1.2), (0.2, 1.6), (0.3, 1.8), (0, 1.8))
 
 
@@ -74,15 +74,6 @@ def with_eyes(body: Mesh, radius: float, color: tuple[int, int, int] = BLACK) ->
     middle, half = (head.max(axis=0) + head.min(axis=0)) / 2, np.ptp(head, axis=0) / 2
     away = np.array([0.4, 0.0, math.sqrt(1 - 0.4**2)]) * half
     return _with_pair(body, EYES, middle, away, radius, EYE_DEPTH, color)
-
-
-def with_contrast(body: Mesh, kept: float) -> Mesh:
-    """Return the body with all colours drawn towards their mean; 0 leaves one colour."""
-    assert body.face_colors is not None
-    colors = body.face_colors.astype(np.float64)
-    mean = np.unique(colors, axis=0).mean(axis=0)
-    drawn = np.rint(mean + kept * (colors - mean)).astype(np.uint8)
-    return replace(body, face_colors=drawn)
 
 
 def recolored(body: Mesh, part: str, color: Sequence[int]) -> Mesh:

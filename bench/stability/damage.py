@@ -35,23 +35,6 @@ def padded(view: View, camera: Camera, margin_px: int) -> Drawn:
     return replace(view, rgba=rgba, box=box), shown
 
 
-def rolled(view: View, camera: Camera, roll: float) -> Drawn:
-    """Return the drawing turned clockwise by `roll` radians about its middle."""
-    height, width = view.rgba.shape[:2]
-    view, camera = padded(view, camera, math.ceil((math.hypot(width, height) - width) / 2))
-    cosine, sine = math.cos(roll), math.sin(roll)
-    turn = np.array([[cosine, -sine], [sine, cosine]])
-    middle = np.array(camera.size_wh) / 2
-    at_integers = middle - 0.5  # OpenCV's pixel centres; ours are at .5
-    affine = np.hstack([turn, (at_integers - turn @ at_integers)[:, None]])
-    rgba = straight(cv2.warpAffine(premultiplied(view.rgba), affine, camera.size_wh))
-    spin = np.eye(3)
-    spin[:2, :2] = turn
-    center = turn @ (camera.center - middle) + middle
-    turned = replace(camera, rotation=spin @ camera.rotation, center=center)
-    return replace(view, rgba=rgba), turned
-
-
 def mirrored(view: View, camera: Camera) -> Drawn:
     """Return the drawing flipped left to right, with the camera that sees a mirrored body so."""
     flipped = replace(
@@ -135,44 +118,30 @@ def with_gaps_closed(view: View, camera: Camera, share: float) -> Drawn:
     return replace(view, rgba=painted), camera
 
 
-def with_capsule(
+def with_ball(
     view: View,
     camera: Camera,
-    ends: Float[np.ndarray, "2 3"],
+    middle: Float[np.ndarray, " 3"],
     radius: float,
     color: tuple[int, int, int],
 ) -> Drawn:
-    """Return the drawing with a ball-ended stick in front of it that the mannequin lacks.
+    """Return the drawing, grown where need be, with a ball in front that the mannequin lacks.
 
-    Args:
-        view: the drawing; it grows where the stick needs room.
-        camera: true of it.
-        ends: world coordinates of the stick's ends; the same point twice is a ball.
-        radius: world units; 0 leaves the drawing as it is.
-        color: sRGB.
+    Its middle and radius are in world units; a radius of 0 leaves the drawing as it is.
     """
     if radius <= 0:
         return view, camera
     radius_px = radius * camera.scale
-    shown, _, _ = camera.project(ends)
-    beyond = np.maximum(-shown, shown - np.array(camera.size_wh)).max() + radius_px
+    at = camera.project(middle[None])[0]
+    beyond = np.maximum(-at, at - np.array(camera.size_wh)).max() + radius_px
     if beyond > 0:
         view, camera = padded(view, camera, math.ceil(beyond) + 1)
-        shown, _, _ = camera.project(ends)
-    away = _distance_to_segment(camera.pixel_grid(), shown)
+        at = camera.project(middle[None])[0]
+    away = np.linalg.norm(camera.pixel_grid() - at[0], axis=-1)
     cover = np.clip(radius_px - away + 0.5, 0, 1)[..., None]
-    stick = np.array([*color, 255], dtype=np.float64)
+    ball = np.array([*color, 255], dtype=np.float64)
     below = premultiplied(view.rgba)
-    return replace(view, rgba=straight(cover * stick + (1 - cover) * below)), camera
-
-
-def _distance_to_segment(
-    points: Float[np.ndarray, "height width 2"], ends: Float[np.ndarray, "2 2"]
-) -> Float[np.ndarray, "height width"]:
-    along = ends[1] - ends[0]
-    length2 = max(float(along @ along), 1e-12)  # a ball's ends coincide
-    at = np.clip((points - ends[0]) @ along / length2, 0, 1)
-    return np.linalg.norm(points - ends[0] - at[..., None] * along, axis=-1)
+    return replace(view, rgba=straight(cover * ball + (1 - cover) * below)), camera
 
 
 def _rows(mask: Bool[np.ndarray, "height width"]) -> tuple[int, int]:

@@ -1,98 +1,106 @@
 """`python -m bench.verdict`: does the verdict of a run say how its new views look?
 
-Draws sheets with known faults, trains on them, and compares what the verdict rests on with FLIP of
-held-out views. The same command goes on where it was stopped; a sheet takes about 12 CPU s.
+Trains on the steps of `bench stability`'s pages about training, or on case folders, and compares
+what the verdict rests on with FLIP of held-out views. The same command goes on where it was
+stopped; a sheet takes about 8 CPU s.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import typer
+
+from bench.cases.cases import case_folders, halved
+from bench.stability.fields import TRAINING
+from bench.stability.pages import PAGES
+from bench.stability.sheets import Step
+from bench.stability.trials import Page
 from bench.verdict.curve import draw_curve, table
-from bench.verdict.measure import FULL, QUICK, Judged, judge
-from bench.verdict.sheets import FAULTS, draw_sheet, small
+from bench.verdict.measure import QUICK, Judged, judge
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Scene
+from toonset.errors import ToonsetError
 from toonset.json_file import read_json
 from toonset.write import write_bytes, write_json
 
 SHEETS, CURVE = "sheets.json", "curve.png"
 EVERY = 2  # of a case's held-out views
 
-Drawer = Callable[[], tuple[Scene, Scene]]
+Drawer = Callable[[], tuple[Scene, Scene, Any]]
 
 
-def main() -> None:
+def main(
+    out: Annotated[Path, typer.Option("-o", "--out")] = Path("bench-results/verdict"),
+    seeds: Annotated[int, typer.Option(help="Bodies, from seed 0 on.")] = 2,
+    only: Annotated[str, typer.Option(help="Sheets whose name contains this.")] = "",
+    cases: Annotated[
+        Path | None, typer.Option(help="Folders with views/ and test/, at half size.")
+    ] = None,
+) -> None:
     """Judge every sheet that is not judged yet, then say and draw what was found."""
-    asked = _arguments()
-    folder: Path = asked.out
-    folder.mkdir(parents=True, exist_ok=True)
-    kept = folder / SHEETS
+    out.mkdir(parents=True, exist_ok=True)
+    kept = out / SHEETS
     done = [_judged(row) for row in read_json(kept)] if kept.is_file() else []
-    for name, draw in _cases(asked.cases) if asked.cases else _synthetic(asked):
-        if asked.only not in name or name in {sheet.name for sheet in done}:
+    for name, draw in _cases(cases) if cases else _synthetic(seeds):
+        if only not in name or name in {sheet.name for sheet in done}:
             continue
-        scene, test = draw()
-        found, picture = judge(name, scene, test, FULL if asked.full else QUICK)
-        write_bytes(folder / f"{name.replace(' ', '_')}.png", picture)
+        try:
+            scene, test, where = draw()
+            found, picture = judge(name, scene, test, QUICK, where)
+        except ToonsetError as error:
+            print(f"{name}: {error}", flush=True)
+            continue
+        write_bytes(out / f"{name.replace(' ', '_')}.png", picture)
         done.append(found)
         write_json(kept, [asdict(sheet) for sheet in done])
-        print(f"{name}: {100 * found.statistic:.2f} %, {found.verdict}", flush=True)
-    groups = _groups(done)
+        print(f"{name}: {100 * found.off:.2f} %, {found.verdict}", flush=True)
+    groups = {
+        name: [s for s in done if _group(s) == name] for name in sorted(set(map(_group, done)))
+    }
     for name, sheets in groups.items():
         print(f"\n{name}\n{table(sheets)}")
-    write_bytes(folder / CURVE, draw_curve(groups))
+    write_bytes(out / CURVE, draw_curve(groups))
 
 
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m bench.verdict", description=__doc__)
-    parser.add_argument("-o", "--out", type=Path, default=Path("bench-results/verdict"))
-    parser.add_argument("--seeds", type=int, default=4, help="bodies, from seed 0 on")
-    parser.add_argument("--only", default="", help="sheets whose name contains this")
-    parser.add_argument("--mannequin", action="store_true", help="drawings come with their body")
-    parser.add_argument("--cases", type=Path, help="folders with views/ and test/, at half size")
-    parser.add_argument("--full", action="store_true", help="train as users do: three times longer")
-    return parser.parse_args()
+def _synthetic(seeds: int) -> Iterator[tuple[str, Drawer]]:
+    for seed in range(seeds):
+        base_is_drawn = False
+        for page in (page for page in PAGES if page.kind is TRAINING):
+            for step in page.steps:
+                if not (step == page.base and base_is_drawn):
+                    yield f"{page.name} {step} s{seed}", partial(_drawn, page, step, seed)
+                base_is_drawn |= step == page.base
 
 
-def _synthetic(asked: argparse.Namespace) -> Iterator[tuple[str, Drawer]]:
-    for seed in range(asked.seeds):
-        for fault in FAULTS:
-            draw = partial(draw_sheet, fault, seed, mannequin=asked.mannequin)
-            yield f"{fault.name} s{seed}", draw
+def _drawn(page: Page, step: Step, seed: int) -> tuple[Scene, Scene, Any]:
+    scene = page.draw(step, seed)
+    return scene.train, scene.test, scene.where
 
 
 def _cases(folder: Path) -> Iterator[tuple[str, Drawer]]:
-    for case in sorted(folder.iterdir()):
-        if (case / "test" / "transforms.json").is_file():
-            yield case.name, partial(_case, case)
+    for case in case_folders(folder, "test/transforms.json"):
+        yield case.name, partial(_case, case)
 
 
-def _case(folder: Path) -> tuple[Scene, Scene]:
-    train, test = (small(0.5)(read_scene(folder / name), 0) for name in ("views", "test"))
-    return train, replace(test, frames=test.frames[::EVERY])
+def _case(folder: Path) -> tuple[Scene, Scene, None]:
+    train, test = (halved(read_scene(folder / name)) for name in ("views", "test"))
+    return train, replace(test, frames=test.frames[::EVERY]), None
 
 
 def _judged(row: dict[str, Any]) -> Judged:
-    lists = {name: tuple(row[name]) for name in ("reasons", "flip", "look")}
-    return Judged(**{**row, **lists})
+    return Judged(**row | {name: tuple(row[name]) for name in ("reasons", "look")})
 
 
-def _groups(done: list[Judged]) -> dict[str, list[Judged]]:
-    """Return sheets by where they come from; bounds were chosen on even seeds."""
-
-    def group(name: str) -> str:
-        seed = name.rpartition(" s")[2]
-        return ("odd seeds" if int(seed) % 2 else "even seeds") if seed.isdigit() else "cases"
-
-    names = sorted({group(sheet.name) for sheet in done})
-    return {name: [sheet for sheet in done if group(sheet.name) == name] for name in names}
+def _group(sheet: Judged) -> str:
+    """Return where a sheet comes from."""
+    seed = sheet.name.rpartition(" s")[2]
+    return f"seed {seed}" if seed.isdigit() else "cases"
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -7,11 +7,12 @@ moved by a hundredth of its height.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float
 
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.images.picture import encode_png
@@ -21,14 +22,11 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.render.layers import default_layer
 from toonset.nerf.render.views import render
 from toonset.nerf.score.flip import FlipMap, load_flip
-from toonset.nerf.score.verdict import MOST_OFF, verdict_of
+from toonset.nerf.score.verdict import verdict_of
 from toonset.nerf.training import train
 from toonset.view import over_white
 
 QUICK = TrainOptions(steps=100, resolution=90)  # shape is settled by then, and so is the drawn look
-FULL = TrainOptions()
-
-Picture = UInt8[np.ndarray, "height width 4"]
 
 
 @dataclass(frozen=True)
@@ -39,24 +37,15 @@ class Judged:
         name: of it.
         verdict: "ok" or "weak".
         reasons: of it.
-        guesses: reasons that need no training: too few drawings.
-        off: per drawing, shares of the figure's height (see `toonset.nerf.score.left_out`).
-        flip: per held-out view, mean over the picture.
-        look: per held-out view, shares of the figure's height.
+        off: the worst drawing, share of the figure's height (see `toonset.nerf.score.left_out`).
+        look: per held-out view where pixels count, share of the figure's height.
     """
 
     name: str
     verdict: str
     reasons: tuple[str, ...]
-    guesses: int
-    off: dict[str, float]
-    flip: tuple[float, ...]
+    off: float
     look: tuple[float, ...]
-
-    @property
-    def statistic(self) -> float:
-        """Return what the verdict rests on: the worst drawing; 0 of none."""
-        return max(self.off.values(), default=0.0)
 
     @property
     def worst_look(self) -> float:
@@ -64,29 +53,36 @@ class Judged:
         return max(self.look)
 
 
-def judge(name: str, scene: Scene, test: Scene, options: TrainOptions) -> tuple[Judged, bytes]:
-    """Return a sheet's verdict and look, and a PNG of held-out views, truth above, in a row."""
+def judge(
+    name: str,
+    scene: Scene,
+    test: Scene,
+    options: TrainOptions,
+    where: Sequence[Bool[np.ndarray, "height width"]] | None = None,
+) -> tuple[Judged, bytes]:
+    """Return a sheet's verdict and look, and a PNG of held-out views, truth above, in a row.
+
+    Args:
+        name: of the sheet.
+        scene: what is trained on.
+        test: held-out views.
+        options: of the training.
+        where: per held-out view the pixels that count; None: all of them.
+    """
     flip = needed_flip()
     run = train(scene, options, threads=1)
     layer = default_layer(run.field)
     found = verdict_of(run.training, run.scene)
-    flips, looks, tiles = [], [], []
-    for frame in test.frames:
+    looks, tiles = [], []
+    for number, frame in enumerate(test.frames):
         shown = render(run.field, frame.camera).picture(layer)
         truth, seen = over_white(frame.rgba), over_white(shown)
-        error = flip(truth, seen)
-        flips.append(float(error.mean()))
-        looks.append(float(error.sum()) / by_pixel(flip, truth).sum() / max(figure_px(frame), 1))
+        counted = where[number] if where else np.ones(truth.shape[:2], dtype=bool)
+        per_px = float(by_pixel(flip, truth)[counted].sum()) * max(figure_px(frame), 1)
+        if per_px:
+            looks.append(float(flip(truth, seen)[counted].sum()) / per_px)
         tiles.append(np.concatenate([truth, seen]))
-    judged = Judged(
-        name,
-        found.verdict,
-        found.reasons,
-        len(found.reasons) - (found.off > MOST_OFF),
-        {view.name: view.off for view in found.views},
-        tuple(flips),
-        tuple(looks),
-    )
+    judged = Judged(name, found.verdict, found.reasons, found.off, tuple(looks))
     return judged, encode_png((np.concatenate(tiles, axis=1) * 255 + 0.5).astype(np.uint8))
 
 

@@ -36,8 +36,8 @@ Picture = UInt8[np.ndarray, "height width 4"]
 
 
 @contextmanager
-def chromium(*switches: str) -> Iterator[Browser]:
-    """Yield a browser without a window; `switches` are further ones of its command line.
+def chromium() -> Iterator[Browser]:
+    """Yield a browser without a window.
 
     Raises:
         SetupError: there is none.
@@ -46,7 +46,7 @@ def chromium(*switches: str) -> Iterator[Browser]:
     if path is None:
         raise SetupError(NO_BROWSER)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *switches])
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield browser
         browser.close()
 

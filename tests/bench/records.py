@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from bench.records.record import Record, summarise
+from bench.records.record import Record, Recorder
 
 
 def record(metric: str, method: str, by_case: dict[str, float], group: str = "exact") -> Record:
     """Return the record of a method whose figure in every case is given."""
-    return summarise(
-        list(by_case.values()),
-        method=method,
-        metric=metric,
-        unit="s" if "seconds" in metric else "dB",
-        direction="lower" if "seconds" in metric else "higher",
-        seed=0,
-        group=group,
-        by_case=by_case,
-    )
+    seconds = "seconds" in metric
+    unit, direction = ("s", "lower") if seconds else ("dB", "higher")
+    values = list(by_case.values())
+    recorder = Recorder(method, group, 0)
+    return recorder.samples(metric, values, unit, direction, by_case)  # type: ignore[arg-type]

@@ -18,7 +18,7 @@ from bench.records.gate import (
     guards_of,
     yardstick_s,
 )
-from bench.records.record import Record, summarise
+from bench.records.record import Record, Recorder
 from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
 
@@ -26,16 +26,8 @@ YARD_S = 0.02
 
 
 def record(metric: str = "held-out PSNR", value: float = 30.0, unit: str = "dB") -> Record:
-    lower = unit in ("s", "deg")
-    return summarise(
-        [value],
-        method="default",
-        metric=metric,
-        unit=unit,
-        direction="lower" if lower else "higher",
-        seed=0,
-        group="clean",
-    )
+    direction = "lower" if unit in ("s", "deg") else "higher"
+    return Recorder("default", "clean", 0).samples(metric, [value], unit, direction)
 
 
 def guards(*records: Record) -> list[Guard]:

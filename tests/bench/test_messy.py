@@ -8,6 +8,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
+from bench.cases.jpeg import through_jpeg
 from bench.messy.cartoon import cartoon_cast
 from bench.messy.figure import (
     Figure,
@@ -17,11 +18,9 @@ from bench.messy.figure import (
     with_colored_lines,
     with_gaps,
 )
-from bench.messy.ground import through_jpeg
 from bench.messy.layout import reach
 from bench.messy.options import DIFFICULTIES, EXCLUSIVE, GROUNDS, MessyOptions, checked, mixture
 from bench.messy.sheet import MessySheet, make_messy_sheet
-from bench.messy.solids import solid_cast
 from toonset.errors import SheetError
 
 SMALL = MessyOptions(figure_px=(70, 90))
@@ -126,7 +125,6 @@ def test_floating_parts_belong_to_their_figure(seed: int) -> None:
 @pytest.mark.parametrize("difficulties", [(), ("paper", "jpeg", "heads")])
 def test_same_seed_same_bytes_and_other_seeds_others(difficulties: tuple[str, ...]) -> None:
     first, other = sheet(1, *difficulties), sheet(2, *difficulties)
-    solid_cast.cache_clear()
     again = make_messy_sheet(1, difficulties, SMALL)
     assert first.what == again.what
     assert first.boxes == again.boxes

@@ -18,9 +18,8 @@ from bench.split.cases import (
     sheet_cases,
     sprite_sheet_cases,
 )
-from bench.split.measure import bench_split
+from bench.split.measure import ACROSS, TILE_WH, bench_split, contact_sheet, tile
 from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
-from bench.split.picture import COLUMNS, TILE_WH, contact_sheet, tile
 from bench.split.score import mask_iou, same_box, score
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split.sheet import LeftOut, Segmentation
@@ -176,8 +175,8 @@ def test_the_picture_shows_boxes_in_their_colours() -> None:
     picture = tile(case(), found(block(10, 10), left_out=(block(100, 10),)), "blocks - number")
     colors = {tuple(c) for c in picture.reshape(-1, 3).tolist()}
     assert {(0, 170, 0), (230, 30, 30), (40, 90, 230)} <= colors
-    sheet = contact_sheet([picture] * (COLUMNS + 1))
-    assert sheet.shape == (2 * len(picture), COLUMNS * TILE_WH[0], 3)
+    sheet = contact_sheet([picture] * (ACROSS + 1))
+    assert sheet.shape == (2 * len(picture), ACROSS * TILE_WH[0], 3)
 
 
 # ---- cases
@@ -250,7 +249,8 @@ def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
     done = bench("split", "--cases", rendered, "-o", out, "--quiet")
     assert done.code == 0, done
     assert "rendered sheets" in done.out
-    assert {path.name for path in out.iterdir()} == {"records.json", "report.html", "wrong.png"}
+    names = {f"chart-rendered-sheets.{form}" for form in ("png", "svg", "csv")}
+    assert {p.name for p in out.iterdir()} == {*names, "records.json", "report.html", "wrong.png"}
     records = json.loads((out / "records.json").read_text())
     assert {record["method"] for record in records} == set(METHODS)
     again = ("split", "--cases", rendered, "-o", out, "--force", "--only", "dog")
@@ -261,7 +261,6 @@ def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
     "wrong",
     [
         ["split", "--half"],
-        ["split", "--baseline", "colmap"],
         ["train", "--sprites", "x"],
         ["palette", "--only", "x"],
         ["palette", "--count", "3"],

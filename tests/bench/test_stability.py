@@ -1,273 +1,335 @@
-"""Stability sweeps: damage keeps its truth, figures count right, runs resume and repeat."""
+"""Stability sweeps: pages draw what they say, figures count right, runs resume and repeat."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
+import re
 from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from bench.__main__ import resumable
-from bench.atlas.run import Counts, TriedStepResult, all_pages, run_steps
-from bench.atlas.training import Tried
-from bench.calib.measure import ViewError
-from bench.cases.bodies import random_body
+from bench.cases.bodies import HAIR, SKIN, random_body
 from bench.cases.workers import THREADS, in_order
-from bench.stability import artist
-from bench.stability import steps as stability
-from bench.stability.chart import draw_stability
-from bench.stability.files import RunKey, as_plain, from_plain, in_table_order, name_of
-from bench.stability.page import chosen
-from bench.stability.sheet import BASE, draw_sheet
-from bench.stability.steps import SheetResult, StepResult, align_from, run_sheet
-from bench.stability.sweeps import SWEEPS, Sweep
-from bench.stability.table import as_csv, as_records, row
+from bench.stability import cameras, colors, fields, scenes, sheets
+from bench.stability import pages as listed
+from bench.stability import run as stability
+from bench.stability.cameras import CALIBRATION
+from bench.stability.colors import EYE, color_away
+from bench.stability.fields import LOOK, TRAINING
+from bench.stability.pages import PAGES
+from bench.stability.report import sweep_html
+from bench.stability.run import Key, run_job, run_steps, tried_pages
+from bench.stability.sheets import BASE, DrawnSheet, draw_sheet
+from bench.stability.trials import (
+    REFUSED,
+    UNJUDGED,
+    Page,
+    Trial,
+    TriedPage,
+    TriedStep,
+    as_plain,
+    as_records,
+    fails_from,
+    shares,
+    summary_csv,
+    summary_rows,
+    tally,
+)
 from toonset.cli.common.output import Printer
-from toonset.errors import BundleError, SheetError
+from toonset.errors import SheetError
+from toonset.nerf.score import verdict
+from toonset.nerf.score.verdict import OK, WEAK
+from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.names import hex_of
 
-PLAIN = replace(BASE, outline_px=0, cell_px=120, views=3)
-KEY = RunKey("1", 0, Counts(1, 1))
-
-
-@pytest.fixture(scope="module")
-def sheet():
-    return draw_sheet(3, PLAIN)
-
-
-# ---- sweeps
+PAGE = {page.name: page for page in PAGES}
+CAMERAS = [page for page in PAGES if page.kind is CALIBRATION]
+KEY = Key("1", 0, 2, 1)
 
 
-def test_every_quick_step_is_one_of_the_full_run():
-    pages = all_pages()
-    assert len({page.name for page in pages}) == len(pages)
-    for page in pages:
+# ---- pages
+
+
+def test_every_quick_step_is_one_of_the_full_run() -> None:
+    assert len(PAGE) == len(PAGES)
+    for page in PAGES:
         assert set(page.quick) <= set(page.steps), page.name
+        assert page.reference in page.quick
+        assert {page.steps[0], page.steps[-1]} <= set(page.quick)
         assert len(set(map(str, page.steps))) == len(page.steps)
 
 
-@pytest.mark.parametrize("sweep", [s for s in SWEEPS if s.base is not None], ids=lambda s: s.name)
-def test_the_base_step_is_the_base_sheet(sweep, monkeypatch):
-    small = replace(BASE, cell_px=60, views=1, supersample=1)
-    for place in ("sheet", "draws"):
-        monkeypatch.setattr(f"bench.stability.{place}.BASE", small)
-    step = 60 if sweep.name == "resolution" else sweep.base
-    for (view, camera), (plain, same) in zip(
-        sweep.draw(step, 5).drawings, draw_sheet(5, small).drawings, strict=True
-    ):
+@pytest.mark.parametrize("page", [p for p in CAMERAS if p.base is not None], ids=lambda p: p.name)
+def test_the_base_step_is_the_base_sheet(page: Page, monkeypatch) -> None:
+    monkeypatch.setattr(sheets, "BASE", replace(BASE, cell_px=60, views=1, supersample=1))
+    step = 60 if page.name == "resolution" else page.base
+    pairs = zip(page.draw(step, 5).drawings, draw_sheet(5).drawings, strict=True)
+    for (view, camera), (plain, same) in pairs:
         np.testing.assert_array_equal(view.rgba, plain.rgba)
         np.testing.assert_array_equal(camera.center, same.center)
 
 
-@pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
-def test_the_worst_step_can_be_drawn_twice_alike(sweep, monkeypatch):
-    small = replace(BASE, cell_px=80, views=2, supersample=1)
-    for place in ("sheet", "draws"):
-        monkeypatch.setattr(f"bench.stability.{place}.BASE", small)
-    of_artist = replace(artist.SHEET, cell_px=120, views=2, supersample=1)
-    monkeypatch.setattr(artist, "SHEET", of_artist)
-    first, second = (sweep.draw(sweep.steps[-1], 5) for _ in range(2))
+@pytest.mark.parametrize("page", CAMERAS, ids=lambda page: page.name)
+def test_the_worst_step_can_be_drawn_twice_alike(page: Page, monkeypatch) -> None:
+    monkeypatch.setattr(sheets, "BASE", replace(BASE, cell_px=80, views=2, supersample=1))
+    of_artist = replace(sheets.ARTIST, cell_px=120, views=2, supersample=1)
+    monkeypatch.setattr(sheets, "ARTIST", of_artist)
+    first, second = (page.draw(page.steps[-1], 5) for _ in range(2))
     for (view, camera), (again, same) in zip(first.drawings, second.drawings, strict=True):
         np.testing.assert_array_equal(view.rgba, again.rgba)
         np.testing.assert_array_equal(camera.rotation, same.rotation)
 
 
-# ---- runs
+# ---- trials of cameras
 
 
-def test_alignment_from_the_truth_stays_and_from_behind_is_lost(sheet):
-    near = align_from(sheet, math.radians(5), 0)
-    far = align_from(sheet, math.radians(150), 0)
-    assert np.median([view.raw for view in near]) < math.radians(1)
-    assert min(view.raw for view in far) > math.radians(15)
-    assert {view.verdict for view in near} == {""}
+@pytest.fixture(scope="module")
+def sheet() -> DrawnSheet:
+    return draw_sheet(3, outline_px=0, cell_px=120, views=3)
 
 
-def test_a_refused_and_a_crashed_sheet_are_results(sheet, monkeypatch):
-    sweep = Sweep("x", "x", (0,), (0,), "", None, lambda step, seed: sheet)
-    for error, verdict in ((SheetError("too faint"), "failed"), (KeyError("k"), "crashed")):
+def test_a_refused_and_a_crashed_sheet_are_results(sheet: DrawnSheet, monkeypatch) -> None:
+    for error, voice in ((SheetError("too faint"), "failed"), (KeyError("k"), "crashed")):
 
         def broken(*_arguments, error=error):
             raise error
 
-        monkeypatch.setattr(stability, "find_cameras", broken)
-        result, picture = run_sheet(sweep, 0, 0)
+        monkeypatch.setattr(cameras, "find_cameras", broken)
+        trials, picture = cameras.try_cameras(lambda: sheet, 0)
         assert picture.startswith(b"\x89PNG")
-        assert [view.verdict for view in result.views] == [verdict] * 3
-        assert "too faint" in result.note or result.note == "KeyError: 'k'"
+        assert [(one.voice, one.value) for one in trials] == [(voice, 180.0)] * 3
+        assert trials[0].words in ("too faint", "KeyError: 'k'")
 
 
-def test_a_missing_mannequin_is_what_users_get_without_one(sheet, monkeypatch):
+def test_a_missing_mannequin_is_what_users_get_without_one(sheet: DrawnSheet, monkeypatch) -> None:
     asked = []
 
     def found(views, mesh):
         asked.append(mesh)
         raise SheetError("stop")
 
-    monkeypatch.setattr(stability, "calibrate", found)
-    monkeypatch.setattr(stability, "find_cameras", found)
+    monkeypatch.setattr(cameras, "calibrate", found)
+    monkeypatch.setattr(cameras, "find_cameras", found)
     for given in ("own", "plain", "none"):
-        same = replace(sheet, given=given)
-        run_sheet(Sweep("x", "x", (0,), (0,), "", None, lambda step, seed, s=same: s), 0, 0)
+        cameras.try_cameras(lambda given=given: replace(sheet, given=given), 0)
     assert asked == [sheet.mesh, None, "none"]
 
 
-def tiny(step, seed):
-    return draw_sheet(seed, replace(PLAIN, views=1, cell_px=60))
+# ---- trials of trainings, palettes, labels, looks
 
 
-def test_the_same_seed_gives_the_same_table_and_another_seed_another():
-    sweep = Sweep("start", "x", (10, 20), (10,), "", None, tiny, from_start=True)
-    plan = [(sweep, step) for step in sweep.steps]
+def test_a_single_drawing_is_refused_and_a_weak_run_says_why(monkeypatch) -> None:
+    monkeypatch.setattr(fields, "STEPS", 2)
+    monkeypatch.setattr(scenes, "SCENE", replace(scenes.SCENE, cell_px=40))
+    monkeypatch.setattr(scenes, "HELD_OUT", 4)
+    stability._base_tried.cache_clear()
+    ((refused,), picture) = run_job(("train views", 1, 0))
+    assert (refused.voice, refused.value, picture) == (REFUSED, TRAINING.worst, b"")
+    assert "at least two views" in refused.words
+    ((clean,), picture) = run_job(("train views", 8, 0))
+    assert picture.startswith(b"\x89PNG")
+    assert clean.voice == WEAK
+    assert "these were 2 steps" in clean.words
+    assert 0 < clean.value < refused.value
+    assert run_job(("train warp", 0, 0))[0][0] is clean  # the same scene, tried once
+    stability._base_tried.cache_clear()
+    monkeypatch.setattr(verdict, "MOST_OFF", 1.0)
+    assert run_job(("train views", 8, 0))[0][0].voice == OK
+    stability._base_tried.cache_clear()
 
-    def table(seed):
-        results = [result for result, _ in run_steps(plan, seed, Counts(2, 1))]
-        return as_csv([row(r) for r in results if isinstance(r, StepResult)], seed)
 
-    once = table(0)
-    assert once == table(0)
-    assert once.splitlines()[1:] != table(7).splitlines()[1:]
-    assert [line.split(b",")[:4] for line in once.splitlines()[1:]] == [
-        [b"start", b"10", b"2", b"2"],
-        [b"start", b"20", b"2", b"2"],
-    ]
+def test_one_drawing_is_odd(monkeypatch) -> None:
+    monkeypatch.setattr(scenes, "SCENE", replace(scenes.SCENE, cell_px=40))
+    monkeypatch.setattr(scenes, "HELD_OUT", 2)
+    usual = scenes.draw_scene(3).train.frames
+    for step in ("flipped", "other pose", "other shirt"):
+        pairs = list(zip(PAGE["train odd"].draw(step, 3).train.frames, usual, strict=True))
+        assert sum(bool((a.rgba != b.rgba).any()) for a, b in pairs) == 1, step
+        assert all((a.camera.rotation == b.camera.rotation).all() for a, b in pairs)
+    turned = PAGE["train one camera"].draw(20, 3).train.frames
+    off = [abs(a.camera.angles[0] - b.camera.angles[0]) for a, b in zip(turned, usual, strict=True)]
+    off = [abs(math.remainder(angle, math.tau)) for angle in off]
+    assert sorted(off) == pytest.approx([0] * 7 + [math.radians(20)])
 
 
-def test_workers_keep_the_order_and_use_one_thread_each():
-    assert list(in_order(math.sqrt, [4, 9, 16], 2)) == list(in_order(math.sqrt, [4, 9, 16], 1))
-    assert list(in_order(os.getenv, THREADS, 2)) == ["1"] * len(THREADS)
+def test_a_colour_lies_as_far_away_as_asked() -> None:
+    for distance in (0.02, 0.1, 0.2):
+        color = color_away(SKIN, HAIR, distance)
+        lab = oklab_from_rgb(np.array([SKIN, color], np.uint8))
+        assert np.linalg.norm(np.diff(lab, axis=0)) == pytest.approx(distance, abs=0.003)
+
+
+def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monkeypatch) -> None:
+    monkeypatch.setattr(colors, "PICTURES", replace(colors.PICTURES, views=2, cell_px=80))
+    ((apart,), _), ((alike,), _) = (run_job(("palette near", step, 0)) for step in (20, 0.5))
+    assert (apart.value, alike.value) == (0, 50)
+    ((eye,), picture) = run_job(("palette tiny", 5, 0))
+    assert eye.value == 100
+    assert picture.startswith(b"\x89PNG")
+    assert "left out" in eye.words
+    assert hex_of(EYE) in eye.words
+
+
+def test_labels_are_right_where_paints_are_plain_and_wrong_in_deep_shadow(monkeypatch) -> None:
+    monkeypatch.setattr(sheets, "ARTIST", replace(sheets.ARTIST, views=3, cell_px=150))
+    ((plain,), picture), ((deep,), _) = (run_job(("labels shadow", step, 0)) for step in (0, 80))
+    assert picture.startswith(b"\x89PNG")
+    assert plain.value < 5
+    assert deep.value > plain.value + 5
 
 
 # ---- figures
 
-
-def result_of(*views, sweep="warp", step="1") -> StepResult:
-    errors = tuple(ViewError(math.radians(r), math.radians(m), v) for r, m, v in views)
-    return StepResult(sweep, step, (SheetResult(errors, 1.0, ""),))
-
-
-def test_figures_count_what_they_say():
-    found = row(
-        result_of(
-            (1, 1, "ok"),
-            (2, 2, "weak"),  # solved, but called weak
-            (170, 2, "ok"),  # flipped in silence
-            (175, 3, "ambiguous"),  # flipped and said so
-            (60, 40, "failed"),
-            (10, 10, "ok"),  # neither solved nor wrong
-        )
-    )
-    assert found.solved_modulo_twin == pytest.approx(4 / 6)
-    assert found.solved == pytest.approx(2 / 6)
-    assert (found.median_deg, found.median_raw_deg) == (pytest.approx(2.5), pytest.approx(35))
-    assert (found.ok, found.weak, found.ambiguous, found.failed, found.crashed) == (3, 1, 1, 1, 0)
-    assert (found.wrong, found.silent_wrong, found.false_alarms) == (3, 1, 1)
-    assert found.announced == pytest.approx(2 / 3)
+WARP = PAGE["warp"]
+FINE, ALARM = Trial(0, 1.0, "ok"), Trial(0, 2.0, "weak", "21 % of the outlines")
+BETWEEN = Trial(0, 10.0, "weak")
+SAID, UNSAID = Trial(1, 50.0, "failed", "54 % of the outlines"), Trial(1, 20.0, "ok")
 
 
-def test_an_alignment_without_verdict_is_neither_silent_nor_an_alarm():
-    found = row(result_of((1, 1, ""), (90, 90, "")))
-    assert (found.wrong, found.silent_wrong, found.false_alarms) == (1, 0, 0)
-    assert found.announced is None
+def page_of(*steps: list[Trial]) -> TriedPage:
+    named = zip(map(str, WARP.steps), steps, strict=False)
+    return TriedPage(WARP, tuple(TriedStep(n, tuple(t)) for n, t in named))
 
 
-def test_csv_does_not_know_the_seconds():
-    one = result_of((1, 1, "ok"))
-    slow = replace(one, sheets=(replace(one.sheets[0], seconds=99.0),))
-    assert as_csv([row(one)], 4) == as_csv([row(slow)], 4)
-    assert as_csv([row(one)], 4).endswith(b",4\n")
-    metrics = {record.metric: record.value for record in as_records([slow], 4)}
-    assert metrics["seconds"] == 99.0
+def test_trials_are_counted_by_their_bounds() -> None:
+    trials = (FINE, ALARM, BETWEEN, SAID, UNSAID, Trial(0, 90.0, UNJUDGED))
+    counts = {"n": 6, "failed": 3, "judged": 2, "announced": 1, "fine": 2, "alarms": 1}
+    assert asdict(tally(trials, CALIBRATION)) == counts
+    fates = shares(TriedStep("1", trials), CALIBRATION)
+    assert [round(6 * share) for share in fates] == [1, 1, 1, 1, 2]
 
 
-def test_steps_survive_the_way_through_json_and_sort_as_listed():
-    steps = [
-        result_of((1 / 3, 0.1, "ok"), step="2"),
-        result_of((2, 2, ""), step="5", sweep="start"),
-        result_of((9, 9, "weak"), step="0.5"),
-        TriedStepResult(
-            "train jpeg", "60", (Tried(3, 30.5, "silent", "", {"apart_px": 0.5}, 2.0),)
-        ),
-    ]
-    text = json.dumps(as_plain(KEY, steps))
-    assert from_plain(json.loads(text), KEY, "x") == steps
-    assert [name_of(s) for s in in_table_order([*steps, result_of(sweep="gone")])] == [
-        ("start", "5"),
-        ("warp", "0.5"),
-        ("warp", "2"),
-        ("train jpeg", "60"),
-    ]
-
-
-@pytest.mark.parametrize(
-    "broken",
-    [[], {}, {"format": 1}, {"format": 2}, None, {**asdict(KEY), "format": 2, "steps": [3]}],
-)
-def test_foreign_steps_are_refused(broken):
-    with pytest.raises(BundleError, match="--force"):
-        from_plain(broken, KEY, "steps.json")
-
-
-def test_steps_of_another_seed_are_refused():
-    with pytest.raises(BundleError, match="seed=1"):
-        from_plain(as_plain(replace(KEY, seed=1), []), KEY, "steps.json")
-
-
-def test_a_picture_is_drawn_of_one_sweep_and_of_many():
-    rows = [row(result_of((1, 1, "ok"), sweep=s.name, step=str(s.steps[0]))) for s in SWEEPS]
-    for some in (rows[:1], rows[:5]):
-        assert draw_stability(some, "n = 1").startswith(b"\x89PNG")
-
-
-# ---- the command
-
-
-def test_a_second_run_takes_the_first_ones_steps(bench, tmp_path, monkeypatch):
-    sweep = Sweep("start", "x", (0, 5), (0,), "", None, tiny, from_start=True)
-    for place in ("atlas.run.SWEEPS", "stability.chart.SWEEPS"):
-        monkeypatch.setattr(f"bench.{place}", (sweep,))
-    monkeypatch.setattr("bench.cases.workers.usable_workers", lambda: 1)
-    out = tmp_path / "out"
-    command = ("stability", "-o", out, "--count", 1, "--json", "--quiet")
-    first = bench(*command, "--quick", "--only", "start")
-    assert first.code == 0, first
-    assert [found["step"] for found in first.json["rows"]] == ["0"]
-    assert {path.name for path in out.iterdir()} == {
-        "steps.json",
-        "stability.csv",
-        "stability.png",
-        "records.json",
-        "pages.csv",
-        "pictures",
-        "report.html",
+def test_a_page_fails_from_where_more_than_a_tenth_fail() -> None:
+    nine = [FINE] * 9
+    page = page_of(nine, [*nine, SAID], [*nine, SAID, UNSAID], [FINE])
+    first = fails_from(page)
+    assert first is not None
+    assert first.step == str(WARP.steps[2])
+    assert fails_from(page_of(nine)) is None
+    assert as_plain([page])[0] | {"n": 0} == {
+        "page": "warp",
+        "fails_from": str(WARP.steps[2]),
+        "n": 0,
+        "failed": 3,
+        "judged": 3,
+        "announced": 2,
+        "fine": 28,
+        "alarms": 0,
     }
-    kept = json.loads((out / "steps.json").read_text())["steps"][0]
-    more = bench(*command, "--only", "start")
-    assert [found["step"] for found in more.json["rows"]] == ["0", "5"]
-    assert {path.name for path in (out / "pictures").iterdir()} == {"start-0.png", "start-5.png"}
+    assert summary_rows([page])[-1][:2] == ("all pages: calibration", "")
+    assert summary_csv([page]).startswith(b"page,fails from,n,failed")
+    records = {(r.method, r.metric): r for r in as_records([page], 4)}
+    assert records["1", "rotation error"].n == 11
+    assert records["1", "failed in silence"].value == 1
+
+
+def test_the_sheet_that_pages_share_counts_once_for_all_of_them() -> None:
+    page = page_of([FINE], [SAID])
+    other = replace(page, page=PAGE["squash"])
+    assert page.page.base == other.page.base == 0
+    rows = summary_rows([page, other])
+    assert [row[2] for row in rows] == ["2", "2", "3"]
+
+
+def test_a_training_loses_against_its_own_bodys_clean_scene() -> None:
+    done = {
+        ("train warp", "0"): (Trial(0, 0.5, OK), Trial(1, 0.75, OK)),
+        ("train warp", "4"): (Trial(0, 0.75, WEAK), Trial(1, 2, WEAK)),
+        ("train jpeg", "60"): (Trial(0, 0.75, OK),),  # without its clean step
+    }
+    (page,) = tried_pages(done)
+    assert [trial.value for trial in page.steps[1].trials] == [0.25, 1.25]
+    found = tally(page.steps[1].trials, TRAINING)
+    assert (found.fine, found.failed, found.alarms, found.announced) == (1, 1, 1, 1)
+
+
+# ---- the report
+
+
+def test_a_report_shows_the_worst_case_and_needs_nothing_else() -> None:
+    page = page_of([FINE, ALARM], [SAID, SAID], [UNSAID])
+    pictures = {("warp", str(step)): b"\x89PNG" for step in WARP.steps[:3]}
+    html = sweep_html([page], "seed 0", pictures)
+    assert "1: 20.0 deg; ok" in html  # of the third step
+    assert "Fails from 0.5 on: there 2 of 2 views fail, 2 of them announced." in html
+    assert "67 % (2 of 3)" in html
+    assert html.count("data:image/png") == 3
+    assert html.count("data:image/svg+xml") == 1
+    assert not re.search(r"<script|src=\"(?!data:)", html)
+    assert "data:image/png" not in sweep_html([page], "seed 0", {})
+
+
+# ---- runs
+
+
+def tiny(step: float, seed: int) -> DrawnSheet:
+    return draw_sheet(seed, views=1, cell_px=60, outline_px=0, warp_percent=step)
+
+
+TINY = Page(CALIBRATION, "tiny", "x", (0, 1, 2), None, tiny)
+
+
+def test_the_same_seed_gives_the_same_trials_and_another_seed_others(monkeypatch) -> None:
+    monkeypatch.setattr(listed, "PAGES", (TINY,))
+
+    def found(seed: int) -> list[tuple[Trial, ...]]:
+        steps = run_steps([(TINY, 0), (TINY, 2)], replace(KEY, seed=seed))
+        return [trials for _, _, (trials, _) in steps]
+
+    once = found(0)
+    assert once == found(0)
+    assert [len(trials) for trials in once] == [2, 2]
+    assert once != found(7)
+
+
+def test_workers_keep_the_order_and_use_one_thread_each() -> None:
+    assert list(in_order(math.sqrt, [4, 9, 16], 2)) == list(in_order(math.sqrt, [4, 9, 16], 1))
+    assert list(in_order(os.getenv, THREADS, 2)) == ["1"] * len(THREADS)
+
+
+def test_a_second_run_takes_the_first_ones_steps(bench, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(listed, "PAGES", (TINY,))
+    monkeypatch.setattr(stability, "usable_workers", lambda: 1)
+    out = tmp_path / "out"
+    command = ("stability", "-o", out, "--count", 1, "--json", "--quiet", "--only", "tiny")
+    monkeypatch.setattr(listed, "PAGES", (replace(TINY, steps=(0, 1)),))
+    first = bench(*command)
+    assert first.code == 0, first
+    assert first.json["pages"][0]["n"] == 2
+    assert {path.name for path in out.iterdir()} == set(stability.WRITTEN)
+    rows = json.loads((out / "steps.json").read_text())["rows"]
+    monkeypatch.setattr(listed, "PAGES", (TINY,))
+    more = bench(*command)
+    assert more.json["pages"][0]["n"] == 3
+    assert json.loads((out / "steps.json").read_text())["rows"][:2] == rows
+    assert {path.name for path in (out / "pictures").iterdir()} == {
+        f"tiny-{step}.png" for step in (0, 1, 2)
+    }
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 3  # two steps, and the worst of them again
-    assert page.count('<section id="') == 1
-    assert json.loads((out / "steps.json").read_text())["steps"][0] == kept  # seconds, too
-    assert "seed=0" in bench(*command, "--seed", 1).reason
-    afresh = bench(*command, "--seed", 1, "--quick", "--only", "start", "--force")
-    assert [found["step"] for found in afresh.json["rows"]] == ["0"]
+    assert page.count("data:image/png;base64,") == 3
+    assert "'seed': 0" in bench(*command, "--seed", 1).reason
+    afresh = bench(*command, "--seed", 1, "--quick", "--force")
+    assert afresh.json["pages"][0]["n"] == 3
+    (out / "steps.json").write_text('{"key": 3}')
+    assert "holds no results" in bench(*command).reason
 
 
-def test_mistakes_are_refused_before_any_work(bench, tmp_path):
+def test_mistakes_are_refused_before_any_work(bench, tmp_path) -> None:
     wrong = bench("stability", "--only", "hat", "-o", tmp_path / "out")
-    assert "takes one of start, views" in wrong.reason
+    assert "takes one of views, angles" in wrong.reason
     (tmp_path / "drawing.png").write_bytes(b"x")
     assert "--force" in bench("stability", "-o", tmp_path).reason
     assert "drawing.png" in bench("stability", "-o", tmp_path, "--force").reason
     assert bench("stability", "--cases", tmp_path).code == 2
 
 
-def test_a_body_of_a_seed_is_the_sheets_body():
-    np.testing.assert_array_equal(draw_sheet(3, PLAIN).mesh.vertices, random_body(3).vertices)
-    assert [step for _, step in chosen("mirror", SWEEPS, quick=True)] == [0, 1, 2]
+def test_a_body_of_a_seed_is_the_sheets_body(sheet: DrawnSheet) -> None:
+    np.testing.assert_array_equal(sheet.mesh.vertices, random_body(3).vertices)
+    assert LOOK.calm == (UNJUDGED,)
 
 
 def test_an_interrupted_bench_says_that_it_goes_on(capsys: pytest.CaptureFixture[str]) -> None:

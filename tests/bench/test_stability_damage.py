@@ -1,37 +1,50 @@
-"""What goes wrong with a drawing keeps its truth: the camera still sees what is drawn."""
+"""What goes wrong with drawings, bodies and cameras keeps its truth, and is as large as said."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
+from bench.stability import scenes
+from bench.stability.bodies import (
+    EARS,
+    vase,
+    with_arms_raised,
+    with_ears,
+    with_eyes,
+    with_head_grown,
+)
 from bench.stability.damage import (
     MIRROR,
     mirrored,
     padded,
-    rolled,
     stretched,
-    with_capsule,
+    with_ball,
     with_gaps_closed,
     without_feet,
     without_pieces,
 )
-from bench.stability.draws import LOSSLESS, blurred, compressed
-from bench.stability.sheet import BASE, DrawnSheet, draw_sheet
+from bench.stability.fields import TRAINING
+from bench.stability.pages import PAGES
+from bench.stability.scenes import draw_scene
+from bench.stability.sheets import BASE, LOSSLESS, DrawnSheet, blurred, compressed, draw_sheet
 from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.view import View
 
-PLAIN = replace(BASE, outline_px=0, cell_px=120, views=3)
+PLAIN = {"outline_px": 0, "cell_px": 120, "views": 3}
+PAGE = {page.name: page for page in PAGES}
 
 
 @pytest.fixture(scope="module")
 def sheet():
-    return draw_sheet(3, PLAIN)
+    return draw_sheet(3, **PLAIN)
 
 
 def overlap(view, camera, mesh: Mesh) -> float:
@@ -43,27 +56,11 @@ def overlap(view, camera, mesh: Mesh) -> float:
     return float((seen & view.mask).sum() / (seen | view.mask).sum())
 
 
-def test_padding_and_rolling_keep_the_camera_true(sheet: DrawnSheet):
+def test_padding_keeps_the_camera_true(sheet: DrawnSheet):
     for drawn in sheet.drawings:
         plain = overlap(*drawn, sheet.mesh)
         assert plain > 0.97
         assert overlap(*padded(*drawn, 17), sheet.mesh) == plain
-        for roll in (-0.3, 0.5):
-            turned = rolled(*drawn, roll)
-            assert overlap(*turned, sheet.mesh) > 0.96
-            _, elevation, angle = turned[1].angles
-            np.testing.assert_allclose([elevation, angle], [drawn[1].angles[1], roll], atol=1e-9)
-
-
-def test_rolling_there_and_back_returns_the_camera(sheet):
-    view, camera = sheet.drawings[0]
-    back_view, back = rolled(*rolled(view, camera, 0.2), -0.2)
-    np.testing.assert_allclose(back.rotation, camera.rotation, atol=1e-12)
-    grown = (np.array(back.size_wh) - camera.size_wh) / 2
-    np.testing.assert_allclose(back.center - grown, camera.center, atol=1e-9)
-    dx, dy = grown.astype(int)
-    inner = back_view.mask[dy : dy + camera.size_wh[1], dx : dx + camera.size_wh[0]]
-    assert (inner == view.mask).mean() > 0.99
 
 
 def test_a_mirrored_drawing_is_the_mirrored_body(sheet: DrawnSheet):
@@ -107,7 +104,7 @@ def test_a_ball_covers_its_disc_where_the_camera_sees_it(sheet):
     view, camera = sheet.drawings[0]
     top = sheet.mesh.vertices[sheet.mesh.vertices[:, 1].argmax()]
     radius = 0.3
-    hairy, shown = with_capsule(view, camera, np.stack([top, top]), radius, (10, 20, 30))
+    hairy, shown = with_ball(view, camera, top, radius, (10, 20, 30))
     at, _, _ = shown.project(top[None])
     away = np.linalg.norm(shown.pixel_grid() - at[0], axis=-1)
     assert hairy.mask[away < radius * camera.scale - 0.5].all()
@@ -119,13 +116,13 @@ def test_a_ball_covers_its_disc_where_the_camera_sees_it(sheet):
 
 def test_no_radius_is_no_ball(sheet):
     view, camera = sheet.drawings[0]
-    same, _ = with_capsule(view, camera, np.zeros((2, 3)), 0.0, (0, 0, 0))
+    same, _ = with_ball(view, camera, np.zeros(3), 0.0, (0, 0, 0))
     assert same is view
 
 
 @pytest.mark.parametrize("growth", [-0.2, 0.3])
 def test_a_stretched_drawing_is_seen_by_pixels_that_are_as_tall(growth):
-    sheet = draw_sheet(3, replace(BASE, outline_px=0, cell_px=120, views=1))
+    sheet = draw_sheet(3, outline_px=0, cell_px=120, views=1)
     view, camera = stretched(*sheet.drawings[0], growth)
     assert camera.pixel_aspect == pytest.approx((1 + growth) ** 2, rel=0.02)
     assert overlap(view, camera, sheet.mesh) > 0.95
@@ -145,6 +142,114 @@ def test_only_gaps_narrower_than_their_share_are_painted_shut():
 
 
 def test_cut_out_of_a_sheet_drawings_keep_their_cameras():
-    for sheet in (compressed(LOSSLESS, 1), compressed(30, 1), blurred(1, 1)):
+    for sheet in (compressed(BASE, LOSSLESS, 1), compressed(BASE, 30, 1), blurred(BASE, 1, 1)):
         for view, camera in sheet.drawings:
             assert overlap(view, camera, sheet.mesh) > 0.85  # lines and blur make them larger
+
+
+# ---- bodies
+
+
+def part(body, *names):
+    numbers = [i for i, name in enumerate(body.part_names) if name in names]
+    return body.vertices[np.unique(body.faces[np.isin(body.face_parts, numbers)])]
+
+
+def test_arms_rise_by_their_angle_about_the_shoulder():
+    body = random_body(4)
+    up = with_arms_raised(body, math.radians(30))
+    for name, side in (("left arm", 1), ("right arm", -1)):
+        before, after = part(body, name), part(up, name)
+        assert after[:, 1].max() > before[:, 1].max()
+        lengths = (np.linalg.norm(np.ptp(points, axis=0)) for points in (before, after))
+        np.testing.assert_allclose(*lengths, rtol=0.2)
+        hands = (points[(side * points[:, 0]).argmax()] for points in (before, after))
+        turn = np.subtract(*hands)
+        assert side * turn[0] < 0
+        assert turn[1] < 0
+    np.testing.assert_array_equal(part(up, "trunk"), part(body, "trunk"))
+
+
+def test_a_head_grows_over_its_chin_and_nothing_else():
+    body = random_body(4)
+    large = with_head_grown(body, 0.5)
+    for name in ("head", "nose", "hair"):
+        sizes = [np.ptp(part(b, name), axis=0) for b in (body, large)]
+        np.testing.assert_allclose(sizes[1], 1.5 * sizes[0])
+    assert part(large, "head")[:, 1].min() == pytest.approx(part(body, "head")[:, 1].min())
+    np.testing.assert_array_equal(part(large, "left leg"), part(body, "left leg"))
+
+
+def test_ears_and_eyes_are_parts_of_the_radius_asked_for():
+    body = random_body(2)
+    for grown, names in ((with_ears(body, 0.1), EARS), (with_eyes(body, 0.02), ("left eye",))):
+        points = part(grown, names[0])
+        radius = 0.1 if names is EARS else 0.02
+        np.testing.assert_allclose(np.ptp(points, axis=0)[:2], 2 * radius, rtol=0.02)
+        assert points[:, 0].mean() > 0  # the character's left
+    assert with_ears(body, 0) is body
+    assert part(with_eyes(body, 0.02), "left eye")[:, 2].max() > part(body, "head")[:, 2].mean()
+
+
+def test_half_of_the_views_are_squashed_and_half_are_stretched():
+    tall = [c.pixel_aspect > 1 for _, c in PAGE["squash"].draw(20, 0).drawings]
+    assert 0 < sum(tall) < len(tall)
+
+
+def test_a_vase_looks_the_same_from_all_round():
+    mesh = vase()
+    turn = 2 * math.pi / 96 * 7
+    c, s = math.cos(turn), math.sin(turn)
+    turned = mesh.vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    gaps = np.linalg.norm(mesh.vertices[:, None] - turned[None], axis=-1)
+    assert gaps.min(axis=1).max() < 1e-6
+    assert mesh.height == pytest.approx(1.8)
+
+
+# ---- scenes
+
+
+def cameras(scene):
+    return [frame.camera for frame in scene.train.frames]
+
+
+def test_errors_of_cameras_are_as_large_as_said_and_none_of_the_body(monkeypatch):
+    monkeypatch.setattr(scenes, "HELD_OUT", 2)
+    true = cameras(draw_scene(5))
+    turned = PAGE["train yaw"].draw(10, 5).train.frames
+    yaws = [(a.camera.angles[0], b.angles[0]) for a, b in zip(turned, true, strict=True)]
+    off = [math.remainder(a - b, math.tau) for a, b in yaws]
+    np.testing.assert_allclose(np.abs(off), math.radians(10))
+    assert sum(off) == pytest.approx(0, abs=1e-9)
+    pairs = list(zip(cameras(PAGE["train scale"].draw(5, 5)), true, strict=True))
+    sizes = [math.log(a.scale / b.scale) for a, b in pairs]
+    np.testing.assert_allclose(np.abs(sizes), math.log(1.05))
+    assert sum(sizes) == pytest.approx(0, abs=1e-9)
+    pairs = list(zip(cameras(PAGE["train shift"].draw(2, 5)), true, strict=True))
+    moves = [a.center - b.center for a, b in pairs]
+    assert math.sqrt(np.square(moves).sum() / len(moves)) == pytest.approx(0.02 * 80)
+    of_body = np.concatenate([camera.rotation[:2] for camera in true])
+    np.testing.assert_allclose(of_body.T @ np.concatenate(moves), 0, atol=1e-9)
+
+
+def test_the_base_step_of_a_page_is_the_base_scene(monkeypatch):
+    small = replace(scenes.SCENE, cell_px=32, supersample=1)
+    monkeypatch.setattr(scenes, "SCENE", small)
+    monkeypatch.setattr(scenes, "HELD_OUT", 2)
+    base = draw_scene(1)
+    for page in PAGE.values():
+        if page.kind is TRAINING and page.base is not None:
+            of_size = page.name == "train resolution"
+            drawn = page.draw(small.cell_px if of_size else page.base, 1)
+            for a, b in zip(drawn.train.frames, base.train.frames, strict=True):
+                np.testing.assert_array_equal(a.rgba, b.rgba, err_msg=page.name)
+                np.testing.assert_allclose(a.camera.center, b.camera.center)
+
+
+def test_a_squashed_drawing_is_believed_to_have_square_pixels(monkeypatch):
+    monkeypatch.setattr(scenes, "HELD_OUT", 2)
+    scene = PAGE["train squash"].draw(20, 1)
+    assert {camera.pixel_aspect for camera in cameras(scene)} == {1.0}
+    heights = [frame.rgba.shape[0] for frame in scene.train.frames]
+    assert min(heights) < 80 < max(heights)
+    assert scene.test.frames[0].rgba.shape[0] == 80

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from bench.calib.measure import view_error
+from bench.calib.figures import view_error
 from bench.cases.bodies import random_body
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.known import Known

@@ -13,39 +13,34 @@ import pytest
 
 from bench.calib import measure as calib
 from bench.calib.baselines import BASELINES
-from bench.calib.figures import (
-    MeasuredSheet,
-    MeasuredView,
-    Recorder,
-    ViewError,
-    angle_between,
-    sheet_records,
+from bench.calib.figures import MeasuredSheet, ViewError, angle_between, sheet_records
+from bench.calib.measure import (
+    METHODS,
+    bench_calibration,
+    named_directions,
+    own_cache,
+    sheets_table,
 )
-from bench.calib.measure import METHODS, SOFT, bench_calibration, named_directions, own_cache
-from bench.calib.table import sheets_table
 from bench.cases import cases
 from bench.cases.bodies import random_body
 from bench.cases.cases import CONDITIONS, CalibCase, calib_cases
-from bench.records.record import Record
+from bench.records.record import Record, Recorder
 from toonset.calib.result import SEVERITY
-from toonset.calib.search import templates
 from toonset.camera import Camera, rotation_from_angles
 from toonset.view import View
 
 RECORDER = Recorder("default", "drawn", 0)
 
 
-def sheet(*views: tuple[float, float, str], sigma: float = 1.0) -> MeasuredSheet:
+def sheet(*views: tuple[float, float, str], sigma: float = 1.0, case: str = "") -> MeasuredSheet:
     """Return a sheet of (error, error modulo twin, verdict) in degrees; yaw errs as the view."""
     return MeasuredSheet(
         tuple(
-            MeasuredView(
-                ViewError(math.radians(raw), math.radians(twin), verdict),
-                math.radians(raw),
-                math.radians(sigma),
-            )
+            ViewError(*map(math.radians, (raw, twin)), verdict, *map(math.radians, (raw, sigma)))
             for raw, twin, verdict in views
         ),
+        case,
+        2.0,
         2.0,
     )
 
@@ -110,7 +105,7 @@ def test_what_was_not_judged_has_no_verdicts_and_nothing_placed_has_no_errors() 
     assert set(by_metric(sheet_records([unjudged], RECORDER))).isdisjoint(
         (*SEVERITY, "wrong but ok", "wrong and announced")
     )
-    assert set(by_metric(sheet_records([sheet()], RECORDER))) == {"seconds"}
+    assert set(by_metric(sheet_records([sheet()], RECORDER))) == {"seconds", "CPU seconds"}
 
 
 def test_without_wrong_views_there_is_no_share_of_announced_ones() -> None:
@@ -149,7 +144,8 @@ def even_case(views: int = 4) -> CalibCase:
 
 def test_even_turns_are_what_the_nominal_angles_say(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calib, "QUICK", ())
-    (nominal,) = [r for r in bench_calibration([even_case()], 0, quick=True) if "deg" == r.unit][:1]
+    records = bench_calibration([even_case()], 0, quick=True)
+    (nominal,) = [r for r in records if r.unit == "deg"][:1]
     assert (nominal.method, nominal.n) == ("nominal angles", 4)
     assert nominal.p95 == pytest.approx(0, abs=1e-4)
 
@@ -170,36 +166,6 @@ def test_methods_get_their_labels_and_their_cache(monkeypatch: pytest.MonkeyPatc
     for method in calib.QUICK:
         own = by_metric([r for r in records if r.method == method])
         assert own["within 5 deg"].value == own["ok"].value == 1
-
-
-def test_a_drawing_alone_is_a_sheet_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    case, seen = even_case(), []
-
-    def watched(views, mesh, options, known=None):
-        seen.append(len(views))
-        return answer(case.rotations[len(seen) - 1][None])
-
-    monkeypatch.setattr(calib, "QUICK", ("each drawing alone",))
-    monkeypatch.setattr(calib, "find_cameras", watched)
-    records = bench_calibration([case], 0, quick=True)
-    own = by_metric([r for r in records if r.method == "each drawing alone"])
-    assert seen == [1, 1, 1, 1]
-    assert (own["rotation error"].n, own["within 5 deg"].value) == (4, 1)
-
-
-def test_constants_are_other_for_a_method_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen, usual = [], templates.YAW_STEP
-
-    def watched(views, mesh, options, known=None):
-        seen.append((len(templates.grid()), len(os.listdir(os.environ["TOONSET_CACHE"]))))
-        raise KeyError
-
-    monkeypatch.setattr(calib, "QUICK", ("templates every 20 deg",))
-    monkeypatch.setattr(calib, "find_cameras", watched)
-    with pytest.raises(KeyError):
-        bench_calibration([even_case()], 0, quick=True)
-    assert seen == [(len(templates.grid()) // 2, 1)]
-    assert usual == templates.YAW_STEP
 
 
 def test_the_users_cache_is_left_alone_whatever_happens(
@@ -272,29 +238,14 @@ def worst_case(method: str) -> list[Record]:
 
 
 def test_the_table_has_a_row_per_method_and_fits_a_terminal() -> None:
-    methods = ["nominal angles", *BASELINES, SOFT, *METHODS, "COLMAP 1000 px, global"]
+    methods = [*BASELINES, *METHODS]
     lines = sheets_table([r for m in methods for r in worst_case(m)]).splitlines()
     assert max(map(len, lines)) <= 120
     for method in methods:
-        assert sum(line.startswith(f"  {method}  ") for line in lines) == 1
-    assert "another body: 121 views, 2 sheets" in lines
-    (default,) = [line for line in lines if line.startswith("  default ")]
-    assert "26/25/25/25" in default
-    assert "90/120" in default
-
-
-def test_what_is_missing_is_a_dash_and_failed_runs_are_told() -> None:
-    recorder = Recorder("COLMAP", "photo", 0)
-    records = [
-        recorder.samples("seconds", [3.0], "s"),
-        recorder.total("views not placed", [True, True, False]),
-        recorder.total("failed runs", [False], "sheets"),
-    ]
-    text = sheets_table(records)
-    (row,) = [line for line in text.splitlines() if line.startswith("  COLMAP")]
-    assert row.split()[1:] == ["-"] * 11 + ["3.00", "-"]
-    assert "photo, COLMAP: views not placed 2 of 3" in text
-    assert "failed runs" not in text  # there were none
+        assert sum(line.startswith(f"{method}  ") for line in lines) == 1
+    assert lines[0] == "another body"
+    (default,) = [line for line in lines if line.startswith("default ")]
+    assert default.split()[:5] == ["default", "121", "179.00", "179.0", "88.0"]
 
 
 # ---- the command
@@ -305,7 +256,6 @@ def test_what_is_missing_is_a_dash_and_failed_runs_are_told() -> None:
     [
         ["train", "--sprites", "x"],
         ["calib", "--sprites", "x", "--cases", "y"],
-        ["calib", "--sprites", "x", "--baseline", "colmap"],
         ["stability", "--cases", "x"],
     ],
 )

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.stability.draws import warped
-from bench.stability.sheet import DrawnSheet
+from bench.stability.sheets import DrawnSheet, draw_sheet
 from toonset.calib import pipeline
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import PROPORTIONS, UNSTEADY, UNSTEADY_MARGIN
@@ -24,7 +23,7 @@ def calibrated(sheet: DrawnSheet) -> Calibration:
 
 
 def test_a_rival_that_only_drawing_error_makes_is_none() -> None:
-    sheet = warped(2.0, 1012)
+    sheet = draw_sheet(1012, warp_percent=2.0)
     found = calibrated(sheet)
     off = [
         rotation_distance(view.camera.rotation, camera.rotation)
@@ -35,7 +34,7 @@ def test_a_rival_that_only_drawing_error_makes_is_none() -> None:
 
 
 def test_unsteady_drawings_do_not_bend_the_mannequin_on_little_evidence() -> None:
-    found = calibrated(warped(2.0, 1003))
+    found = calibrated(draw_sheet(1003, warp_percent=2.0))
     rung = next(rung for rung in found.model.rungs if rung.name == PROPORTIONS)
     assert found.noise.smooth > UNSTEADY
     assert (rung.margin, rung.is_proven) == (UNSTEADY_MARGIN, False)
@@ -54,7 +53,7 @@ def test_the_chosen_camera_and_its_twin_stay_among_the_candidates(
         return steady
 
     monkeypatch.setattr(pipeline, "steadied", watched)
-    calibrated(warped(percent, 1012))
+    calibrated(draw_sheet(1012, warp_percent=percent))
     assert len(seen) == 5
     for found, steady, pose in seen:
         twin = pose.twin()

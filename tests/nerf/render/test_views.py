@@ -10,7 +10,6 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from bench.train.views_speed import compare, plain
 from toonset.camera import Camera
 from toonset.errors import PaletteError
 from toonset.nerf.fields.trained_field import TrainedField
@@ -190,16 +189,3 @@ def test_a_whole_palette_is_matched_by_order_or_by_nearest() -> None:
         repainted(run, "#0000ff,#ff0000,#00ff00")
     with pytest.raises(PaletteError, match="without palette"):
         repainted(ball(), "#0000ff")
-
-
-def test_the_plain_renderer_of_the_bench_is_the_slow_loop_and_views_come_near_it() -> None:
-    trained = ball()
-    camera = Camera.looking_at(np.zeros(3), 0.4, 0.2, 9.0, (18, 18))
-    chosen = np.zeros((18, 18), dtype=bool)
-    chosen[9, 4:14:3] = True
-    places = places_within(chosen).reshape(-1, 2)
-    truth = slow(trained, camera, places)[:, :4].reshape(-1, 4, 4).mean(axis=1)
-    np.testing.assert_allclose(plain(trained, camera, chosen), truth, atol=1e-4)
-    row = compare(trained, 16)
-    assert row.psnr > 35
-    assert row.fast_ms > 0

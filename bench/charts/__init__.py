@@ -1,1 +1,0 @@
-"""Charts of cost against merit."""

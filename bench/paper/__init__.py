@@ -1,1 +1,0 @@
-"""The plain method's table and figure."""
