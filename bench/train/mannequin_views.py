@@ -3,7 +3,7 @@
     colour(x) = sum_v w_v colour_v(project_v(x)) / sum_v w_v,   w_v = cos^4 of the angle of sight
 
 over the drawings in which the mannequin hides x behind nothing: the rule of the coloured hull
-(`toonset.nerf.fields.painted_hull`), so that the two differ in shape alone. A point that no drawing
+(`bench.train.painted_hull`), so that the two differ in shape alone. A point that no drawing
 shows, or only beside its figure, takes the colour of the nearest one that a drawing's pixel lies
 on.
 
@@ -22,12 +22,12 @@ from jaxtyping import Bool, Float, UInt8
 from scipy.ndimage import map_coordinates
 from scipy.spatial import KDTree
 
+from bench.train.painted_hull import GRAZING, SHARPNESS
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
-from toonset.nerf.fields.painted_hull import GRAZING, SHARPNESS
 
 SAMPLES = 4  # per pixel and axis, of what is drawn; half as many cost 3 dB where the mesh is true
 MOST_SIDE_PX = 2048  # of those samples: half a GiB of points

@@ -8,8 +8,12 @@ from typing import Any, Literal, get_args
 
 from bench.cases.cases import TrainCase
 from bench.charts.chart import DEFAULT
+from bench.train.mlp import network
+from bench.train.painted_hull import painted
 from bench.train.peers import Peer
+from bench.train.voxel import voxels
 from toonset.nerf.options import TrainOptions, paper
+from toonset.nerf.train.train import FieldOf
 
 NEAREST = "nearest drawing"
 MANNEQUIN = "coloured mannequin"
@@ -38,6 +42,7 @@ class Method:
         share: cells of the planes, of the finest that the scene could have; None: as `options` say.
         mannequin: no training either; the case's mannequin, where there is one, is fitted to the
             outlines and shown in the drawings' colours.
+        field: returns what is fitted; None: planes.
     """
 
     options: TrainOptions | None
@@ -48,6 +53,7 @@ class Method:
     curve: bool = False
     share: float | None = None
     mannequin: bool = False
+    field: FieldOf | None = None
 
 
 def _without(
@@ -67,7 +73,9 @@ METHODS: dict[str, Method] = {
     DEFAULT: Method(TrainOptions(), curve=True),
     NEAREST: Method(None, first_seed_only=True),
     MANNEQUIN: Method(None, first_seed_only=True, mannequin=True),
-    "coloured hull": Method(TrainOptions(field="hull"), "no palette", first_seed_only=True),
+    "coloured hull": Method(
+        TrainOptions(steps=0), "no palette", first_seed_only=True, field=painted
+    ),
     **{
         f"{steps} steps": Method(
             TrainOptions(steps=steps), first_seed_only=True, most_views_only=True
@@ -86,12 +94,10 @@ METHODS: dict[str, Method] = {
     "without both": _without("alignment", register=False, unbend=False),
     "without symmetry": _without("symmetry", symmetric=False),
     "without hull": Method(TrainOptions(carve=False), first_seed_only=True, most_views_only=True),
-    "voxel": Method(TrainOptions(field="voxel"), first_seed_only=True, curve=True),
-    "mlp": Method(TrainOptions(field="mlp"), first_seed_only=True, curve=True),
+    "voxel": Method(TrainOptions(), first_seed_only=True, curve=True, field=voxels),
+    "mlp": Method(TrainOptions(), first_seed_only=True, curve=True, field=network),
     **PAPER,
-    "paper, mlp": Method(
-        replace(paper(2000), field="mlp"), first_seed_only=True, most_views_only=True
-    ),
+    "paper, mlp": Method(paper(2000), first_seed_only=True, most_views_only=True, field=network),
 }
 OF_PEERS = Method(None, first_seed_only=True, most_views_only=True)
 FOR_THE_TABLE_ALONE = [name for name in PAPER if PAPER[name].palette != "automatic palette"]
@@ -186,6 +192,7 @@ class Job:
             "palette": method.palette,
         }
         found |= {} if method.share is None else {"share": method.share}
+        found |= {} if method.field is None else {"field": method.field.__name__}
         return found if self.peer is None else found | {"peer": self.peer.command}
 
 

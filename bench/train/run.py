@@ -119,7 +119,7 @@ def _trained(
     share = job.way.share
     if share is not None:
         options = replace(options, resolution=round(share * finest_cells(scene)))
-    training = fit_field(scene, options, watch=watch)
+    training = fit_field(scene, options, watch=watch, field_of=job.way.field)
     seconds, cpu_seconds = watch.spent()
     sample = curve_frames(case.test)
     curve = [Seen(*spent, _psnr(trained, sample)) for spent, trained in watch.states()]

@@ -42,7 +42,7 @@ from toonset.nerf.train.loss import Model
 from toonset.nerf.train.train import fit_field
 
 # a grid in the whole box, of few rays a step: small scenes train in seconds
-QUICK = TrainOptions(device="cpu", carve=False, field="voxel", register=False, unbend=False)
+QUICK = TrainOptions(device="cpu", carve=False, field="triplane", register=False, unbend=False)
 
 
 def ball(yaw: float, side: int, name: str) -> Frame:

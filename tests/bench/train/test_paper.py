@@ -125,7 +125,7 @@ def test_hand_picked_palettes_are_those_that_cases_come_with() -> None:
     assert not any("hand-picked" in job.method for job in paper_plan([bare], 0, "", quick=False))
     jobs = paper_plan([own], 0, "", quick=False)
     assert {job.method for job in jobs} == {"default", *PAPER}
-    with_it = Method(TrainOptions(steps=1, field="voxel", device="cpu"), "hand-picked palette")
+    with_it = Method(TrainOptions(steps=1, field="triplane", device="cpu"), "hand-picked palette")
     seen = []
     METHODS["own"] = with_it
     try:
@@ -151,7 +151,9 @@ def short_methods() -> Iterator[None]:
     """Let the quick bench train for few steps."""
     known = dict(METHODS)
     for name in ("default", *QUICK):
-        options = TrainOptions(steps=2, field="voxel", register=False, unbend=False, device="cpu")
+        options = TrainOptions(
+            steps=2, field="triplane", register=False, unbend=False, device="cpu"
+        )
         METHODS[name] = replace(METHODS[name], options=replace(options, carve=name == "default"))
     yield
     METHODS.update(known)
