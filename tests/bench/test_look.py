@@ -19,7 +19,7 @@ from bench.charts.chart import DEFAULT
 from bench.charts.points import charts_of
 from bench.look.cases import DRAWN, LookCase, drawn_case, look_cases
 from bench.look.eyes import Eye, check_eyes, eye_look, eyes_of_body, marked_eyes, read_eyes
-from bench.look.measure import LookResult, bench_look, eyes_text, records_of, table_of
+from bench.look.measure import LookResult, bench_look, eyes_text, flicker, records_of, table_of
 from bench.look.picture import draw_looks, face_sheet, look_sheet
 from bench.look.plan import FIELD, LOOKS, Recipe, Variant
 from bench.stability.bodies import with_eyes
@@ -275,3 +275,10 @@ def test_cameras_of_a_look_page_are_off_as_said(monkeypatch: pytest.MonkeyPatch)
     assert np.abs(turns) == pytest.approx([10] * 4)
     assert sum(turns) == pytest.approx(0, abs=1e-6)
     assert len(atlas_look.numbered(5, 2).train.frames) == 5
+
+
+def test_an_even_turn_does_not_flicker_and_a_pop_does() -> None:
+    ramp = [np.full((4, 4, 3), value) for value in (0.2, 0.4, 0.2, 0.0)]
+    assert flicker(ramp) == pytest.approx(0.2)
+    assert flicker(ramp[:3]) == pytest.approx(0.4)  # up, down
+    assert flicker(ramp[1:]) == pytest.approx(0)

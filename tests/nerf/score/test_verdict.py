@@ -153,14 +153,6 @@ def test_an_undrawn_side_that_is_the_mirror_image_of_another_is_no_guess(whole) 
     assert whole(training(half, symmetry=found)).verdict == OK
 
 
-def test_outlines_are_compared_where_every_step_that_would_is_switched_off() -> None:
-    drawn = scene(*TURN)
-    lifted = replace(drawn.frames[0], rgba=disc(0, 6))
-    moved = replace(drawn, frames=(lifted, *drawn.frames[1:]))
-    apart = Prepared(moved, moved, None, None, None, None)
-    assert Prepared(drawn, drawn, None, None, None, None).outlines_px < 0.5 < apart.outlines_px
-
-
 # ---- whether drawings agree, which decides how much a field is smoothed
 
 
