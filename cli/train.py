@@ -64,7 +64,7 @@ def train(
         typer.Option(
             "--field",
             help="auto (default): planes as coarse as the drawings allow; triplane: one cell per "
-            "pixel; to compare with: mlp, voxel, hull (no training).",
+            "pixel.",
         ),
     ] = None,
     no_mannequin: Annotated[

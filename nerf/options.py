@@ -24,7 +24,7 @@ class Layer(StrEnum):
 
 
 LAYERS = tuple(layer.value for layer in Layer)
-FieldName = Literal["auto", "triplane", "mlp", "voxel", "hull"]
+FieldName = Literal["auto", "triplane"]
 FIELDS: tuple[FieldName, ...] = get_args(FieldName)
 DeviceName = Literal["auto", "cpu", "cuda"]
 DEVICES: tuple[DeviceName, ...] = get_args(DeviceName)
@@ -56,9 +56,7 @@ class TrainOptions:
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
         field: what is fitted: "auto", planes with a small decoder, as coarse as predicts left-out
-            drawings well (`resolution_search`); "triplane", one cell per pixel; or, to compare
-            with, a network alone, a grid of voxels, or the hull with the drawings' colours (nothing
-            is fitted then).
+            drawings well (`resolution_search`); "triplane", one cell per pixel.
         mannequin: take the mannequin's shape where it predicts drawings better than they predict
             each other (off: --no-mannequin).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the

@@ -27,7 +27,6 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Picture, Rendering
 from toonset.nerf.render.views import render
-from toonset.nerf.score.appearance import flicker
 from toonset.nerf.score.evaluate import label_figures
 from toonset.nerf.score.metrics import Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
@@ -220,8 +219,13 @@ def _flicker(truth: Scene | None, turn: list[Picture]) -> float | None:
     """Return how much a turn flickers, over the truth's own."""
     if truth is None:
         return None
-    own = flicker([over_white(frame.rgba) for frame in truth.frames], whole=False)
-    return flicker([over_white(picture) for picture in turn], whole=False) / own
+    own = flicker([over_white(frame.rgba) for frame in truth.frames])
+    return flicker([over_white(picture) for picture in turn]) / own
+
+
+def flicker(turn: Sequence[np.ndarray]) -> float:
+    """Return the mean absolute second difference of consecutive pictures, three or more."""
+    return float(np.abs(np.diff(np.stack(turn), n=2, axis=0)).mean())
 
 
 # of the figures: name, metric, unit, which is better, heading in the table, form of the number

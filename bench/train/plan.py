@@ -8,7 +8,11 @@ from typing import Any, Literal, get_args
 
 from bench.cases.cases import TrainCase
 from bench.records.record import DEFAULT
+from bench.train.mlp import network
+from bench.train.painted_hull import painted
+from bench.train.voxel import voxels
 from toonset.nerf.options import TrainOptions, paper
+from toonset.nerf.train.train import FieldOf
 
 NEAREST = "nearest drawing"
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]
@@ -28,6 +32,7 @@ class Method:
         fewer: it is run with fewer views, too.
         share: cells of the planes, of the finest that the scene could have; None: as `options` say.
         slow: so slow that one case per condition and size must do.
+        field: returns what is fitted; None: planes.
     """
 
     options: TrainOptions | None
@@ -36,12 +41,13 @@ class Method:
     fewer: bool = True
     share: float | None = None
     slow: bool = False
+    field: FieldOf | None = None
 
 
 METHODS: dict[str, Method] = {
     DEFAULT: Method(TrainOptions(), seeds=True),
     NEAREST: Method(None),
-    "coloured hull": Method(TrainOptions(field="hull"), "no palette"),
+    "coloured hull": Method(TrainOptions(steps=0), "no palette", field=painted),
     **{f"{n} steps": Method(TrainOptions(steps=n), fewer=False) for n in (30, 75)},
     **{n: Method(TrainOptions(field="triplane"), share=share) for n, share in PLANES.items()},
     "without palette": Method(TrainOptions(), "no palette"),
@@ -52,14 +58,14 @@ METHODS: dict[str, Method] = {
     "without both": Method(TrainOptions(register=False, unbend=False)),
     "without symmetry": Method(TrainOptions(symmetric=False)),
     "without hull": Method(TrainOptions(carve=False), fewer=False, slow=True),
-    "voxel": Method(TrainOptions(field="voxel")),
-    "mlp": Method(TrainOptions(field="mlp"), slow=True),
+    "voxel": Method(TrainOptions(), field=voxels),
+    "mlp": Method(TrainOptions(), slow=True, field=network),
     **{
         f"paper, {palette}, {steps} steps": Method(paper(steps), palette, fewer=False, slow=True)
         for palette in PALETTES
         for steps in (200, 2000)
     },
-    "paper, mlp": Method(replace(paper(2000), field="mlp"), fewer=False, slow=True),
+    "paper, mlp": Method(paper(2000), fewer=False, slow=True, field=network),
 }
 
 
@@ -123,7 +129,8 @@ class Job:
         way = self.way
         options = None if way.options is None else asdict(way.options)
         found = {"name": self.name, "seed": self.seed, "options": options, "palette": way.palette}
-        return found | ({} if way.share is None else {"share": way.share})
+        found |= {} if way.share is None else {"share": way.share}
+        return found | ({} if way.field is None else {"field": way.field.__name__})
 
 
 def plan(cases: Iterable[TrainCase], seed: int, only: str, scope: Scope) -> list[Job]:

@@ -84,7 +84,7 @@ def _trained(
     scene = _with_palette(case.train, job.way.palette)
     if job.way.share is not None:
         options = replace(options, resolution=round(job.way.share * finest_cells(scene)))
-    training = fit_field(scene, options)
+    training = fit_field(scene, options, field_of=job.way.field)
     seconds, cpu_seconds = time.perf_counter() - wall, time.process_time() - cpu
     views = score_views(training.result, case.test, judges)
     look(job, training.result, views)

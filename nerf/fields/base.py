@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 import torch
@@ -19,26 +19,8 @@ from torch import Tensor, nn
 
 from toonset.dataset.silhouettes.bounds import Box
 
-Kind = Literal["triplane", "mlp", "voxel"]
 OPAQUE_AT_START = 0.1  # optical depth of one cell before training: space starts as a mist
 DENSITY_SHIFT = math.log(math.expm1(OPAQUE_AT_START))  # softplus of it is the above
-
-
-@dataclass(frozen=True)
-class FieldSpec:
-    """What builds a field, beside its box.
-
-    Attributes:
-        kind: name of the kind.
-        resolution: cells along the longest side of the box.
-        channels: features per plane; layers of an mlp.
-        hidden: width of the decoder's hidden layers; 0: no decoder.
-    """
-
-    kind: Kind
-    resolution: int
-    channels: int
-    hidden: int
 
 
 class Constants(Protocol):
@@ -68,11 +50,6 @@ class Field(nn.Module, ABC):
 
     decoder_rate = 0.05  # Adam's, for everything that is no table
 
-    def __init__(self, spec: FieldSpec) -> None:
-        """Remember what the field is built from."""
-        super().__init__()
-        self.spec = spec
-
     @abstractmethod
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Constants:
         """Return what depends on the points alone."""
@@ -86,6 +63,10 @@ class Field(nn.Module, ABC):
         self, points_world: Float[Tensor, "n 3"]
     ) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:
         """Return density and colour at points that come but once."""
+
+    @abstractmethod
+    def thin(self, by: float) -> None:
+        """Lower softplus's argument, whose value is the density, everywhere by so much."""
 
     def tables(self) -> list[nn.Parameter]:
         """Return the parameters that hold values at places, which learn faster than decoders."""

@@ -20,9 +20,7 @@ from toonset.view import small_png
 
 STRIP_PX = 960  # of all drawings, in a notebook
 
-NO_PALETTE = (
-    "run: was trained without palette; train again without --no-palette and without --field hull"
-)
+NO_PALETTE = "run: was trained without palette; train again without --no-palette"
 NO_LINES = "run: its drawings have no contour lines; leave --layer ink out"
 NO_DRAWINGS = "run: holds no drawings, so it has no drawn look; train again, or render --layer rgb"
 
@@ -63,8 +61,7 @@ class TrainedField:
         ]
         views = self.drawings.views if self.drawings is not None else ()
         caption = (
-            f"{self.field.spec.kind} field of {len(views)} drawings, {self.size_px} px, "
-            f"{len(colors) or 'no'} colours"
+            f"field of {len(views)} drawings, {self.size_px} px, {len(colors) or 'no'} colours"
         )
         strip = _strip([view.rgba for view in views]) if views else None
         return table(caption, ("", "code", "colour"), rows, strip)

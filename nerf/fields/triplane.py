@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, FieldSpec, Places, shape_of
+from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, Places, shape_of
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.decoder import two_layers
 from toonset.nerf.kernels.interpolation import Operator, apply_once
@@ -41,7 +41,7 @@ class TriplaneField(Field):
             channels: features per plane.
             hidden: width of the decoder's hidden layer.
         """
-        super().__init__(FieldSpec("triplane", resolution, channels, hidden))
+        super().__init__()
         self.resolution = resolution
         self.cell, self.shape = shape_of(box, resolution)
         self.register_buffer("low", torch.as_tensor(box.low, dtype=torch.float32))
@@ -59,6 +59,11 @@ class TriplaneField(Field):
             rows, self.planes, per_sample_weights=weights.to(self.planes.dtype), mode="sum"
         )
         return self.decode(features)
+
+    @torch.no_grad()
+    def thin(self, by: float) -> None:
+        """Lower softplus's argument everywhere by so much."""
+        self.out.bias[0] -= by
 
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Operator:
         """Return the interpolation as a sparse matrix."""

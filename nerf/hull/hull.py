@@ -83,12 +83,6 @@ class Hull:
         pooled = F.max_pool3d(self.near[None, None].float(), BLOCK, ceil_mode=True)
         return grown(pooled[0, 0] > 0, 1)
 
-    def lookup(
-        self, cells: Bool[Tensor, "x y z"], points_world: Float[Tensor, "n 3"], edge: int
-    ) -> Bool[Tensor, " n"]:
-        """Return the cell (of `edge` voxels) in which each point lies; outside the nearest."""
-        return cells.reshape(-1)[self.cell_index(points_world, cells.shape, edge)]
-
     def cell_index(
         self, points_world: Float[Tensor, "n 3"], shape: torch.Size, edge: int
     ) -> Int[Tensor, " n"]:

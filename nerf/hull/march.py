@@ -227,7 +227,7 @@ def _along(
     cells: Bool[Tensor, "x y z"],
     edge: int,
 ) -> Bool[Tensor, "rays places"]:
-    """Return `hull.lookup(cells, points, edge)` at distances along rays.
+    """Return the cells (of `edge` voxels) in which places along rays lie; outside the nearest.
 
     Axis by axis, all rays at a time: a third of the time of making the points first.
     """

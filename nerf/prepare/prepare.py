@@ -52,16 +52,6 @@ class Prepared:
         return applied[-1].apart_px[1] if applied else 0.0
 
     @property
-    def outlines_px(self) -> float:
-        """Return by how much outlines disagree now, even where nothing was mended for that.
-
-        They are compared here where all steps that would have done so are switched off.
-        """
-        steps = [step for step in (self.registration, self.unbending) if step]
-        compared = steps[-1] if steps else registered(self.scene)[1]
-        return self.apart_px or compared.apart_px[0]
-
-    @property
     def bent(self) -> bool:
         """Return whether drawings were bent."""
         return self.unbending is not None and self.unbending.applied

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import torch
@@ -26,10 +26,9 @@ from safetensors.torch import save
 
 from toonset.errors import BundleError
 from toonset.json_file import read_json, validation_reason
-from toonset.nerf.fields.base import FieldSpec
-from toonset.nerf.fields.build import build_field
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.run.drawings import (
     PAINT,
@@ -56,10 +55,9 @@ class FieldRecord(BaseModel):
     """What builds a `TrainedField` around the tensors of model.safetensors."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    kind: Literal["triplane", "mlp", "voxel"]
     resolution: int = Field(ge=1, le=MOST_CELLS)
     channels: int = Field(ge=1, le=256)
-    hidden: int = Field(ge=0, le=1024)
+    hidden: int = Field(ge=1, le=1024)
     hull_low: tuple[float, float, float]
     hull_voxel: float = Field(gt=0, le=1e9)
     hull_shape: tuple[int, int, int]
@@ -73,15 +71,15 @@ class FieldRecord(BaseModel):
     @classmethod
     def of(cls, trained: TrainedField) -> FieldRecord:
         """Return the record of a field."""
-        spec = trained.field.spec
+        field = trained.field
+        assert isinstance(field, TriplaneField)
         low = trained.hull.low.tolist()
         shape = tuple(trained.hull.support.shape)
         palette = None if trained.palette is None else [tuple(c) for c in trained.palette.tolist()]
         return cls(
-            kind=spec.kind,
-            resolution=spec.resolution,
-            channels=spec.channels,
-            hidden=spec.hidden,
+            resolution=field.resolution,
+            channels=field.hidden.in_features,
+            hidden=field.hidden.out_features,
             hull_low=(low[0], low[1], low[2]),
             hull_voxel=trained.hull.voxel,
             hull_shape=(shape[0], shape[1], shape[2]),
@@ -164,8 +162,7 @@ def _record(file: Path) -> FieldRecord:
 def _empty(record: FieldRecord) -> TrainedField:
     low = np.array(record.hull_low)
     hull = Hull(low, record.hull_voxel, torch.zeros(record.hull_shape))
-    spec = FieldSpec(record.kind, record.resolution, record.channels, record.hidden)
-    field = build_field(spec, hull.box)
+    field = TriplaneField(hull.box, record.resolution, record.channels, record.hidden)
     palette = None if record.palette is None else np.array(record.palette, dtype=np.uint8)
     classifier = None if palette is None else PaletteClassifier(len(palette))
     return TrainedField(

@@ -5,8 +5,6 @@ PSNR likes blur: a crisp edge a pixel beside the true one costs more than a soft
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float
@@ -51,18 +49,6 @@ def dirt(rendered: Picture, drawn: Picture, figure: Mask) -> float | None:
     square = np.ones((2 * FLAT_PX + 1,) * 2, np.uint8)
     flat = figure & (cv2.dilate(_gradient(drawn), square) < FLAT)
     return 255 / 8 * float(_gradient(rendered)[flat].mean()) if flat.any() else None
-
-
-def flicker(turn: Sequence[Picture], *, whole: bool = True) -> float:
-    """Return the mean absolute second difference of consecutive pictures of a turn.
-
-    Args:
-        turn: three pictures or more.
-        whole: the first one follows the last.
-    """
-    pictures = np.stack([*turn[-1:], *turn, *turn[:1]] if whole else turn)
-    second = pictures[:-2] - 2 * pictures[1:-1] + pictures[2:]
-    return float(np.abs(second).mean())
 
 
 def _gradient(picture: Picture) -> Float[np.ndarray, "height width"]:

@@ -99,7 +99,7 @@ def _remedy(training: Training, worst: LeftOut, *, stands_out: bool) -> str:
     """Return what helps, by what is most likely the cause."""
     done = len(training.history)
     usual = STEPS_ON_SHAPE if training.prepared.shape else USUAL_STEPS
-    ended = training.stopped in ("steps", "budget") and training.options.field != "hull"
+    ended = training.stopped in ("steps", "budget")
     if ended and done < usual // 2:
         return f"these were {done} steps: train longer"
     if stands_out:

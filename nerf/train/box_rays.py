@@ -16,9 +16,6 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.bounds import Box, box_of_masks
 from toonset.dataset.silhouettes.mask import OPAQUE, has_figure, mask_of
 from toonset.nerf.fields.base import Field, Places
-from toonset.nerf.fields.mlp import MlpField
-from toonset.nerf.fields.triplane import TriplaneField
-from toonset.nerf.fields.voxel import VoxelField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.march import Rays, clip, rays_of
 from toonset.nerf.train.batches import Batch
@@ -31,7 +28,9 @@ RAYS_PER_STEP = 1024
 EMPTY_BELOW = 0.01  # opacity of a voxel that rendering skips
 POINTS_PER_CHUNK = 1 << 16
 OPACITY_WEIGHT = 0.25  # 3 colours' variance of 1/12: see `any_backdrop`
-CLEARER = 4.0  # by which softplus's argument starts lower: 0.002 per cell instead of 0.1
+# By which softplus's argument starts lower, for rays to see through the whole box at first: fields
+# start as a mist which suits a thin hull; 0.002 per cell instead of 0.1
+CLEARER = 4.0
 
 
 def any_backdrop(palette: float, smoothness: float) -> Weights:
@@ -42,19 +41,6 @@ def any_backdrop(palette: float, smoothness: float) -> Weights:
     well as nothing, and hides the figure from other sides.
     """
     return Weights(palette, smoothness, backdrop=0.5, opacity=OPACITY_WEIGHT)
-
-
-@torch.no_grad()
-def clear(field: Field) -> Field:
-    """Return the field with a start so thin that rays see through the whole box.
-
-    Fields start as a mist which suits a thin hull; a box of a hundred cells would be opaque.
-    """
-    if isinstance(field, VoxelField):
-        field.grid[:, 0] -= CLEARER
-    elif isinstance(field, TriplaneField | MlpField):
-        field.out.bias[0] -= CLEARER
-    return field
 
 
 class BoxRays:

@@ -16,7 +16,7 @@ import torch
 
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import figure_px
-from toonset.nerf.fields.base import Field
+from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.options import TrainOptions
@@ -37,7 +37,7 @@ SEEN_RAYS, UNSEEN_RAYS = 32_000, 8_000  # drawn by lot; a trial goes through the
 STEPS = 60  # by then the order of the candidates shows
 TWO_FROM = 6  # views from which two drawings are left out, half a turn apart
 
-Build = Callable[[int], Field]
+Build = Callable[[int], TriplaneField]
 Batches = Sequence[tuple[Batch, ...]]
 
 
@@ -112,17 +112,17 @@ def left_out(frames: Sequence[Frame]) -> list[Frame]:
     return [frames[number] for number in numbers]
 
 
-def _tried(ground: Ground, seen: Batches, unseen: Batches, field: Field) -> Candidate:
+def _tried(ground: Ground, seen: Batches, unseen: Batches, field: TriplaneField) -> Candidate:
     generator = torch.Generator().manual_seed(ground.options.seed)
     model = Model(field, None).to(ground.device)
     few = replace(ground.options, steps=STEPS, budget_s=None)
     fit(model, FixedRays(seen), ground.weights, few, generator)
     parameters = sum(values.numel() for values in field.parameters())
-    return Candidate(field.spec.resolution, parameters, _psnr(field, unseen))
+    return Candidate(field.resolution, parameters, _psnr(field, unseen))
 
 
 @torch.no_grad()
-def _psnr(field: Field, batches: Batches) -> float:
+def _psnr(field: TriplaneField, batches: Batches) -> float:
     error, rays = 0.0, 0
     for batch in (batch for parts in batches for batch in parts):
         color, opacity = render_batch(field, batch)

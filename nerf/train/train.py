@@ -9,6 +9,7 @@ which samples count. A step is two sparse products, a small decoder and sums.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -18,12 +19,10 @@ import torch
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import check_cut_out
 from toonset.errors import BundleError, SetupError
-from toonset.nerf.fields.base import Field, FieldSpec
-from toonset.nerf.fields.build import build_field
+from toonset.nerf.fields.base import Field
 from toonset.nerf.fields.classifier import PaletteClassifier
-from toonset.nerf.fields.painted_hull import paint
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.fields.voxel import VoxelField
+from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.mannequin_volume import hull_of_shape
 from toonset.nerf.hull.march import surface_depth
@@ -38,9 +37,9 @@ from toonset.nerf.prepare.symmetry import completed, with_mirrored
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
+    CLEARER,
     BoxRays,
     any_backdrop,
-    clear,
     open_box,
     without_empty_space,
 )
@@ -56,9 +55,9 @@ CELLS_PER_PX, CELLS = 1.0, (48, 256)
 STEPS_ALONG = 200  # samples that the longest side of the hull would take
 MOST_SAMPLES = 30  # per ray, from its first inside the hull; twice as deep, surfaces turn to mist
 TRIAL_STRIDE = 2  # times the samples' distance: the order of fields is the same, in half the time
-MLP_LAYERS, MLP_WIDTH = 4, 64
 PARTS: tuple[str, ...] = ("drawings", "hull", "planes", "rays")  # before the steps, in order
 NO_EVIDENCE = HullEvidence(0, ())
+FieldOf = Callable[[Scene, Hull], Field]
 
 
 def fit_field(
@@ -68,6 +67,7 @@ def fit_field(
     watch: Watch | None = None,
     *,
     agree: bool = True,
+    field_of: FieldOf | None = None,
 ) -> Training:
     """Return the field that explains the drawings, and how it came about.
 
@@ -80,6 +80,7 @@ def fit_field(
         progress: called with a line that says what is prepared.
         watch: looks on while the field is fitted.
         agree: bend drawings that were bent further until their paint agrees (off: to compare).
+        field_of: returns what is fitted, to compare with; None: planes.
 
     Raises:
         BundleError: fewer than two usable views, a picture that is opaque all over, or cameras that
@@ -88,7 +89,7 @@ def fit_field(
     """
     tell = progress or (lambda _: None)
     clock = [time.perf_counter()]
-    options, device = _resolved(options), device_of(options.device)
+    device = device_of(options.device)
     check_cut_out(scene)
     torch.default_generator.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
@@ -105,14 +106,15 @@ def fit_field(
     scene = with_mirrored(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
-    if options.field == "auto" and options.resolution is None:
+    if options.field == "auto" and options.resolution is None and field_of is None:
         tell("choosing the planes")
         choice = _choice(ready.scene, hull, weights, options, device, agree=ready.agree)
         torch.default_generator.manual_seed(options.seed)
-    cells = choice.cells if choice else None
+    cells = choice.cells if choice else options.resolution or finest_cells(scene)
     clock.append(time.perf_counter())
     tell("laying out the rays")
-    start = _untrained(scene, hull, options, cells)
+    field = field_of(scene, hull) if field_of else planes_of(hull, cells)
+    start = _untrained(field, scene, hull, options)
     rays, counts = _rays(scene, start, options, generator, device)
     clock.append(time.perf_counter())
     model = Model(start.field, start.classifier).to(device)
@@ -153,11 +155,6 @@ def _height(hull: Hull) -> float:
     return float(hull.inside.any(dim=2).any(dim=0).sum()) * hull.voxel
 
 
-def _resolved(options: TrainOptions) -> TrainOptions:
-    """Return the options without contradictions: a painted hull is carved, nothing is fitted."""
-    return replace(options, steps=0, carve=True) if options.field == "hull" else options
-
-
 def _choice(
     scene: Scene,
     hull: Hull,
@@ -171,10 +168,12 @@ def _choice(
     step = TRIAL_STRIDE * float(hull.box.size.max()) / STEPS_ALONG
     ground = Ground(scene, hull, step, MOST_SAMPLES // TRIAL_STRIDE, weights, options, device)
 
-    def build(cells: int) -> Field:
-        return build_field(FieldSpec("triplane", cells, CHANNELS, HIDDEN), hull.box)
+    return choose_cells(ground, finest_cells(scene), partial(planes_of, hull), agree=agree)
 
-    return choose_cells(ground, finest_cells(scene), build, agree=agree)
+
+def planes_of(hull: Hull, cells: int) -> TriplaneField:
+    """Return untrained planes of so many cells round a hull."""
+    return TriplaneField(hull.box, cells, CHANNELS, HIDDEN)
 
 
 def finest_cells(scene: Scene) -> int:
@@ -214,15 +213,10 @@ def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:
     return any_backdrop(options.palette_weight, smoothness)
 
 
-def _untrained(scene: Scene, hull: Hull, options: TrainOptions, cells: int | None) -> TrainedField:
-    field = build_field(_spec(scene, options, cells), hull.box)
+def _untrained(field: Field, scene: Scene, hull: Hull, options: TrainOptions) -> TrainedField:
     if not options.carve:
-        field = clear(field)
+        field.thin(CLEARER)
     colors = scene.palette
-    if options.field == "hull":
-        assert isinstance(field, VoxelField)
-        paint(field, hull, scene)
-        colors = None  # no step would teach the classifier
     classifier = None if colors is None else PaletteClassifier(len(colors))
     along, most = (STEPS_ALONG, MOST_SAMPLES) if options.carve else (BINS, 2 * BINS)
     step = float(hull.box.size.max()) / along
@@ -235,17 +229,6 @@ def _finished(trained: TrainedField, options: TrainOptions) -> TrainedField:
     if options.carve:
         return trained
     return replace(trained, hull=without_empty_space(trained.hull, trained.field))
-
-
-def _spec(scene: Scene, options: TrainOptions, cells: int | None) -> FieldSpec:
-    cells = cells or options.resolution or finest_cells(scene)
-    if options.field == "mlp":
-        return FieldSpec("mlp", 1, MLP_LAYERS, MLP_WIDTH)
-    if options.field in ("auto", "triplane"):
-        return FieldSpec("triplane", cells, CHANNELS, HIDDEN)
-    if options.field == "voxel":  # whose cost grows with the cube of it
-        return FieldSpec("voxel", max(1, cells * 3 // 4), 4, 0)
-    return FieldSpec("voxel", cells, 4, 0)
 
 
 def _typical_camera(scene: Scene, hull: Hull) -> tuple[float, int]:

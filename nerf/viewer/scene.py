@@ -84,13 +84,10 @@ def field_record(trained: TrainedField, blob: Blob) -> dict[str, Any]:
     """Return a trained field.
 
     Raises:
-        BundleError: it has no planes, or more colours than a page can show.
+        BundleError: it has more colours than a page can show.
     """
     triplane = trained.field
-    if not isinstance(triplane, TriplaneField):
-        raise BundleError(
-            f"run: its field has no planes ({triplane.spec.kind}); train again without --field"
-        )
+    assert isinstance(triplane, TriplaneField)
     drawn = () if trained.drawings is None else trained.drawings.paints
     count = max(len(drawn), 0 if trained.palette is None else len(trained.palette))
     if count > MOST_PAINTS:

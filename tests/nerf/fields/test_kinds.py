@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
+from bench.train.mlp import MlpField
+from bench.train.voxel import VoxelField
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf.fields.base import Field, FieldSpec, Places
-from toonset.nerf.fields.build import build_field
+from toonset.nerf.fields.base import Field, Places
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
 from toonset.nerf.kernels.compositing import (
@@ -26,13 +28,17 @@ from toonset.nerf.train.gradients import gradients_of
 from toonset.nerf.train.loss import Model, Weights, loss_terms, render_batch
 
 BOX = Box(np.array([-3.0, 10.0, 0.5]), np.array([1.0, 18.0, 2.5]))
-SPECS = (FieldSpec("triplane", 9, 5, 6), FieldSpec("voxel", 7, 4, 0), FieldSpec("mlp", 1, 2, 8))
+KINDS: dict[str, Callable[[], Field]] = {
+    "triplane": lambda: TriplaneField(BOX, 9, 5, 6),
+    "voxel": lambda: VoxelField(BOX, 7),
+    "mlp": lambda: MlpField(BOX, 2, 8),
+}
 
 
-def made(spec: FieldSpec, seed: int = 0) -> Field:
+def made(kind: str) -> Field:
     """Return a field with random values everywhere."""
-    torch.manual_seed(seed)
-    field = build_field(spec, BOX)
+    torch.manual_seed(0)
+    field = KINDS[kind]()
     for values in field.parameters():
         torch.nn.init.normal_(values, std=0.7)
     return field
@@ -59,9 +65,9 @@ def batch_of(
     return Batch(constants, ray, length, rgb, alpha, labels)
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.kind)
-def test_what_is_precomputed_changes_nothing(spec: FieldSpec) -> None:
-    field, points = made(spec), places(300)
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_precomputed_changes_nothing(kind: str) -> None:
+    field, points = made(kind), places(300)
     plain = field(points)
     for constants in (field.constants(points), Places(points)):
         for fast, slow in zip(field.shade(constants), plain, strict=True):
@@ -70,9 +76,9 @@ def test_what_is_precomputed_changes_nothing(spec: FieldSpec) -> None:
     assert bool(((plain[1] >= 0) & (plain[1] <= 1)).all())
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.kind)
-def test_what_is_precomputed_changes_no_gradient(spec: FieldSpec) -> None:
-    field, points = made(spec), places(200)
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_precomputed_changes_no_gradient(kind: str) -> None:
+    field, points = made(kind), places(200)
     grads = []
     for constants in (field.constants(points), Places(points)):
         field.zero_grad()
@@ -83,16 +89,8 @@ def test_what_is_precomputed_changes_no_gradient(spec: FieldSpec) -> None:
     assert any(bool(g.abs().max() > 1e-3) for g in grads[0] if g is not None)
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.kind)
-def test_a_field_is_built_again_from_its_spec(spec: FieldSpec) -> None:
-    field = made(spec)
-    again = build_field(field.spec, BOX)
-    again.load_state_dict(field.state_dict())
-    torch.testing.assert_close(again(places(20))[1], field(places(20))[1])
-
-
 def test_triplane_and_rays_equal_a_loop_over_every_sample() -> None:
-    field = made(SPECS[0])
+    field = made("triplane")
     assert isinstance(field, TriplaneField)
     counts = [4, 1, 7]
     batch, points = batch_of(field, counts), places(sum(counts)).double().numpy()
@@ -159,9 +157,9 @@ def test_packed_compositing_survives_extreme_depths() -> None:
     assert bool(torch.isfinite(depth.grad).all())
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.kind)
-def test_gradients_of_the_whole_loss_match_central_differences(spec: FieldSpec) -> None:
-    field = made(spec).double()
+@pytest.mark.parametrize("kind", KINDS)
+def test_gradients_of_the_whole_loss_match_central_differences(kind: str) -> None:
+    field = made(kind).double()
     model = Model(field, PaletteClassifier(3).double())
     batch, weights = batch_of(field, [4, 2, 5, 3], torch.float64), Weights(0.3, 0.02)
     torch.autograd.backward(torch.stack(loss_terms(model, batch, weights)).sum())
@@ -179,7 +177,7 @@ def test_gradients_of_the_whole_loss_match_central_differences(spec: FieldSpec) 
 
 
 def test_the_gradient_of_parts_is_that_of_their_mean_and_smoothness() -> None:
-    field = made(SPECS[0]).double()
+    field = made("triplane").double()
     model = Model(field, PaletteClassifier(3).double())
     parts = [batch_of(field, counts, torch.float64) for counts in ([4, 2, 5], [3])]
     weights = Weights(0.3, 0.02)
@@ -194,7 +192,7 @@ def test_the_gradient_of_parts_is_that_of_their_mean_and_smoothness() -> None:
 
 
 def test_only_hidden_samples_are_dropped() -> None:
-    field = made(SPECS[1])
+    field = made("voxel")
     with torch.no_grad():
         field.tables()[0][:, 0] = 40.0  # opaque
     model, batch = Model(field, None), batch_of(field, [6, 8, 1, 7], placed=True)

@@ -103,7 +103,7 @@ def test_what_is_alike_is_counted_in_pixels_of_either_side() -> None:
 def test_a_training_sees_mirror_images_unless_it_is_told_not_to(
     symmetric: bool, views: int
 ) -> None:
-    plain = TrainOptions(device="cpu", carve=False, field="voxel", register=False, unbend=False)
+    plain = TrainOptions(device="cpu", carve=False, field="triplane", register=False, unbend=False)
     options = replace(plain, steps=1, symmetric=symmetric)
     training = fit_field(some(turn(3, symmetric=True), FRONT_SIDE_BACK), options)
     assert training.counts["views"] == views

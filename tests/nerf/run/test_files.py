@@ -43,7 +43,7 @@ def planes_of(trained: TrainedField) -> TriplaneField:
 
 def empty(trained: TrainedField) -> TrainedField:
     hull = Hull(trained.hull.low, trained.hull.voxel, torch.zeros_like(trained.hull.support))
-    field = TriplaneField(hull.box, trained.field.spec.resolution, 16, 8)
+    field = TriplaneField(hull.box, planes_of(trained).resolution, 16, 8)
     colors, k = trained.palette, trained.k
     return TrainedField(field, hull, 0.05, 24, PaletteClassifier(3), colors, k, 40)
 

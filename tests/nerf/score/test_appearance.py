@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.nerf.look.painted import camera_at, draw
-from toonset.nerf.score.appearance import block_psnr, dirt, flicker, sharpness
+from toonset.nerf.score.appearance import block_psnr, dirt, sharpness
 from toonset.nerf.score.metrics import BEST_PSNR
 from toonset.view import over_white
 
@@ -46,12 +46,3 @@ def test_what_cannot_be_said_is_none(picture: np.ndarray, figure: np.ndarray) ->
     assert sharpness(picture, picture, nothing) is None
     assert dirt(picture, picture, nothing) is None
     assert sharpness(picture, np.ones_like(picture), figure) is None
-
-
-def test_an_even_turn_does_not_flicker_and_a_pop_does(picture: np.ndarray) -> None:
-    ramp = [np.full((4, 4, 3), value) for value in (0.2, 0.4, 0.2, 0.0)]
-    assert flicker(ramp) == pytest.approx(0.2)
-    assert flicker(ramp[:3], whole=False) == pytest.approx(0.4)  # up, down
-    assert flicker(ramp[1:], whole=False) == pytest.approx(0)
-    assert flicker([picture] * 5) == 0
-    assert flicker([picture, picture, 1 - picture, picture]) > 0.3

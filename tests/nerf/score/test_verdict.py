@@ -115,8 +115,6 @@ def test_what_helps_goes_by_the_cause() -> None:
     short = replace(done, history=DONE[:20])
     assert "these were 20 steps: train longer" in judged(odd, short)
     assert "train longer" not in judged(odd, replace(short, stopped="the loss grew"))
-    hull = replace(short, options=TrainOptions(field="hull"))
-    assert "train longer" not in judged(odd, hull)
 
 
 def test_blends_are_named_where_there_are_many() -> None:
@@ -153,14 +151,6 @@ def test_an_undrawn_side_that_is_the_mirror_image_of_another_is_no_guess(whole) 
     assert "no drawing in the 180 deg" in whole(training(half)).reasons[0]
     found = Symmetry((1.0,), 0.0, ("45", "90", "135"))
     assert whole(training(half, symmetry=found)).verdict == OK
-
-
-def test_outlines_are_compared_where_every_step_that_would_is_switched_off() -> None:
-    drawn = scene(*TURN)
-    lifted = replace(drawn.frames[0], rgba=disc(0, 6))
-    moved = replace(drawn, frames=(lifted, *drawn.frames[1:]))
-    apart = Prepared(moved, moved, None, None, None, None)
-    assert Prepared(drawn, drawn, None, None, None, None).outlines_px < 0.5 < apart.outlines_px
 
 
 # ---- whether drawings agree, which decides how much a field is smoothed

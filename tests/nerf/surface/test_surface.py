@@ -13,7 +13,7 @@ from PIL import Image
 
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError, OutputError, PaletteError
-from toonset.nerf.fields.base import Constants, Field, FieldSpec, Places
+from toonset.nerf.fields.base import Constants, Field, Places
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import Hull
@@ -41,7 +41,7 @@ class StripedBall(Field):
     """Red below, blue in the middle, yellow on top; dense where `density` says."""
 
     def __init__(self, density: float) -> None:
-        super().__init__(FieldSpec("voxel", 8, 4, 0))
+        super().__init__()
         self.density = density
 
     def constants(self, points_world: torch.Tensor) -> Constants:
@@ -55,6 +55,9 @@ class StripedBall(Field):
         number = torch.bucketize(points_world[:, 1].contiguous(), torch.tensor(EDGES))
         rgb = torch.as_tensor(PALETTE / 255, dtype=torch.float32)[number]
         return torch.full((len(points_world),), self.density), rgb
+
+    def thin(self, by: float) -> None:
+        raise NotImplementedError
 
 
 class Nearest(PaletteClassifier):

@@ -9,8 +9,8 @@ import torch
 
 from bench.cases.cases import train_cases
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf.fields.base import FieldSpec, Places
-from toonset.nerf.fields.build import build_field
+from toonset.nerf.fields.base import Places
+from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.scene_hull import hull_of
 from toonset.nerf.kernels.compositing import composite_packed
@@ -64,7 +64,7 @@ def test_every_pixel_lies_in_one_batch_however_they_are_cut(scene: Scene, hull: 
 @torch.no_grad()
 def test_a_pixel_shows_the_mean_of_its_rays(scene: Scene, hull: Hull) -> None:
     torch.manual_seed(0)
-    field = build_field(FieldSpec("triplane", 12, 4, 8), hull.box)
+    field = TriplaneField(hull.box, 12, 4, 8)
     batch = batches(scene, hull)[0]
     assert batch.pixel is not None
     assert batch.share is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,14 +11,14 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from bench.train.mlp import MlpField
+from bench.train.painted_hull import paint
+from bench.train.voxel import VoxelField
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf.fields.base import FieldSpec, Kind, Places
-from toonset.nerf.fields.build import build_field
-from toonset.nerf.fields.painted_hull import paint
+from toonset.nerf.fields.base import Field, Places
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
-from toonset.nerf.fields.voxel import VoxelField
 from toonset.nerf.hull.hull import Hull, carve
 from toonset.nerf.hull.march import march, rays_of
 from toonset.nerf.kernels.compositing import composite_even, composite_packed
@@ -26,9 +27,9 @@ from toonset.nerf.kernels.losses import photometric
 from toonset.nerf.options import PRESETS, TrainOptions, preset
 from toonset.nerf.train.box_rays import (
     BINS,
+    CLEARER,
     BoxRays,
     any_backdrop,
-    clear,
     nearest_labels,
     open_box,
     without_empty_space,
@@ -213,13 +214,22 @@ def test_the_loss_is_the_mean_over_backdrops_of_all_colours() -> None:
     assert float(found) == pytest.approx(float(expected), rel=5e-3)
 
 
-@pytest.mark.parametrize("kind", ["triplane", "voxel", "mlp"])
-def test_rays_see_through_the_whole_box_at_first(kind: Kind) -> None:
+UNIT = Box(np.zeros(3), np.ones(3))
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda n: TriplaneField(UNIT, n, 4, 8),
+        lambda n: VoxelField(UNIT, n),
+        lambda _: MlpField(UNIT, 4, 8),
+    ],
+    ids=["triplane", "voxel", "mlp"],
+)
+def test_rays_see_through_the_whole_box_at_first(build: Callable[[int], Field]) -> None:
     torch.manual_seed(0)
     cells = 48
-    made = build_field(
-        FieldSpec(kind, cells, 4, 8 * (kind != "voxel")), Box(np.zeros(3), np.ones(3))
-    )
+    made = build(cells)
     along = (torch.arange(cells) + 0.5) / cells
     points = torch.stack([along, torch.full_like(along, 0.4), torch.full_like(along, 0.6)], dim=1)
 
@@ -228,7 +238,7 @@ def test_rays_see_through_the_whole_box_at_first(kind: Kind) -> None:
             return float(torch.exp(-made(points)[0].sum() / cells))
 
     assert seen_through() < 0.1
-    clear(made)
+    made.thin(CLEARER)
     assert seen_through() > 0.7
 
 

@@ -12,6 +12,8 @@ from bench.cases.cases import train_cases
 from tests.cli.common.test_train_summary import metrics
 from toonset.cli.common.train_summary import summary
 from toonset.dataset.bundle.scene import Scene
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.run.report import write_run
@@ -126,7 +128,7 @@ def test_the_choice_is_all_that_trials_change(few: Scene, quick: None, tmp_path:
         assert torch.equal(values, told.result.field.state_dict()[name]), name
     written = write_run(tmp_path, auto, few)
     assert written["planes"]["cells"] == auto.choice.cells
-    assert read_field(tmp_path).field.spec.resolution == auto.choice.cells
+    assert cells_of(read_field(tmp_path)) == auto.choice.cells
 
 
 def test_many_drawings_that_agree_may_have_a_cell_per_pixel(scene: Scene, quick: None) -> None:
@@ -136,7 +138,7 @@ def test_many_drawings_that_agree_may_have_a_cell_per_pixel(scene: Scene, quick:
     cells = [candidate.cells for candidate in training.choice.candidates]
     assert cells == [finest_cells(scene), round(2 / 3 * finest_cells(scene))]
     assert finest.choice is None
-    assert finest.result.field.spec.resolution == cells[0]
+    assert cells_of(finest.result) == cells[0]
 
 
 def test_the_summary_has_the_evidence() -> None:
@@ -151,3 +153,8 @@ def test_the_summary_has_the_evidence() -> None:
 
 def summary_of(choice: FieldChoice) -> str:
     return summary(Path("run"), metrics() | {"planes": choice.to_json()}, verbose=True)
+
+
+def cells_of(trained: TrainedField) -> int:
+    assert isinstance(trained.field, TriplaneField)
+    return trained.field.resolution

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -79,24 +78,6 @@ def test_what_cannot_be_written_is_refused_first(
         assert said in capsys.readouterr().err
     assert there.read_text() == "mine"
     assert not (tmp_path / "x.html").exists()
-
-
-def test_a_run_without_planes_is_refused(
-    bundle: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    from toonset.dataset.bundle.bundle import read_bundle
-    from toonset.nerf.options import TrainOptions
-    from toonset.nerf.training import train
-
-    scene = read_bundle(bundle).scene
-    options = TrainOptions(steps=2, device="cpu", field="voxel")
-    train(scene, options).save(bundle / "run")
-    assert view(monkeypatch, bundle, "-o", tmp_path / "page.html") == 2
-    assert "has no planes" in capsys.readouterr().err
-    shutil.rmtree(bundle / "run")
 
 
 def test_more_colours_than_a_page_shows_are_refused(training: Training) -> None:

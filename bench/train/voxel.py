@@ -10,10 +10,13 @@ import torch.nn.functional as F
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
+from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, FieldSpec, Places, shape_of
+from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, Places, shape_of
+from toonset.nerf.hull.hull import Hull
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.interpolation import Operator
+from toonset.nerf.train.train import finest_cells
 
 
 class VoxelField(Field):
@@ -26,10 +29,15 @@ class VoxelField(Field):
 
     def __init__(self, box: Box, resolution: int) -> None:
         """Build a grid of grey mist with `resolution` cells along the longest side of the box."""
-        super().__init__(FieldSpec("voxel", resolution, 4, 0))
+        super().__init__()
         self.cell, self.shape = shape_of(box, resolution)
         self.register_buffer("low", torch.as_tensor(box.low, dtype=torch.float32))
         self.grid = nn.Parameter(torch.zeros(int(np.prod(self.shape)), 4))
+
+    @torch.no_grad()
+    def thin(self, by: float) -> None:
+        """Lower softplus's argument everywhere by so much."""
+        self.grid[:, 0] -= by
 
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Operator:
         """Return the interpolation as a sparse matrix."""
@@ -87,3 +95,8 @@ class VoxelField(Field):
     ) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:
         density = F.softplus(values[:, 0] + DENSITY_SHIFT) / self.cell
         return density, torch.sigmoid(values[:, 1:])
+
+
+def voxels(scene: Scene, hull: Hull) -> VoxelField:
+    """Return the untrained grid for a scene; its cost grows with the cube of its cells."""
+    return VoxelField(hull.box, max(1, finest_cells(scene) * 3 // 4))

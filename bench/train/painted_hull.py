@@ -15,18 +15,26 @@ from jaxtyping import Bool, Float
 from scipy import ndimage
 from torch import Tensor
 
+from bench.train.voxel import VoxelField
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.fields.voxel import VoxelField
 from toonset.nerf.hull.hull import LEVEL, Hull
 from toonset.nerf.hull.march import march, rays_of
 from toonset.nerf.hull.support import project
+from toonset.nerf.train.train import finest_cells
 
 DENSITY_SLOPE = 16.0  # of the grid's values over the hull's support: about 0 outside, 8 inside
 REACH = 2.0  # cells behind the first surface that still count as seen
 GRAZING = 0.05  # cosine that a view at a glancing angle still counts with
 SHARPNESS = 4  # of the preference for views that look straight at the surface
 LOGIT_EDGE = 0.004  # colours are kept this far from 0 and 1, where logits are finite
+
+
+def painted(scene: Scene, hull: Hull) -> VoxelField:
+    """Return a scene's hull in the drawings' colours."""
+    field = VoxelField(hull.box, finest_cells(scene))
+    paint(field, hull, scene)
+    return field
 
 
 @torch.no_grad()

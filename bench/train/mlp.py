@@ -14,9 +14,12 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.bounds import Box
-from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, FieldSpec, Places
+from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, Places
+from toonset.nerf.hull.hull import Hull
 
+LAYERS, WIDTH = 4, 64
 CELLS = 64  # of the box: density is per cell of this size, as in the other fields
 
 
@@ -35,13 +38,18 @@ class MlpField(Field):
             hidden: width of each.
             octaves: of the encoding.
         """
-        super().__init__(FieldSpec("mlp", 1, layers, hidden))
+        super().__init__()
         self.size = float(box.size.max())
         self.octaves = octaves
         self.register_buffer("low", torch.as_tensor(box.low, dtype=torch.float32))
         widths = [3 + 6 * octaves, *[hidden] * layers]
         self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in itertools.pairwise(widths))
         self.out = nn.Linear(hidden, 4)
+
+    @torch.no_grad()
+    def thin(self, by: float) -> None:
+        """Lower softplus's argument everywhere by so much."""
+        self.out.bias[0] -= by
 
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Places:
         """Return the points: their encoding is 15 times as large."""
@@ -64,3 +72,9 @@ class MlpField(Field):
         raw = self.out(values)
         density = F.softplus(raw[:, 0] + DENSITY_SHIFT) * (CELLS / self.size)
         return density, torch.sigmoid(raw[:, 1:])
+
+
+def network(scene: Scene, hull: Hull) -> MlpField:
+    """Return the untrained field for a scene."""
+    del scene
+    return MlpField(hull.box, LAYERS, WIDTH)
