@@ -268,7 +268,7 @@ def draw_scatter(
     bound: tuple[float, str],
     band: tuple[float, float],
 ) -> bytes:
-    """Return points (x, y) of some groups as a PNG.
+    """Return points (x, y) of some groups as a PNG; y is above 0.
 
     Args:
         groups: by name.
@@ -283,8 +283,9 @@ def draw_scatter(
         axes.scatter(x, y, s=26, color=color, label=f"{name}: {len(points)}")
     axes.axvline(bound[0], color="black", lw=1, ls="--", label=bound[1])
     axes.axhspan(*band, color=LIGHT, zorder=0)
-    axes.set(xlim=(0, None), ylim=(0, None), xlabel=axis[0], ylabel=axis[1])
-    axes.legend(fontsize=8, frameon=False, loc="upper left")
+    axes.set(xlim=(-0.1, None), yscale="log", xlabel=axis[0], ylabel=f"{axis[1]}, logarithmic")
+    log_ticks(axes.yaxis, *axes.get_ylim())
+    axes.legend(fontsize=8, frameon=False, loc="lower right")
     return figure_bytes(figure, "png")
 
 
