@@ -6,8 +6,8 @@
 3. selections of one candidate per view, compared by a joint fit of the sheet
 4. the camera model, from orthography up; drawings that are stretched are begun anew without it
    (`toonset.calib.flaws.stretched`); the mannequin's proportions where outlines
-   do not meet or a glance proves them
-5. rivals of the chosen cameras at full resolution: probabilities, uncertainties, verdicts
+   do not meet or a quick test proves them
+5. alternatives of the chosen cameras at full resolution: probabilities, uncertainties, verdicts
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toonset.calib.evidence.coherence_state import state_of
-from toonset.calib.fit.model_selection import Rung
+from toonset.calib.fit.model_selection import ModelTest
 from toonset.calib.fit.sheet_prior import Turn, off_places
 from toonset.calib.flaws.stretched import (
     as_drawn,
@@ -85,7 +85,7 @@ def find_cameras(
         taken = [unstretched(*pair) for pair in zip(views, stretches.views, strict=True)]
         mannequin = stretched_mannequin(mesh, stretches)
         fitted = _fitted(taken, mannequin, options, progress, known, seconds)
-    found = _judged(fitted, stretches.rungs, seconds)
+    found = _judged(fitted, stretches.tried, seconds)
     return as_drawn(found, taken, views)
 
 
@@ -122,31 +122,31 @@ def _fitted(
         candidates, together = problem.search()
     with _timed(seconds, "together"):
         progress("together", 0.0)
-        sketch, turn, candidates = problem.together(candidates, together)
+        coarse_fit, turn, candidates = problem.together(candidates, together)
     with _timed(seconds, "joint"):
         progress("joint", 0.0)
-        whole = problem.rigid(sketch, turn)
+        whole = problem.rigid(coarse_fit, turn)
         problem, rigid, cuts = problem.cut_off(whole, turn)
     return _Fitted(problem, candidates, turn, rigid, cuts)
 
 
-def _judged(fitted: _Fitted, rungs: Sequence[Rung], seconds: dict[str, float]) -> Calibration:
-    """Return the calibration; `rungs` are what has been said about stretches."""
+def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, float]) -> Calibration:
+    """Return the calibration; `tried` are what has been said about stretches."""
     problem = fitted.problem
     with _timed(seconds, "joint"):
         bent = problem.bent(fitted.rigid, fitted.turn)
         joint, differs = bent.joint, bent.differs
-        model = replace(bent.model, rungs=(*rungs, *bent.model.rungs))
+        model = replace(bent.model, tried=(*tried, *bent.model.tried))
     with _timed(seconds, "judge"):
         problem.progress("judge", 0.0)
         observable = turns_visibly(problem.templates)
         state = state_of(problem.views, problem.cameras(joint), yaw_observable=observable)
-        bare = [drawing.inset(joint.offset) for drawing in problem.fine]
-        final = problem.rivals(bare, joint, model, fitted.candidates, differs=differs)
+        inset = [drawing.inset(joint.offset) for drawing in problem.fine]
+        final = problem.alternatives(inset, joint, model, fitted.candidates, differs=differs)
         sure = problem.sheet.probabilities(final)
         body = joint.body.surface
         each = [
-            judge_view(v, bare[i], body, joint, i, final[i], sure[i], state, differs=differs)
+            judge_view(v, inset[i], body, joint, i, final[i], sure[i], state, differs=differs)
             for i, v in enumerate(problem.views)
         ]
         labels = problem.known.labels  # of every view they are no even steps

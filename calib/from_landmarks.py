@@ -16,7 +16,7 @@ from toonset.calib.fit.align import measure
 from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.landmark_models import MARGIN
 from toonset.calib.fit.landmarks import LandmarkFit, solve_landmarks
-from toonset.calib.fit.model_selection import ORTHOGRAPHIC, PER_VIEW, ModelChoice, Rung
+from toonset.calib.fit.model_selection import ORTHOGRAPHIC, PER_VIEW, ModelChoice, ModelTest
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
@@ -142,6 +142,6 @@ def _model(
     return ModelChoice(
         PER_VIEW if any(nearness) else ORTHOGRAPHIC,
         tuple(1 / near if near > 0 else float("inf") for near in nearness),
-        (Rung(TYPICAL, float(np.median([fit.bic_gain for fit in fits])), 1, MARGIN),),
+        (ModelTest(TYPICAL, float(np.median([fit.bic_gain for fit in fits])), 1, MARGIN),),
         float(2 * sum(len(own.names) for own in pairs)),
     )

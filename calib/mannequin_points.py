@@ -1,4 +1,4 @@
-"""Coloured points of the mannequin for an export: its surface, and its rim in every view."""
+"""Coloured points of the mannequin for an export: its surface and its contour in every view."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.outline.occluding_contour import find_rim, prepare_surface
+from toonset.calib.outline.occluding_contour import find_occluding_contour, prepare_surface
 from toonset.camera import Camera
 from toonset.dataset.exporters.common import ExportView
 from toonset.dataset.exporters.points import TrackedPoints, sample_surface, track_points
 from toonset.mesh import Mesh
 
-RIM_SPACING_PX = 2.0
+CONTOUR_SPACING_PX = 2.0
 SURFACE_POINTS = 10_000  # about what a splatting trainer starts a single object from
 
 
@@ -29,10 +29,10 @@ def mannequin_points(mesh: Mesh, views: Sequence[ExportView], seed: int) -> Trac
 def _rims(mesh: Mesh, cameras: Sequence[Camera]) -> list[Float[np.ndarray, "n 3"]]:
     """Return the points of the mannequin that are its outline in a view, per view."""
     surface = prepare_surface(mesh)
-    rims = []
+    contours = []
     for camera in cameras:
         pixels, _, in_front = camera.project(mesh.vertices)
         if in_front.all():
-            rim = find_rim(surface, pixels, camera.size_wh, RIM_SPACING_PX)
-            rims.append(rim.points + surface.middle)
-    return rims
+            occluding = find_occluding_contour(surface, pixels, camera.size_wh, CONTOUR_SPACING_PX)
+            contours.append(occluding.points + surface.middle)
+    return contours

@@ -1,4 +1,4 @@
-"""A sheet on its way from drawings to cameras: search, selection, camera model, body, rivals.
+"""A sheet on its way from drawings to cameras: search, selection, camera model, body, alternatives.
 
 What `toonset.calib.find_cameras` does one after the other, each a step from plain data to plain
 data.
@@ -21,12 +21,12 @@ from toonset.calib.fit.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.fit.landmarks import landmark_starts
 from toonset.calib.fit.model_selection import (
     BODY_WIDTHS,
-    GLANCE_MARGIN,
-    GLANCE_WIDTHS,
     MODELS,
     NEAR_BODY_WIDTHS,
+    QUICK_TEST_MARGIN,
+    QUICK_TEST_WIDTHS,
     ModelChoice,
-    climb,
+    select_model,
     with_proportions,
 )
 from toonset.calib.fit.proportions import as_it_is
@@ -42,7 +42,7 @@ from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import CutOff
-from toonset.calib.search.alternatives import steadied
+from toonset.calib.search.alternatives import refine_alternatives
 from toonset.calib.search.hypotheses import (
     Candidates,
     half_turned,
@@ -51,7 +51,7 @@ from toonset.calib.search.hypotheses import (
     refine,
     with_twins,
 )
-from toonset.calib.search.selection import SKETCHED, TogetherSearch, with_k
+from toonset.calib.search.selection import COARSE_WIDTHS_TOGETHER, TogetherSearch, with_k
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.search.templates import Templates, find_hypotheses
@@ -66,9 +66,9 @@ COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
 COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
 FINE_WIDTHS = np.geomspace(0.015, 0.01, 3)
 FREE_WIDTHS = np.geomspace(0.04, 0.01, 8)  # wide at first: what a lock held back may be far
-# Typical coverage below which proportions are tried without a glance (docs/decisions.md)
+# Typical coverage below which proportions are tried without a quick test (docs/decisions.md)
 SAME_BODY_COVERAGE = 0.96
-FEWEST_TO_GLANCE = 3  # two drawings are explained by many bodies
+FEWEST_TO_TEST = 3  # two drawings are explained by many bodies
 # Yaw's z-scores on synthetic sheets spread 0.9 and 1.4 to 2.9 without them
 SIGMA_OF_SAME_BODY, SIGMA_OF_ANOTHER_BODY = 0.9, 1.8
 
@@ -81,7 +81,7 @@ class SheetFit:
         problem: what was fitted.
         joint: the fit.
         model: of the cameras.
-        differs: the mannequin is another body than the drawn one, visibly or by a glance's proof.
+        differs: the mannequin is another body than the drawn one, visibly or by a quick test.
     """
 
     problem: JointProblem
@@ -176,34 +176,38 @@ class Problem:
         if self.known.cameras:
             turn = self.sheet.weigh([starts[0].poses])[1][0]
             model = SheetModel("given")
-            fit = JointProblem(self.coarse, turn).fit(body, starts[0].poses, SKETCHED[-1:], model)
+            fit = JointProblem(self.coarse, turn).fit(
+                body, starts[0].poses, COARSE_WIDTHS_TOGETHER[-1:], model
+            )
             return replace(fit, poses=starts[0].poses), turn, candidates
         search = TogetherSearch(self.coarse, body, self.sheet, self._informed)
         return search.run(candidates, starts, self.options.rounds)
 
-    def rigid(self, sketch: JointFit, turn: Turn, *, differs: bool | None = None) -> SheetFit:
+    def rigid(self, coarse_fit: JointFit, turn: Turn, *, differs: bool | None = None) -> SheetFit:
         """Return the fit at full resolution, the mannequin as it is.
 
         Args:
-            sketch: where to begin.
+            coarse_fit: where to begin.
             turn: where the views are meant to be seen from.
             differs: the mannequin is another body; None: if the outlines visibly do not meet.
         """
         if differs is None:
-            differs = typical_coverage(self.fine, sketch) < SAME_BODY_COVERAGE
+            differs = typical_coverage(self.fine, coarse_fit) < SAME_BODY_COVERAGE
         samples = ROUGH_POINTS if differs else WHITE_POINTS
         problem = JointProblem(self.fine, turn, self.known.locks(self.surface.middle), samples)
         keep_fov = "fov" in self.known.locked
-        starts = self.known.at_locks(sketch.poses, self.surface.middle)
-        joint, model = climb(problem, sketch.body, starts, doubtful=differs, keep_fov=keep_fov)
+        starts = self.known.at_locks(coarse_fit.poses, self.surface.middle)
+        joint, model = select_model(
+            problem, coarse_fit.body, starts, doubtful=differs, keep_fov=keep_fov
+        )
         return SheetFit(problem, joint, model, differs)
 
     def bent(self, rigid: SheetFit, turn: Turn) -> SheetFit:
         """Return the fit with the mannequin bent, if that is proven, its sigmas made true."""
         fit, widths = rigid, BODY_WIDTHS
-        if not rigid.differs and len(self.views) >= FEWEST_TO_GLANCE:
+        if not rigid.differs and len(self.views) >= FEWEST_TO_TEST:
             _, model = with_proportions(
-                rigid.problem, rigid.joint, rigid.model, GLANCE_WIDTHS, GLANCE_MARGIN
+                rigid.problem, rigid.joint, rigid.model, QUICK_TEST_WIDTHS, QUICK_TEST_MARGIN
             )
             if model.bends_mannequin:
                 fit, widths = self.rigid(rigid.joint, turn, differs=True), NEAR_BODY_WIDTHS
@@ -269,7 +273,7 @@ class Problem:
             for view, pose in zip(self.views, joint.poses, strict=True)
         ]
 
-    def rivals(
+    def alternatives(
         self,
         drawings: Sequence[Drawing],
         joint: JointFit,
@@ -283,9 +287,9 @@ class Problem:
         from_behind = looks_alike_from_behind(bent, joint.poses)
         found = []
         for i, (pose, view) in enumerate(zip(joint.poses, candidates, strict=True)):
-            starts = _rivals(pose, view) + with_twins([half_turned(pose)]) * from_behind
+            starts = _alternative_starts(pose, view) + with_twins([half_turned(pose)]) * from_behind
             final = refine(drawings[i], bent, starts, FINE_WIDTHS)
-            final = steadied(drawings[i], joint, i, final)
+            final = refine_alternatives(drawings[i], joint, i, final)
             seen = pose if model.is_perspective else replace(pose, k=0.0)
             final = level_twins(final, bent, seen, always=differs, from_behind=from_behind)
             found.append(self._informed(final, i))
@@ -327,6 +331,6 @@ class Problem:
         return problem.with_elevation(ElevationPrior(mean + found.offset, found.sigma))
 
 
-def _rivals(pose: Pose, candidates: Candidates) -> list[Pose]:
+def _alternative_starts(pose: Pose, candidates: Candidates) -> list[Pose]:
     """Return the chosen pose, its twin and the best candidates, all with the chosen k."""
     return with_k(with_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)

@@ -29,6 +29,12 @@ MODULES = {"consistency": "evaluate", "info": "check", "recolor": "palette"}
 
 INTERRUPTED, REFUSED = 130, 2
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name
+RENAMED = {  # switches of before
+    "--as-bent": "--no-unwarp",
+    "--as-carved": "--no-fairing",
+    "--as-placed": "--no-register",
+    "--one-sided": "--no-symmetry",
+}
 PLACES_AT_FAULT = (  # what the system says of a place that the user has named, wherever it is used
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP),
     *(errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ESTALE),
@@ -104,6 +110,8 @@ def run(program: typer.Typer, name: str) -> None:
 def _usage(error: Any) -> str:
     """Return what is wrong with the command line, and where its help is."""
     said = error.format_message().replace("Value error, ", "").rstrip(". ")
+    if (now := RENAMED.get(getattr(error, "option_name", ""))) is not None:
+        said = f"No such option: {error.option_name}; did you mean {now}?"
     return f"{said}; see `{error.ctx.command_path} -h`" if error.ctx is not None else said
 
 

@@ -73,19 +73,20 @@ def train(
             "--no-mannequin", help="Learn the shape from the drawings alone, not the mannequin's."
         ),
     ] = False,
-    as_placed: Annotated[
-        bool, typer.Option("--as-placed", help="Trust the cameras: do not register drawings.")
+    no_register: Annotated[
+        bool, typer.Option("--no-register", help="Trust the cameras: do not register drawings.")
     ] = False,
-    as_bent: Annotated[
-        bool, typer.Option("--as-bent", help="Trust the outlines: do not unbend drawings.")
+    no_unwarp: Annotated[
+        bool, typer.Option("--no-unwarp", help="Trust the outlines: do not unwarp drawings.")
     ] = False,
-    as_carved: Annotated[
-        bool, typer.Option("--as-carved", help="Keep the corners of the drawings' visual hull.")
+    no_fairing: Annotated[
+        bool, typer.Option("--no-fairing", help="Keep the corners of the drawings' visual hull.")
     ] = False,
-    one_sided: Annotated[
+    no_symmetry: Annotated[
         bool,
         typer.Option(
-            "--one-sided", help="Do not take an undrawn side from a symmetric body's mirror image."
+            "--no-symmetry",
+            help="Do not take an undrawn side from a symmetric body's mirror image.",
         ),
     ] = False,
     no_palette: Annotated[
@@ -132,8 +133,8 @@ def train(
     finishes the step and writes the run as it stands; a second one leaves at once.
     """
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
-    switches = {"fair": as_carved, "register": as_placed}
-    switches |= {"unbend": as_bent, "symmetric": one_sided, "mannequin": no_mannequin}
+    switches = {"fairing": no_fairing, "register": no_register}
+    switches |= {"unwarp": no_unwarp, "symmetry": no_symmetry, "mannequin": no_mannequin}
     given |= {name: False for name, off in switches.items() if off}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle
     request = Request(

@@ -61,12 +61,12 @@ class TrainOptions:
             each other (off: --no-mannequin).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the
             figure's box, at new places in every step, against pictures over any backdrop.
-        fair: take the fairest surface inside the hull instead of the hull with its corners
-            (off: --as-carved).
-        register: let cameras follow drawings that were placed or sized off (off: --as-placed).
-        unbend: bend drawings back that disagree with the others' outlines (off: --as-bent).
-        symmetric: where drawings show that the body is its own mirror image, flip them for the side
-            that no drawing shows (off: --one-sided).
+        fairing: take the fairest surface inside the hull instead of the hull with its corners
+            (off: --no-fairing).
+        register: let cameras follow drawings that were placed or sized off (off: --no-register).
+        unwarp: bend drawings back that disagree with the others' outlines (off: --no-unwarp).
+        symmetry: where drawings show that the body is its own mirror image, flip them for the side
+            that no drawing shows (off: --no-symmetry).
     """
 
     steps: int | None = None
@@ -80,10 +80,10 @@ class TrainOptions:
     field: FieldName = "auto"
     mannequin: bool = True
     carve: bool = True
-    fair: bool = True
+    fairing: bool = True
     register: bool = True
-    unbend: bool = True
-    symmetric: bool = True
+    unwarp: bool = True
+    symmetry: bool = True
 
     def check(self) -> None:
         """Refuse what means nothing.
@@ -131,6 +131,6 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
         carve=False,
         smoothness=0.0,
         register=False,
-        unbend=False,
-        symmetric=False,
+        unwarp=False,
+        symmetry=False,
     )

@@ -25,7 +25,7 @@ from toonset.nerf.prepare.symmetry import with_all_mirrored
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.folder import WRITTEN
-from toonset.nerf.run.monitor import Looking, Onlooker
+from toonset.nerf.run.monitor import Monitor, MonitorOptions
 from toonset.nerf.run.report import preview, write_run
 from toonset.nerf.train.labelling import labelled, without_palette
 from toonset.nerf.train.result import HeldOut, Training
@@ -110,7 +110,7 @@ def train(
     threads: int | None = None,
     test: Scene | None = None,
     listener: Listener | None = None,
-    looking: Looking | None = None,
+    looking: MonitorOptions | None = None,
 ) -> Run:
     """Return a radiance field, and a classifier from its colours to the palette's.
 
@@ -153,13 +153,13 @@ def train(
     ):
         told.detail(f"{count} CPU thread{'s' * (count > 1)}")
         scene = _with_palette(scene, told) if palette else without_palette(scene)
-        onlooker = Onlooker(looking or Looking(test=test))
-        for guess in guesses(with_all_mirrored(scene) if options.symmetric else scene):
+        monitor = Monitor(looking or MonitorOptions(test=test))
+        for guess in guesses(with_all_mirrored(scene) if options.symmetry else scene):
             told.say(guess)
-        training = fit_field(scene, options, told.progress, onlooker)
+        training = fit_field(scene, options, told.progress, monitor)
         told.progress("laying the drawings over the field")
         training = replace(training, result=with_drawings(training, scene))
-    return Run(training.result, training, scene, test, onlooker.held_out, count)
+    return Run(training.result, training, scene, test, monitor.held_out, count)
 
 
 def with_drawings(training: Training, scene: Scene) -> TrainedField:

@@ -358,7 +358,7 @@ NO_OPTIONS = [
     ({"resolution": 0}, "resolution: 0"),
     ({"field": "bogus"}, "field: 'bogus' is none of auto, triplane"),
     ({"steps": 1.5}, "steps: 1.5 is out of range"),
-    ({"fair": "no"}, "fair: 'no' is neither True nor False"),
+    ({"fairing": "no"}, "fairing: 'no' is neither True nor False"),
     ({"device": "tpu"}, "device: 'tpu' is none of auto, cpu, cuda"),
 ]
 
@@ -380,13 +380,13 @@ def test_options_out_of_range_are_refused(
 
 
 def test_a_library_call_removes_no_file_of_its_host(bundle: Path, tmp_path: Path) -> None:
-    from toonset.nerf.run.monitor import Looking
+    from toonset.nerf.run.monitor import MonitorOptions
 
     kept = tmp_path / "mine" / "notes.txt"
     kept.parent.mkdir()
     kept.write_text("mine")
     scene, options = ts.read_bundle(bundle).scene, ts.TrainOptions(steps=1, device="cpu")
-    ts.train(scene, options, looking=Looking(folder=kept.parent))
+    ts.train(scene, options, looking=MonitorOptions(folder=kept.parent))
     assert kept.read_text() == "mine"
 
 

@@ -26,7 +26,7 @@ class Sections:
 
     Attributes:
         lab: (height, width, 3) OKLab.
-        across: (height, width) position in the row's cross-section, -1 = left rim, 1 = right rim.
+        across: (height, width) position in the row's cross-section, -1 = left edge, 1 = right edge.
         inside: (height, width) pixels of a cross-section that lie deeper than the contour's ink.
         widths: (height,) of the cross-sections in pixels, 0 where there is none.
     """

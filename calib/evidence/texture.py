@@ -1,7 +1,7 @@
 """Paint on a turning body: which yaws make the drawings' colours agree.
 
 Outlines have mirror twins: yaw and 180 - yaw look the same under orthography. What is painted on
-the body does not: between two views it moves to the left or to the right, comes round one rim and
+the body does not: between two views it moves to the left or to the right, comes round one edge and
 leaves over the other. No face, no skin, no meaning is needed: a belt, a cape, a parting will do.
 
 The figure is a stack of bands, each a turning cylinder whose paint is a short Fourier series in

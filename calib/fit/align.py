@@ -1,7 +1,8 @@
 """Contour alignment of one view: robust two-sided point-to-line Gauss-Newton, from one start.
 
-Residuals, in pixels of the working scale: (a) every rim point against the nearest drawn contour
-point, (b) every drawn contour point against the nearest rim point, both along the drawn normal.
+Residuals, in pixels of the working scale: (a) every point of the occluding contour against the
+nearest drawn one, (b) every drawn point against the nearest of the occluding contour, both along
+the drawn normal.
 "Nearest" is measured over position and outline direction together, so that the two sides of a
 thin limb are not confused. Geman-McClure weights w = (t^2 / (t^2 + d^2))^2 with t annealed from
 coarse to fine make far points, such as a hat that the mesh lacks, count little.
@@ -29,7 +30,7 @@ MERGED = np.radians(3.0)  # starts this near to each other go to the same optimu
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
 EFFECTIVE_POINTS = 40.0  # weight of a view's outline against the priors, in points
-INDEPENDENT_POINTS = 10.0  # outline errors of a view when rival poses are compared
+INDEPENDENT_POINTS = 10.0  # outline errors of a view when alternative poses are compared
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Fit:
         pose: in pixels of the full-size view.
         cost: mean squared two-sided outline distance, each capped, over height squared.
         error: root mean square of the uncapped part, over height: what is badly off stays out.
-        coverage: share of rim and drawn points nearer than the cap.
+        coverage: share of occluding contour and drawn points nearer than the cap.
     """
 
     pose: Pose

@@ -6,7 +6,7 @@
 with drawings and a mannequin that are stretched, where that is proven
 (`toonset.calib.flaws.stretched`), and the mannequin's proportions (which have priors of their
 own and therefore pay Akaike's 2 per number instead of BIC's log(samples)), where its outline is
-visibly not theirs or a glance says so.
+visibly not theirs or a quick test says so.
 
 All are one model in k = 1 / distance with more or fewer numbers free, so a richer model is judged
 by how far its extra numbers are from what the simpler one says, in their own covariance: BIC's gain
@@ -39,8 +39,8 @@ WARM_WIDTHS = np.geomspace(0.013, 0.01, 4)
 # Of bodies whose outlines lack something, hair or a bag, and of those that nearly meet
 BODY_WIDTHS, NEAR_BODY_WIDTHS = np.geomspace(0.04, 0.015, 8), np.geomspace(0.04, 0.01, 10)
 BODY_ELEVATION = np.radians(1.5)  # half of `Spreads.elevation`: a bent body can look tilted
-# Where outlines nearly meet, a glance says whether proportions are worth a fit (docs/decisions.md)
-GLANCE_WIDTHS, GLANCE_MARGIN = np.array([0.02, 0.015]), 120.0
+# Where outlines nearly meet, a quick test says whether proportions need a fit (docs/decisions.md)
+QUICK_TEST_WIDTHS, QUICK_TEST_MARGIN = np.array([0.02, 0.015]), 120.0
 # Drawings so far off a bent body look like another body to any (docs/decisions.md)
 UNSTEADY, UNSTEADY_MARGIN = 0.009, 200.0
 
@@ -59,7 +59,7 @@ MODELS: dict[str, SheetModel] = {
 
 
 @dataclass(frozen=True)
-class Rung:
+class ModelTest:
     """A richer model that was tried.
 
     Attributes:
@@ -87,13 +87,13 @@ class ModelChoice:
     Attributes:
         model: name of the chosen camera model.
         distances: camera distance of every view in body heights; infinity for orthographic.
-        rungs: what was tried.
+        tried: what was tried.
         effective_samples: outline samples counted as independent.
     """
 
     model: str
     distances: tuple[float, ...]
-    rungs: tuple[Rung, ...]
+    tried: tuple[ModelTest, ...]
     effective_samples: float
 
     @property
@@ -105,10 +105,10 @@ class ModelChoice:
     def bends_mannequin(self) -> bool:
         """Return whether the mannequin's proportions were changed."""
         bends = (PROPORTIONS, TALLER)
-        return any(rung.name in bends and rung.is_proven for rung in self.rungs)
+        return any(model_test.name in bends and model_test.is_proven for model_test in self.tried)
 
 
-def climb(
+def select_model(
     problem: JointProblem,
     body: Body,
     poses: Sequence[Pose],
@@ -134,18 +134,18 @@ def climb(
     fit = problem.fit(body, poses, WIDTHS, MODELS[SHARED])
     first_k = PARAMETERS * views
     gain = fit.poses[0].k ** 2 / fit.covariance[first_k, first_k] - np.log(samples)
-    rungs = [Rung(SHARED, float(gain), 1, margin)]
-    model = SHARED if rungs[0].is_proven else ORTHOGRAPHIC
+    tried = [ModelTest(SHARED, float(gain), 1, margin)]
+    model = SHARED if tried[0].is_proven else ORTHOGRAPHIC
     if model == ORTHOGRAPHIC:
         fit = problem.fit(body, poses, WIDTHS, MODELS[ORTHOGRAPHIC])
     if views > 1:
         richer = PER_VIEW if model == SHARED else SCALES
         rich = problem.fit(body, fit.poses, WARM_WIDTHS, MODELS[richer], offset=fit.offset)
         gain = _differences(rich, richer) - (views - 1) * np.log(samples)
-        rungs.append(Rung(richer, float(gain), views - 1, margin))
-        if rungs[1].is_proven:
+        tried.append(ModelTest(richer, float(gain), views - 1, margin))
+        if tried[1].is_proven:
             model, fit = richer, rich
-    return fit, ModelChoice(model, _distances(fit), tuple(rungs), samples)
+    return fit, ModelChoice(model, _distances(fit), tuple(tried), samples)
 
 
 def with_proportions(
@@ -174,9 +174,9 @@ def with_proportions(
     gain = theta @ np.linalg.solve(block, theta) - AKAIKE * unknowns
     if bent.noise.smooth > UNSTEADY:
         margin = max(margin, UNSTEADY_MARGIN)
-    rung = Rung(PROPORTIONS, float(gain), unknowns, margin)
-    choice = replace(choice, rungs=(*choice.rungs, rung))
-    if not rung.is_proven:
+    model_test = ModelTest(PROPORTIONS, float(gain), unknowns, margin)
+    choice = replace(choice, tried=(*choice.tried, model_test))
+    if not model_test.is_proven:
         return fit, choice
     return bent, replace(choice, distances=_distances(bent))
 

@@ -24,7 +24,7 @@ from toonset.calib.fit.model_selection import (
     MODELS,
     STRETCHED,
     TALLER,
-    Rung,
+    ModelTest,
     contrasts,
 )
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem
@@ -49,12 +49,12 @@ class Stretches:
     Attributes:
         views: of every drawing beside the typical one; 0 where that is not proven or clear.
         mannequin: how much taller than the mannequin the typical drawing is; 0 likewise.
-        rungs: the evidence.
+        tried: the evidence.
     """
 
     views: tuple[float, ...]
     mannequin: float
-    rungs: tuple[Rung, ...]
+    tried: tuple[ModelTest, ...]
 
     @property
     def is_none(self) -> bool:
@@ -64,7 +64,7 @@ class Stretches:
     def and_then(self, more: Stretches) -> Stretches:
         """Return both, with the first evidence."""
         views = tuple(a + b for a, b in zip(self.views, more.views, strict=True))
-        return Stretches(views, self.mannequin + more.mannequin, self.rungs or more.rungs)
+        return Stretches(views, self.mannequin + more.mannequin, self.tried or more.tried)
 
 
 def nothing_stretched(views: int) -> Stretches:
@@ -90,7 +90,7 @@ def find_stretches(
     margin = DOUBTFUL_MARGIN if doubtful else MARGIN
     for widths in (GLANCE, WIDTHS):
         rich = problem.fit(fit.body, fit.poses, widths, free, offset=fit.offset)
-        apart, taller = _rungs(rich, np.log(problem.samples * views), margin)
+        apart, taller = _model_tests(rich, np.log(problem.samples * views), margin)
         if max(apart.bic_gain, taller.bic_gain) <= 0:
             break
     found, sigma = np.array(rich.stretches), np.sqrt(np.diag(_covariance(rich)))
@@ -110,7 +110,7 @@ def _covariance(rich: JointFit) -> Float[np.ndarray, "views views"]:
     return rich.covariance[first : first + views, first : first + views]
 
 
-def _rungs(rich: JointFit, price: float, margin: float) -> tuple[Rung, Rung]:
+def _model_tests(rich: JointFit, price: float, margin: float) -> tuple[ModelTest, ModelTest]:
     """Return the evidence that drawings differ, and that the typical one is not the mannequin's.
 
     Args:
@@ -122,17 +122,19 @@ def _rungs(rich: JointFit, price: float, margin: float) -> tuple[Rung, Rung]:
     stretches, covariance = np.array(rich.stretches), _covariance(rich)
     views = len(stretches)
 
-    def rung(name: str, over: Float[np.ndarray, "views unknowns"], margin: float) -> Rung:
+    def model_test(
+        name: str, over: Float[np.ndarray, "views unknowns"], margin: float
+    ) -> ModelTest:
         off, unknowns = over.T @ stretches, over.shape[1]
         gain = off @ np.linalg.solve(over.T @ covariance @ over, off) - unknowns * price
-        return Rung(name, float(gain), unknowns, margin)
+        return ModelTest(name, float(gain), unknowns, margin)
 
-    apart = rung(STRETCHED, contrasts(views), margin)
+    apart = model_test(STRETCHED, contrasts(views), margin)
     if not apart.is_proven:
-        return apart, rung(TALLER, np.full((views, 1), 1 / views), margin)
+        return apart, model_test(TALLER, np.full((views, 1), 1 / views), margin)
     middle = np.argsort(stretches)[(views - 1) // 2 : views // 2 + 1]
     typical = np.eye(views)[:, middle].mean(axis=1, keepdims=True)
-    return apart, rung(TALLER, typical, BIC_MARGIN)
+    return apart, model_test(TALLER, typical, BIC_MARGIN)
 
 
 def stretched_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:

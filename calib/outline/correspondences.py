@@ -1,8 +1,8 @@
 """Corresponding points of a drawing and the mannequin's outline at a pose.
 
-Every rim point is matched with the nearest drawn contour point and every drawn point with the
-nearest rim point. "Nearest" is measured over position and outline direction together, so that the
-two sides of a thin limb are not confused.
+Every point of the occluding contour is matched with the nearest drawn one, and every drawn point
+with the nearest occluding one. "Nearest" is measured over position and outline direction together,
+so that the two sides of a thin limb are not confused.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.calib.outline.occluding_contour import Rim, Surface, rim_at
+from toonset.calib.outline.occluding_contour import OccludingContour, Surface, occluding_contour_at
 from toonset.calib.outline.pose import Pose, project
 from toonset.dataset.silhouettes.contour import Contour
 
@@ -25,14 +25,14 @@ BLOCK = 64  # rows of a distance table at once
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Corresponding points of rim and drawing.
+    """Corresponding points of occluding contour and drawing.
 
     Attributes:
-        points: (n, 3) rim points, surface coordinates.
+        points: (n, 3) occluding points, surface coordinates.
         targets: (n, 2) drawn points in pixels.
         normals: (n, 2) outward normals of the drawn outline there.
         distances: (n,) pixel distance before the step, direction included.
-        drawn: number of leading rows that come from drawn points (the rest from rim points).
+        drawn: number of leading rows that come from drawn points (the rest from occluding points).
         target_index: (n,) which drawn point each row's target is.
     """
 
@@ -123,27 +123,27 @@ class Drawing:
 
 
 def match(drawing: Drawing, surface: Surface, pose: Pose) -> Matches:
-    """Return two-sided nearest neighbours of rim and drawn outline at a working pose."""
+    """Return two-sided nearest neighbours of occluding contour and drawing at a pose."""
     spacing = max(1.0, drawing.height / 128)
-    rim = rim_at(surface, pose, drawing.size_wh, spacing, drawing.subpixels)
+    occluding = occluding_contour_at(surface, pose, drawing.size_wh, spacing, drawing.subpixels)
     if drawing.is_cut:
-        shown = drawing.shows(project(pose, rim.points))
-        rim = Rim(rim.points[shown], rim.normals[shown])
-    if len(rim.points) == 0:  # nothing in the picture: far off, every residual is at its cap
+        shown = drawing.shows(project(pose, occluding.points))
+        occluding = OccludingContour(occluding.points[shown], occluding.normals[shown])
+    if len(occluding.points) == 0:  # nothing in the picture: far off, every residual is at its cap
         far = np.full(len(drawing.points), drawing.height)
         zeros = np.zeros((len(far), 3))
         everything = np.arange(len(far))
         return Matches(zeros, drawing.points, drawing.normals, far, len(far), everything)
-    rim = _thinned(rim, len(drawing.points))
-    seen = np.hstack([project(pose, rim.points), drawing.direction_px * rim.normals])
+    occluding = _thinned(occluding, len(drawing.points))
+    seen = np.hstack([project(pose, occluding.points), drawing.direction_px * occluding.normals])
     table = Table(seen)
-    to_rim, to_drawn = nearest(drawing.table, table), nearest(table, drawing.table)
-    off = np.concatenate([drawing.features - seen[to_rim], seen - drawing.features[to_drawn]])
+    to_occluding, to_drawn = nearest(drawing.table, table), nearest(table, drawing.table)
+    off = np.concatenate([drawing.features - seen[to_occluding], seen - drawing.features[to_drawn]])
     target = np.concatenate([np.arange(len(drawing.points)), to_drawn])
     # where the picture's edge cuts the figure, nothing is met: as good as infinitely far
     distances = np.where(drawing.free[target], np.sqrt((off**2).sum(axis=1)), FAR * drawing.height)
     return Matches(
-        np.concatenate([rim.points[to_rim], rim.points]),
+        np.concatenate([occluding.points[to_occluding], occluding.points]),
         np.concatenate([drawing.points, drawing.points[to_drawn]]),
         np.concatenate([drawing.normals, drawing.normals[to_drawn]]),
         distances,
@@ -165,6 +165,6 @@ def nearest(asking: Table, asked: Table) -> Int[np.ndarray, " n"]:
         )
 
 
-def _thinned(rim: Rim, wanted: int) -> Rim:
-    every = max(1, len(rim.points) // max(wanted, 1))
-    return Rim(rim.points[::every], rim.normals[::every])
+def _thinned(occluding: OccludingContour, wanted: int) -> OccludingContour:
+    every = max(1, len(occluding.points) // max(wanted, 1))
+    return OccludingContour(occluding.points[::every], occluding.normals[::every])

@@ -1,9 +1,9 @@
 """The mannequin's outline from any direction: contour generators and silhouette masks, no OpenGL.
 
 A contour generator is an edge whose two faces lie on one side of it in the image (or an edge of an
-open surface). Its points on the outer silhouette are kept by a low-resolution mask. In the image a
-rim point's normal is perpendicular to its edge, away from the faces. To first order in the pose a
-rim point may be treated as fixed on the mesh: its sliding moves it along the outline only.
+open surface). Its points on the outer silhouette are kept by a low-resolution mask. In the image an
+occluding point's normal is perpendicular to its edge, away from the faces. To first order in the
+pose it may be treated as fixed on the mesh: its sliding moves it along the outline only.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FAR = 9.0  # depth that means "nothing here" in the rasteriser
 
 
 @dataclass(frozen=True, eq=False)
-class Rim:
+class OccludingContour:
     """Points of the mesh on its outline in one view.
 
     Attributes:
@@ -56,18 +56,18 @@ def silhouette_mask(
     return depth < FAR - 0.1
 
 
-def rim_at(
+def occluding_contour_at(
     surface: Surface, pose: Pose, size_wh: tuple[int, int], spacing_px: float, subpixels: int = 1
-) -> Rim:
+) -> OccludingContour:
     """Return the points of the surface on its outer silhouette, seen from `pose`.
 
     Args:
         surface: the prepared mesh.
         pose: of the camera; its pixels also set the resolution of the visibility test.
         size_wh: image size that holds the figure.
-        spacing_px: distance of neighbouring rim points along an edge.
-        subpixels: the visibility test's pixels per pixel, along an axis: the rim of a leg that is
-            hidden by less than such a pixel counts as seen.
+        spacing_px: distance of neighbouring occluding points along an edge.
+        subpixels: the visibility test's pixels per pixel, along an axis: the contour of a leg that
+            is hidden by less than such a pixel counts as seen.
     """
     ends, pixels, layers = _seen_folds(surface, pose)
     return _rim(ends, pixels, layers, size_wh, spacing_px, subpixels)
@@ -81,13 +81,13 @@ def mask_at(
     return covered(pixels[:, 0], pixels[:, 1], layers, size_wh)
 
 
-def find_rim(
+def find_occluding_contour(
     surface: Surface,
     pixels: Float[np.ndarray, "vertices 2"],
     size_wh: tuple[int, int],
     spacing_px: float,
-) -> Rim:
-    """Return what `rim_at` returns, for any projection: `pixels` are the projected vertices."""
+) -> OccludingContour:
+    """Return the same for any projection: `pixels` are the projected vertices."""
     a, b, c = (pixels[surface.faces[:, i]] for i in range(3))
     ab, ac = b - a, c - a
     folds, layers = _folds(surface, ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0)
@@ -127,7 +127,7 @@ def _rim(
     size_wh: tuple[int, int],
     spacing_px: float,
     subpixels: int,
-) -> Rim:
+) -> OccludingContour:
     (u, v), (du, dv) = pixels[:, 0].T, (pixels[:, 1] - pixels[:, 0]).T
     length = np.hypot(du, dv)
     count = np.where(length > 1e-6, np.maximum(1, np.ceil(length / spacing_px)), 0).astype(np.intp)
@@ -142,7 +142,7 @@ def _rim(
     keep = np.flatnonzero(_is_background(beside, pixels * subpixels, layers, size))
     which, fraction = which[keep], fraction[keep, None]
     points = ends[which, 0] * (1 - fraction) + ends[which, 1] * fraction
-    return Rim(points, normals[keep])
+    return OccludingContour(points, normals[keep])
 
 
 def _is_background(

@@ -2,8 +2,8 @@
 
 Aligned to the outline alone, a camera bends to what the artist drew wrongly: a front view whose hem
 is a little too round fits better from 30 degrees above. The sheet knows how far its drawings are
-off (`toonset.calib.fit.drawing_error`); with that in mind, such a rival goes back to the chosen
-camera, and only those that stay are others.
+off (`toonset.calib.fit.drawing_error`); with that in mind, such an alternative goes back to the
+chosen camera, and only those that stay are others.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.search.hypotheses import OTHER, Candidates, is_twin
 from toonset.camera import rotation_distance
 
-WIDTHS = np.full(5, 0.01)  # robust ones over the figure's height: rivals are near an optimum
-WORTH = 6.0  # nats behind the best: rivals farther behind do not count
+WIDTHS = np.full(5, 0.01)  # robust ones over the figure's height: alternatives are near an optimum
+WORTH = 6.0  # nats behind the best: alternatives farther behind do not count
 
 
-def steadied(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -> Candidates:
+def refine_alternatives(
+    drawing: Drawing, joint: JointFit, index: int, found: Candidates
+) -> Candidates:
     """Return a view's candidates, those that count refined under the sheet's drawing error.
 
     The chosen camera is among them, as it is and refined like them. Its twin stays: no error of a

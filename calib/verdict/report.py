@@ -29,12 +29,12 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
             "distance_heights": [d if math.isfinite(d) else None for d in model.distances],
             "tried": [
                 {
-                    "model": rung.name,
-                    "bic_gain": rung.bic_gain,
-                    "margin": rung.margin,
-                    "unknowns": rung.unknowns,
+                    "model": model_test.name,
+                    "bic_gain": model_test.bic_gain,
+                    "margin": model_test.margin,
+                    "unknowns": model_test.unknowns,
                 }
-                for rung in model.rungs
+                for model_test in model.tried
             ],
             "effective_samples": model.effective_samples,
         },
@@ -87,7 +87,7 @@ def model_line(calibration: Calibration) -> str:
 def evidence_line(calibration: Calibration) -> str:
     """Return the evidence for the camera model: what larger models gained of what they need."""
     model = calibration.model
-    tried = "; ".join(f"{r.name} {r.bic_gain:+.0f} of {r.margin:.0f}" for r in model.rungs)
+    tried = "; ".join(f"{r.name} {r.bic_gain:+.0f} of {r.margin:.0f}" for r in model.tried)
     evidence = f"BIC gain and what is needed: {tried}. " if tried else ""
     return f"  {evidence}{model.effective_samples:.0f} effective samples"
 

@@ -55,7 +55,7 @@ def run(request: Request, printer: Printer) -> int:
     from toonset.dataset.bundle.read_scene import read_scene
     from toonset.nerf.options import TrainOptions
     from toonset.nerf.run.folder import WRITTEN
-    from toonset.nerf.run.monitor import INTERRUPTED, Looking
+    from toonset.nerf.run.monitor import INTERRUPTED, MonitorOptions
     from toonset.nerf.training import train
 
     scene = read_scene(request.bundle)
@@ -66,7 +66,9 @@ def run(request: Request, printer: Printer) -> int:
         check_output(request.previews, inputs, PREVIEWS, force=True)
     keep_freed_memory()
     stopper = Stopper(printer)
-    looking = Looking(Voice(printer).tell, stopper, test, request.previews, request.preview_every)
+    looking = MonitorOptions(
+        Voice(printer).tell, stopper, test, request.previews, request.preview_every
+    )
     with stopper.listening():
         found = train(
             scene,

@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from toonset.dataset.images.picture import decode_rgba
-from toonset.dataset.mesh.soup import Soup, check_counts, face_colors_from_texture
+from toonset.dataset.mesh.raw_triangles import RawTriangles, check_counts, face_colors_from_texture
 from toonset.errors import MeshError
 from toonset.palette.colors import linear_from_srgb, srgb_from_linear
 
@@ -78,7 +78,7 @@ class GltfFile:
         return self.buffers[view["buffer"]][start : start + view["byteLength"]]
 
 
-def read_gltf(data: bytes, path: Path, max_faces: int) -> Soup:
+def read_gltf(data: bytes, path: Path, max_faces: int) -> RawTriangles:
     """Return the triangles of a glTF or GLB file; every node with a mesh is one part.
 
     Raises:
@@ -182,10 +182,10 @@ def _local_matrix(node: dict[str, Any]) -> Matrix:
     return np.asarray(translation_matrix(node.get("translation", (0, 0, 0))) @ turned)
 
 
-def _pieces(file: GltfFile) -> list[Soup]:
+def _pieces(file: GltfFile) -> list[RawTriangles]:
     """Return every primitive in world coordinates."""
     world = _world_matrices(file)
-    pieces: list[Soup] = []
+    pieces: list[RawTriangles] = []
     vertices = faces = 0
     for index in world:
         node = file.json["nodes"][index]
@@ -207,7 +207,7 @@ def _pieces(file: GltfFile) -> list[Soup]:
 
 def _piece(
     file: GltfFile, index: int, primitive: dict[str, Any], world: dict[int, Matrix], name: str
-) -> Soup:
+) -> RawTriangles:
     node, attributes = file.json["nodes"][index], primitive["attributes"]
     vertices = file.array(attributes["POSITION"]).astype(np.float64).reshape(-1, 3)
     corners = np.arange(len(vertices))
@@ -227,7 +227,7 @@ def _piece(
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         if np.linalg.det(matrix[:3, :3]) < 0:
             faces = faces[:, ::-1]
-    return Soup(vertices, faces, colors, None, (name,))
+    return RawTriangles(vertices, faces, colors, None, (name,))
 
 
 def _skinned(
@@ -289,9 +289,9 @@ def _texture_colors(
     return linear_from_srgb(face_colors_from_texture(texture, uvs, faces, white) / 255)
 
 
-def _joined(pieces: list[Soup]) -> Soup:
+def _joined(pieces: list[RawTriangles]) -> RawTriangles:
     if not pieces:
-        return Soup(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+        return RawTriangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     starts = np.cumsum([0] + [len(piece.vertices) for piece in pieces[:-1]])
     names = list(dict.fromkeys(piece.part_names[0] for piece in pieces))
     numbers = [names.index(piece.part_names[0]) for piece in pieces]
@@ -300,7 +300,7 @@ def _joined(pieces: list[Soup]) -> Soup:
         np.full(piece.faces.shape, 255, np.uint8) if piece.colors is None else piece.colors
         for piece in pieces
     ]
-    return Soup(
+    return RawTriangles(
         vertices=np.concatenate([piece.vertices for piece in pieces]),
         faces=np.concatenate([p.faces + start for p, start in zip(pieces, starts, strict=True)]),
         colors=np.concatenate(colors) if any(p.colors is not None for p in pieces) else None,

@@ -17,7 +17,7 @@ import numpy as np
 from toonset.dataset.mesh.gltf import read_gltf
 from toonset.dataset.mesh.obj import read_obj
 from toonset.dataset.mesh.ply_stl_off import read_scan
-from toonset.dataset.mesh.soup import mesh_of_soup
+from toonset.dataset.mesh.raw_triangles import weld_mesh
 from toonset.errors import MeshError
 from toonset.mesh import Mesh, split_by_face
 from toonset.read import describe, read_whole
@@ -47,12 +47,12 @@ def load_mesh(path: str | Path, max_bytes: int = MAX_BYTES, max_faces: int = MAX
     data = read_whole(path, "mesh", MeshError, max_bytes)
     kind = _kind(data, path)
     if kind == "obj":
-        soup = read_obj(data, path, max_faces)
+        raw = read_obj(data, path, max_faces)
     elif kind in ("glb", "gltf"):
-        soup = read_gltf(data, path, max_faces)
+        raw = read_gltf(data, path, max_faces)
     else:
-        soup = read_scan(data, kind, path, max_faces)
-    return replace(mesh_of_soup(soup, path), sha256=sha256(data).hexdigest())
+        raw = read_scan(data, kind, path, max_faces)
+    return replace(weld_mesh(raw, path), sha256=sha256(data).hexdigest())
 
 
 def save_obj(mesh: Mesh) -> bytes:

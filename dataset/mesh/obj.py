@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import load_rgba
-from toonset.dataset.mesh.soup import Soup, check_counts, face_colors_from_texture
+from toonset.dataset.mesh.raw_triangles import RawTriangles, check_counts, face_colors_from_texture
 from toonset.errors import MeshError, printable
 from toonset.read import read_whole
 
@@ -72,7 +72,7 @@ class _Lists:
         return _index(vertex, len(self.vertices)), known
 
 
-def read_obj(data: bytes, path: Path, max_faces: int) -> Soup:
+def read_obj(data: bytes, path: Path, max_faces: int) -> RawTriangles:
     """Return the triangles of an OBJ file; polygons are fanned from their first corner.
 
     Raises:
@@ -98,7 +98,7 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> Soup:
     faces = np.array(lists.faces, dtype=np.int64).reshape(-1, 6)
     names = list(dict.fromkeys(lists.parts)) or [""]
     numbers = {name: number for number, name in enumerate(names)}
-    return Soup(
+    return RawTriangles(
         vertices=np.array(lists.vertices, dtype=np.float64),
         faces=faces[:, :3],
         colors=_colors(lists, faces, path),

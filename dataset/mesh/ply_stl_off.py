@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from toonset.dataset.mesh.soup import Soup, check_counts
+from toonset.dataset.mesh.raw_triangles import RawTriangles, check_counts
 from toonset.errors import MeshError
 from toonset.read import describe
 
@@ -21,7 +21,7 @@ HEADER_BYTES = 65536
 STL_HEADER_BYTES, STL_FACE_BYTES = 84, 50
 
 
-def read_scan(data: bytes, kind: str, path: Path, max_faces: int) -> Soup:
+def read_scan(data: bytes, kind: str, path: Path, max_faces: int) -> RawTriangles:
     """Return the triangles of a PLY, STL or OFF file.
 
     Raises:
@@ -43,7 +43,7 @@ def read_scan(data: bytes, kind: str, path: Path, max_faces: int) -> Soup:
             f"{path}: has {len(vertices)} vertices and {len(faces)} faces, its header announces "
             f"{counts[0]} and {counts[1]}; the file is cut off, export it again"
         )
-    return Soup(vertices, faces, _colors(mesh, faces) if len(faces) else None)
+    return RawTriangles(vertices, faces, _colors(mesh, faces) if len(faces) else None)
 
 
 def _announced(data: bytes, kind: str) -> tuple[int, int]:

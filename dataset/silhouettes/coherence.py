@@ -1,8 +1,8 @@
 """Do the drawings agree with each other under their cameras? Needs no mesh.
 
 Under the right cameras every outline point of a view is the picture of some point of the body, and
-that point lies inside (or on the rim of) every other silhouette. With the signed distance D_j to
-silhouette j's rim, positive inside, the ray X_i(p, t) through outline point p of view i has
+that point lies inside (or on the outline of) every other silhouette. With the signed distance D_j
+to silhouette j's outline, positive inside, the ray X_i(p, t) through outline point p of view i has
 
     residual(p) = max over t of min over j != i of D_j(pixel_j(X_i(p, t)))
 

@@ -1,8 +1,8 @@
 """Rays through outline points, cut by the other silhouettes: the visual hull where it matters.
 
 A point of a ray lies in the visual hull if it is inside every silhouette. Instead of cutting rays
-with polygons, the signed distance to each silhouette's rim is sampled along them: its minimum over
-the silhouettes says how deep in the hull, or how far outside of it, a sample lies.
+with polygons, the signed distance to each silhouette's outline is sampled along them: its minimum
+over the silhouettes says how deep in the hull, or how far outside of it, a sample lies.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from toonset.view import Ends, View
 SAMPLES = 96  # along a ray through the whole figure: about 1 % of the height apart
 FINE = 17  # samples between the neighbours of the best one
 POINTS = 160  # of a view's outline
-PAD_OF_HEIGHT = 0.25  # around a crop: how far outside a point can be told from the rim
+PAD_OF_HEIGHT = 0.25  # around a crop: how far outside a point can be told from the outline
 
 
 class Silhouette:
@@ -56,7 +56,7 @@ class Silhouette:
         directions: Float[np.ndarray, "points 3"],
         along: Float[np.ndarray, "points t"],
     ) -> Float[np.ndarray, "points t"]:
-        """Return the signed distance from the rim over the height, positive inside, along rays."""
+        """Return the signed distance from the outline over the height, > 0 inside, along rays."""
         camera = self.camera
         start = ((origins - camera.target) @ camera.rotation.T).astype(np.float32)
         slope = (directions @ camera.rotation.T).astype(np.float32)
@@ -101,7 +101,7 @@ class Rays:
         return cls(*camera.rays(pixels), along.astype(np.float32))
 
     def inside(self, silhouette: Silhouette) -> Float[np.ndarray, "points t"]:
-        """Return the samples' signed distances from a silhouette's rim over its height."""
+        """Return the samples' signed distances from a silhouette's outline over its height."""
         along = np.broadcast_to(self.along, (len(self.origins), len(self.along)))
         return silhouette.depth_inside(self.origins, self.directions, along)
 
@@ -204,5 +204,5 @@ def _signed_distance(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray
     inside = mask.astype(np.uint8)
     within = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_5)
     beyond = cv2.distanceTransform(1 - inside, cv2.DIST_L2, cv2.DIST_MASK_5)
-    # the rim lies half a pixel before the first centre of the other kind
+    # the outline lies half a pixel before the first centre of the other kind
     return np.where(mask, within - 0.5, 0.5 - beyond).astype(np.float32)

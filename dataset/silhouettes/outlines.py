@@ -1,7 +1,7 @@
-"""The outlines of a sheet's drawings, ready to be compared: distances, gradients, rim points.
+"""The outlines of a sheet's drawings, ready to be compared: distances, gradients, outline points.
 
 All of it is kept at one small size, whatever the pictures' size, so that comparing costs the same
-for every sheet; the antialiased rim keeps its place to a tenth of a pixel.
+for every sheet; the antialiased outline keeps its place to a tenth of a pixel.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.dataset.silhouettes.mask import FAINT, thin
 
 FIGURE_PX = 128  # larger figures are made this small; smaller ones stay as they are
-RIM_POINTS = 50.0  # rim points along a length as long as the figure
+RIM_POINTS = 50.0  # outline points along a length as long as the figure
 ROOM = 1.12  # of the figure's longer side: the square on which it may move
-SHORTEST = 12  # rim points of a contour below which it is a speck
+SHORTEST = 12  # outline points of a contour below which it is a speck
 SLOPE = 0.3  # below which a ridge's slope has no direction
 
 
@@ -55,15 +55,15 @@ class Outline:
 
     Attributes:
         camera: of the small picture.
-        distance: (3, height, width) signed distance to the rim in pixels, > 0 inside, and its
+        distance: (3, height, width) signed distance to the outline in pixels, > 0 inside, and its
             unit gradient (x, y).
-        rim: (n, 2) points on the rim, evenly spaced.
+        points: (n, 2) points on the outline, evenly spaced.
         square: where the figure is.
     """
 
     camera: Camera
     distance: Float[Tensor, "3 height width"]
-    rim: Float[np.ndarray, "n 2"]
+    points: Float[np.ndarray, "n 2"]
     square: Square
 
     def at(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "3 n"]:
@@ -127,15 +127,17 @@ def sample(
 
 
 def signed_distance(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    """Return the distance to the rim (alpha 1/2) in pixels, > 0 inside.
+    """Return the distance to the outline (alpha 1/2) in pixels, > 0 inside.
 
-    What is too thin to cover half a pixel, as a cape's corner seen from its edge, has no rim, but
-    is there: around it, distances are to its middle.
+    What is too thin to cover half a pixel, as a cape's corner seen from its edge, has no outline,
+    but is there: around it, distances are to its middle.
     """
     inside = ((alpha >= 0.5) | thin(alpha)).astype(np.uint8)
     distance = cv2.distanceTransform(inside, cv2.DIST_L2, 5)
     distance -= cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
-    distance -= np.sign(distance) * np.float32(0.5)  # from pixel centres to the rim between them
+    distance -= np.sign(distance) * np.float32(
+        0.5
+    )  # from pixel centres to the outline between them
     known = (alpha > FAINT) & (alpha < 1 - FAINT) & (np.abs(distance) < 1)
     return np.where(known, alpha - 0.5, distance).astype(np.float32)
 
@@ -166,7 +168,7 @@ def _outline(camera: Camera, alpha: Float[np.ndarray, "height width"], side: flo
 
 
 def _rim(alpha: Float[np.ndarray, "height width"], step: float) -> Float[np.ndarray, "n 2"]:
-    """Return points `step` pixels apart on all rims, but where the picture's edge cuts them."""
+    """Return points `step` pixels apart on all outlines, but where the picture's edge cuts them."""
     points = [np.zeros((0, 2))]
     for contour in find_contours(alpha, 0.5):
         corners = contour[:, ::-1] + 0.5

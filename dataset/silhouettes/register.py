@@ -2,7 +2,7 @@
 
 Minimised over the numbers c_v of all drawings at once, by Gauss-Newton:
 
-    sum over rim points and other views of rho(r / sigma)^2 / CORRELATED  +  c' K^-1 c / tau^2
+    sum over outline points and other views of rho(r / sigma)^2 / CORRELATED  +  c' K^-1 c / tau^2
 
 What all drawings share is the body's own place and size, and kept out (`common`).
 tau, the size of the drawings' errors, comes from the sheet itself (expectation maximisation, as
@@ -25,8 +25,8 @@ from toonset.dataset.silhouettes.displacement import Moves
 from toonset.dataset.silhouettes.outlines import Outlines
 from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
 
-NOISE, NOISE_PX = 0.003, 0.2  # of the square, but at least so many pixels: a rim's own error
-CORRELATED = 5.0  # rim points in a row that err together
+NOISE, NOISE_PX = 0.003, 0.2  # of the square, but at least so many pixels: an outline's own error
+CORRELATED = 5.0  # outline points in a row that err together
 FOREIGN = 0.02  # of the square: larger disagreements are more and more another shape, no error
 LEAST, MOST = 0.001, 0.02  # of the square: limits of tau; a larger one would bend other shapes
 SETTLED = 3  # rounds before tau is learned
@@ -42,8 +42,8 @@ class Fit:
         numbers: (views, k) of the family, in units of the squares.
         tau: the size of errors that the sheet asks for, of the square.
         gain_nats: log marginal likelihood above that of drawings without error.
-        apart_px: root mean square disagreement per rim point, before and after, in pixels of the
-            small pictures.
+        apart_px: root mean square disagreement per outline point, before and after, in pixels of
+            the small pictures.
     """
 
     numbers: Float[np.ndarray, "views k"]
@@ -131,7 +131,9 @@ def _linearised(
 
 def _touches(placed: Placed, near: list[np.ndarray] | None) -> list[Touch]:
     return [
-        touch(placed, view, placed.target(view, outline.rim), None if near is None else near[view])
+        touch(
+            placed, view, placed.target(view, outline.points), None if near is None else near[view]
+        )
         for view, outline in enumerate(placed.outlines.views)
     ]
 

@@ -1,10 +1,10 @@
 """How far a sheet's outlines are from being those of one body.
 
-Every ray through a drawing's rim touches the body, so somewhere on it there is a point that all
+Every ray through a drawing's outline touches the body, so somewhere on it there is a point that all
 other drawings show as figure. Where there is none, the drawings disagree, and the ray's point
 with the smallest sum of squared distances to the other figures says by how much, and with whom:
 
-    r(rim point, other view) = min(0, signed distance of the other figure at the ray's best point)
+    r(outline point, other view) = min(0, signed distance of the other figure at its best point)
 
 Any sheet of any body, however few its views and however hollow the body, has r = 0, so nothing is
 asked of drawings that agree. (A hull of the other views is too large instead, and would be.)

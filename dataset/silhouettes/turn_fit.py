@@ -2,7 +2,7 @@
 
 Minimised over each camera's shift, growth and yaw, by Gauss-Newton:
 
-    sum over rim points and other views of rho(r / sigma)^2 / CORRELATED
+    sum over outline points and other views of rho(r / sigma)^2 / CORRELATED
       + |shift, 2 growth|^2 / tau^2 + (yaw / its sigma)^2
 
 with r of `toonset.dataset.silhouettes.tangency`, noise and tau as in
@@ -162,7 +162,7 @@ def _linearised(outlines: Outlines, flat: np.ndarray, free: Bool[np.ndarray, " m
     cost = squares = 0.0
     points = 0
     for view, outline in enumerate(views):
-        found = touch(placed, view, outline.rim)
+        found = touch(placed, view, outline.points)
         points += len(found.pixels)
         for other in range(len(views)):
             if other == view:

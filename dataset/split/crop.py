@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int
 
-from toonset.dataset.split.segment import Survey, figure_cells, in_pixels, joined
+from toonset.dataset.split.segment import SheetLayout, figure_cells, in_pixels, joined
 from toonset.errors import SheetError
 from toonset.view import Box
 
@@ -32,9 +32,9 @@ class Crop:
 
 
 def found_crops(
-    found: Survey, paint: Bool[np.ndarray, "height width"], margin_px: int
+    found: SheetLayout, paint: Bool[np.ndarray, "height width"], margin_px: int
 ) -> list[Crop]:
-    """Return the crops of the figures that the survey found, in reading order."""
+    """Return the crops of the figures that segmentation found, in reading order."""
     cells = figure_cells(found)
     return [
         _crop(found, paint, _box(found, number, paint.shape, margin_px), cells, number)
@@ -43,7 +43,10 @@ def found_crops(
 
 
 def boxed_crops(
-    found: Survey, paint: Bool[np.ndarray, "height width"], boxes: Sequence[Box], margin_px: int
+    found: SheetLayout,
+    paint: Bool[np.ndarray, "height width"],
+    boxes: Sequence[Box],
+    margin_px: int,
 ) -> list[Crop]:
     """Return one crop per box: all paint in it is one figure's.
 
@@ -69,7 +72,10 @@ def boxed_crops(
 
 
 def grid_crops(
-    found: Survey, paint: Bool[np.ndarray, "height width"], grid: tuple[int, int], margin_px: int
+    found: SheetLayout,
+    paint: Bool[np.ndarray, "height width"],
+    grid: tuple[int, int],
+    margin_px: int,
 ) -> list[Crop]:
     """Return one crop per cell (columns, rows) of a grid that is not empty.
 
@@ -94,7 +100,7 @@ def grid_crops(
 
 
 def _crop(
-    found: Survey,
+    found: SheetLayout,
     paint: Bool[np.ndarray, "height width"],
     box: Box,
     cells: Int[np.ndarray, "rows columns"] | None = None,
@@ -144,7 +150,7 @@ def _own_pixels(
     return np.asarray(in_pixels(own, cell_px, local), dtype=bool)
 
 
-def _box(found: Survey, number: int, shape: tuple[int, ...], margin: int) -> Box:
+def _box(found: SheetLayout, number: int, shape: tuple[int, ...], margin: int) -> Box:
     """Return the box of a figure with its margin, in pixels of the sheet."""
     boxes = found.blobs.boxes[found.grouping.figure_of_blob == number] * found.cell_px
     left, top = np.maximum(boxes[:, :2].min(axis=0) - margin, 0)

@@ -1,7 +1,7 @@
 """A look at the whole sheet: what is paint, what is paper, which figures stand where.
 
-Very large sheets are surveyed on cells of a few pixels; cutting out (`toonset.dataset.split.sheet`)
-uses every pixel again.
+Very large sheets are segmented on cells of a few pixels; cutting out
+(`toonset.dataset.split.sheet`) uses every pixel again.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from toonset.dataset.split.touching.cut import Cut, part_touching
 from toonset.dataset.split.touching.parts import part_shared
 from toonset.view import Box
 
-LARGEST_SIDE = 4096  # pixels: a larger sheet is surveyed on cells
+LARGEST_SIDE = 4096  # pixels: a larger sheet is segmented on cells
 BAND = 2**22  # pixels that are compared with the background at a time
 PAINTED = 0.12  # of a cell: less is noise
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
+class SheetLayout:
     """What a look at the sheet found, in cells of `cell_px` pixels.
 
     Attributes:
@@ -74,11 +74,11 @@ def find_paint(
     return away > ground.tolerance, ground
 
 
-def survey(
+def find_layout(
     rgba: UInt8[np.ndarray, "height width 4"],
     paint: Bool[np.ndarray, "height width"],
     ground: Background,
-) -> Survey:
+) -> SheetLayout:
     """Return what stands where on a sheet."""
     cell = max(1, -(-max(paint.shape) // LARGEST_SIDE))
     painted = in_cells(paint, cell)
@@ -109,7 +109,7 @@ def survey(
     if shared:
         grouping = group_blobs(blobs, mains, small[..., :3], bodies)
     cuts += shared
-    return Survey(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
+    return SheetLayout(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
 
 
 def joined(
@@ -147,7 +147,7 @@ def in_pixels(cells: np.ndarray, cell_px: int, box: Box) -> np.ndarray:
     return cells[rows[:, None], columns]
 
 
-def figure_cells(found: Survey) -> Int[np.ndarray, "rows columns"]:
+def figure_cells(found: SheetLayout) -> Int[np.ndarray, "rows columns"]:
     """Return the number of the figure of every cell, plus 1; 0 = none."""
     number = np.append(0, found.grouping.figure_of_blob + 1).astype(np.int16)
     return number[found.blobs.labels]

@@ -19,7 +19,7 @@ from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
 from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.split.matting import cut_out, edge_softness_px
-from toonset.dataset.split.segment import Survey, find_paint, survey
+from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
 from toonset.dataset.split.warnings import border_doubts, figure_doubts
 from toonset.errors import SheetError
 from toonset.view import Box, View
@@ -113,7 +113,7 @@ def split_picture(
         rgba = flattened(rgba)
     ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
-    found = survey(rgba, paint, ground)
+    found = find_layout(rgba, paint, ground)
     _check(found, ground, options)
     crops = _crops(found, paint, options)
     views, holes = _views(rgba, ground, crops, options)
@@ -128,7 +128,7 @@ def split_picture(
     )
 
 
-def _check(found: Survey, ground: Background, options: SheetOptions) -> None:
+def _check(found: SheetLayout, ground: Background, options: SheetOptions) -> None:
     color = "transparent" if ground.rgb is None else "#{:02x}{:02x}{:02x}".format(*ground.rgb)
     blobs = found.blobs
     if not len(blobs.areas):
@@ -148,7 +148,7 @@ def _check(found: Survey, ground: Background, options: SheetOptions) -> None:
 
 
 def _crops(
-    found: Survey, paint: Bool[np.ndarray, "height width"], options: SheetOptions
+    found: SheetLayout, paint: Bool[np.ndarray, "height width"], options: SheetOptions
 ) -> list[Crop]:
     if options.boxes:
         return boxed_crops(found, paint, options.boxes, options.margin_px)
@@ -207,7 +207,7 @@ def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View
     return View(cut, box, contour_width_px(cut), name)
 
 
-def _left_out(found: Survey) -> tuple[LeftOut, ...]:
+def _left_out(found: SheetLayout) -> tuple[LeftOut, ...]:
     """Return what was seen but is no view, words as one each."""
     boxes = [(line.box, "frame") for line in found.lines]
     kinds = np.array(found.grouping.kinds, dtype=object)
@@ -221,7 +221,7 @@ def _left_out(found: Survey) -> tuple[LeftOut, ...]:
     )
 
 
-def _remarks(ground: Background, found: Survey, holes: int, cuts: int) -> tuple[str, ...]:
+def _remarks(ground: Background, found: SheetLayout, holes: int, cuts: int) -> tuple[str, ...]:
     said = [] if ground.kind in ("plain", "transparent") else [str(ground)]
     kinds = found.grouping.kinds
     said += [f"{NAMES[kind]} left out ({kinds.count(kind)})" for kind in NAMES if kind in kinds]

@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 from toonset.dataset.split.background import Background
 from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
-from toonset.dataset.split.segment import Survey
+from toonset.dataset.split.segment import SheetLayout
 from toonset.view import View
 
 SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
@@ -20,7 +20,7 @@ NEARER = 1.2  # times the gap between parts and their bodies: so near a part may
 WIDE = 1.8  # times the median width: two figures that touch
 
 
-def border_doubts(ground: Background, found: Survey) -> tuple[str, ...]:
+def border_doubts(ground: Background, found: SheetLayout) -> tuple[str, ...]:
     """Return a line if the background is hardly one."""
     if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:  # a frame explains it
         return ()
@@ -28,7 +28,7 @@ def border_doubts(ground: Background, found: Survey) -> tuple[str, ...]:
 
 
 def figure_doubts(
-    found: Survey, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
+    found: SheetLayout, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
 ) -> tuple[str, ...]:
     """Return a line for every cut in doubt, every wide view, all left out that may be views."""
     return (
@@ -39,7 +39,7 @@ def figure_doubts(
     )
 
 
-def _cuts(found: Survey) -> list[str]:
+def _cuts(found: SheetLayout) -> list[str]:
     said = []
     for cut in (cut for cut in found.cuts if cut.in_doubt):
         x, y, width, height = (value * found.cell_px for value in cut.box)
@@ -60,7 +60,7 @@ def _wide_views(views: list[View]) -> list[str]:
     return said
 
 
-def _near_parts(found: Survey, views: list[View]) -> list[str]:
+def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:
     """Return a line for every part apart that stands as near to another view as parts do."""
     parts, bodies = _parts_apart(found)
     own = [_gap(found.blobs, n, bodies[k]) for n, k in parts]
@@ -77,7 +77,7 @@ def _near_parts(found: Survey, views: list[View]) -> list[str]:
     return said
 
 
-def _parts_apart(found: Survey) -> tuple[list[tuple[int, int]], list[int]]:
+def _parts_apart(found: SheetLayout) -> tuple[list[tuple[int, int]], list[int]]:
     """Return patches that are parts, with the numbers of their views, and the views' bodies."""
     parts, bodies = list[tuple[int, int]](), list[int]()
     areas = found.blobs.areas
@@ -100,7 +100,7 @@ def _gap(blobs: Blobs, part: int, body: int) -> float:
     return float(max(left + columns[0] - x - width, x - left - columns[-1] - 1, 0) / tall)
 
 
-def _like_views(found: Survey, views: list[View], rgba: np.ndarray) -> list[str]:
+def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
     """Return a line for every drawing left out that is as high as a view, or like a small one."""
     usual = float(np.median([view.figure_box[3] for view in views]))
     shapes = [view.figure_box[2] / view.figure_box[3] for view in views]

@@ -52,7 +52,7 @@ SLAB = 1 << 19  # cells whose passes stay in cache
 UNKNOWN = 1 << 14  # more than any squared distance within reach, far from int16's end
 
 
-def faired(
+def fair_hull(
     hull: Hull, cameras: Sequence[Camera], alphas: Sequence[Tensor], slack: float = 0.0
 ) -> Hull:
     """Return the hull without the corners that no drawing asks for.

@@ -132,7 +132,9 @@ def parts_left(outlines: Outlines) -> float:
 def _beyond(one: Outline, other: Outline) -> float:
     """Return the share of an outline that lies more than PART outside of the other."""
     return (
-        float(np.mean(other.at(one.rim)[0] < -PART * one.square.size)) if _both(one, other) else 1
+        float(np.mean(other.at(one.points)[0] < -PART * one.square.size))
+        if _both(one, other)
+        else 1
     )
 
 
@@ -141,15 +143,15 @@ def _apart(one: Outline, other: Outline) -> float:
         return FARTHEST
     farthest = FARTHEST * one.square.size
     squares = [
-        np.square(np.minimum(np.abs(to.at(rim.rim)[0]), farthest)).mean()
-        for to, rim in ((one, other), (other, one))
+        np.square(np.minimum(np.abs(to.at(outline.points)[0]), farthest)).mean()
+        for to, outline in ((one, other), (other, one))
     ]
     return float(np.sqrt(np.mean(squares))) / one.square.size
 
 
 def _both(one: Outline, other: Outline) -> bool:
     """Return whether both have an outline: specks, and a picture that is all figure, have none."""
-    return len(one.rim) > 0 and len(other.rim) > 0
+    return len(one.points) > 0 and len(other.points) > 0
 
 
 def _by_others(cameras: Sequence[Camera], alphas: Sequence[Alpha]) -> list[Alpha]:

@@ -10,7 +10,7 @@ import torch
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import alpha_of, figure_px, widened
 from toonset.errors import BundleError
-from toonset.nerf.hull.fairing import faired
+from toonset.nerf.hull.fairing import fair_hull
 from toonset.nerf.hull.hull import Hull, carve
 from toonset.nerf.hull.tolerance import HullEvidence, choose_missing
 from toonset.nerf.options import TrainOptions
@@ -48,7 +48,7 @@ def hull_of(
     wide = [torch.as_tensor(widened(alpha.numpy())) for alpha in alphas]
     hull = carve(cameras, wide if len(frames) >= WIDE_FROM else alphas, voxels, evidence.missing)
     slack = SLACK * apart_px / (hull.voxel * max(camera.scale for camera in cameras))
-    hull = faired(hull, cameras, alphas, slack) if options.fair else hull
+    hull = fair_hull(hull, cameras, alphas, slack) if options.fairing else hull
     return as_stored(hull), evidence
 
 

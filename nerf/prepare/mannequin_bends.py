@@ -147,8 +147,8 @@ def _normal(
     reach: float,
 ) -> _Normal:
     size = drawn.square.size
-    jacobian = _BENDS.jacobian(drawn.square.unit(shape.rim))
-    distance, *slope = drawn.at(shape.rim + size * jacobian @ numbers)
+    jacobian = _BENDS.jacobian(drawn.square.unit(shape.points))
+    distance, *slope = drawn.at(shape.points + size * jacobian @ numbers)
     across = np.stack(slope, axis=-1)
     squares, points = float((distance**2).sum()), len(distance)
     if lines is not None and len(lines.unit):

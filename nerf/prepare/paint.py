@@ -1,6 +1,6 @@
 """Drawings that paint one body alike: what outlines cannot say of a drawing's bend, paint does.
 
-Outlines fix a bend along the rim only; a face or a buckle within still lies elsewhere in every
+Outlines fix a bend along the outline only; a face or a buckle within still lies elsewhere in every
 drawing. Neighbouring drawings show the same places X of the body, so the bends d are those under
 which they show the same colours there,
 
@@ -49,8 +49,8 @@ FEWEST = 50  # places that two drawings must share
 NOISE = 0.2  # of colours at one place
 WEIGHT = 60.0  # of a place beside the priors
 EXPECTED = 0.004  # of the figure's square: bends that outlines leave
-HOLD = 4.0  # of a pixel of the rim, per squared pixel that it moves across itself
-EVERY = 3  # of a rim's pixels is held
+HOLD = 4.0  # of a pixel of the outline, per squared pixel that it moves across itself
+EVERY = 3  # of an outline's pixels is held
 GAIN, GAIN_NOISE = 0.03, 0.3  # standard deviations: of a drawing's gain; of one place's colour
 SAME_PAINT, DARK = 0.12, 0.15  # logarithms apart; below, a channel says nothing of its gain
 Depths = Callable[[Camera], Float[np.ndarray, "height width"]]
@@ -169,7 +169,7 @@ class _Figure:
         return ((self.basis(pixels) @ numbers.reshape(2, -1).T) ** 2).sum(axis=-1)
 
     def held(self) -> Float[np.ndarray, "k k"]:
-        """Return the information that the rim stays where it is, across itself."""
+        """Return the information that the outline stays where it is, across itself."""
         distance = (depth_inside(self.mask) - depth_inside(~self.mask)).astype(np.float32)
         smooth = cv2.GaussianBlur(distance, (0, 0), 2)
         rows, columns = np.nonzero(self.mask & (depth_inside(self.mask) < 1))

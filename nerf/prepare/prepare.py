@@ -15,9 +15,9 @@ from toonset.nerf.hull.mannequin_fit import MannequinFit
 from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
-from toonset.nerf.prepare.registration import Registration, registered
+from toonset.nerf.prepare.registration import Registration, register_drawings
 from toonset.nerf.prepare.to_mannequin import Posed, posed
-from toonset.nerf.prepare.unwarp import Unbending, unbent
+from toonset.nerf.prepare.unwarp import Unbending, unwarp_drawings
 
 AGREE_PX = 0.1  # outlines this near agree (docs/decisions.md)
 
@@ -75,21 +75,21 @@ class Prepared:
         }
 
 
-def prepared(scene: Scene, options: TrainOptions) -> Prepared:
+def prepare(scene: Scene, options: TrainOptions) -> Prepared:
     """Return the scene as `options` want it prepared.
 
     Args:
         scene: posed drawings.
-        options: its `mannequin`, `register` and `unbend` switch the steps.
+        options: its `mannequin`, `register` and `unwarp` switch the steps.
 
     Raises:
         MeshError: the mannequin lies in none of the pictures.
     """
-    given = posed(scene, unbend=options.unbend) if options.mannequin else Posed.left_alone(scene)
+    given = posed(scene, unwarp=options.unwarp) if options.mannequin else Posed.left_alone(scene)
     straight, unbending = given.scene, given.unbending
     registration = None
     if given.shape is None:
-        straight, registration, unbending = aligned(scene, options.register, options.unbend)
+        straight, registration, unbending = aligned(scene, options.register, options.unwarp)
     return Prepared(straight, given.drawn, registration, unbending, None, given.fit, given.shape)
 
 
@@ -111,7 +111,7 @@ def with_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
 
 
 def aligned(
-    scene: Scene, register: bool = True, unbend: bool = True
+    scene: Scene, register: bool = True, unwarp: bool = True
 ) -> tuple[Scene, Registration | None, Unbending | None]:
     """Return the scene with drawings set right that disagree, and what was found of each kind.
 
@@ -121,18 +121,18 @@ def aligned(
     Args:
         scene: posed drawings.
         register: whether cameras may move; else there is no registration.
-        unbend: whether drawings may be bent; else there is no unbending.
+        unwarp: whether drawings may be bent; else there is no unbending.
 
     Raises:
         BundleError: the cameras do not belong together (see `box_of_masks`).
     """
-    placed, registration = registered(scene) if register else (scene, None)
-    if not unbend:
+    placed, registration = register_drawings(scene) if register else (scene, None)
+    if not unwarp:
         return placed, registration, None
-    straight, unbending = unbent(scene)
+    straight, unbending = unwarp_drawings(scene)
     if registration is None or not registration.applied:
         return straight, registration, unbending
-    rest, left = unbent(placed)
+    rest, left = unwarp_drawings(placed)
     if registration.gain_nats + max(0.0, left.gain_nats) >= unbending.gain_nats:
         return rest, registration, left
     return straight, replace(registration, applied=False), unbending

@@ -2,7 +2,7 @@
 
 Artists place and size the views of a sheet by eye. What is moved is each view's camera (its
 principal point and its scale), never a pixel: nothing is resampled, and the correction is exact.
-Drawings that agree within a rim's own error are left as they are, to the bit.
+Drawings that agree within an outline's own error are left as they are, to the bit.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Registration(Alignment):
         }
 
 
-def registered(scene: Scene) -> tuple[Scene, Registration]:
+def register_drawings(scene: Scene) -> tuple[Scene, Registration]:
     """Return the scene with each camera moved to where its drawing sits, and the evidence.
 
     Pictures without a figure, and scenes with fewer than FEWEST_VIEWS, are returned as they are.

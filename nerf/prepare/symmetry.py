@@ -49,7 +49,7 @@ class Symmetry:
         return {"alike": alike, "plane_x": self.plane_x, "mirrored": list(self.mirrored)}
 
 
-def completed(scene: Scene) -> tuple[Scene, Symmetry | None]:
+def add_mirrored_views(scene: Scene) -> tuple[Scene, Symmetry | None]:
     """Return the scene with mirror images of drawings where nothing was drawn, and the evidence.
 
     None: no drawing shows both sides, or no mirror image would be new.

@@ -57,12 +57,12 @@ class Posed:
         return cls(scene, scene, None, fit)
 
 
-def posed(scene: Scene, *, unbend: bool = True) -> Posed:
+def posed(scene: Scene, *, unwarp: bool = True) -> Posed:
     """Judge whether a scene's mannequin is the drawn body, and bend the drawings to it if so.
 
     Args:
         scene: posed drawings.
-        unbend: whether drawings may be bent.
+        unwarp: whether drawings may be bent.
 
     Raises:
         BundleError: the cameras do not belong together (see `box_of_masks`).
@@ -80,8 +80,8 @@ def posed(scene: Scene, *, unbend: bool = True) -> Posed:
     fit = replace(fit, left=parts_left(_beside(_in_pictures(bent, scene), shape)))
     if not fit.chosen:
         return Posed.left_alone(scene, fit)
-    if not unbend or not unbending.applied:
-        return Posed(scene, scene, shape, fit, unbending if unbend else None)
+    if not unwarp or not unbending.applied:
+        return Posed(scene, scene, shape, fit, unbending if unwarp else None)
     return Posed(bent, drawn, shape, fit, unbending)
 
 
@@ -132,9 +132,9 @@ def _outside(scene: Scene, shape: Shape) -> float:
         return 0.0
     outlines = _beside(frames, shape).views
     pairs = list(zip(outlines[: len(frames)], outlines[len(frames) :], strict=True))
-    if not all(len(drawn.rim) for drawn, _ in pairs):
+    if not all(len(drawn.points) for drawn, _ in pairs):
         return 0.0
-    off = [-float(np.median(own.at(drawn.rim)[0])) / own.camera.scale for drawn, own in pairs]
+    off = [-float(np.median(own.at(drawn.points)[0])) / own.camera.scale for drawn, own in pairs]
     found, sure = float(np.mean(off)), SURE * float(np.std(off, ddof=1)) / len(off) ** 0.5
     return found if max(sure, OUTSIDE * width) < found < MOST_OUTSIDE * width else 0.0
 

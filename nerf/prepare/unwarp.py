@@ -66,10 +66,10 @@ class Unbending(Alignment):
     warps: tuple[Warp, ...]
 
 
-def unbent(scene: Scene) -> tuple[Scene, Unbending]:
+def unwarp_drawings(scene: Scene) -> tuple[Scene, Unbending]:
     """Return the scene with its drawings unbent, and how.
 
-    Drawings that agree within a rim's own error are returned as they are, to the bit; so are
+    Drawings that agree within an outline's own error are returned as they are, to the bit; so are
     pictures without a figure, and scenes with fewer than FEWEST_VIEWS.
 
     Raises:

@@ -46,8 +46,8 @@ class Baked:
         trained: where it comes from.
         matter: slices of constant x, one voxel round each: what softplus makes a step's optical
             depth from, and the hull's support, here and in the next slice.
-        leaps: (x, y, z) steps, in any direction, from anywhere in this voxel over what certainly
-            holds no sample.
+        safe_steps: (x, y, z) steps, in any direction, from anywhere in this voxel over what
+            certainly holds no sample.
         color: RGB in the same places as `matter`; a fourth channel is read faster than none.
         shell: (3, n) places of voxels that may hold a sample beside voxels that may not.
         labels: a palette label for every colour; None without palette.
@@ -57,7 +57,7 @@ class Baked:
 
     trained: TrainedField
     matter: Slices
-    leaps: UInt8[Tensor, "x y z"]
+    safe_steps: UInt8[Tensor, "x y z"]
     color: Slices
     shell: Float[Tensor, "3 n"]
     labels: UInt8[Tensor, "red green blue"] | None
@@ -100,16 +100,16 @@ class Baked:
             *(matter, partial(_leaps, hull, trained.step), colors),
             *(partial(_shell, hull.near), labels),
         ]
-        slices, leaps, shades, shell, table = side_by_side(tasks)
-        return cls(trained, slices, leaps, shades, shell, table, paints)
+        slices, safe_steps, shades, shell, table = side_by_side(tasks)
+        return cls(trained, slices, safe_steps, shades, shell, table, paints)
 
     def leap(self, place: Float[Tensor, "3 n"]) -> Float[Tensor, " n"]:
-        """Return `leaps` at places; outside of the hull's box, of the nearest voxel."""
-        most = torch.tensor(self.leaps.shape)[:, None] - 1.0
+        """Return `safe_steps` at places; outside of the hull's box, of the nearest voxel."""
+        most = torch.tensor(self.safe_steps.shape)[:, None] - 1.0
         cell = torch.minimum((place - 0.5).clamp_min_(0), most).int()
-        strides = torch.tensor(self.leaps.stride(), dtype=torch.int32)[:, None]
+        strides = torch.tensor(self.safe_steps.stride(), dtype=torch.int32)[:, None]
         index = (cell * strides).sum(dim=0, dtype=torch.int32)
-        return self.leaps.view(-1).index_select(0, index).float()
+        return self.safe_steps.view(-1).index_select(0, index).float()
 
     def optical_depth(self, place: Float[Tensor, "3 steps n"]) -> Float[Tensor, "steps n"]:
         """Return a step's optical depth at places, which are clamped to the hull in place."""
@@ -131,7 +131,7 @@ class Baked:
 
     def _split(self, place: Float[Tensor, "3 steps n"]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return the slice before each place, how far it is towards the next, and y, z there."""
-        most = torch.tensor(self.leaps.shape)[:, None, None] + (1 - 1e-3)
+        most = torch.tensor(self.safe_steps.shape)[:, None, None] + (1 - 1e-3)
         x, y, z = torch.minimum(place, most, out=place.clamp_min_(0))
         number = x.floor()
         return number, x.sub_(number), y, z

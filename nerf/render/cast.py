@@ -2,9 +2,9 @@
 
 The samples are those of `toonset.nerf.hull.march`, so a view shows what was trained. But a picture
 needs only the front of what a ray meets: a ray begins where the hull may begin, goes on a few steps
-at a time, leaps over those that its voxel says are empty, and ends where it is opaque.
+at a time, steps over those that its voxel says are empty, and ends where it is opaque.
 
-Source: leaps by the distance to the nearest surface: Zuiderveld, Koning, Viergever, "Acceleration
+Source: steps by the distance to the nearest surface: Zuiderveld, Koning, Viergever, "Acceleration
 of ray-casting using 3-D distance transforms", 1992.
 """
 

@@ -35,7 +35,7 @@ INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True)
-class Looking:
+class MonitorOptions:
     """What to look at.
 
     Attributes:
@@ -54,15 +54,15 @@ class Looking:
 
 
 @dataclass
-class Onlooker:
-    """A `Watch` that does what a `Looking` asks for.
+class Monitor:
+    """A `Watch` that does what a `MonitorOptions` asks for.
 
     Attributes:
         looking: what to look at.
         held_out: what was seen of held-out views.
     """
 
-    looking: Looking
+    looking: MonitorOptions
     held_out: list[HeldOut] = field(default_factory=list)
 
     def begin(self, trained: TrainedField) -> None:

@@ -32,8 +32,8 @@ from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint import Depths
-from toonset.nerf.prepare.prepare import Prepared, prepared, with_paint
-from toonset.nerf.prepare.symmetry import completed, with_mirrored
+from toonset.nerf.prepare.prepare import Prepared, prepare, with_paint
+from toonset.nerf.prepare.symmetry import add_mirrored_views, with_mirrored
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
@@ -94,10 +94,10 @@ def fit_field(
     torch.default_generator.manual_seed(options.seed)
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")
-    ready = prepared(scene, options)
+    ready = prepare(scene, options)
     if options.steps is None:
         options = replace(options, steps=STEPS_ON_SHAPE if ready.shape else USUAL_STEPS)
-    whole, symmetry = completed(ready.scene) if options.symmetric else (ready.scene, None)
+    whole, symmetry = add_mirrored_views(ready.scene) if options.symmetry else (ready.scene, None)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
     hull, evidence = _hull(whole, options, ready)

@@ -112,7 +112,7 @@ def field_record(trained: TrainedField, blob: Blob) -> dict[str, Any]:
             "voxel": trained.hull.voxel,
             "box": hull.box.tolist(),
             "support": blob.add(hull.support),
-            "leaps": blob.add(hull.leaps),
+            "safe_steps": blob.add(hull.safe_steps),
             "block": BLOCK,
         },
         "step": trained.step,

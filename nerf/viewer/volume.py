@@ -1,7 +1,7 @@
 """What a page's rays read of a field's hull: where samples may be, and how far is clear.
 
 support  (z, y, x)  the hull's support, 0 to 255
-leaps    (z, y, x)  per block of BLOCK voxels: 0 = the field is read there; n = steps, in any
+safe_steps (z, y, x)  per block of BLOCK voxels: 0 = the field is read there; n = steps, in any
                     direction, over what certainly holds no sample
 """
 
@@ -32,13 +32,13 @@ class PackedHull:
     Attributes:
         low: (3,) world place of the first voxel's centre.
         box: (2, 3) in voxels from there: where rays begin and end.
-        support, leaps: see the module.
+        support, safe_steps: see the module.
     """
 
     low: Float[np.ndarray, " 3"]
     box: Float[np.ndarray, "2 3"]
     support: Volume
-    leaps: Volume
+    safe_steps: Volume
 
 
 def packed_hull(trained: TrainedField) -> PackedHull:

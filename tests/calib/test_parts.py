@@ -1,4 +1,4 @@
-"""Building blocks of calibration: derivatives, outlines, rims, probabilities."""
+"""Building blocks of calibration: derivatives, outlines, contours, probabilities."""
 
 import math
 from dataclasses import replace
@@ -11,7 +11,11 @@ import trimesh
 from toonset.calib.evidence.face import FaceEvidence
 from toonset.calib.fit.align import ElevationPrior, Fit, align, tilt, upright_prior
 from toonset.calib.outline.correspondences import Drawing
-from toonset.calib.outline.occluding_contour import find_rim, prepare_surface, silhouette_mask
+from toonset.calib.outline.occluding_contour import (
+    find_occluding_contour,
+    prepare_surface,
+    silhouette_mask,
+)
 from toonset.calib.outline.pose import Pose, project, project_with_jacobian
 from toonset.calib.search.hypotheses import Candidates
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
@@ -145,12 +149,12 @@ def test_silhouette_mask_covers_exactly_the_pixel_centres_inside():
 def test_rim_of_a_sphere_is_where_the_view_ray_grazes_it(k):
     surface = prepare_surface(as_mesh(trimesh.creation.icosphere(subdivisions=4)))
     pose = pose_at(k=k)
-    rim = find_rim(surface, project(pose, surface.vertices), (320, 320), 2.0)
-    depth = (rim.points @ pose.rotation.T)[:, 2]
+    occluding = find_occluding_contour(surface, project(pose, surface.vertices), (320, 320), 2.0)
+    depth = (occluding.points @ pose.rotation.T)[:, 2]
     np.testing.assert_allclose(depth, -k, atol=0.09)  # the grazing circle: z = -r^2 k
-    outward = project(pose, rim.points) - pose.shift
+    outward = project(pose, occluding.points) - pose.shift
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    assert (outward * rim.normals).sum(axis=1).min() > 0.97
+    assert (outward * occluding.normals).sum(axis=1).min() > 0.97
     angle = np.sort(np.arctan2(outward[:, 1], outward[:, 0]))
     assert np.diff(angle).max() < 0.2  # all the way round
 
@@ -161,10 +165,10 @@ def test_rim_of_an_open_sheet_is_its_border():
     )
     surface = prepare_surface(as_mesh(square))
     pose = pose_at(0.4, 0.2, 0.0)
-    rim = find_rim(surface, project(pose, surface.vertices), (320, 320), 2.0)
-    on_border = np.abs(np.abs(rim.points[:, :2]).max(axis=1) - 1) < 1e-9
+    occluding = find_occluding_contour(surface, project(pose, surface.vertices), (320, 320), 2.0)
+    on_border = np.abs(np.abs(occluding.points[:, :2]).max(axis=1) - 1) < 1e-9
     assert on_border.all()
-    assert len(rim.points) > 100
+    assert len(occluding.points) > 100
 
 
 def test_templates_find_the_direction_of_an_asymmetric_body():

@@ -13,7 +13,7 @@ from bench.cases.bodies import random_body
 from bench.stability.bodies import with_arms_raised, with_head_grown
 from toonset.calib import pipeline
 from toonset.calib.find_cameras import find_cameras
-from toonset.calib.fit.model_selection import BIC_MARGIN, GLANCE_MARGIN, PROPORTIONS, Rung
+from toonset.calib.fit.model_selection import BIC_MARGIN, PROPORTIONS, QUICK_TEST_MARGIN, ModelTest
 from toonset.calib.pipeline import SAME_BODY_COVERAGE
 from toonset.calib.result import Calibration
 from toonset.camera import rotation_distance
@@ -27,9 +27,11 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 OPTIONS = SynthOptions(views=5, cell_px=200, outline_px=0, elevation_deg=8, yaw_jitter_deg=8)
 
 
-def bending(found: Calibration) -> Rung:
-    (rung,) = (rung for rung in found.model.rungs if rung.name == PROPORTIONS)
-    return rung
+def bending(found: Calibration) -> ModelTest:
+    (model_test,) = (
+        model_test for model_test in found.model.tried if model_test.name == PROPORTIONS
+    )
+    return model_test
 
 
 def errors(found: Calibration, made: Turnaround) -> np.ndarray:
@@ -44,7 +46,7 @@ def test_arms_that_hardly_show_in_the_outlines_are_raised(monkeypatch: pytest.Mo
     assert bending(found).is_proven
     assert found.model.bends_mannequin
     assert errors(found, made).max() < 5.5
-    monkeypatch.setattr(pipeline, "GLANCE_MARGIN", np.inf)
+    monkeypatch.setattr(pipeline, "QUICK_TEST_MARGIN", np.inf)
     rigid = find_cameras(made.views, body)
     assert not rigid.model.bends_mannequin
     assert np.median([view.coverage for view in rigid.views]) > SAME_BODY_COVERAGE
@@ -85,7 +87,7 @@ def test_drawing_error_bends_no_mannequin(views: int, seed: int) -> None:
     drawn = replace(OPTIONS, views=views, outline_px=2, warp_percent=1.5)
     made = make_turnaround(random_body(seed), drawn, seed)
     found = find_cameras(made.views, made.mesh)
-    assert bending(found).margin == GLANCE_MARGIN
+    assert bending(found).margin == QUICK_TEST_MARGIN
     assert not bending(found).is_proven
     assert bending(found).bic_gain > BIC_MARGIN  # strong evidence by itself
     assert np.ptp(found.mannequin, axis=0) == pytest.approx(np.ptp(made.mesh.vertices, axis=0))
@@ -95,7 +97,7 @@ def test_two_drawings_whose_outlines_meet_prove_no_other_body() -> None:
     body = random_body(3004)
     made = make_turnaround(with_arms_raised(body, math.radians(8)), replace(OPTIONS, views=2), 3004)
     found = find_cameras(made.views, body)
-    assert PROPORTIONS not in {rung.name for rung in found.model.rungs}
+    assert PROPORTIONS not in {model_test.name for model_test in found.model.tried}
 
 
 def test_the_example_is_ok_though_its_mannequin_lacks_hair_scarf_and_bag() -> None:

@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from toonset.cli.common.train_watch import LOG_S, Pace, Stopper
+from toonset.cli.main import RENAMED
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
 RUN_FILES = {
@@ -159,14 +160,19 @@ def test_a_log_gets_a_line_now_and_then_and_a_terminal_a_live_one():
     assert lines(True, 6, 300) in range(50, 62)
 
 
+def test_a_switch_of_before_names_the_one_of_now(toonset) -> None:
+    for before, now in RENAMED.items():
+        assert f"No such option: {before}; did you mean {now}?" in toonset("train", before).reason
+
+
 def test_every_switch_switches_its_option(toonset, monkeypatch) -> None:
     asked: list[dict[str, object]] = []
     monkeypatch.setattr("toonset.cli.train.run", lambda request, _: asked.append(request.options))
     switches = {
-        ("--as-carved",): {"fair": False},
-        ("--as-placed",): {"register": False},
-        ("--as-bent",): {"unbend": False},
-        ("--one-sided",): {"symmetric": False},
+        ("--no-fairing",): {"fairing": False},
+        ("--no-register",): {"register": False},
+        ("--no-unwarp",): {"unwarp": False},
+        ("--no-symmetry",): {"symmetry": False},
     }
     for words in ((), *switches):
         assert toonset("train", *words).code == 0

@@ -41,7 +41,7 @@ export function cameraUniforms(camera, name = "camera") {
 
 const MARCH = `${CAMERA}
 uniform Camera camera;
-uniform sampler3D field, support, leaps;
+uniform sampler3D field, support, safe_steps;
 uniform vec3 low, box_low, box_high;
 uniform float voxel, step_length, block;
 uniform float finer; // pixels of the target per pixel of the camera's picture
@@ -63,7 +63,7 @@ void main() {
   float begin = near + 0.5 * step_depth, count = (far - near) / step_depth;
   vec3 place = start + slope * begin + 0.5, ahead = slope * step_depth;
   vec3 texel = 1.0 / vec3(textureSize(field, 0));
-  ivec3 most = textureSize(leaps, 0) - 1;
+  ivec3 most = textureSize(safe_steps, 0) - 1;
   vec4 seen = vec4(0.0);
   float left = 1.0, number = 0.0;
   if (tile > 0.0) {
@@ -77,7 +77,7 @@ void main() {
   for (int guard = 0; guard < 4096 && number < count && left > 0.001; guard++) {
     vec3 at = place + ahead * number;
     ivec3 cell = clamp(ivec3(floor(at / block)), ivec3(0), most);
-    float leap = floor(texelFetch(leaps, cell, 0).r * 255.0 / 3.0 + 0.01);
+    float leap = floor(texelFetch(safe_steps, cell, 0).r * 255.0 / 3.0 + 0.01);
     if (leap > 0.0) { number += 3.0 * leap; continue; }
     float weight = 0.0, moment = 0.0; // of three steps, which share a colour
     for (int i = 0; i < 3; i++, number += 1.0) {
@@ -140,7 +140,7 @@ export class Field {
     this.size = volume(hull.support);
     const three = gl.TEXTURE_3D;
     this.support = makeTexture(gl, three, gl.R8, this.size, arrayOf(blob, hull.support), true);
-    this.leaps = makeTexture(gl, three, gl.R8, volume(hull.leaps), arrayOf(blob, hull.leaps), false);
+    this.safe_steps = makeTexture(gl, three, gl.R8, volume(hull.safe_steps), arrayOf(blob, hull.safe_steps), false);
     this.volume = makeTexture(gl, three, gl.RGBA8, this.size, null, true);
     this.table = record.table
       ? makeTexture(gl, three, gl.R8, volume(record.table), arrayOf(blob, record.table), false)
@@ -217,7 +217,7 @@ export class Field {
     gl.viewport(0, 0, size[0], size[1]);
     gl.disable(gl.SCISSOR_TEST);
     const { low, voxel } = record.hull;
-    this.reader.use({ planes: this.planes, leaps: this.leaps, low, voxel });
+    this.reader.use({ planes: this.planes, safe_steps: this.safe_steps, low, voxel });
     for (let slice = 0; slice < size[2]; slice++) {
       gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, this.volume.texture, 0, slice);
       this.reader.use({ slice }).fill();
@@ -239,7 +239,7 @@ export class Field {
         ...cameraUniforms(camera),
         field: this.volume,
         support: this.support,
-        leaps: this.leaps,
+        safe_steps: this.safe_steps,
         low: hull.low,
         box_low: hull.box[0],
         box_high: hull.box[1],
@@ -288,7 +288,7 @@ function readingShader(record, layers, size) {
   );
   return `
 uniform highp sampler2DArray planes;
-uniform sampler3D leaps;
+uniform sampler3D safe_steps;
 uniform vec3 low;
 uniform float voxel;
 uniform int slice;
@@ -297,7 +297,7 @@ layout(location = 0) out vec4 result;
 void main() {
   ivec3 here = ivec3(gl_FragCoord.xy, slice);
   result = vec4(0.0);
-  if (texelFetch(leaps, here / ${record.hull.block}, 0).r > 0.0) return;
+  if (texelFetch(safe_steps, here / ${record.hull.block}, 0).r > 0.0) return;
   vec3 at = clamp((low + voxel * vec3(here) - ${vec(low)}) / ${cell.toExponential(7)}, vec3(0.0), ${vec(shape)} - 1.0);
   ${uv.join("\n  ")}
   ${lines.join("\n  ")}

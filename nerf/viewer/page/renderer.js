@@ -107,7 +107,7 @@ export async function createRenderer(canvas, scene, blob) {
       ray_depths: targets.rays.textures[1],
       fine: targets.fine.textures[0],
       fine_depths: targets.fine.textures[1],
-      table: field.table ?? field.leaps,
+      table: field.table ?? field.safe_steps,
       labelled: Boolean(field.table),
       still,
     };

@@ -21,7 +21,7 @@ from toonset.nerf.score.metrics_view import Judges
 from toonset.nerf.train import box_rays
 
 # a grid in the whole box, of few rays a step: small scenes train in seconds
-QUICK = TrainOptions(device="cpu", carve=False, field="triplane", register=False, unbend=False)
+QUICK = TrainOptions(device="cpu", carve=False, field="triplane", register=False, unwarp=False)
 
 
 def ball(yaw: float, side: int, name: str) -> Frame:

@@ -132,7 +132,7 @@ def test_series_is_a_von_mises_kernel_without_asymmetry(monkeypatch: pytest.Monk
     np.testing.assert_allclose(kernel - kernel[0, 0], expected - expected[0, 0], atol=1e-12)
 
 
-def test_across_runs_from_rim_to_rim() -> None:
+def test_across_runs_from_edge_to_edge() -> None:
     view = _cylinder(0.0, 1)
     sections = read_sections(view, 1.0, 0.0, figure_height([view]))
     row = len(sections.widths) // 2

@@ -31,7 +31,10 @@ def made() -> Turnaround:
 
 
 def proven(found: Calibration) -> set[str]:
-    return {rung.name for rung in found.model.rungs if rung.is_proven} & {STRETCHED, TALLER}
+    return {model_test.name for model_test in found.model.tried if model_test.is_proven} & {
+        STRETCHED,
+        TALLER,
+    }
 
 
 def test_each_drawing_is_seen_through_pixels_of_its_own(made: Turnaround) -> None:
@@ -57,7 +60,7 @@ def test_drawing_error_is_no_stretch(seed: int, looks: str) -> None:
     drawn = replace(OPTIONS, outline_px=2, warp_percent=1.2)
     made = make_turnaround(random_body(seed), drawn, seed)
     found = find_cameras(made.views, made.mesh)
-    gains = {rung.name: rung.bic_gain for rung in found.model.rungs}
+    gains = {model_test.name: model_test.bic_gain for model_test in found.model.tried}
     assert gains[looks] > BIC_MARGIN  # strong evidence by itself
     assert not proven(found)
     assert {view.camera.pixel_aspect for view in found.views} == {1.0}

@@ -11,7 +11,11 @@ from scipy.spatial import KDTree
 from toonset.calib.fit.align import align, align_all, measure
 from toonset.calib.outline.correspondences import Drawing, Table, match, nearest
 from toonset.calib.outline.mesh_edges import Surface, prepare_surface
-from toonset.calib.outline.occluding_contour import find_rim, rim_at, silhouette_mask
+from toonset.calib.outline.occluding_contour import (
+    find_occluding_contour,
+    occluding_contour_at,
+    silhouette_mask,
+)
 from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
@@ -76,8 +80,8 @@ def test_more_than_two_faces_at_an_edge_are_all_counted(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_rim_from_planes_equals_rim_from_pixels(seed, k):
     surface, pose = prepare_surface(ball()), pose_at(seed, k)
-    fast = rim_at(surface, pose, SIZE, 1.0)
-    plain = find_rim(surface, project(pose, surface.vertices), SIZE, 1.0)
+    fast = occluding_contour_at(surface, pose, SIZE, 1.0)
+    plain = find_occluding_contour(surface, project(pose, surface.vertices), SIZE, 1.0)
     np.testing.assert_allclose(fast.points, plain.points)
     np.testing.assert_allclose(fast.normals, plain.normals)
     np.testing.assert_allclose(np.linalg.norm(fast.normals, axis=1), 1)
@@ -87,8 +91,8 @@ def test_rim_from_planes_equals_rim_from_pixels(seed, k):
 def test_a_mesh_turned_inside_out_has_the_same_rim():
     mesh, pose = ball(), pose_at(1)
     inside_out = Mesh(mesh.vertices, mesh.faces[:, ::-1])
-    fast = rim_at(prepare_surface(mesh), pose, SIZE, 1.0)
-    other = rim_at(prepare_surface(inside_out), pose, SIZE, 1.0)
+    fast = occluding_contour_at(prepare_surface(mesh), pose, SIZE, 1.0)
+    other = occluding_contour_at(prepare_surface(inside_out), pose, SIZE, 1.0)
     np.testing.assert_allclose(fast.points, other.points)
     np.testing.assert_allclose(fast.normals, other.normals)
 
@@ -169,7 +173,7 @@ def test_a_figure_outside_of_the_picture_is_far_from_everything():
 
 def test_other_vertices_on_the_same_edges_have_planes_of_their_own():
     surface, pose = prepare_surface(ball()), pose_at(2)
-    assert len(rim_at(surface, pose, SIZE, 1.0).points)  # the planes are there
+    assert len(occluding_contour_at(surface, pose, SIZE, 1.0).points)  # the planes are there
     flat = replace(surface, vertices=surface.vertices * [1.0, 1.0, 0.1])
-    plain = find_rim(flat, project(pose, flat.vertices), SIZE, 1.0)
-    np.testing.assert_allclose(rim_at(flat, pose, SIZE, 1.0).points, plain.points)
+    plain = find_occluding_contour(flat, project(pose, flat.vertices), SIZE, 1.0)
+    np.testing.assert_allclose(occluding_contour_at(flat, pose, SIZE, 1.0).points, plain.points)

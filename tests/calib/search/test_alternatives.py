@@ -1,4 +1,4 @@
-"""Drawings that are strongly off: their errors make no rival camera and no other body."""
+"""Drawings that are strongly off: their errors make no alternative camera and no other body."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import Calibration
-from toonset.calib.search.alternatives import WORTH, steadied
+from toonset.calib.search.alternatives import WORTH, refine_alternatives
 from toonset.calib.search.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates
 from toonset.camera import rotation_distance
 
@@ -35,10 +35,12 @@ def test_a_rival_that_only_drawing_error_makes_is_none() -> None:
 
 def test_unsteady_drawings_do_not_bend_the_mannequin_on_little_evidence() -> None:
     found = calibrated(draw_sheet(1003, warp_percent=2.0))
-    rung = next(rung for rung in found.model.rungs if rung.name == PROPORTIONS)
+    model_test = next(
+        model_test for model_test in found.model.tried if model_test.name == PROPORTIONS
+    )
     assert found.noise.smooth > UNSTEADY
-    assert (rung.margin, rung.is_proven) == (UNSTEADY_MARGIN, False)
-    assert rung.bic_gain > 100
+    assert (model_test.margin, model_test.is_proven) == (UNSTEADY_MARGIN, False)
+    assert model_test.bic_gain > 100
 
 
 @pytest.mark.parametrize("percent", [0.0, 2.0])
@@ -48,11 +50,11 @@ def test_the_chosen_camera_and_its_twin_stay_among_the_candidates(
     seen: list[tuple[Candidates, Candidates, Pose]] = []
 
     def watched(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -> Candidates:
-        steady = steadied(drawing, joint, index, found)
+        steady = refine_alternatives(drawing, joint, index, found)
         seen.append((found, steady, joint.poses[index]))
         return steady
 
-    monkeypatch.setattr(pipeline, "steadied", watched)
+    monkeypatch.setattr(pipeline, "refine_alternatives", watched)
     calibrated(draw_sheet(1012, warp_percent=percent))
     assert len(seen) == 5
     for found, steady, pose in seen:

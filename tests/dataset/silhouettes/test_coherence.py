@@ -96,7 +96,7 @@ def test_residuals_equal_a_dense_search_with_the_cameras_own_projection(sheet):
 
 
 def signed_distance(view: View, pixels: np.ndarray) -> np.ndarray:
-    """Return the distance from the rim by trying every pixel, positive inside."""
+    """Return the distance from the outline by trying every pixel, positive inside."""
     rows, columns = np.nonzero(view.mask)
     inside = np.stack([columns, rows], axis=1) + 0.5
     rows, columns = np.nonzero(~view.mask)

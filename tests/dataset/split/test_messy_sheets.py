@@ -9,7 +9,7 @@ import pytest
 from bench.cases.bodies import random_body
 from bench.messy.options import DIFFICULTIES
 from bench.messy.sheet import make_messy_sheet
-from toonset.dataset.split import segment as survey
+from toonset.dataset.split import segment
 from toonset.dataset.split.background import find_background
 from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
 from toonset.dataset.synthetic.options import SynthOptions
@@ -172,13 +172,13 @@ def test_white_clothes_are_no_holes_and_gaps_behind_arms_are() -> None:
     assert view.rgba[215 - y, 100 - x, 3] == 255
 
 
-def test_surveying_in_cells_finds_the_same_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_segmentation_in_cells_finds_the_same_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     picture = paper(1240, 400)
     for x in (100, 300, 500):
         person(picture, x)
     picture = cv2.resize(picture[:200, :620], (1240, 400), interpolation=cv2.INTER_NEAREST)
     whole = split_picture(opaque(picture))
-    monkeypatch.setattr(survey, "LARGEST_SIDE", 400)  # cells of 4 px
+    monkeypatch.setattr(segment, "LARGEST_SIDE", 400)  # cells of 4 px
     in_cells = split_picture(opaque(picture))
     assert figure_boxes(in_cells) == figure_boxes(whole)
     for a, b in zip(whole.views, in_cells.views, strict=True):

@@ -10,7 +10,7 @@ from scipy import ndimage
 from torch import Tensor
 
 from toonset.camera import Camera
-from toonset.nerf.hull.fairing import UNKNOWN, faired, sheets, signed_distance, squared_distance
+from toonset.nerf.hull.fairing import UNKNOWN, fair_hull, sheets, signed_distance, squared_distance
 from toonset.nerf.hull.fairing_fit import Contacts, Pyramid
 from toonset.nerf.hull.hull import Hull, carve
 from toonset.nerf.hull.tolerance import mask_iou
@@ -96,7 +96,7 @@ def test_fairing_removes_corners_but_no_outline() -> None:
     alpha = np.clip(0.5 + 20 * np.minimum(1 - np.abs(u), 1.2 - np.abs(v)), 0, 1)  # upright cylinder
     alphas = [torch.as_tensor(alpha, dtype=torch.float32)] * 8
     hull = carve(cameras, alphas, 96, 0)
-    smooth = faired(hull, cameras, alphas)
+    smooth = fair_hull(hull, cameras, alphas)
     between = Camera.looking_at(np.zeros(3), np.pi / 8, 0.0, 20.0, (64, 64))
     assert mask_iou(smooth, cameras[1], alphas[1]) > 0.98
     assert mask_iou(smooth, between, alphas[0]) > mask_iou(hull, between, alphas[0]) + 0.02
@@ -125,6 +125,6 @@ def test_fairing_leaves_no_hole_in_a_cape() -> None:
         return camera, alpha
 
     cameras, alphas = zip(*(seen(yaw) for yaw in np.arange(8) * np.pi / 4), strict=True)
-    smooth = faired(carve(cameras, alphas, 128, 0), cameras, alphas)
+    smooth = fair_hull(carve(cameras, alphas, 128, 0), cameras, alphas)
     for between in (3, 5):  # beside the body, through what was the cape
         assert mask_iou(smooth, *seen(between * np.pi / 8)) > 0.95

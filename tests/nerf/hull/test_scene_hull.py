@@ -31,15 +31,15 @@ def ball(views: int) -> Scene:
 
 def test_the_fair_surface_is_rounder_than_the_hull_as_carved() -> None:
     def volume(*, fair: bool) -> float:
-        hull, _ = hull_of(ball(4), TrainOptions(fair=fair))
+        hull, _ = hull_of(ball(4), TrainOptions(fairing=fair))
         assert torch.equal(hull.support, (hull.support * 255).round() / 255)
         assert len(hull.support.unique()) <= LEVELS + 1
         return float(hull.inside.sum()) * hull.voxel**3
 
     true = 4 / 3 * math.pi * RADIUS**3
     carved = 16 / 3 * RADIUS**3  # two cylinders that cross
-    assert abs(volume(fair=False) / carved - 1) < 0.05
-    assert abs(volume(fair=True) / true - 1) < 0.12
+    assert abs(volume(fairing=False) / carved - 1) < 0.05
+    assert abs(volume(fairing=True) / true - 1) < 0.12
 
 
 @pytest.mark.parametrize(("views", "kept"), [(8, True), (4, False)])

@@ -16,7 +16,7 @@ from toonset.nerf.hull.hull import carve
 from toonset.nerf.hull.march import surface_depth
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, with_paint_agreed
-from toonset.nerf.prepare.prepare import Prepared, prepared, with_paint
+from toonset.nerf.prepare.prepare import Prepared, prepare, with_paint
 from toonset.nerf.prepare.unwarp import Warp
 
 WRONG = 0  # the drawing that is wrong: from the front
@@ -36,7 +36,7 @@ def nearly_none() -> Warp:
 
 
 def swollen(pixels: float) -> np.ndarray:
-    """Return a displacement that is `pixels` to the right in the middle, none along the rim."""
+    """Return a displacement that is `pixels` to the right in the middle, none along the outline."""
     y, x = (np.mgrid[:SIDE, :SIDE] - SIDE / 2) / (SIDE / 2)
     size = np.exp(-((x / 0.35) ** 2) - (y / 0.5) ** 2)
     return np.dstack([-pixels * size, 0 * size])
@@ -85,7 +85,7 @@ def test_paint_that_was_mixed_anew_becomes_one_paint() -> None:
 
 def test_exact_drawings_are_untouched_to_the_bit() -> None:
     scene = scene_of(ring())
-    ready = prepared(scene, TrainOptions())
+    ready = prepare(scene, TrainOptions())
     after = with_paint(ready, *body_of(scene))
     assert after.paint is None
     for one, other in zip(after.scene.frames, scene.frames, strict=True):

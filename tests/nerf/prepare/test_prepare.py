@@ -43,11 +43,11 @@ def test_cameras_follow_where_places_explain_enough(balls) -> None:
 
 def test_switches_are_heard(balls) -> None:
     drawn, _ = balls.bent_sheet()
-    scene, registration, unbending = aligned(drawn, register=False, unbend=False)
+    scene, registration, unbending = aligned(drawn, register=False, unwarp=False)
     assert scene is drawn
     assert registration is None
     assert unbending is None
-    scene, registration, unbending = aligned(drawn, unbend=False)
+    scene, registration, unbending = aligned(drawn, unwarp=False)
     assert registration is not None
     assert registration.applied
     assert unbending is None
@@ -58,7 +58,7 @@ def test_planes_are_smoother_where_drawings_were_bent_back(balls) -> None:
     drawn, _ = balls.bent_sheet()
     variation = []
     for trusted in (False, True):
-        options = TrainOptions(steps=30, register=not trusted, unbend=not trusted)
+        options = TrainOptions(steps=30, register=not trusted, unwarp=not trusted)
         field = fit_field(drawn, options).result.field
         assert isinstance(field, TriplaneField)
         planes = field.planes.detach()

@@ -7,12 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from toonset.nerf.prepare.registration import registered
+from toonset.nerf.prepare.registration import register_drawings
 
 
 @pytest.mark.parametrize("views", [3, 5, 8])
 def test_a_perfect_sheet_keeps_its_cameras(balls, views: int) -> None:
-    result, found = registered(balls.sheet(views))
+    result, found = register_drawings(balls.sheet(views))
     assert result is balls.sheet(views)
     assert not found.applied
     assert found.gain_nats <= 0
@@ -21,7 +21,7 @@ def test_a_perfect_sheet_keeps_its_cameras(balls, views: int) -> None:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_shifts_and_sizes_are_found(balls, seed: int) -> None:
     scene, shifts, sizes = balls.misplaced(seed)
-    result, found = registered(scene)
+    result, found = register_drawings(scene)
     assert found.applied
     scales = np.array([view.scale for view in found.views])
     np.testing.assert_allclose(scales / scales.mean(), sizes / sizes.mean(), atol=0.016)
@@ -43,7 +43,7 @@ def test_shifts_and_sizes_are_found(balls, seed: int) -> None:
 def test_the_body_stays_where_it_stands(balls) -> None:
     """What all drawings share is no error: taken for one, it would push the body off its place."""
     scene, _ = balls.bent_sheet()
-    result, _ = registered(scene)
+    result, _ = register_drawings(scene)
     moves = []
     for before, after in zip(scene.frames, result.frames, strict=True):
         pixels = before.camera.pixel_grid()[before.rgba[..., 3] > 127]
@@ -59,7 +59,7 @@ def test_the_body_stays_where_it_stands(balls) -> None:
 
 def test_pictures_are_not_touched(balls) -> None:
     scene, _, _ = balls.misplaced(0)
-    result, _ = registered(scene)
+    result, _ = register_drawings(scene)
     for before, after in zip(scene.frames, result.frames, strict=True):
         assert after.rgba is before.rgba
         np.testing.assert_array_equal(after.camera.rotation, before.camera.rotation)
@@ -67,15 +67,15 @@ def test_pictures_are_not_touched(balls) -> None:
 
 def test_registering_twice_changes_little(balls) -> None:
     scene, _, _ = balls.misplaced(1)
-    once, _ = registered(scene)
-    _, again = registered(once)
+    once, _ = register_drawings(scene)
+    _, again = register_drawings(once)
     assert again.apart_px[0] < 0.6
     shifts = np.array([view.shift_px for view in again.views])
     assert np.abs(shifts).max() < 1.0
 
 
 def test_the_report_has_plain_numbers(balls) -> None:
-    _, found = registered(balls.misplaced(0)[0])
+    _, found = register_drawings(balls.misplaced(0)[0])
     again = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert again["applied"] is True
     assert len(again["views"]) == 8
@@ -84,6 +84,6 @@ def test_the_report_has_plain_numbers(balls) -> None:
 
 def test_two_drawings_keep_their_cameras(balls) -> None:
     scene = balls.sheet(2)
-    result, found = registered(scene)
+    result, found = register_drawings(scene)
     assert result is scene
     assert len(found.views) == 2

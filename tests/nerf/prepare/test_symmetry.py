@@ -13,7 +13,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.symmetry import ALIKE, completed, likeness, mirrored
+from toonset.nerf.prepare.symmetry import ALIKE, add_mirrored_views, likeness, mirrored
 from toonset.nerf.train.train import fit_field
 
 FLAT = SynthOptions(cell_px=80, outline_px=0, elevation_deg=8)
@@ -57,7 +57,7 @@ def test_a_mirrored_camera_sees_mirrored_points_where_the_flipped_picture_has_th
 @pytest.mark.parametrize("distance", [0.0, 2.5])
 def test_a_symmetric_bodys_undrawn_side_is_completed(distance: float) -> None:
     whole = turn(3, symmetric=True, options=replace(FLAT, distance_heights=distance))
-    scene, found = completed(some(whole, FRONT_SIDE_BACK))
+    scene, found = add_mirrored_views(some(whole, FRONT_SIDE_BACK))
     assert found is not None
     assert found.mirrored == ("002.png",)
     assert min(found.alike) > 0.98
@@ -76,7 +76,7 @@ def test_a_symmetric_bodys_undrawn_side_is_completed(distance: float) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_body_with_a_bag_is_left_as_drawn(seed: int) -> None:
     lopsided = some(turn(seed, symmetric=False), FRONT_SIDE_BACK)
-    scene, found = completed(lopsided)
+    scene, found = add_mirrored_views(lopsided)
     assert scene is lopsided
     assert found is not None
     assert found.mirrored == ()
@@ -86,7 +86,7 @@ def test_a_body_with_a_bag_is_left_as_drawn(seed: int) -> None:
 def test_without_a_new_side_or_a_view_of_both_sides_nothing_is_asked() -> None:
     whole = turn(0, symmetric=True)
     for numbers in ((0, 2, 4, 6), (0, 3, 5), (0, 4), tuple(range(8)), (1, 2)):
-        assert completed(some(whole, numbers))[1] is None, numbers
+        assert add_mirrored_views(some(whole, numbers))[1] is None, numbers
 
 
 def test_what_is_alike_is_counted_in_pixels_of_either_side() -> None:
@@ -103,8 +103,8 @@ def test_what_is_alike_is_counted_in_pixels_of_either_side() -> None:
 def test_a_training_sees_mirror_images_unless_it_is_told_not_to(
     symmetric: bool, views: int
 ) -> None:
-    plain = TrainOptions(device="cpu", carve=False, field="triplane", register=False, unbend=False)
-    options = replace(plain, steps=1, symmetric=symmetric)
+    plain = TrainOptions(device="cpu", carve=False, field="triplane", register=False, unwarp=False)
+    options = replace(plain, steps=1, symmetry=symmetric)
     training = fit_field(some(turn(3, symmetric=True), FRONT_SIDE_BACK), options)
     assert training.counts["views"] == views
     assert (training.symmetry is None) == (not symmetric)

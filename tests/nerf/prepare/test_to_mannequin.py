@@ -11,7 +11,7 @@ from tests.nerf.bodies import Hand, body, camera_at, drawing, ring, sheet, with_
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.hull.mannequin_shape import shape_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.prepare import prepared
+from toonset.nerf.prepare.prepare import prepare
 from toonset.nerf.prepare.to_mannequin import bent_to, posed
 
 BEND = Hand(bend=0.012)
@@ -78,7 +78,7 @@ def sheet_frame(mesh, camera):
 
 
 def test_preparation_takes_the_mannequin_where_it_is_the_body() -> None:
-    ready = prepared(sheet(body(), BEND, body()), TrainOptions())
+    ready = prepare(sheet(body(), BEND, body()), TrainOptions())
     assert ready.shape is not None
     assert ready.bent
     assert ready.mannequin is not None
@@ -92,7 +92,7 @@ def test_preparation_takes_the_mannequin_where_it_is_the_body() -> None:
 def test_preparation_leaves_another_body_alone() -> None:
     other = body(scale=1.3)
     with_it, without = (
-        prepared(sheet(body(), BEND, mannequin), TrainOptions()) for mannequin in (other, None)
+        prepare(sheet(body(), BEND, mannequin), TrainOptions()) for mannequin in (other, None)
     )
     assert with_it.shape is None
     assert with_it.mannequin is not None
@@ -104,14 +104,14 @@ def test_preparation_leaves_another_body_alone() -> None:
 def test_switched_off_or_too_few_it_is_not_asked(views: int) -> None:
     scene = sheet(body(), BEND, body(), views=views)
     options = TrainOptions() if views == 2 else TrainOptions(mannequin=False)
-    ready = prepared(scene, options)
+    ready = prepare(scene, options)
     assert ready.shape is None
     assert ready.mannequin is None
 
 
 def test_unbend_off_keeps_drawings_but_takes_the_shape() -> None:
     scene = sheet(body(), BEND, body())
-    ready = prepared(scene, TrainOptions(unbend=False))
+    ready = prepare(scene, TrainOptions(unwarp=False))
     assert ready.shape is not None
     assert ready.scene is scene
 

@@ -11,7 +11,7 @@ from toonset.dataset.silhouettes.displacement import CONTROLS, Bends, ShiftAndSc
 from toonset.dataset.silhouettes.outlines import FIGURE_PX, Square, outlines_of, signed_distance
 from toonset.dataset.silhouettes.register import fit_moves
 from toonset.dataset.silhouettes.tangency import Placed, touch
-from toonset.nerf.prepare.unwarp import MOST, Warp, unbent, warped
+from toonset.nerf.prepare.unwarp import MOST, Warp, unwarp_drawings, warped
 
 
 def outlines(scene):
@@ -52,18 +52,18 @@ def test_rays_of_a_perfect_sheet_touch_every_figure(balls) -> None:
     found = outlines(balls.sheet())
     placed = Placed.of(found, ShiftAndScale.expected(), np.zeros((8, 3)))
     for view, outline in enumerate(found.views):
-        assert touch(placed, view, outline.rim).apart.max() < 0.6
+        assert touch(placed, view, outline.points).apart.max() < 0.6
 
 
 def test_a_thin_part_is_there_where_it_is_seen_from_its_edge(balls) -> None:
-    """A cape's corner covers a third of a pixel from the side: no rim, but no disagreement."""
+    """A cape's corner covers a third of a pixel from the side: no outline, but no disagreement."""
     cape = ((0.0, -0.55, -0.5), (0.35, 0.45, 0.005))
     frames = []
     for frame in balls.sheet().frames:
         frames.append(replace(frame, rgba=balls.draw(frame.camera, (*balls.BALLS, cape))))
     found = outlines(replace(balls.sheet(), frames=tuple(frames)))
     placed = Placed.of(found, ShiftAndScale.expected(), np.zeros((8, 3)))
-    apart = [touch(placed, view, outline.rim).apart for view, outline in enumerate(found.views)]
+    apart = [touch(placed, view, outline.points).apart for view, outline in enumerate(found.views)]
     assert np.concatenate(apart).max() < 1.3  # 2.7 where only pixels covered by half count
 
 
@@ -89,7 +89,7 @@ def test_gradient_of_the_disagreement(balls) -> None:
 @pytest.mark.parametrize("views", [3, 5, 8])
 def test_a_perfect_sheet_is_left_as_it_is(balls, views: int) -> None:
     scene = balls.sheet(views)
-    result, found = unbent(scene)
+    result, found = unwarp_drawings(scene)
     assert result is scene
     assert not found.applied
     assert found.gain_nats <= 0
@@ -98,7 +98,7 @@ def test_a_perfect_sheet_is_left_as_it_is(balls, views: int) -> None:
 
 def test_bent_drawings_are_unbent(balls) -> None:
     scene, fields = balls.bent_sheet()
-    result, found = unbent(scene)
+    result, found = unwarp_drawings(scene)
     assert found.applied
     assert found.gain_nats > 50
     assert found.apart_px[1] < 0.5 * found.apart_px[0]
@@ -106,11 +106,11 @@ def test_bent_drawings_are_unbent(balls) -> None:
     for frame, good, field, warp in zip(
         scene.frames, balls.sheet().frames, fields, found.warps, strict=True
     ):
-        rim = np.abs(good.rgba[..., 3].astype(int) - 128) < 127
-        move = warp.at(frame.camera.pixel_grid()[rim])
+        outline = np.abs(good.rgba[..., 3].astype(int) - 128) < 127
+        move = warp.at(frame.camera.pixel_grid()[outline])
         # corrected(x) = good(x + warp + field): the field is what the warp must undo
-        left += float(((move + field[rim]) ** 2).sum())
-        before += float((field[rim] ** 2).sum())
+        left += float(((move + field[outline]) ** 2).sum())
+        before += float((field[outline] ** 2).sum())
         assert np.linalg.norm(move, axis=1).max() <= MOST * warp.square.size
     assert left < 0.75 * before  # the rest moves all outlines alike: another body, no disagreement
     worst = [np.abs(r.rgba[..., 3].astype(int) - g.rgba[..., 3]).mean() for r, g in
@@ -122,7 +122,7 @@ def test_bent_drawings_are_unbent(balls) -> None:
 
 def test_the_same_bits_twice(balls) -> None:
     scene, _ = balls.bent_sheet()
-    first, second = unbent(scene)[1], unbent(scene)[1]
+    first, second = unwarp_drawings(scene)[1], unwarp_drawings(scene)[1]
     for one, other in zip(first.warps, second.warps, strict=True):
         assert one.numbers.tobytes() == other.numbers.tobytes()
 
@@ -135,10 +135,10 @@ def test_larger_pictures_are_compared_at_one_size(balls) -> None:
 
 
 def test_too_few_drawings_and_empty_ones_are_left_alone(balls) -> None:
-    assert unbent(balls.sheet(2))[0] is balls.sheet(2)
+    assert unwarp_drawings(balls.sheet(2))[0] is balls.sheet(2)
     scene, _ = balls.bent_sheet()
     empty = replace(scene.frames[0], rgba=np.zeros_like(scene.frames[0].rgba))
-    result, found = unbent(replace(scene, frames=(empty, *scene.frames[1:])))
+    result, found = unwarp_drawings(replace(scene, frames=(empty, *scene.frames[1:])))
     assert result.frames[0] is empty
     assert found.warps[0].is_none
     assert found.applied

@@ -11,7 +11,7 @@ import torch
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.run.monitor import Looking, Onlooker, held_out_psnr, sample_of
+from toonset.nerf.run.monitor import Monitor, MonitorOptions, held_out_psnr, sample_of
 from toonset.nerf.train import loop
 from toonset.nerf.train.carved_rays import PRUNE_AFTER
 from toonset.nerf.train.progress import Status
@@ -67,7 +67,7 @@ def test_looking_on_changes_no_bit(
     whole: Training, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("toonset.nerf.run.monitor.FIRST_LOOK_S", 0.05)
-    watch = Onlooker(Looking(quiet, lambda: False, HELD_OUT, tmp_path, preview_every_s=0.2))
+    watch = Monitor(MonitorOptions(quiet, lambda: False, HELD_OUT, tmp_path, preview_every_s=0.2))
     watched = fit_field(SCENE, OPTIONS, watch=watch)
     assert {p.name for p in tmp_path.iterdir()} == {"preview.png"}
     assert watch.held_out
@@ -80,11 +80,13 @@ def test_looking_on_changes_no_bit(
 
 def test_a_wish_to_stop_ends_a_training_with_what_it_has_learned(whole: Training) -> None:
     steps: list[int] = []
-    watch = Onlooker(Looking(lambda status: steps.append(status.steps), lambda: len(steps) == CUT))
+    watch = Monitor(
+        MonitorOptions(lambda status: steps.append(status.steps), lambda: len(steps) == CUT)
+    )
     cut = fit_field(SCENE, OPTIONS, watch=watch)
     assert (cut.stopped, cut.options.steps) == ("interrupted", STEPS)
     assert [s.loss for s in cut.history] == [s.loss for s in whole.history[: CUT + 1]]
-    asked = Onlooker(Looking(quiet, lambda: True))  # too late: nothing is left to do
+    asked = Monitor(MonitorOptions(quiet, lambda: True))  # too late: nothing is left to do
     one = fit_field(SCENE, TrainOptions(steps=1, device="cpu", resolution=16), watch=asked)
     assert one.stopped == "steps"
 

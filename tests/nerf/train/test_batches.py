@@ -29,7 +29,7 @@ def scene() -> Scene:
 @pytest.fixture(scope="module")
 def hull(scene: Scene) -> Hull:
     """Return their hull."""
-    return hull_of(scene, TrainOptions(fair=False, missing_views=0))[0]
+    return hull_of(scene, TrainOptions(fairing=False, missing_views=0))[0]
 
 
 def batches(scene: Scene, hull: Hull, parts: int = 2) -> list[Batch]:

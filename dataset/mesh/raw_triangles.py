@@ -11,11 +11,11 @@ from jaxtyping import Float, Int, UInt8
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
 
-VERTICES_PER_FACE = 3  # a soup of unconnected triangles has no more
+VERTICES_PER_FACE = 3  # a heap of unconnected triangles has no more
 
 
 @dataclass(frozen=True, eq=False)
-class Soup:
+class RawTriangles:
     """Triangles as a file has them: unchecked, vertices repeated.
 
     Attributes:
@@ -33,15 +33,15 @@ class Soup:
     part_names: tuple[str, ...] = ("body",)
 
 
-def mesh_of_soup(soup: Soup, path: Path) -> Mesh:
+def weld_mesh(raw: RawTriangles, path: Path) -> Mesh:
     """Return the checked mesh: vertices at the same place are one, unused ones dropped.
 
     Raises:
         MeshError: what `Mesh` refuses, and faces that are all lines or points.
     """
-    vertices = soup.vertices
-    Mesh(vertices, soup.faces, path=path)  # refuses what could not be welded
-    welded = _weld(vertices)[soup.faces]
+    vertices = raw.vertices
+    Mesh(vertices, raw.faces, path=path)  # refuses what could not be welded
+    welded = _weld(vertices)[raw.faces]
     keep = (welded != np.roll(welded, 1, axis=1)).all(axis=1)  # three different corners
     corners = vertices[welded[keep]]
     edges = corners[:, 1:] - corners[:, :1]
@@ -51,9 +51,9 @@ def mesh_of_soup(soup: Soup, path: Path) -> Mesh:
     return Mesh(
         vertices=vertices[used],
         faces=compact.reshape(-1, 3),
-        face_colors=None if soup.colors is None else soup.colors[keep],
-        face_parts=None if soup.parts is None else soup.parts[keep],
-        part_names=soup.part_names,
+        face_colors=None if raw.colors is None else raw.colors[keep],
+        face_parts=None if raw.parts is None else raw.parts[keep],
+        part_names=raw.part_names,
         name=path.name,
         path=path,
     )
