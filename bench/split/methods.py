@@ -5,13 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
 from bench.split.cases import Drawn, drawn_at
-from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.split.corrections import CORRECTIONS
+from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.errors import ToonsetError
 from toonset.view import Box
 
@@ -33,11 +35,11 @@ class Found:
 Method = Callable[[UInt8[np.ndarray, "height width 4"]], Found]
 
 
-def by_toonset(rgba: UInt8[np.ndarray, "height width 4"]) -> Found:
-    """Return what `split_picture` finds; a refusal is a warning and finds nothing."""
+def by_toonset(rgba: UInt8[np.ndarray, "height width 4"], without: str = "") -> Found:
+    """Return what `split_picture` finds without a correction; a refusal is a warning."""
     start = time.process_time()
     try:
-        sheet = split_picture(rgba)
+        sheet = split_picture(rgba, SheetOptions(without=(without,)))
     except ToonsetError:
         return Found((), True, (), time.process_time() - start)
     seconds = time.process_time() - start
@@ -62,7 +64,11 @@ def by_corner_color(rgba: UInt8[np.ndarray, "height width 4"]) -> Found:
     return Found(tuple(figures), False, (), time.process_time() - start)
 
 
-METHODS: dict[str, Method] = {"default": by_toonset, "corner colour": by_corner_color}
+METHODS: dict[str, Method] = {
+    "default": by_toonset,
+    **{f"without {name}": partial(by_toonset, without=name) for name in CORRECTIONS},
+    "corner colour": by_corner_color,
+}
 
 
 def _differs(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height width"]:

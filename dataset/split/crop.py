@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int
 
-from toonset.dataset.split.segment import SheetLayout, figure_cells, in_pixels, joined
+from toonset.dataset.split.corrections import joined
+from toonset.dataset.split.segment import SheetLayout, figure_cells, in_pixels
 from toonset.errors import SheetError
 from toonset.view import Box
 

@@ -6,6 +6,7 @@ Very large sheets are segmented on cells of a few pixels; cutting out
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -13,19 +14,11 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.background import Background, difference, ring_of, with_final_tolerance
-from toonset.dataset.split.figures.blobs import (
-    Blobs,
-    find_blobs,
-    find_mains,
-    with_blocks,
-    without_strangers,
-)
+from toonset.dataset.split.corrections import CORRECTIONS, SheetState
+from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.grouping import Grouping, group_blobs
-from toonset.dataset.split.figures.swatch_strips import strip_seams
 from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
-from toonset.dataset.split.shadows import find_shadows
-from toonset.dataset.split.touching.cut import Cut, part_touching
-from toonset.dataset.split.touching.parts import part_shared
+from toonset.dataset.split.touching.cut import Cut
 from toonset.view import Box
 
 LARGEST_SIDE = 4096  # pixels: a larger sheet is segmented on cells
@@ -78,50 +71,29 @@ def find_layout(
     rgba: UInt8[np.ndarray, "height width 4"],
     paint: Bool[np.ndarray, "height width"],
     ground: Background,
+    without: Sequence[str] = (),
 ) -> SheetLayout:
-    """Return what stands where on a sheet."""
+    """Return what stands where on a sheet; `without` names corrections that are left out."""
     cell = max(1, -(-max(paint.shape) // LARGEST_SIDE))
     painted = in_cells(paint, cell)
     lines = find_lines(painted)
-    ruled = line_pixels(painted, lines)
-    shadow = np.zeros_like(painted)
-    ring = ring_of(painted.shape[0], painted.shape[1], ground.inset)
-    paper = joined(~painted | ruled, ring)
-    blobs = find_blobs(~paper)
-    small = np.ascontiguousarray(rgba[::cell, ::cell])
-    seams = strip_seams(blobs, small[..., :3])
-    if seams.any():
-        ruled = ruled | seams
-        paper = joined(~painted | ruled, ring)
-        blobs = find_blobs(~paper)
-    if len(blobs.areas):
-        box = (0, 0, paint.shape[1], paint.shape[0])
-        colors = None if ground.rgb is None else ground.colors(box)[::cell, ::cell]
-        shadow = find_shadows(blobs, find_mains(blobs), small, colors, ground.tolerance)
-    if shadow.any():
-        paper = joined(~painted | ruled | shadow, ring)
-        blobs = find_blobs(~paper)
-    blobs, cuts = part_touching(blobs, painted & ~ruled & ~shadow, small[..., :3])
-    mains = with_blocks(blobs, find_mains(blobs), painted, small[..., :3])
-    mains = without_strangers(blobs, mains, painted, small[..., :3])
-    grouping = group_blobs(blobs, mains, small[..., :3])
-    blobs, bodies, shared = part_shared(blobs, mains, grouping)
-    if shared:
-        grouping = group_blobs(blobs, mains, small[..., :3], bodies)
-    cuts += shared
-    return SheetLayout(cell, paper, shadow, ruled, tuple(lines), blobs, grouping, tuple(cuts))
-
-
-def joined(
-    free: Bool[np.ndarray, "height width"], seeds: Bool[np.ndarray, "height width"]
-) -> Bool[np.ndarray, "height width"]:
-    """Return the free pixels that are connected to a seed through free pixels."""
-    _, found = cv2.connectedComponents(free.view(np.uint8), connectivity=4)
-    labels = np.asarray(found, dtype=np.int32)
-    touched = np.zeros(int(labels.max()) + 1, dtype=bool)
-    touched[labels[seeds]] = True
-    touched[0] = False
-    return touched[labels]
+    box = (0, 0, paint.shape[1], paint.shape[0])
+    state = SheetState.first(
+        np.ascontiguousarray(rgba[::cell, ::cell]),
+        None if ground.rgb is None else ground.colors(box)[::cell, ::cell],
+        ground.tolerance,
+        painted,
+        ring_of(painted.shape[0], painted.shape[1], ground.inset),
+        line_pixels(painted, lines),
+    )
+    for name, propose in CORRECTIONS.items():
+        if name not in without:
+            state = propose(state) or state
+    grouping = group_blobs(state.blobs, state.mains, state.rgba[..., :3])
+    return SheetLayout(
+        *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
+        *(state.blobs, grouping, state.cuts),
+    )
 
 
 def in_cells(

@@ -51,6 +51,8 @@ class SheetOptions:
         boxes: (x, y, width, height) of the figures where a person gives them; one view each, in
             this order.
         grid: columns and rows of equal cells, one view per cell that is not empty.
+        without: names of corrections that are left out, of
+            `toonset.dataset.split.corrections.CORRECTIONS`.
     """
 
     margin_px: int = 4
@@ -59,6 +61,7 @@ class SheetOptions:
     background_rgb: tuple[int, int, int] | None = None
     boxes: tuple[Box, ...] = ()
     grid: tuple[int, int] | None = None
+    without: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def split_picture(
         rgba = flattened(rgba)
     ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
-    found = find_layout(rgba, paint, ground)
+    found = find_layout(rgba, paint, ground, options.without)
     _check(found, ground, options)
     crops = _crops(found, paint, options)
     views, holes = _views(rgba, ground, crops, options)

@@ -6,7 +6,6 @@ or close to it, or if most views have the like at the same level; else it is lef
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -56,10 +55,7 @@ class Grouping:
 
 
 def group_blobs(
-    blobs: Blobs,
-    mains: Int[np.ndarray, " mains"],
-    rgb: UInt8[np.ndarray, "height width 3"],
-    bodies_known: Mapping[int, int] | None = None,
+    blobs: Blobs, mains: Int[np.ndarray, " mains"], rgb: UInt8[np.ndarray, "height width 3"]
 ) -> Grouping:
     """Return which figure every patch belongs to, and what the others are.
 
@@ -67,9 +63,7 @@ def group_blobs(
         blobs: the patches.
         mains: those that are the bodies of the views.
         rgb: the sheet.
-        bodies_known: numbers of the bodies of parts that are known already.
     """
-    known = bodies_known or {}
     mains = mains[reading_order(blobs.boxes[mains], blobs.centers[mains])]
     figure = np.full(len(blobs.areas), -1)
     figure[mains] = np.arange(len(mains))
@@ -80,8 +74,6 @@ def group_blobs(
         letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[mains, 3])))
         swatches = find_swatches(blobs.boxes[small], blobs.areas[small])
         typical = float(np.median(blobs.areas[mains]))
-        for i, part in enumerate(small.tolist()):
-            nearest[i] = figure[known[part]] if part in known else nearest[i]
         bodies = mains[nearest]
         for i, number in enumerate(small):
             within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
@@ -90,7 +82,6 @@ def group_blobs(
                 figure[number] = nearest[i]
         again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(mains), rgb)
         figure[small[again]] = nearest[again]
-        figure[list(known)] = figure[list(known.values())]
         for i, number in enumerate(small):
             if figure[number] >= 0:
                 continue

@@ -105,7 +105,7 @@ def part_touching(
             top += 1
             queue += [label, top]
             cuts.append(cut)
-    return (measured(patches.labels, top) if cuts else blobs), cuts
+    return (_measured(patches.labels, top) if cuts else blobs), cuts
 
 
 def _part(patches: _Patches, label: int, new: int) -> Cut | None:
@@ -156,7 +156,7 @@ def _crossed(
     return between[patches]
 
 
-def measured(labels: Int[np.ndarray, "height width"], count: int) -> Blobs:
+def _measured(labels: Int[np.ndarray, "height width"], count: int) -> Blobs:
     """Return boxes, areas and centres of numbered patches."""
     rows, columns = np.nonzero(labels)
     number = labels[rows, columns] - 1

@@ -1,0 +1,137 @@
+"""Corrections of a sheet's first look, one after the other: each proposes a better one, or nothing.
+
+`./run bench split` runs the sheets with each of them left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Int, UInt8
+
+from toonset.dataset.split.figures.blobs import (
+    Blobs,
+    find_blobs,
+    find_mains,
+    with_blocks,
+    without_strangers,
+)
+from toonset.dataset.split.figures.swatch_strips import strip_seams
+from toonset.dataset.split.shadows import find_shadows
+from toonset.dataset.split.touching.cut import Cut, part_touching
+
+
+@dataclass(frozen=True, eq=False)
+class SheetState:
+    """What is known of a sheet so far, in cells.
+
+    Attributes:
+        rgba: the sheet.
+        ground: its background's colours; None: it is transparent.
+        tolerance: noise of the background, levels.
+        painted: cells that are not background.
+        ring: cells at the border, where background is paper.
+        ruled: cells of ruled lines and of seams between swatches.
+        shadow: cells of cast shadows.
+        paper: cells that the border reaches through background.
+        blobs: patches of figures and other things.
+        bodies: numbers of the patches that are bodies of views; None: as `find_mains` says.
+        cuts: where touching figures were cut apart.
+    """
+
+    rgba: UInt8[np.ndarray, "rows columns 4"]
+    ground: UInt8[np.ndarray, "rows columns 3"] | None
+    tolerance: int
+    painted: Bool[np.ndarray, "rows columns"]
+    ring: Bool[np.ndarray, "rows columns"]
+    ruled: Bool[np.ndarray, "rows columns"]
+    shadow: Bool[np.ndarray, "rows columns"]
+    paper: Bool[np.ndarray, "rows columns"]
+    blobs: Blobs
+    bodies: Int[np.ndarray, " bodies"] | None = None
+    cuts: tuple[Cut, ...] = ()
+
+    @classmethod
+    def first(
+        cls,
+        rgba: UInt8[np.ndarray, "rows columns 4"],
+        ground: UInt8[np.ndarray, "rows columns 3"] | None,
+        tolerance: int,
+        painted: Bool[np.ndarray, "rows columns"],
+        ring: Bool[np.ndarray, "rows columns"],
+        ruled: Bool[np.ndarray, "rows columns"],
+    ) -> SheetState:
+        """Return what is known before anything is corrected."""
+        paper = joined(~painted | ruled, ring)
+        shadow = np.zeros_like(painted)
+        known = rgba, ground, tolerance, painted, ring, ruled, shadow
+        return cls(*known, paper, find_blobs(~paper))
+
+    @property
+    def mains(self) -> Int[np.ndarray, " bodies"]:
+        """Return the numbers of the patches that are bodies of views."""
+        return find_mains(self.blobs) if self.bodies is None else self.bodies
+
+    def less(self, taken: Bool[np.ndarray, "rows columns"], what: str) -> SheetState:
+        """Return the state with cells taken from the figures: `what` is "ruled" or "shadow"."""
+        paper = joined(~self.painted | self.ruled | self.shadow | taken, self.ring)
+        more = {what: getattr(self, what) | taken}
+        return replace(self, paper=paper, blobs=find_blobs(~paper), **more)
+
+
+def cut_swatch_strips(state: SheetState) -> SheetState | None:
+    """Propose touching swatches apart."""
+    seams = strip_seams(state.blobs, state.rgba[..., :3])
+    return state.less(seams, "ruled") if seams.any() else None
+
+
+def remove_shadows(state: SheetState) -> SheetState | None:
+    """Propose figures without the shadows that they cast."""
+    if not len(state.blobs.areas):
+        return None
+    seen = state.rgba, state.ground, state.tolerance
+    shadow = find_shadows(state.blobs, state.mains, *seen)
+    return state.less(shadow, "shadow") if shadow.any() else None
+
+
+def cut_touching_figures(state: SheetState) -> SheetState | None:
+    """Propose touching figures apart."""
+    painted = state.painted & ~state.ruled & ~state.shadow
+    blobs, cuts = part_touching(state.blobs, painted, state.rgba[..., :3])
+    return replace(state, blobs=blobs, cuts=tuple(cuts)) if cuts else None
+
+
+def add_blocky_figures(state: SheetState) -> SheetState | None:
+    """Propose rectangles as views that stand with the others in the same colours."""
+    mains = with_blocks(state.blobs, state.mains, state.painted, state.rgba[..., :3])
+    return replace(state, bodies=mains) if len(mains) > len(state.mains) else None
+
+
+def drop_strangers(state: SheetState) -> SheetState | None:
+    """Propose smaller figures in other colours, such as weapons, as no views."""
+    mains = without_strangers(state.blobs, state.mains, state.painted, state.rgba[..., :3])
+    return replace(state, bodies=mains) if len(mains) < len(state.mains) else None
+
+
+CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {
+    "swatch strips": cut_swatch_strips,
+    "shadows": remove_shadows,
+    "touching figures": cut_touching_figures,
+    "blocky figures": add_blocky_figures,
+    "strangers": drop_strangers,
+}
+
+
+def joined(
+    free: Bool[np.ndarray, "height width"], seeds: Bool[np.ndarray, "height width"]
+) -> Bool[np.ndarray, "height width"]:
+    """Return the free pixels that are connected to a seed through free pixels."""
+    _, found = cv2.connectedComponents(free.view(np.uint8), connectivity=4)
+    labels = np.asarray(found, dtype=np.int32)
+    touched = np.zeros(int(labels.max()) + 1, dtype=bool)
+    touched[labels[seeds]] = True
+    touched[0] = False
+    return touched[labels]
