@@ -188,12 +188,15 @@ def test_a_second_call_waits_for_the_one_that_sets_up(checkout: Path) -> None:
     assert log_of(checkout)[-1] == "[palette]"
 
 
+EVERY_CORE = "[-n][auto][--dist][loadfile]"
+
+
 @pytest.mark.parametrize(
     ("words", "asked"),
     [
-        (["test"], "[-P][-m][pytest][-m][not slow]"),
-        (["test", "--all"], "[-P][-m][pytest][-m][]"),
-        (["test", "-k", "a b", "--all", "-x"], "[-P][-m][pytest][-m][][-k][a b][-x]"),
+        (["test"], "[-P][-m][pytest][-m][not slow]" + EVERY_CORE),
+        (["test", "--all"], "[-P][-m][pytest][-m][]" + EVERY_CORE),
+        (["test", "-k", "a b", "--all", "-x"], f"[-P][-m][pytest][-m][]{EVERY_CORE}[-k][a b][-x]"),
     ],
 )
 def test_all_adds_the_slow_tests(checkout: Path, words: list[str], asked: str) -> None:

@@ -50,6 +50,7 @@ LEAST_GAIN = 2.0  # nats, of free yaws over an even ring
 LEAST_YAW_SIGMA, YAW_PER_APART, FREE_SIGMA = np.radians(1.0), np.radians(200.0), np.radians(7.0)
 ROLL_SIGMA, SCALE_SIGMA, SHIFT = np.radians(1.0), 0.01, 0.01  # the last of the height
 WEAK_APART, FAILED_APART = 0.03, 0.06  # of the height
+WEAK_SCALE, FAILED_SCALE = 1.25, 1.5  # times the others' scale: another size, or another body
 FEWEST_TO_CONFIRM = 3  # views
 MOST_AGAINST = 3.0  # nats by which drawings speak against a label
 ASK = "say which view is the front (--front 0)"
@@ -202,6 +203,7 @@ def _verdict(
     found: Found, labels: Sequence[Label], apart: float, wrong: float, doubt: Doubts, against: float
 ) -> tuple[Verdict, str]:
     views, has_label = len(found.placed.cameras), any(labels)
+    scale = scale_apart(found.placed.cameras)
     if views == 1:
         if has_label:
             return "weak", "a single drawing: nothing confirms its label, scale and elevation"
@@ -211,6 +213,11 @@ def _verdict(
     if apart > FAILED_APART:
         off = f"{100 * apart:.1f} % of the height"
         return "failed", f"the outlines are {off} from being one turning body's: {ONE}"
+    if scale > FAILED_SCALE:
+        return (
+            "failed",
+            f"only at {scale:.1f} times the others' scale it is one turning body's: {ONE}",
+        )
     if wrong > 1 - SURE:
         kinds = {"front or back": doubt.front, "which way round": doubt.way}
         kinds["where the axis lies"] = doubt.spacing
@@ -222,9 +229,17 @@ def _verdict(
         return "weak", "its steps may be uneven: label every view to confirm them"
     if against > MOST_AGAINST:
         return "weak", "what is drawn speaks for another direction: is a label wrong?"
+    if scale > WEAK_SCALE:
+        return "weak", f"a drawing is at {scale:.1f} times the others' scale: {ONE}"
     if apart > WEAK_APART and views >= TELLING_VIEWS:
         return "weak", f"the outlines are {100 * apart:.1f} % of the height apart: {ONE}"
     return "ok", ""
+
+
+def scale_apart(cameras: Sequence[Camera]) -> float:
+    """Return how many times larger or smaller than usual the farthest view is drawn, >= 1."""
+    logs = np.log([camera.scale for camera in cameras])
+    return float(np.exp(np.abs(logs - np.median(logs)).max()))
 
 
 def _doubts_text(doubt: Doubts) -> str:

@@ -177,11 +177,14 @@ def size_of_figures(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[f
 
 
 def _placed_as(fitted: SheetCameras | None, cameras: list[Camera]) -> list[Camera]:
-    """Return cameras where others of the same sheet were found: that is near, boxes may be far."""
+    """Return cameras where others of the same sheet were found: that is near, boxes may be far.
+
+    Sizes begin alike: what is drawn at another scale may be another character.
+    """
     if fitted is None:
         return cameras
     pairs = zip(cameras, fitted.cameras, strict=True)
-    return [replace(camera, center=near.center, scale=near.scale) for camera, near in pairs]
+    return [replace(camera, center=near.center) for camera, near in pairs]
 
 
 def _fitted(

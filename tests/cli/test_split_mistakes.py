@@ -11,7 +11,7 @@ from tests.cli.split_sheets import COLORS, drawn_sheet
 
 
 @pytest.fixture(scope="module")
-def prepare(toonset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def prepared(toonset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a sheet, what was split from it, and things that are broken."""
     here = tmp_path_factory.mktemp("prepared")
     drawn_sheet().save(here / "sheet.png")

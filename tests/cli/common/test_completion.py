@@ -27,7 +27,7 @@ def ask(shell: str, line: str, toonset: Callable[..., Any], monkeypatch: pytest.
 
 
 @pytest.fixture(params=SHELLS)
-def add_mirrored_views(
+def completed(
     request: pytest.FixtureRequest, toonset: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> Callable[[str], set[str]]:
     """Return the words that a shell offers for a line."""
@@ -43,16 +43,15 @@ def add_mirrored_views(
 
 
 def test_verbs_are_completed(completed: Callable[[str], set[str]]) -> None:
-    assert set(VERBS) <= add_mirrored_views("toonset ")
-    assert add_mirrored_views("toonset ca") == {"calibrate"}
-    assert add_mirrored_views("toonset help tr") == {"train"}
+    assert set(VERBS) <= completed("toonset ")
+    assert completed("toonset ca") == {"calibrate"}
+    assert completed("toonset help tr") == {"train"}
 
 
 def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
-    assert {"--mesh", "--views", "--force"} <= add_mirrored_views("toonset calibrate sheet.png --")
-    assert add_mirrored_views("toonset train --as-") == {
-        f"--as-{w}d" for w in ("place", "turne", "carve")
-    } | {"--no-unwarp"}
+    assert {"--mesh", "--views", "--force"} <= completed("toonset calibrate sheet.png --")
+    steps = ("mannequin", "palette", "register", "unwarp", "fairing", "symmetry")
+    assert completed("toonset train --no-") == {f"--no-{step}" for step in steps}
 
 
 @pytest.mark.parametrize(
@@ -76,4 +75,4 @@ def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
 def test_choices_are_completed(
     line: str, choices: set[str], completed: Callable[[str], set[str]]
 ) -> None:
-    assert add_mirrored_views(f"toonset {line}") == choices
+    assert completed(f"toonset {line}") == choices

@@ -30,8 +30,8 @@ def ball(views: int) -> Scene:
 
 
 def test_the_fair_surface_is_rounder_than_the_hull_as_carved() -> None:
-    def volume(*, fair: bool) -> float:
-        hull, _ = hull_of(ball(4), TrainOptions(fairing=fair))
+    def volume(*, fairing: bool) -> float:
+        hull, _ = hull_of(ball(4), TrainOptions(fairing=fairing))
         assert torch.equal(hull.support, (hull.support * 255).round() / 255)
         assert len(hull.support.unique()) <= LEVELS + 1
         return float(hull.inside.sum()) * hull.voxel**3

@@ -166,4 +166,4 @@ def test_drawings_agree_as_they_are_or_once_cameras_follow_them(
 def test_drawings_that_were_bent_or_stay_apart_do_not_agree() -> None:
     assert not moved(training(scene(*TURN)), 0.5, applied=True).prepared.agree
     bends = Unbending(True, 5.0, 1.0, (9.0, 0.01), ())
-    assert not Prepared(scene(*TURN), scene(*TURN), None, None, bends, None).agree
+    assert not Prepared(scene(*TURN), scene(*TURN), None, bends).agree
