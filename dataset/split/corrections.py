@@ -19,7 +19,6 @@ from toonset.dataset.split.figures.blobs import (
     with_blocks,
     without_strangers,
 )
-from toonset.dataset.split.figures.swatch_strips import strip_seams
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 
@@ -34,7 +33,7 @@ class SheetState:
         tolerance: noise of the background, levels.
         painted: cells that are not background.
         ring: cells at the border, where background is paper.
-        ruled: cells of ruled lines and of seams between swatches.
+        ruled: cells of ruled lines.
         shadow: cells of cast shadows.
         paper: cells that the border reaches through background.
         blobs: patches of figures and other things.
@@ -75,18 +74,6 @@ class SheetState:
         """Return the numbers of the patches that are bodies of views."""
         return find_mains(self.blobs) if self.bodies is None else self.bodies
 
-    def less(self, taken: Bool[np.ndarray, "rows columns"], what: str) -> SheetState:
-        """Return the state with cells taken from the figures: `what` is "ruled" or "shadow"."""
-        paper = joined(~self.painted | self.ruled | self.shadow | taken, self.ring)
-        more = {what: getattr(self, what) | taken}
-        return replace(self, paper=paper, blobs=find_blobs(~paper), **more)
-
-
-def cut_swatch_strips(state: SheetState) -> SheetState | None:
-    """Propose touching swatches apart."""
-    seams = strip_seams(state.blobs, state.rgba[..., :3])
-    return state.less(seams, "ruled") if seams.any() else None
-
 
 def remove_shadows(state: SheetState) -> SheetState | None:
     """Propose figures without the shadows that they cast."""
@@ -94,7 +81,10 @@ def remove_shadows(state: SheetState) -> SheetState | None:
         return None
     seen = state.rgba, state.ground, state.tolerance
     shadow = find_shadows(state.blobs, state.mains, *seen)
-    return state.less(shadow, "shadow") if shadow.any() else None
+    if not shadow.any():
+        return None
+    paper = joined(~state.painted | state.ruled | shadow, state.ring)
+    return replace(state, shadow=shadow, paper=paper, blobs=find_blobs(~paper))
 
 
 def cut_touching_figures(state: SheetState) -> SheetState | None:
@@ -117,7 +107,6 @@ def drop_strangers(state: SheetState) -> SheetState | None:
 
 
 CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {
-    "swatch strips": cut_swatch_strips,
     "shadows": remove_shadows,
     "touching figures": cut_touching_figures,
     "blocky figures": add_blocky_figures,

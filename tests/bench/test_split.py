@@ -22,7 +22,7 @@ from bench.split.measure import ACROSS, TILE_WH, bench_split, contact_sheet, til
 from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
 from bench.split.score import mask_iou, same_box, score
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.split.sheet import LeftOut, Segmentation
+from toonset.dataset.split.sheet import LeftOut, Segmentation, SheetOptions
 from toonset.errors import BundleError, SheetError
 from toonset.view import View
 
@@ -136,7 +136,7 @@ def test_our_views_keep_their_place_and_their_warnings(monkeypatch: pytest.Monke
     rgba[4:44, 4:64] = 255
     view = View(rgba, (6, 6, 68, 48), 0.0, "000.png")
     sheet = Segmentation((view,), None, 1.0, ("look at this",), (LeftOut((1, 2, 3, 4), "speck"),))
-    monkeypatch.setattr("bench.split.methods.split_picture", lambda rgba: sheet)
+    monkeypatch.setattr("bench.split.methods.split_picture", lambda *_: sheet)
     result = by_toonset(rgba)
     assert [figure.box for figure in result.figures] == [(10, 10, 60, 40)]
     assert result.warned
@@ -144,7 +144,7 @@ def test_our_views_keep_their_place_and_their_warnings(monkeypatch: pytest.Monke
 
 
 def test_a_refusal_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(rgba: np.ndarray) -> Segmentation:
+    def refuse(rgba: np.ndarray, options: SheetOptions) -> Segmentation:
         raise SheetError("blank")
 
     monkeypatch.setattr("bench.split.methods.split_picture", refuse)
