@@ -274,10 +274,11 @@ def _pooled(records: Sequence[Record], metric: str) -> list[Record]:
         named = {f"{record.group}: {case}": value for case, value in own.items()}
         found.setdefault(record.method, {}).update(named)
     sizes = dict.fromkeys(r.group for r in records if r.metric == CPU_SECONDS)
-    of = [(metric, merits[0].unit, merits[0].direction, merits[0].seed)] if merits else []
     return [
-        Recorder(method, size, seed).samples(name, list(values.values()), unit, way, values)
-        for name, unit, way, seed in of
+        Recorder(method, size, first.seed).samples(
+            metric, list(values.values()), first.unit, first.direction, values
+        )
+        for first in merits[:1]
         for size in sizes
         for method, values in found.items()
     ]

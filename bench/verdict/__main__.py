@@ -93,7 +93,8 @@ def _case(folder: Path) -> tuple[Scene, Scene, None]:
 
 
 def _judged(row: dict[str, Any]) -> Judged:
-    return Judged(**row | {name: tuple(row[name]) for name in ("reasons", "look")})
+    lists: dict[str, Any] = {name: tuple(row[name]) for name in ("reasons", "look")}
+    return Judged(**row | lists)
 
 
 def _group(sheet: Judged) -> str:

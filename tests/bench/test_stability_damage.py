@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -38,7 +39,7 @@ from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.view import View
 
-PLAIN = {"outline_px": 0, "cell_px": 120, "views": 3}
+PLAIN: dict[str, Any] = {"outline_px": 0, "cell_px": 120, "views": 3}
 PAGE = {page.name: page for page in PAGES}
 
 

@@ -36,7 +36,13 @@ def sheet(*views: tuple[float, float, str], sigma: float = 1.0, case: str = "") 
     """Return a sheet of (error, error modulo twin, verdict) in degrees; yaw errs as the view."""
     return MeasuredSheet(
         tuple(
-            ViewError(*map(math.radians, (raw, twin)), verdict, *map(math.radians, (raw, sigma)))
+            ViewError(
+                math.radians(raw),
+                math.radians(twin),
+                verdict,
+                math.radians(raw),
+                math.radians(sigma),
+            )
             for raw, twin, verdict in views
         ),
         case,
