@@ -51,7 +51,7 @@ from toonset.calib.search.hypotheses import (
     refine,
     with_twins,
 )
-from toonset.calib.search.selection import COARSE_WIDTHS_TOGETHER, TogetherSearch, with_k
+from toonset.calib.search.selection import RANKING_WIDTHS, TogetherSearch, with_k
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.search.templates import Templates, find_hypotheses
@@ -177,7 +177,7 @@ class Problem:
             turn = self.sheet.weigh([starts[0].poses])[1][0]
             model = SheetModel("given")
             fit = JointProblem(self.coarse, turn).fit(
-                body, starts[0].poses, COARSE_WIDTHS_TOGETHER[-1:], model
+                body, starts[0].poses, RANKING_WIDTHS[-1:], model
             )
             return replace(fit, poses=starts[0].poses), turn, candidates
         search = TogetherSearch(self.coarse, body, self.sheet, self._informed)

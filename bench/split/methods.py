@@ -35,11 +35,11 @@ class Found:
 Method = Callable[[UInt8[np.ndarray, "height width 4"]], Found]
 
 
-def by_toonset(rgba: UInt8[np.ndarray, "height width 4"], without: str = "") -> Found:
-    """Return what `split_picture` finds without a correction; a refusal is a warning."""
+def by_toonset(rgba: UInt8[np.ndarray, "height width 4"], *without: str) -> Found:
+    """Return what `split_picture` finds without some corrections; a refusal is a warning."""
     start = time.process_time()
     try:
-        sheet = split_picture(rgba, SheetOptions(without=(without,)))
+        sheet = split_picture(rgba, SheetOptions(without=without))
     except ToonsetError:
         return Found((), True, (), time.process_time() - start)
     seconds = time.process_time() - start
@@ -64,9 +64,13 @@ def by_corner_color(rgba: UInt8[np.ndarray, "height width 4"]) -> Found:
     return Found(tuple(figures), False, (), time.process_time() - start)
 
 
+def _without(name: str, rgba: UInt8[np.ndarray, "height width 4"]) -> Found:
+    return by_toonset(rgba, name)
+
+
 METHODS: dict[str, Method] = {
     "default": by_toonset,
-    **{f"without {name}": partial(by_toonset, without=name) for name in CORRECTIONS},
+    **{f"without {name}": partial(_without, name) for name in CORRECTIONS},
     "corner colour": by_corner_color,
 }
 

@@ -28,11 +28,9 @@ from toonset.camera import rotation_distance
 RECHECK_WIDTHS = np.geomspace(0.03, 0.015, 3)
 RECHECKED = 4  # best candidates of a view that are tried again at another camera distance
 NEAR_HEIGHTS = 3.0  # camera distance of the second first guess
-SKETCH_NOISE = Noise()  # one for all, so that energies compare
+RANKING_NOISE = Noise()  # one for all, so that energies compare
 SAME_START = np.radians(25.0)  # a candidate this near to a start is what the start became
-COARSE_WIDTHS_TOGETHER = np.geomspace(
-    0.04, 0.015, 6
-)  # a joint fit that only has to rank selections
+RANKING_WIDTHS = np.geomspace(0.04, 0.015, 6)  # a joint fit that only has to rank selections
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +86,7 @@ class TogetherSearch:
         """Return a joint fit that only has to rank a selection."""
         _, turns = self.sheet.weigh([poses])
         problem = JointProblem(self.drawings, turns[0])
-        return problem.fit(
-            self.body, poses, COARSE_WIDTHS_TOGETHER, SheetModel("shared"), SKETCH_NOISE
-        )
+        return problem.fit(self.body, poses, RANKING_WIDTHS, SheetModel("shared"), RANKING_NOISE)
 
     def _selected(self, candidates: Sequence[Candidates]) -> list[Pose]:
         chosen, _ = self.sheet.choose(candidates)

@@ -216,7 +216,7 @@ def _verdict(
     if scale > FAILED_SCALE:
         return (
             "failed",
-            f"only at {scale:.1f} times the others' scale it is one turning body's: {ONE}",
+            f"a drawing fits only {scale:.1f} times larger or smaller than the others: {ONE}",
         )
     if wrong > 1 - SURE:
         kinds = {"front or back": doubt.front, "which way round": doubt.way}
@@ -230,7 +230,7 @@ def _verdict(
     if against > MOST_AGAINST:
         return "weak", "what is drawn speaks for another direction: is a label wrong?"
     if scale > WEAK_SCALE:
-        return "weak", f"a drawing is at {scale:.1f} times the others' scale: {ONE}"
+        return "weak", f"a drawing is {scale:.1f} times larger or smaller than the others: {ONE}"
     if apart > WEAK_APART and views >= TELLING_VIEWS:
         return "weak", f"the outlines are {100 * apart:.1f} % of the height apart: {ONE}"
     return "ok", ""

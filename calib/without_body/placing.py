@@ -35,7 +35,7 @@ USUAL, SPREAD, P_STEEP = np.radians(5.0), np.radians(6.0), 0.3  # of elevations 
 FLOOR = 0.003  # of the height: outlines that are drawn well are this far apart
 MEASUREMENTS = 2.0  # that count, per view: its outline errs together
 TRIED = 3  # elevations, per nearness, that are fitted
-SKETCH_ROUNDS, ROUNDS = 4, 12  # of Gauss-Newton at most
+COARSE_ROUNDS, ROUNDS = 4, 12  # of Gauss-Newton at most
 TAU = 0.01  # of the figure's square: first guess of how far a drawing is misplaced
 LEAST_SIGMA = np.radians(1.5)  # of the elevation
 
@@ -147,7 +147,7 @@ def place(
         likely = coherence_log_likelihood(rough, views) + prior
         for i in np.sort(np.argsort(-likely)[:TRIED]):
             cameras = _placed_as(fitted, figures.cameras(yaws, float(ELEVATIONS[i]), k))
-            fitted = _fitted(figures, cameras, yaw_sigma, SKETCH_ROUNDS)
+            fitted = _fitted(figures, cameras, yaw_sigma, COARSE_ROUNDS)
             tried.append((float(ELEVATIONS[i]), k))
             worth.append(coherence_log_likelihood(np.array(fitted.apart), views) + prior[i])
     shares = np.exp(np.array(worth) - max(worth))

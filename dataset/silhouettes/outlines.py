@@ -22,7 +22,7 @@ from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.dataset.silhouettes.mask import FAINT, thin
 
 FIGURE_PX = 128  # larger figures are made this small; smaller ones stay as they are
-RIM_POINTS = 50.0  # outline points along a length as long as the figure
+OUTLINE_POINTS = 50.0  # outline points along a length as long as the figure
 ROOM = 1.12  # of the figure's longer side: the square on which it may move
 SHORTEST = 12  # outline points of a contour below which it is a speck
 SLOPE = 0.3  # below which a ridge's slope has no direction
@@ -135,9 +135,8 @@ def signed_distance(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarra
     inside = ((alpha >= 0.5) | thin(alpha)).astype(np.uint8)
     distance = cv2.distanceTransform(inside, cv2.DIST_L2, 5)
     distance -= cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
-    distance -= np.sign(distance) * np.float32(
-        0.5
-    )  # from pixel centres to the outline between them
+    # from pixel centres to the outline between them
+    distance -= np.sign(distance) * np.float32(0.5)
     known = (alpha > FAINT) & (alpha < 1 - FAINT) & (np.abs(distance) < 1)
     return np.where(known, alpha - 0.5, distance).astype(np.float32)
 
@@ -164,10 +163,12 @@ def _outline(camera: Camera, alpha: Float[np.ndarray, "height width"], side: flo
     stack = torch.as_tensor(np.concatenate([distance[None], slope]).astype(np.float32))
     middle, _ = _box(alpha)
     square = Square(np.array(middle) - side / 2, side)
-    return Outline(camera, stack, _rim(alpha, side / ROOM / RIM_POINTS), square)
+    return Outline(camera, stack, _outline_points(alpha, side / ROOM / OUTLINE_POINTS), square)
 
 
-def _rim(alpha: Float[np.ndarray, "height width"], step: float) -> Float[np.ndarray, "n 2"]:
+def _outline_points(
+    alpha: Float[np.ndarray, "height width"], step: float
+) -> Float[np.ndarray, "n 2"]:
     """Return points `step` pixels apart on all outlines, but where the picture's edge cuts them."""
     points = [np.zeros((0, 2))]
     for contour in find_contours(alpha, 0.5):

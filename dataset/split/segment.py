@@ -19,6 +19,7 @@ from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.grouping import Grouping, group_blobs
 from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
 from toonset.dataset.split.touching.cut import Cut
+from toonset.errors import SheetError
 from toonset.view import Box
 
 LARGEST_SIDE = 4096  # pixels: a larger sheet is segmented on cells
@@ -73,7 +74,15 @@ def find_layout(
     ground: Background,
     without: Sequence[str] = (),
 ) -> SheetLayout:
-    """Return what stands where on a sheet; `without` names corrections that are left out."""
+    """Return what stands where on a sheet; `without` names corrections that are left out.
+
+    Raises:
+        SheetError: there is no such correction.
+    """
+    for name in without:
+        if name not in CORRECTIONS:
+            known = ", ".join(CORRECTIONS)
+            raise SheetError(f"split: there is no correction {name!r}; choose from {known}")
     cell = max(1, -(-max(paint.shape) // LARGEST_SIDE))
     painted = in_cells(paint, cell)
     lines = find_lines(painted)

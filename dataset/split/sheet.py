@@ -109,7 +109,8 @@ def split_picture(
         options: see `SheetOptions`.
 
     Raises:
-        SheetError: blank, no plain background, nothing on it large enough, far too many figures.
+        SheetError: blank, no plain background, nothing on it large enough, far too many figures, or
+            no correction of that name to leave out.
     """
     options = options or SheetOptions()
     if options.background_rgb is not None or not is_transparent(rgba):

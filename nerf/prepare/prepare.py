@@ -2,7 +2,7 @@
 
 Where the mannequin is the body that was drawn, drawings are bent to show it (`to_mannequin`). Else
 each only where the drawings ask for it: cameras follow drawings that were placed or
-sized off (`registration`), drawings that bend are unbent (`unwarp`).
+sized off (`registration`), bends are taken out of drawings (`unwarp`).
 """
 
 from __future__ import annotations

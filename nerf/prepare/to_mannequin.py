@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import alpha_of, figure_px, has_figure
-from toonset.dataset.silhouettes.outlines import RIM_POINTS, ROOM, Outlines, Square
+from toonset.dataset.silhouettes.outlines import OUTLINE_POINTS, ROOM, Outlines, Square
 from toonset.dataset.silhouettes.register import Fit
 from toonset.nerf.hull.hull import LEVEL
 from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired, parts_left
@@ -204,7 +204,7 @@ def _inner_lines(
         return None
     found = []
     for cover, sight, square in zip(covers, sights, squares, strict=True):
-        gap = square.size / ROOM / RIM_POINTS
+        gap = square.size / ROOM / OUTLINE_POINTS
         places, across = step_places(sight.fine, style.least * height, FINER, gap)
         inside = _depth_inside(sight)
         clear = inside[tuple(np.floor(places).astype(int).T[::-1])] > width + style.width_px

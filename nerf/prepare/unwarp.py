@@ -67,7 +67,7 @@ class Unbending(Alignment):
 
 
 def unwarp_drawings(scene: Scene) -> tuple[Scene, Unbending]:
-    """Return the scene with its drawings unbent, and how.
+    """Take the bends out of a scene's drawings; return it, and what was found.
 
     Drawings that agree within an outline's own error are returned as they are, to the bit; so are
     pictures without a figure, and scenes with fewer than FEWEST_VIEWS.

@@ -175,7 +175,7 @@ def test_drawings_that_are_no_turn_are_never_ok() -> None:
     labels = parse_labels("front,left,back,right", 4)
     mixed = calibrate_without_body([one, pole, drawing(1.0, 0.1), pole], Known(labels=labels))
     assert mixed.verdict == "failed"
-    assert "times the others' scale it is one turning body's" in mixed.views[0].reason
+    assert "times larger or smaller than the others" in mixed.views[0].reason
 
 
 def test_a_bundle_without_a_body_has_no_mannequin(tmp_path: Path) -> None:

@@ -1,0 +1,33 @@
+"""Corrections of a sheet's first look: each can be left out, and is missed where it is needed."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench.messy.sheet import make_messy_sheet
+from toonset.dataset.split.corrections import CORRECTIONS
+from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.errors import SheetError
+
+
+@pytest.mark.parametrize(
+    ("difficulty", "correction"), [("shadows", "shadows"), ("touching", "touching figures")]
+)
+def test_a_sheet_that_needs_a_correction_misses_it(difficulty: str, correction: str) -> None:
+    sheet = make_messy_sheet(0, [difficulty])
+    boxes = [view.box for view in split_picture(sheet.rgba).views]
+    without = split_picture(sheet.rgba, SheetOptions(without=(correction,)))
+    assert len(boxes) == len(sheet.boxes)
+    assert [view.box for view in without.views] != boxes
+
+
+def test_a_plain_sheet_needs_none() -> None:
+    rgba = make_messy_sheet(0, ["plain"]).rgba
+    bare = split_picture(rgba, SheetOptions(without=tuple(CORRECTIONS)))
+    assert [view.box for view in bare.views] == [view.box for view in split_picture(rgba).views]
+
+
+def test_a_correction_that_is_none_is_refused() -> None:
+    rgba = make_messy_sheet(0, ["plain"]).rgba
+    with pytest.raises(SheetError, match="no correction 'shade'; choose from shadows, touching"):
+        split_picture(rgba, SheetOptions(without=("shade",)))
