@@ -44,6 +44,7 @@ def calibrate(
     seed: int = 0,
     progress: Progress = lambda step, share: None,
     cues: Cues | None = None,
+    options: CalibrationOptions = CalibrationOptions(),
 ) -> Calibration:
     """Return one camera per drawing, with how sure it is.
 
@@ -58,6 +59,7 @@ def calibrate(
         progress: called with the step's name and the share of it that is done.
         cues: what an earlier call has found in the same drawings, and keeps what this one finds;
             those of other drawings are passed over.
+        options: how hard to look and what to doubt; what differs from the default is recorded.
 
     Raises:
         ToonsetError: no view, two of one name, a mannequin that lies, or hints that contradict
@@ -73,21 +75,27 @@ def calibrate(
             known = known_of(hints, views, {})
             if known.landmarks:
                 raise UsageError("landmarks need a mannequin; drop them or --mesh none")
-            alone = calibrate_without_body(views, known, progress, cues)
-            return _alone(views, alone, hints, seed)
+            alone = calibrate_without_body(views, known, progress, cues, options)
+            return _alone(views, alone, hints, seed, options)
     body = _Body.of(mesh)
     known = known_of(hints, views, body.points_for(hints))
     with threadpool_limits(1, user_api="blas"):  # more only wait, and change the last digits
         marks = _landmark_fits(known, body.mesh)
         if hints.landmarks_only:
-            found = calibrate_by_landmarks(views, body.mesh, known.landmarks)
+            found = calibrate_by_landmarks(views, body.mesh, known.landmarks, options.thresholds)
         else:
-            found = find_cameras(views, body.mesh, CalibrationOptions(), progress, known)
+            found = find_cameras(views, body.mesh, options, progress, known)
             better = without_body_if_better(
-                views, found, known, given=body.looks is None, tell=progress, cues=cues
+                views,
+                found,
+                known,
+                given=body.looks is None,
+                tell=progress,
+                cues=cues,
+                options=options,
             )
             if better is not None:
-                return _alone(views, better, hints, seed)
+                return _alone(views, better, hints, seed, options)
     drawings, found = at_cuts(views, found)
     drawings, filled = without_false_holes(drawings, found.views, found.mannequin)
     return replace(
@@ -96,7 +104,7 @@ def calibrate(
         landmarks=tuple(marks),
         drawings=drawings,
         mesh=body.mesh,
-        origin=_origin(views, body, hints, seed),
+        origin=_origin(views, body, hints, seed, options),
     )
 
 
@@ -110,9 +118,11 @@ def _check_without_body(hints: Hints) -> None:
             raise UsageError(f"{name} needs a mannequin; drop it or --mesh none")
 
 
-def _alone(views: Sequence[View], found: Calibration, hints: Hints, seed: int) -> Calibration:
+def _alone(
+    views: Sequence[View], found: Calibration, hints: Hints, seed: int, options: CalibrationOptions
+) -> Calibration:
     """Return a calibration without a body with its drawings and where it comes from."""
-    return replace(found, drawings=tuple(views), origin=_origin(views, None, hints, seed))
+    return replace(found, drawings=tuple(views), origin=_origin(views, None, hints, seed, options))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +182,9 @@ def _landmark_fits(known: Known, mesh: Mesh) -> list[LandmarkFit]:
     return [fit for fit in landmark_starts(known.landmarks, prepare_surface(mesh)) if fit]
 
 
-def _origin(views: Sequence[View], body: _Body | None, hints: Hints, seed: int) -> dict[str, Any]:
+def _origin(
+    views: Sequence[View], body: _Body | None, hints: Hints, seed: int, options: CalibrationOptions
+) -> dict[str, Any]:
     """Return what calibration.json says of where its cameras come from."""
     origins = list(dict.fromkeys(view.origin for view in views if view.origin is not None))
     files = [file for origin in origins for file in origin.files]
@@ -184,13 +196,25 @@ def _origin(views: Sequence[View], body: _Body | None, hints: Hints, seed: int) 
     cut = origins[0].options if origins else {}
     made = {} if body is None or body.looks is None else {"mannequin": asdict(body.looks)}
     return {
-        "options": asdict(CalibrationOptions()) | hints.as_options(views) | dict(cut) | made,
+        "options": _recorded(options) | hints.as_options(views) | dict(cut) | made,
         "seed": seed,
         "versions": {name: version(name) for name in PACKAGES},
         "inputs": [  # views may come from files of the same name in several folders
             {"name": file.name, "sha256": file.sha256, "role": file.role} for file in files
         ],
     }
+
+
+def _recorded(options: CalibrationOptions) -> dict[str, Any]:
+    """Return the search effort, and of what is doubted what differs from the default."""
+    said, usual = asdict(options), asdict(CalibrationOptions())
+    doubts = {
+        name: value
+        for name, value in said.pop("thresholds").items()
+        if value != usual["thresholds"][name]
+    }
+    without = list(said.pop("without"))
+    return said | {k: v for k, v in {"thresholds": doubts, "without": without}.items() if v}
 
 
 def _hint_files(mesh: Mesh | None, hints: Hints) -> list[tuple[str, Path]]:

@@ -34,17 +34,8 @@ from toonset.calib.pipeline import Problem, SheetFit
 from toonset.calib.result import Calibration, CutOff
 from toonset.calib.search.hypotheses import Candidates
 from toonset.calib.search.templates import turns_visibly
-from toonset.calib.verdict.elevations import with_elevations_in_mind
-from toonset.calib.verdict.judge import (
-    judge_sheet,
-    judge_view,
-    with_labels_in_mind,
-    with_locks_in_mind,
-    with_places_in_mind,
-    with_sheet_in_mind,
-)
-from toonset.calib.verdict.one_character import with_one_character_in_mind
-from toonset.calib.verdict.repeated import with_repeats_in_mind
+from toonset.calib.verdict.checks import JudgedSheet, apply_checks
+from toonset.calib.verdict.judge import judge_sheet, judge_view
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -137,28 +128,37 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         bent = problem.bent(fitted.rigid, fitted.turn)
         joint, differs = bent.joint, bent.differs
         model = replace(bent.model, tried=(*tried, *bent.model.tried))
+    options = problem.options
     with _timed(seconds, "judge"):
         problem.progress("judge", 0.0)
         observable = turns_visibly(problem.templates)
-        state = state_of(problem.views, problem.cameras(joint), yaw_observable=observable)
+        state = state_of(
+            problem.views, problem.cameras(joint), options.thresholds, yaw_observable=observable
+        )
         inset = [drawing.inset(joint.offset) for drawing in problem.fine]
         final = problem.alternatives(inset, joint, model, fitted.candidates, differs=differs)
         sure = problem.sheet.probabilities(final)
-        body = joint.body.surface
-        each = [
-            judge_view(v, inset[i], body, joint, i, final[i], sure[i], state, differs=differs)
-            for i, v in enumerate(problem.views)
+        poses = [
+            [(float(p), fit.pose) for p, fit in zip(own, view.fits, strict=True)]
+            for own, view in zip(sure, final, strict=True)
         ]
+        each = tuple(
+            judge_view(v, inset[i], joint, i, poses[i], state, differs=differs)
+            for i, v in enumerate(problem.views)
+        )
         labels = problem.known.labels  # of every view they are no even steps
         even = np.isfinite(fitted.turn.places).all() and not (labels and all(labels))
-        if differs and even:
-            each = with_places_in_mind(each, off_places(joint.poses, fitted.turn))
-        each = with_labels_in_mind(with_elevations_in_mind(each), labels)
-        each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
-        contradict = problem.sheet.faces_contradict(final)
-        judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)
-        judged = with_repeats_in_mind(judged, problem.views)
-        judged = with_one_character_in_mind(judged, problem.views)
+        sheet = JudgedSheet(
+            each,
+            problem.views,
+            state,
+            labels,
+            off_places(joint.poses, fitted.turn) if differs and even else None,
+            problem.pulled(joint, model, fitted.turn),
+            problem.sheet.faces_contradict(final),
+            model.bends_mannequin,
+        )
+        judged = apply_checks(sheet, without=options.without)
     verdict, reason = judge_sheet(judged, state)
     return Calibration(
         judged,

@@ -17,11 +17,12 @@ from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.landmark_models import MARGIN
 from toonset.calib.fit.landmarks import LandmarkFit, solve_landmarks
 from toonset.calib.fit.model_selection import ORTHOGRAPHIC, PER_VIEW, ModelChoice, ModelTest
+from toonset.calib.options import VerdictThresholds
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.search.hypotheses import is_twin
-from toonset.calib.verdict.judge import FAILED_COVERAGE, SURE, WEAK_ANGLE, angle_sigmas, judge_sheet
+from toonset.calib.verdict.judge import angle_sigmas, judge_sheet, outlines_apart
 from toonset.camera import angles_from_rotation
 from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.dataset.silhouettes.contour import drawn_contour
@@ -31,11 +32,13 @@ from toonset.view import View
 
 OUTLINE_HEIGHT_PX, OUTLINE_POINTS = 250.0, 200  # scale at which outlines are compared
 TYPICAL = "perspective in the typical view"
-MOST_RMS = 0.05  # of the figure's height; farther off, the pairs are not this mannequin's
 
 
 def calibrate_by_landmarks(
-    views: Sequence[View], mesh: Mesh, landmarks: Sequence[Landmarks | None]
+    views: Sequence[View],
+    mesh: Mesh,
+    landmarks: Sequence[Landmarks | None],
+    thresholds: VerdictThresholds = VerdictThresholds(),
 ) -> Calibration:
     """Return one camera per view from its landmarks; no outline is fitted.
 
@@ -43,6 +46,7 @@ def calibrate_by_landmarks(
         views: the drawings, at least one.
         mesh: the mannequin that the landmarks' world points belong to.
         landmarks: the pairs of every view.
+        thresholds: where to begin to doubt.
 
     Raises:
         LandmarkError: a view without landmarks, or pairs that determine no camera.
@@ -53,8 +57,9 @@ def calibrate_by_landmarks(
     fits = [solve_landmarks(own, surface) for own in pairs]
     solved = time.perf_counter()
     drawings = [Drawing(drawn_contour(v), OUTLINE_HEIGHT_PX, OUTLINE_POINTS) for v in views]
-    judged = tuple(_judged(*each, surface) for each in zip(views, drawings, fits, strict=True))
-    state = state_of(views, [view.camera for view in judged])
+    each = zip(views, drawings, fits, strict=True)
+    judged = tuple(_judged(*one, surface, thresholds) for one in each)
+    state = state_of(views, [view.camera for view in judged], thresholds)
     # one drawing's landmarks confirm its scale and elevation; its outline would not
     only = judged[0]
     single = len(views) == 1
@@ -91,7 +96,9 @@ def landmarks_of_every_view(
     return [own for own in landmarks if own is not None]
 
 
-def _judged(view: View, drawing: Drawing, fit: LandmarkFit, surface: Surface) -> ViewCalibration:
+def _judged(
+    view: View, drawing: Drawing, fit: LandmarkFit, surface: Surface, limits: VerdictThresholds
+) -> ViewCalibration:
     size_wh = (view.rgba.shape[1], view.rgba.shape[0])
     pose, *others = fit.poses
     cameras = [other.camera(surface.middle, size_wh) for other in others]
@@ -100,9 +107,9 @@ def _judged(view: View, drawing: Drawing, fit: LandmarkFit, surface: Surface) ->
     p_flip = float(np.dot(mirrored, fit.probabilities[1:]))
     outline = measure(drawing, surface, drawing.pose_in(pose))
     sigmas = angle_sigmas(pose, fit.covariance)
-    verdict, reason = _verdict(fit, sigmas, drawing.height / drawing.factor)
-    if verdict == "ok" and outline.coverage < FAILED_COVERAGE:
-        apart = f"{100 * (1 - outline.coverage):.0f} % of the outlines are more than 5 % apart"
+    verdict, reason = _verdict(fit, sigmas, drawing.height / drawing.factor, limits)
+    if verdict == "ok" and outline.coverage < limits.failed_coverage:
+        apart = outlines_apart(outline.coverage)
         verdict, reason = "weak", f"{apart}: are these the points of this mannequin?"
     return ViewCalibration(
         view.name,
@@ -119,17 +126,19 @@ def _judged(view: View, drawing: Drawing, fit: LandmarkFit, surface: Surface) ->
     )
 
 
-def _verdict(fit: LandmarkFit, sigmas: Sigmas, height_px: float) -> tuple[Verdict, str]:
-    if fit.rms_px > MOST_RMS * height_px:
+def _verdict(
+    fit: LandmarkFit, sigmas: Sigmas, height_px: float, limits: VerdictThresholds
+) -> tuple[Verdict, str]:
+    if fit.rms_px > limits.most_landmarks_off * height_px:
         off = f"{100 * fit.rms_px / height_px:.0f} % of the height"
         return "failed", f"the landmarks are {off} off: other points, or another body's"
-    if sum(fit.probabilities[1:]) > 1 - SURE:
+    if sum(fit.probabilities[1:]) > 1 - limits.sure:
         yaw = np.degrees(angles_from_rotation(fit.poses[1].rotation)[0]) % 360
         p = fit.probabilities[1]
         return "ambiguous", f"yaw {yaw:.0f} fits as well (p = {p:.2f}): add a point off their plane"
     if fit.misplaced:
         return "weak", f"landmarks that do not fit the others: {', '.join(fit.misplaced)}"
-    if max(sigmas.yaw, sigmas.elevation) > WEAK_ANGLE:
+    if max(sigmas.yaw, sigmas.elevation) > np.radians(limits.weak_sigma_deg):
         worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
         return "weak", f"the landmarks hardly tell {worst}: add points farther from the others"
     return "ok", ""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.evidence.coherence_state import TELLING_VIEWS
 from toonset.calib.evidence.common_elevation import common_elevation
 from toonset.calib.evidence.face import read_faces
 from toonset.calib.evidence.texture import read_paint
@@ -304,10 +303,10 @@ class Problem:
 
     def pulled(
         self, joint: JointFit, model: ModelChoice, turn: Turn
-    ) -> Float[np.ndarray, " views"]:
-        """Return how far every view would turn without the locks, radians."""
+    ) -> Float[np.ndarray, " views"] | None:
+        """Return how far every view would turn without the locks, radians; None: there are none."""
         if not self.known.holds:
-            return np.zeros(len(joint.poses))
+            return None
         problem = JointProblem(self.fine, turn)
         free = problem.fit(
             joint.body, joint.poses, FREE_WIDTHS, MODELS[model.model], offset=joint.offset
@@ -321,7 +320,10 @@ class Problem:
 
     def _level(self, problem: JointProblem, joint: JointFit) -> JointProblem:
         """Return the problem with the mean elevation that the drawings agree on best."""
-        if len(self.views) < TELLING_VIEWS or "elevation" in self.known.locked:
+        if (
+            len(self.views) < self.options.thresholds.telling_views
+            or "elevation" in self.known.locked
+        ):
             return problem
         cameras = self.cameras(joint)
         found = common_elevation(self.views, cameras)

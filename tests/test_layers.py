@@ -38,7 +38,8 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "importers",
     ),
     "calib": (
-        "@options evidence outline",
+        "@options",
+        "evidence outline",
         "@mannequin_points fit",
         "@result search",
         "@known flaws verdict",

@@ -7,16 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toonset.calib.options import VerdictThresholds
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.coherence import coherence
 from toonset.view import View
-
-# Sheets with cameras that are right contradict themselves by 0.4 to 0.9 %, wrong ones by 1.8 % on
-MOST_CONTRADICTION = 0.012
-# Under it a mannequin of another shape is no reason to doubt the cameras (docs/decisions.md)
-CONFIRMING = 0.008
-STEEP = np.radians(30.0)  # turnarounds are drawn from about eye level, none of ours from above 20
-TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly anything
 
 
 @dataclass(frozen=True)
@@ -29,6 +23,7 @@ class SheetState:
         odd_view: the one drawing that disagrees with the others, if any.
         views: how many there are.
         elevation: of the typical camera, radians.
+        thresholds: where to begin to doubt.
     """
 
     yaw_observable: bool
@@ -36,11 +31,13 @@ class SheetState:
     odd_view: int | None
     views: int
     elevation: float
+    thresholds: VerdictThresholds = VerdictThresholds()
 
     @property
     def drawings_agree(self) -> bool:
         """Return whether the drawings do not contradict the cameras."""
-        return self.views >= TELLING_VIEWS and self.contradiction < MOST_CONTRADICTION
+        least, most = self.thresholds.telling_views, self.thresholds.most_contradiction
+        return self.views >= least and self.contradiction < most
 
     @property
     def drawings_confirm(self) -> bool:
@@ -54,28 +51,34 @@ class SheetState:
         How far all cameras look down is the mannequin's word alone: steeply, if its shape is
         another's.
         """
-        if self.views < TELLING_VIEWS:
-            return f"{TELLING_VIEWS} drawings or more could confirm the camera all the same"
-        if self.contradiction >= CONFIRMING:
+        limits = self.thresholds
+        if self.views < limits.telling_views:
+            return f"{limits.telling_views} drawings or more could confirm the camera all the same"
+        if self.contradiction >= limits.confirming_contradiction:
             off = f"{100 * self.contradiction:.1f} % of the height"
             return f"the drawings, {off} off each other, do not confirm the camera"
-        if abs(self.elevation) >= STEEP:
+        if abs(self.elevation) >= np.radians(limits.steep_deg):
             return "drawings from so steeply above cannot confirm the camera"
         return ""
 
 
 def state_of(
-    views: Sequence[View], cameras: Sequence[Camera], *, yaw_observable: bool = True
+    views: Sequence[View],
+    cameras: Sequence[Camera],
+    thresholds: VerdictThresholds = VerdictThresholds(),
+    *,
+    yaw_observable: bool = True,
 ) -> SheetState:
     """Return what the drawings say about each other under these cameras.
 
     Args:
         views: the drawings, at least one.
         cameras: theirs, in pixels of the views' crops.
+        thresholds: where to begin to doubt.
         yaw_observable: the mannequin looks different from different sides.
     """
     elevation = float(np.median([camera.angles[1] for camera in cameras]))
-    if len(views) < 2:
-        return SheetState(yaw_observable, float("nan"), None, len(views), elevation)
-    found = coherence(views, cameras)
-    return SheetState(yaw_observable, found.contradiction, found.odd_view, len(views), elevation)
+    found = coherence(views, cameras) if len(views) > 1 else None
+    contradiction = found.contradiction if found else float("nan")
+    odd = found.odd_view if found else None
+    return SheetState(yaw_observable, contradiction, odd, len(views), elevation, thresholds)

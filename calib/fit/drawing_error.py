@@ -52,6 +52,25 @@ class Noise:
 
 
 @dataclass(frozen=True, eq=False)
+class Residuals:
+    """How far outlines are apart, and how that changes with the unknowns.
+
+    Attributes:
+        px: (n,) across the drawn outline.
+        slopes: (n, u) their derivatives, px per unknown.
+        target_index: (n,) which drawn point a row aims at; rows of one point share its error.
+        shares: (n,) of the outline; they sum to one.
+        robust: (n,) weights in [0, 1].
+    """
+
+    px: Float[np.ndarray, " n"]
+    slopes: Float[np.ndarray, "n u"]
+    target_index: Int[np.ndarray, " n"]
+    shares: Float[np.ndarray, " n"]
+    robust: Float[np.ndarray, " n"]
+
+
+@dataclass(frozen=True, eq=False)
 class Marginal:
     """A view's normal equations with its drawing error integrated out, and what that error is.
 
@@ -89,51 +108,44 @@ def marginalise(
     modes: Float[np.ndarray, "points modes"],
     noise: Noise,
     height_px: float,
-    target_index: Int[np.ndarray, " n"],
-    rows: Float[np.ndarray, "n u"],
-    residuals: Float[np.ndarray, " n"],
-    shares: Float[np.ndarray, " n"],
-    robust: Float[np.ndarray, " n"],
+    off: Residuals,
     width: float,
     samples: float,
 ) -> Marginal:
-    """Return the normal equations of rows x = -residuals under the drawing's error.
+    """Return the normal equations of slopes x = -residuals under the drawing's error.
 
     Args:
         modes: of the drawing.
         noise: assumed.
         height_px: the figure's height.
-        target_index: which drawn point a row aims at; rows of one point share its error.
-        rows: derivatives of the residuals, px per unknown.
-        residuals: px across the outline.
-        shares: each row's share of the outline; sums to one.
-        robust: weight of each row in [0, 1].
+        off: the residuals.
         width: robust width over the height, for the energy.
         samples: how many independent samples the outline is worth.
     """
-    weights = shares * robust * samples / (noise.white * height_px) ** 2
-    per_point = np.bincount(target_index, weights, len(modes))
+    weighed = off.shares * off.robust
+    weights = weighed * samples / (noise.white * height_px) ** 2
+    per_point = np.bincount(off.target_index, weights, len(modes))
     inner = (modes * per_point[:, None]).T @ modes
     inner[np.diag_indices_from(inner)] += 1 / noise.smooth**2
-    both = np.column_stack([rows, residuals])
+    both = np.column_stack([off.slopes, off.px])
     weighted = both * weights[:, None]
     gathered = np.zeros((len(modes), both.shape[1]))
-    np.add.at(gathered, target_index, weighted)
+    np.add.at(gathered, off.target_index, weighted)
     projected = modes.T @ gathered
     factor = cho_factor(inner)
     solved = cho_solve(factor, projected)
     system = both.T @ weighted - projected.T @ solved
     bent = solved[:, -1]
-    rest = (residuals - (modes @ bent)[target_index]) / height_px
+    rest = (off.px - (modes @ bent)[off.target_index]) / height_px
     unsure = float(np.trace(cho_solve(factor, np.eye(len(bent))))) / noise.smooth**2
     capped = rest**2 * width**2 / (width**2 + rest**2)
     return Marginal(
         system[:-1, :-1],
         system[:-1, -1],
-        float(bent @ bent / noise.smooth**2 + samples * shares @ capped / noise.white**2),
+        float(bent @ bent / noise.smooth**2 + samples * off.shares @ capped / noise.white**2),
         float(bent @ bent),
         max(len(bent) - unsure, 1e-3),
-        float((shares * robust) @ rest**2 / (shares @ robust)),
+        float(weighed @ rest**2 / (off.shares @ off.robust)),
     )
 
 

@@ -24,6 +24,7 @@ from toonset.calib.fit.drawing_error import (
     ROUGH_POINTS,
     Marginal,
     Noise,
+    Residuals,
     error_modes,
     least_white,
     marginalise,
@@ -31,7 +32,7 @@ from toonset.calib.fit.drawing_error import (
 )
 from toonset.calib.fit.proportions import Body
 from toonset.calib.fit.sheet_prior import Spreads, Turn, anchors, locks, sheet_ties
-from toonset.calib.outline.correspondences import Drawing, match
+from toonset.calib.outline.correspondences import Drawing, Matches, match
 from toonset.calib.outline.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
 
 OFFSET_OF_HEIGHT = 0.006  # prior of the outline offset: a line's half width
@@ -196,47 +197,24 @@ class JointProblem:
         self, state: _State, model: SheetModel, index: int, width: float
     ) -> tuple[list[int], Marginal]:
         """Return which unknowns view `index` has and its normal equations."""
-        drawing, pose = self.drawings[index], state.poses[index]
+        drawing = self.drawings[index]
         if model.stretches:
             drawing = drawing.unstretched(state.stretches[index])
         height = drawing.height
-        found = match(drawing, state.body.surface, pose)
-        pixels, jacobian = project_with_jacobian(pose, found.points)
-        across = np.einsum("ni,nij->nj", found.normals, jacobian)
-        residuals = (found.normals * (pixels - found.targets)).sum(axis=1) + state.offset * height
-        views = len(state.poses)
-        where = list(range(PARAMETERS * index, PARAMETERS * (index + 1)))
-        parts = [across[:, :PARAMETERS]]
-        if model.perspective in ("shared", "per view"):
-            where.append(PARAMETERS * views + (index if model.perspective == "per view" else 0))
-            parts.append(across[:, PARAMETERS:])
-        first = _first_shared(model, views)
-        if model.stretches:
-            where.append(first - views + index)
-            by = np.array([0.5, -0.5]) * (found.targets - np.array(drawing.size_wh) / 2)
-            parts.append(-(found.normals * by).sum(axis=1)[:, None])
-        where.append(first)
-        parts.append(np.full((len(residuals), 1), height))
-        if model.proportions:
-            where.extend(range(first + 1, first + 1 + len(state.body.theta)))
-            by_point = np.einsum("ni,nij->nj", found.normals, pixel_slopes(pose, found.points))
-            slopes = state.body.slopes(state.body.at_rest(found.points))
-            parts.append(np.einsum("nj,njp->np", by_point, slopes))
+        found = match(drawing, state.body.surface, state.poses[index])
+        where, pixels, slopes = _derivatives(state, model, index, drawing, found)
         relative = found.distances / height
-        side = np.arange(len(residuals)) < found.drawn
+        side = np.arange(len(relative)) < found.drawn
         counts = np.where(side, found.drawn, max(len(side) - found.drawn, 1))
-        return where, marginalise(
-            self.modes[index],
-            state.noise,
-            height,
+        off = Residuals(
+            (found.normals * (pixels - found.targets)).sum(axis=1) + state.offset * height,
+            slopes,
             found.target_index,
-            np.hstack(parts),
-            residuals,
             1 / (2 * counts),
             (width**2 / (width**2 + relative**2)) ** 2,
-            width,
-            self.samples,
         )
+        modes = self.modes[index]
+        return where, marginalise(modes, state.noise, height, off, width, self.samples)
 
     def _system(self, state: _State, model: SheetModel, width: float, *, settled: bool) -> _System:
         size = self._size(state, model)
@@ -320,3 +298,30 @@ def _first_shared(model: SheetModel, views: int) -> int:
     """Return the index of the outline offset, after poses, distances and stretches."""
     distances = {"none": 0, "given": 0, "shared": 1, "per view": views}[model.perspective]
     return PARAMETERS * views + distances + views * model.stretches
+
+
+def _derivatives(
+    state: _State, model: SheetModel, index: int, drawing: Drawing, found: Matches
+) -> tuple[list[int], Float[np.ndarray, "n 2"], Float[np.ndarray, "n u"]]:
+    """Return which unknowns view `index` has, where its points are seen, and px per unknown."""
+    pose, views = state.poses[index], len(state.poses)
+    pixels, jacobian = project_with_jacobian(pose, found.points)
+    across = np.einsum("ni,nij->nj", found.normals, jacobian)
+    where = list(range(PARAMETERS * index, PARAMETERS * (index + 1)))
+    parts = [across[:, :PARAMETERS]]
+    if model.perspective in ("shared", "per view"):
+        where.append(PARAMETERS * views + (index if model.perspective == "per view" else 0))
+        parts.append(across[:, PARAMETERS:])
+    first = _first_shared(model, views)
+    if model.stretches:
+        where.append(first - views + index)
+        by = np.array([0.5, -0.5]) * (found.targets - np.array(drawing.size_wh) / 2)
+        parts.append(-(found.normals * by).sum(axis=1)[:, None])
+    where.append(first)
+    parts.append(np.full((len(pixels), 1), drawing.height))
+    if model.proportions:
+        where.extend(range(first + 1, first + 1 + len(state.body.theta)))
+        by_point = np.einsum("ni,nij->nj", found.normals, pixel_slopes(pose, found.points))
+        slopes = state.body.slopes(state.body.at_rest(found.points))
+        parts.append(np.einsum("nj,njp->np", by_point, slopes))
+    return where, pixels, np.hstack(parts)

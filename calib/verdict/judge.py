@@ -8,29 +8,17 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.evidence.coherence_state import MOST_CONTRADICTION, SheetState
+from toonset.calib.evidence.coherence_state import SheetState
 from toonset.calib.fit.align import Fit, measure
 from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.outline.correspondences import Drawing
-from toonset.calib.outline.occluding_contour import Surface
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
-from toonset.calib.search.hypotheses import OTHER, Candidates, is_twin
+from toonset.calib.search.hypotheses import OTHER, is_twin
 from toonset.camera import angles_from_rotation, rotation_distance
-from toonset.dataset.split_folder.view_labels import Label
 from toonset.view import View
 
-SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
-WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
-FAILED_COVERAGE = 0.70
-# Of the probability that faces are none: at most 0.2 on sheets with right cameras
-MOST_FACES_CONTRADICT = 0.5
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
-# 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
-MOST_PULL = np.radians(5.0)
-FAR_FROM_PLACE = np.radians(12.0)  # four times what artists are off an even turn
-FAR_FROM_LABEL = np.radians(60.0)  # three quarters is neither front nor side
-WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
 
 def measured(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
@@ -49,11 +37,9 @@ def typical_coverage(drawings: Sequence[Drawing], joint: JointFit) -> float:
 def judge_view(
     view: View,
     drawing: Drawing,
-    surface: Surface,
     joint: JointFit,
     index: int,
-    candidates: Candidates,
-    probability: Float[np.ndarray, " n"],
+    candidates: Sequence[tuple[float, Pose]],
     sheet: SheetState,
     *,
     differs: bool,
@@ -63,157 +49,44 @@ def judge_view(
     Args:
         view: the drawing.
         drawing: its outline, the sheet's offset taken off.
-        surface: the mannequin, bent where it was.
         joint: the sheet's fit.
         index: of the view.
-        candidates: what else it could be.
-        probability: of each candidate.
+        candidates: what else it could be, each with its probability.
         sheet: what the drawings say about each other.
         differs: the mannequin is another body than the drawn one.
     """
-    pose = joint.poses[index]
+    pose, middle = joint.poses[index], joint.body.surface.middle
     size_wh = (view.rgba.shape[1], view.rgba.shape[0])
-    fit = measure(drawing, surface, drawing.pose_in(pose))
+    fit = measure(drawing, joint.body.surface, drawing.pose_in(pose))
     own = slice(PARAMETERS * index, PARAMETERS * (index + 1))
     covariance = _in_view_pixels(joint.covariance[own, own], drawing.factor)
-    far = [
-        (float(p), f.pose)
-        for p, f in zip(probability, candidates.fits, strict=True)
-        if rotation_distance(f.pose.rotation, pose.rotation) > OTHER
-    ]
-    far.sort(key=lambda item: -item[0])
-    mirrored = [item for item in far if is_twin(pose, item[1])]
-    p_flip = sum(p for p, _ in mirrored)
-    twin = mirrored[0][1] if mirrored else pose.twin()
     sigmas = angle_sigmas(pose, covariance)
     if not sheet.yaw_observable:
         sigmas = replace(sigmas, yaw=float(np.pi / np.sqrt(3)))
+    far = [c for c in candidates if rotation_distance(c[1].rotation, pose.rotation) > OTHER]
+    far.sort(key=lambda item: -item[0])
+    mirrored = [item for item in far if is_twin(pose, item[1])]
     others = [item for item in far if not is_twin(pose, item[1])]
-    sideways = abs(np.cos(angles_from_rotation(pose.rotation)[0])) < SIDEWAYS
-    twin_is = "seen from below for above" if sideways else "front and back swapped"
-    verdict, reason = _verdict(fit.coverage, sigmas, p_flip, others, sheet, index, twin_is)
+    p_flip = sum(p for p, _ in mirrored)
+    verdict, reason = _verdict(fit.coverage, sigmas, p_flip, others, sheet, index, pose)
     if verdict == "ok" and not drawing.free.all() and differs:
         verdict = "weak"
         reason = (
             "the figure is cut off, and the mannequin another body: scale and shift are guesses"
         )
+    twin = mirrored[0][1] if mirrored else pose.twin()
     return ViewCalibration(
         view.name,
-        pose.camera(surface.middle, size_wh),
+        pose.camera(middle, size_wh),
         sigmas,
         covariance,
         p_flip,
-        twin.camera(surface.middle, size_wh),
-        tuple(Alternative(q.camera(surface.middle, size_wh), p) for p, q in far[:4]),
+        twin.camera(middle, size_wh),
+        tuple(Alternative(other.camera(middle, size_wh), p) for p, other in far[:4]),
         fit.error,
         fit.coverage,
         verdict,
         reason,
-    )
-
-
-def with_locks_in_mind(
-    views: Sequence[ViewCalibration], pulled: Float[np.ndarray, " views"]
-) -> list[ViewCalibration]:
-    """Return the views; none is ok that its outline would turn far from what is locked.
-
-    A wrong lock can hide in another number (elevation in scale) and its sigma is none, so that the
-    outlines alone look well met. Where most views are pulled, all are.
-
-    Args:
-        views: judged one by one.
-        pulled: how far every view turns where nothing is locked, radians.
-    """
-    least = MOST_PULL if np.median(pulled) < MOST_PULL else 0.0
-    return [
-        replace(
-            view,
-            verdict="weak",
-            reason=f"without the lock the outlines turn this view by {np.degrees(turn):.0f} "
-            "degrees: is what is locked right?",
-        )
-        if view.verdict == "ok" and turn > least
-        else view
-        for view, turn in zip(views, pulled, strict=True)
-    ]
-
-
-def with_places_in_mind(
-    views: Sequence[ViewCalibration], off: Float[np.ndarray, " views"]
-) -> list[ViewCalibration]:
-    """Return the views; none is ok that stands far off its place in the even turn.
-
-    The outline of another body can ask for that; that of one's own is to be believed.
-
-    Args:
-        views: judged one by one, with a mannequin that is another body.
-        off: how far they are turned off their places, radians; 0 where none is known.
-    """
-    away = np.abs(off - np.median(off))
-    reason = "turned {:.0f} degrees off even steps, and the mannequin is another body"
-    return [
-        replace(view, verdict="weak", reason=reason.format(np.degrees(turn)))
-        if view.verdict == "ok" and turn > FAR_FROM_PLACE
-        else view
-        for view, turn in zip(views, away, strict=True)
-    ]
-
-
-def with_labels_in_mind(
-    views: Sequence[ViewCalibration], labels: Sequence[Label]
-) -> list[ViewCalibration]:
-    """Return the views; none is ok that ended far from what its label says."""
-    judged = list(views)
-    for i, (view, label) in enumerate(zip(views, labels, strict=False)):
-        off = [abs((view.camera.angles[0] - yaw + np.pi) % (2 * np.pi) - np.pi) for yaw in label]
-        if view.verdict == "ok" and off and min(off) > FAR_FROM_LABEL:
-            reason = f"{np.degrees(min(off)):.0f} degrees from its label: which of them is right?"
-            judged[i] = replace(view, verdict="weak", reason=reason)
-    return judged
-
-
-def with_sheet_in_mind(
-    views: Sequence[ViewCalibration],
-    sheet: SheetState,
-    faces_contradict: float = 0.0,
-    *,
-    bent: bool = False,
-) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where the sheet as a whole is not.
-
-    A wrong body can match a side view's outline well, at a wrong angle; a mirrored one matches all
-    views, front and back swapped. A failed view has drawn the others along: they were fitted
-    together.
-
-    Args:
-        views: judged one by one.
-        sheet: what the drawings say about each other.
-        faces_contradict: probability that what looks like faces must be none.
-        bent: the mannequin was another body, its proportions were fitted.
-    """
-    typical = float(np.median([view.coverage for view in views]))
-    doubtful = sum(view.verdict != "ok" for view in views)
-    if typical < WEAK_COVERAGE and not sheet.drawings_confirm:
-        reason = (
-            f"in the sheet's typical view {_apart(typical)}: the mannequin's shape differs from "
-            f"the drawings'; {sheet.unconfirmed}"
-        )
-    elif bent and not sheet.drawings_confirm:
-        reason = f"the mannequin is another body, fitted to the drawings; {sheet.unconfirmed}"
-    elif any(view.verdict == "failed" for view in views):
-        reason = "a view of this sheet failed, and all were fitted together"
-    elif 2 * doubtful > len(views):
-        reason = f"{doubtful} of the sheet's {len(views)} views are uncertain"
-    elif faces_contradict > MOST_FACES_CONTRADICT:
-        reason = (
-            f"what looks like faces is not where these cameras have the front (p = "
-            f"{faces_contradict:.2f}): is the sheet, the mannequin or a label the wrong way round?"
-        )
-    else:
-        return tuple(views)
-    return tuple(
-        replace(view, verdict="weak", reason=reason) if view.verdict == "ok" else view
-        for view in views
     )
 
 
@@ -233,12 +106,12 @@ def judge_sheet(views: Sequence[ViewCalibration], sheet: SheetState) -> tuple[Ve
         return "weak", "a single drawing: nothing confirms its scale, elevation and perspective"
     if worst == "ok" and named:
         return "weak", named
-    if worst == "ok" and sheet.contradiction > MOST_CONTRADICTION:
+    if worst == "ok" and sheet.contradiction > sheet.thresholds.most_contradiction:
         off = f"{100 * sheet.contradiction:.1f} % of the height"
         return "weak", f"the drawings contradict each other by {off} under these cameras"
     typical = float(np.median([view.coverage for view in views]))
-    if worst == "ok" and typical < WEAK_COVERAGE and sheet.drawings_confirm:
-        apart = _apart(typical)
+    if worst == "ok" and typical < sheet.thresholds.weak_coverage and sheet.drawings_confirm:
+        apart = outlines_apart(typical)
         return "ok", f"the mannequin has another shape, {apart}; but the drawings fit together"
     return worst, named
 
@@ -259,6 +132,11 @@ def angle_sigmas(pose: Pose, covariance: Float[np.ndarray, "6 6"]) -> Sigmas:
     return Sigmas(yaw, elevation, roll, float(np.sqrt(covariance[5, 5])), shift)
 
 
+def outlines_apart(coverage: float) -> str:
+    """Return in words how much of the outlines does not meet."""
+    return f"{100 * (1 - coverage):.0f} % of the outlines are more than 5 % of the height apart"
+
+
 def _verdict(
     coverage: float,
     sigmas: Sigmas,
@@ -266,32 +144,30 @@ def _verdict(
     others: list[tuple[float, Pose]],
     sheet: SheetState,
     index: int,
-    twin_is: str,
+    pose: Pose,
 ) -> tuple[Verdict, str]:
-    apart = _apart(coverage)
-    if coverage < FAILED_COVERAGE and not sheet.drawings_agree:
+    limits, apart = sheet.thresholds, outlines_apart(coverage)
+    if coverage < limits.failed_coverage and not sheet.drawings_agree:
         return "failed", f"{apart}: this is not the mannequin's pose or shape"
     if not sheet.yaw_observable:
         return "ambiguous", "the body is a surface of revolution: yaw is not observable"
-    if p_flip > 1 - SURE:
+    if p_flip > 1 - limits.sure:
+        sideways = abs(np.cos(angles_from_rotation(pose.rotation)[0])) < SIDEWAYS
+        twin_is = "seen from below for above" if sideways else "front and back swapped"
         return "ambiguous", f"the mirror twin ({twin_is}) has p = {p_flip:.2f}"
     p_other = sum(p for p, _ in others)
-    if p_other > 1 - SURE:
+    if p_other > 1 - limits.sure:
         rival = _direction(others[0][1])
         return "ambiguous", f"{rival} fits as well, other directions have p = {p_other:.2f}"
     if index == sheet.odd_view:
         return "weak", "disagrees with the other drawings: wrong direction, mirrored or other scale"
-    if coverage < (FAILED_COVERAGE if sheet.drawings_confirm else WEAK_COVERAGE):
+    if coverage < (limits.failed_coverage if sheet.drawings_confirm else limits.weak_coverage):
         why = f"; {sheet.unconfirmed}" if sheet.unconfirmed else ""
         return "weak", f"{apart}: the mannequin's shape differs from the drawing's{why}"
-    if max(sigmas.yaw, sigmas.elevation) > WEAK_ANGLE:
+    if max(sigmas.yaw, sigmas.elevation) > np.radians(limits.weak_sigma_deg):
         worst = "yaw" if sigmas.yaw >= sigmas.elevation else "elevation"
         return "weak", f"the outline hardly changes with {worst}"
     return "ok", ""
-
-
-def _apart(coverage: float) -> str:
-    return f"{100 * (1 - coverage):.0f} % of the outlines are more than 5 % of the height apart"
 
 
 def _direction(pose: Pose) -> str:

@@ -8,7 +8,6 @@ where even the last link, the weakest, is none, there are two characters. Nothin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -16,7 +15,6 @@ from jaxtyping import Float
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.ndimage import gaussian_filter
 
-from toonset.calib.result import ViewCalibration
 from toonset.palette.colors import oklab_from_rgb
 from toonset.view import View
 
@@ -29,31 +27,6 @@ FEWEST_PIXELS = 200  # that lie deeper than the contour's ink; fewer, and ink co
 # Share of colours that two drawings have not in common. The weakest link of 40 sheets of one
 # character has at most 0.45, of nine in ten pairs of characters more than 0.5 (docs/decisions.md)
 MOST_APART = 0.5
-
-
-def with_one_character_in_mind(
-    views: Sequence[ViewCalibration], drawings: Sequence[View]
-) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where the drawings show two characters.
-
-    Args:
-        views: judged one by one.
-        drawings: theirs.
-    """
-    others = other_character(drawings)
-    if not others:
-        return tuple(views)
-    rest = [i for i in range(len(drawings)) if i not in others]
-    doubt = (
-        f"views {_listed(others)} have other colours than views {_listed(rest)}: if they show "
-        "another character, calibrate each by itself"
-    )
-    return tuple(
-        replace(view, verdict="weak", reason=doubt)
-        if view.verdict == "ok"
-        else replace(view, reason=f"{view.reason}; {doubt}")
-        for view in views
-    )
 
 
 def other_character(drawings: Sequence[View]) -> list[int]:
@@ -81,7 +54,3 @@ def _colors(view: View) -> Float[np.ndarray, "lightness a b"]:
     counts, _ = np.histogramdd(lab, [np.arange(0, 1 + 1.5 * BIN, BIN), sides, sides])
     blurred = gaussian_filter(counts, BLUR, mode="constant")
     return np.asarray(blurred / blurred.sum())
-
-
-def _listed(numbers: Sequence[int]) -> str:
-    return ", ".join(map(str, numbers))

@@ -9,14 +9,12 @@ Of silhouettes in one colour nothing is said: front and back may have equal ones
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import cv2
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.result import SEVERITY, ViewCalibration
 from toonset.view import View
 
 SIDE, SPREAD = 96, 0.2  # of the picture in pixels; the figure's standard deviation over the side
@@ -26,40 +24,6 @@ BLUR = 2.0  # sigma, pixels
 # alike drawings of a sheet (docs/decisions.md)
 MOST_NOISE = 0.04
 PLAIN = 4.0  # levels: standard deviation of one colour with a file's noise
-ELSEWHERE = np.radians(10.0)  # between cameras that see another side
-
-
-def with_repeats_in_mind(
-    views: Sequence[ViewCalibration], drawings: Sequence[View]
-) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where one drawing was given cameras on two sides.
-
-    At least one of these cameras is wrong, and every other's place in the turn may be. Nor is any
-    where all are one drawing: copies confirm nothing.
-
-    Args:
-        views: judged one by one.
-        drawings: theirs.
-    """
-    yaws = [view.camera.angles[0] for view in views]
-    same = repeated_drawings(drawings)
-    apart = [(i, j) for i, j in same if _turn(yaws[i], yaws[j]) > ELSEWHERE]
-    if apart:
-        first, second = apart[0]
-        reason = f"views {first} and {second} are the same drawing: remove one of them (--drop)"
-    elif 0 < len(views) - 1 == sum(i == 0 for i, _ in same):
-        reason = f"all {len(views)} views are the same drawing: nothing confirms its camera"
-    else:
-        return tuple(views)
-    failed = {i for pair in apart for i in pair}
-    return tuple(
-        replace(
-            view,
-            verdict="failed" if i in failed else max("weak", view.verdict, key=SEVERITY.index),
-            reason=reason,
-        )
-        for i, view in enumerate(views)
-    )
 
 
 def repeated_drawings(drawings: Sequence[View]) -> list[tuple[int, int]]:
@@ -70,11 +34,6 @@ def repeated_drawings(drawings: Sequence[View]) -> list[tuple[int, int]]:
         for i, j in combinations(pictures, 2)
         if np.square(pictures[i] - pictures[j]).sum(axis=-1).max() < MOST_NOISE**2
     ]
-
-
-def _turn(yaw: float, other: float) -> float:
-    """Return by how much two yaws differ, 0 to pi."""
-    return abs((yaw - other + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _is_painted(view: View) -> bool:

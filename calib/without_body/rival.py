@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from toonset.calib.known import Known
-from toonset.calib.options import Progress
+from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.result import Calibration
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
@@ -31,6 +31,7 @@ def without_body_if_better(
     given: bool,
     tell: Progress,
     cues: Cues | None = None,
+    options: CalibrationOptions = CalibrationOptions(),
 ) -> Calibration | None:
     """Return the calibration without a body if it explains the drawings better, else None.
 
@@ -46,12 +47,13 @@ def without_body_if_better(
         given: somebody chose the mannequin; then no view without it is better than weak.
         tell: called with the step's name and the share of it that is done.
         cues: of these drawings, if they were looked at before.
+        options: what to doubt.
     """
     fine = found.verdict != "failed" if given or any(known.placed) else found.is_certain
     if fine or len(views) < FEWEST or known.landmarks or known.cameras or known.locked:
         return None
     cues = cues or Cues(views)
-    alone = calibrate_without_body(views, known, tell, cues)
+    alone = calibrate_without_body(views, known, tell, cues, options)
     explains = found.verdict != "failed"
     worse = _odds(cues, alone, found, known) <= 0 if explains else alone.verdict == "failed"
     if worse:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from toonset.calib.fit.drawing_error import Noise, error_modes, marginalise, next_noise
+from toonset.calib.fit.drawing_error import Noise, Residuals, error_modes, marginalise, next_noise
 from toonset.calib.outline.correspondences import Drawing
 from toonset.dataset.silhouettes.contour import Contour
 
@@ -21,32 +21,23 @@ def problem(rng: np.random.Generator, drawing: Drawing):
     count = len(drawing.points)
     index = rng.integers(0, count, 2 * count)
     rows, residuals = rng.normal(size=(2 * count, 3)), rng.normal(size=2 * count)
-    return index, rows, residuals, np.full(2 * count, 0.5 / count), rng.uniform(0.2, 1, 2 * count)
+    shares, robust = np.full(2 * count, 0.5 / count), rng.uniform(0.2, 1, 2 * count)
+    return Residuals(residuals, rows, index, shares, robust)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_integrating_out_equals_generalised_least_squares(seed):
     drawing, noise = circle(), Noise(0.01, 0.004)
-    index, rows, residuals, shares, robust = problem(np.random.default_rng(seed), drawing)
+    off = problem(np.random.default_rng(seed), drawing)
     modes = error_modes(drawing)
-    found = marginalise(
-        modes,
-        noise,
-        drawing.height,
-        index,
-        rows,
-        residuals,
-        shares,
-        robust,
-        width=0.02,
-        samples=80.0,
-    )
-    white = (noise.white * drawing.height) ** 2 / (shares * robust * 80.0)
-    covariance = noise.smooth**2 * modes[index] @ modes[index].T + np.diag(white)
-    np.testing.assert_allclose(found.normal, rows.T @ np.linalg.solve(covariance, rows), rtol=1e-6)
-    np.testing.assert_allclose(
-        found.gradient, rows.T @ np.linalg.solve(covariance, residuals), rtol=1e-6, atol=1e-9
-    )
+    found = marginalise(modes, noise, drawing.height, off, width=0.02, samples=80.0)
+    white = (noise.white * drawing.height) ** 2 / (off.shares * off.robust * 80.0)
+    spread = modes[off.target_index]
+    covariance = noise.smooth**2 * spread @ spread.T + np.diag(white)
+    normal = off.slopes.T @ np.linalg.solve(covariance, off.slopes)
+    gradient = off.slopes.T @ np.linalg.solve(covariance, off.px)
+    np.testing.assert_allclose(found.normal, normal, rtol=1e-6)
+    np.testing.assert_allclose(found.gradient, gradient, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(("smooth", "white"), [(0.01, 0.002), (0.005, 0.003)])
@@ -63,19 +54,8 @@ def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
             residuals = modes @ rng.normal(0, smooth, modes.shape[1])
             residuals += rng.normal(0, white * drawing.height, count)
             rows = np.zeros((count, 0))
-            marginal = marginalise(
-                modes,
-                estimate,
-                drawing.height,
-                index,
-                rows,
-                residuals,
-                shares,
-                np.ones(count),
-                1.0,
-                80.0,
-            )
-            views.append(marginal)
+            off = Residuals(residuals, rows, index, shares, np.ones(count))
+            views.append(marginalise(modes, estimate, drawing.height, off, 1.0, 80.0))
         estimate = next_noise(views, 0.0, 1.0)
     assert estimate.smooth == pytest.approx(smooth, rel=0.25)
     assert estimate.white == pytest.approx(white, rel=0.5)
@@ -83,21 +63,9 @@ def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
 
 def test_a_bent_drawing_costs_information():
     drawing = circle()
-    index, rows, residuals, shares, robust = problem(np.random.default_rng(5), drawing)
-    modes = error_modes(drawing)
+    off, modes = problem(np.random.default_rng(5), drawing), error_modes(drawing)
     rigid, bent = (
-        marginalise(
-            modes,
-            Noise(s, 0.004),
-            drawing.height,
-            index,
-            rows,
-            residuals,
-            shares,
-            robust,
-            0.02,
-            80.0,
-        ).normal
+        marginalise(modes, Noise(s, 0.004), drawing.height, off, 0.02, 80.0).normal
         for s in (1e-5, 0.02)
     )
     assert (np.linalg.eigvalsh(rigid - bent) > -1e-9).all()

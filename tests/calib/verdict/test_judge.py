@@ -1,4 +1,4 @@
-"""What is known of a sheet weakens its views: elevation, labels, locks, other views."""
+"""Checks of a sheet weaken its views: elevation, labels, locks, other views."""
 
 import math
 from dataclasses import replace
@@ -6,16 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toonset.calib.evidence.coherence_state import CONFIRMING, TELLING_VIEWS, SheetState
+from toonset.calib.evidence.coherence_state import SheetState
+from toonset.calib.options import VerdictThresholds
 from toonset.calib.result import Sigmas, ViewCalibration
-from toonset.calib.verdict.elevations import with_elevations_in_mind
-from toonset.calib.verdict.judge import (
-    judge_sheet,
-    with_labels_in_mind,
-    with_locks_in_mind,
-    with_places_in_mind,
-    with_sheet_in_mind,
-)
+from toonset.calib.verdict.checks import CHECKS, JudgedSheet, apply_checks
+from toonset.calib.verdict.judge import judge_sheet
 from toonset.camera import Camera
 
 
@@ -33,42 +28,53 @@ def verdicts(views) -> list[str]:
     return [view.verdict for view in views]
 
 
+def state(
+    views: int = 3,
+    contradiction: float = 0.0,
+    elevation: float = 0.1,
+    limits: VerdictThresholds = VerdictThresholds(),
+) -> SheetState:
+    return SheetState(True, contradiction, None, views, elevation, limits)
+
+
+def after(check: str, views, sheet_state: SheetState | None = None, **known):
+    """Return the views after one check."""
+    sheet = JudgedSheet(tuple(views), (), sheet_state or state(len(views)), **known)
+    return apply_checks(sheet, {check: CHECKS[check]})
+
+
 def test_a_view_that_looks_up_where_the_sheet_looks_down_is_not_ok():
-    views = [seen_from(elevation_deg=e) for e in (10, 8, 12, -10)]
-    judged = with_elevations_in_mind(views)
+    judged = after("elevations", [seen_from(elevation_deg=e) for e in (10, 8, 12, -10)])
     assert verdicts(judged) == ["ok", "ok", "ok", "weak"]
     assert "mirrored" in judged[3].reason
 
 
 def test_a_view_that_leaves_the_even_turn_is_not_ok():
     views = [seen_from(yaw_deg=y) for y in (23, 90, 181, 270)]
-    judged = with_places_in_mind(views, np.radians([23, 0, 0, 0]))
+    judged = after("even steps", views, off_places=np.radians([23, 0, 0, 0]))
     assert verdicts(judged) == ["weak", "ok", "ok", "ok"]
     assert "23 degrees" in judged[0].reason
-    assert verdicts(with_places_in_mind(views, np.radians([11, -1, 1, 0]))) == ["ok"] * 4
+    for off in (np.radians([11, -1, 1, 0]), None):
+        assert verdicts(after("even steps", views, off_places=off)) == ["ok"] * 4
 
 
 def test_a_sheet_that_looks_up_is_not_ok():
-    judged = with_elevations_in_mind([seen_from(elevation_deg=e) for e in (-7, -8, -9, 8)])
+    judged = after("elevations", [seen_from(elevation_deg=e) for e in (-7, -8, -9, 8)])
     assert verdicts(judged) == ["weak"] * 4
     assert "mirrored" in judged[0].reason
-    assert verdicts(with_elevations_in_mind([seen_from(elevation_deg=-3)])) == ["ok"]
+    assert verdicts(after("elevations", [seen_from(elevation_deg=-3)])) == ["ok"]
 
 
 def test_a_view_far_from_its_label_is_not_ok_and_no_label_says_nothing():
     views = [seen_from(yaw_deg=y) for y in (20, 170, 170)]
-    labels = [(0.0,), (0.0,), ()]
-    assert verdicts(with_labels_in_mind(views, labels)) == ["ok", "weak", "ok"]
+    assert verdicts(after("labels", views, labels=[(0.0,), (0.0,), ()])) == ["ok", "weak", "ok"]
+    assert verdicts(after("labels", views)) == ["ok"] * 3
 
 
 def test_views_that_turn_without_their_lock_are_not_ok():
     views = [seen_from() for _ in range(3)]
-    assert verdicts(with_locks_in_mind(views, np.radians([1, 2, 9]))) == ["ok", "ok", "weak"]
-    assert verdicts(with_locks_in_mind(views, np.radians([9, 2, 9]))) == ["weak"] * 3
-
-
-def state(views: int = 3, contradiction: float = 0.0, elevation: float = 0.1) -> SheetState:
-    return SheetState(True, contradiction, None, views, elevation)
+    assert verdicts(after("locks", views, pulled=np.radians([1, 2, 9]))) == ["ok", "ok", "weak"]
+    assert verdicts(after("locks", views, pulled=np.radians([9, 2, 9]))) == ["weak"] * 3
 
 
 @pytest.mark.parametrize("how", ["bent", "faces", "uncertain", "shape", "failed"])
@@ -81,22 +87,33 @@ def test_no_view_is_ok_where_the_sheet_is_not(how):
     if how == "failed":
         views[0] = replace(views[0], verdict="failed")
     faces = 0.9 if how == "faces" else 0.0
-    judged = with_sheet_in_mind(views, state(), faces, bent=how == "bent")
+    judged = after("sheet", views, faces_contradict=faces, bent=how == "bent")
     assert judged[2].verdict == "weak"
     assert judged[2].reason
-    assert verdicts(with_sheet_in_mind([seen_from()] * 3, state())) == ["ok"] * 3
+    assert verdicts(after("sheet", [seen_from()] * 3)) == ["ok"] * 3
 
 
 @pytest.mark.parametrize("bent", [True, False])
 def test_another_shape_is_no_reason_to_doubt_where_many_drawings_agree(bent):
-    views = [replace(seen_from(), coverage=0.85) for _ in range(TELLING_VIEWS)]
-    agreeing = state(TELLING_VIEWS)
-    assert verdicts(with_sheet_in_mind(views, agreeing, bent=bent)) == ["ok"] * len(views)
+    limits = VerdictThresholds()
+    views = [replace(seen_from(), coverage=0.85) for _ in range(limits.telling_views)]
+    agreeing = state(len(views))
+    assert verdicts(after("sheet", views, agreeing, bent=bent)) == ["ok"] * len(views)
     verdict, said = judge_sheet(views, agreeing)
     assert verdict == "ok"
     assert "15 %" in said
-    steep = state(TELLING_VIEWS, elevation=math.radians(40))
-    for other in (state(TELLING_VIEWS - 1), state(TELLING_VIEWS, 1.01 * CONFIRMING), steep):
-        judged = with_sheet_in_mind(views, other, bent=bent)
+    steep = state(len(views), elevation=math.radians(40))
+    contradicting = state(len(views), 1.01 * limits.confirming_contradiction)
+    for other in (state(len(views) - 1), contradicting, steep):
+        judged = after("sheet", views, other, bent=bent)
         assert verdicts(judged) == ["weak"] * len(views)
         assert other.unconfirmed in judged[0].reason
+
+
+def test_thresholds_and_checks_are_options():
+    views = tuple(seen_from(elevation_deg=e) for e in (10, 8, 12, -10))
+    strict = state(4, limits=VerdictThresholds(far_from_level_deg=2.5))
+    assert verdicts(after("elevations", views, strict)) == ["ok", "ok", "weak", "weak"]
+    sheet = JudgedSheet(views, (), state(4))
+    without = apply_checks(sheet, {"elevations": CHECKS["elevations"]}, ["elevations"])
+    assert verdicts(without) == ["ok"] * 4

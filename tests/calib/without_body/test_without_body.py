@@ -12,7 +12,7 @@ import trimesh
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
 from toonset.calib.known import Known
-from toonset.calib.verdict.judge import SURE
+from toonset.calib.options import VerdictThresholds
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
 from toonset.calib.without_body.rival import WITHOUT
@@ -180,7 +180,7 @@ def test_drawings_that_are_no_turn_are_never_ok() -> None:
 
 def test_a_bundle_without_a_body_has_no_mannequin(tmp_path: Path) -> None:
     found = calibrate(sheet(RING), "none", Hints(labels="front,?,?,?,?,?,?,?"))
-    assert found.views[0].p_flip < 1 - SURE
+    assert found.views[0].p_flip < 1 - VerdictThresholds().sure
     bundle = write_bundle(tmp_path / "bundle", found)
     assert bundle.mannequin is None
     names = sorted(path.name for path in (tmp_path / "bundle").iterdir())
