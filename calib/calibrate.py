@@ -70,11 +70,8 @@ def calibrate(
     if cues is None or not cues.are_of(views):
         cues = Cues(views)
     if isinstance(mesh, str):
-        _check_without_body(hints)
+        known = _known_without_body(hints, views)
         with threadpool_limits(1, user_api="blas"):
-            known = known_of(hints, views, {})
-            if known.landmarks:
-                raise UsageError("landmarks need a mannequin; drop them or --mesh none")
             alone = calibrate_without_body(views, known, progress, cues, options)
             return _alone(views, alone, hints, seed, options)
     body = _Body.of(mesh)
@@ -108,7 +105,7 @@ def calibrate(
     )
 
 
-def _check_without_body(hints: Hints) -> None:
+def _known_without_body(hints: Hints, views: Sequence[View]) -> Known:
     for name, value in {
         "--landmarks": hints.landmarks,
         "--init": hints.init,
@@ -116,6 +113,10 @@ def _check_without_body(hints: Hints) -> None:
     }.items():
         if value:
             raise UsageError(f"{name} needs a mannequin; drop it or --mesh none")
+    known = known_of(hints, views, {})
+    if known.landmarks:
+        raise UsageError("landmarks need a mannequin; drop them or --mesh none")
+    return known
 
 
 def _alone(

@@ -126,51 +126,52 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
     problem = fitted.problem
     with _timed(seconds, "joint"):
         bent = problem.bent(fitted.rigid, fitted.turn)
-        joint, differs = bent.joint, bent.differs
+        joint = bent.joint
         model = replace(bent.model, tried=(*tried, *bent.model.tried))
-    options = problem.options
     with _timed(seconds, "judge"):
         problem.progress("judge", 0.0)
-        observable = turns_visibly(problem.templates)
-        state = state_of(
-            problem.views, problem.cameras(joint), options.thresholds, yaw_observable=observable
-        )
-        inset = [drawing.inset(joint.offset) for drawing in problem.fine]
-        final = problem.alternatives(inset, joint, model, fitted.candidates, differs=differs)
-        sure = problem.sheet.probabilities(final)
-        poses = [
-            [(float(p), fit.pose) for p, fit in zip(own, view.fits, strict=True)]
-            for own, view in zip(sure, final, strict=True)
-        ]
-        each = tuple(
-            judge_view(v, inset[i], joint, i, poses[i], state, differs=differs)
-            for i, v in enumerate(problem.views)
-        )
-        labels = problem.known.labels  # of every view they are no even steps
-        even = np.isfinite(fitted.turn.places).all() and not (labels and all(labels))
-        sheet = JudgedSheet(
-            each,
-            problem.views,
-            state,
-            labels,
-            off_places(joint.poses, fitted.turn) if differs and even else None,
-            problem.pulled(joint, model, fitted.turn),
-            problem.sheet.faces_contradict(final),
-            model.bends_mannequin,
-        )
-        judged = apply_checks(sheet, without=options.without)
-    verdict, reason = judge_sheet(judged, state)
+        sheet = _judged_one_by_one(fitted, bent)
+        views = apply_checks(sheet, without=problem.options.without)
+    verdict, reason = judge_sheet(views, sheet.state)
     return Calibration(
-        judged,
+        views,
         model,
         joint.offset,
         joint.noise,
-        state.contradiction,
+        sheet.state.contradiction,
         joint.body.surface.vertices + problem.surface.middle,
         verdict,
         reason,
         seconds,
         fitted.cuts,
+    )
+
+
+def _judged_one_by_one(fitted: _Fitted, bent: SheetFit) -> JudgedSheet:
+    problem, joint, model, differs = fitted.problem, bent.joint, bent.model, bent.differs
+    observable = turns_visibly(problem.templates)
+    limits = problem.options.thresholds
+    state = state_of(problem.views, problem.cameras(joint), limits, yaw_observable=observable)
+    inset = [drawing.inset(joint.offset) for drawing in problem.fine]
+    final = problem.alternatives(inset, joint, model, fitted.candidates, differs=differs)
+    poses = [
+        [(float(p), fit.pose) for p, fit in zip(own, view.fits, strict=True)]
+        for own, view in zip(problem.sheet.probabilities(final), final, strict=True)
+    ]
+    labels = problem.known.labels  # of every view they are no even steps
+    even = np.isfinite(fitted.turn.places).all() and not (labels and all(labels))
+    return JudgedSheet(
+        tuple(
+            judge_view(v, inset[i], joint, i, poses[i], state, differs=differs)
+            for i, v in enumerate(problem.views)
+        ),
+        problem.views,
+        state,
+        labels,
+        off_places(joint.poses, fitted.turn) if differs and even else None,
+        problem.pulled(joint, model, fitted.turn),
+        problem.sheet.faces_contradict(final),
+        model.bends_mannequin,
     )
 
 

@@ -31,6 +31,7 @@ from toonset.cli.common.output import (
 from toonset.write import check_output
 
 if TYPE_CHECKING:
+    from toonset.calib.hints import Hints
     from toonset.calib.result import Calibration
     from toonset.dataset.split_folder.load import Sheet
     from toonset.mesh import Mesh
@@ -137,19 +138,14 @@ def calibrate(
     Writes a bundle: transforms.json, images/, calibration.json, overlay.png and mannequin.obj. Exit
     code 3 when a view is weak, ambiguous or failed; the files are written then too.
     """
-    from toonset.calib.calibrate import calibrate as find
     from toonset.calib.hints import Hints
     from toonset.calib.verdict.report import calibration_dict
     from toonset.calib.write_bundle import write_bundle
     from toonset.dataset.bundle.bundle import WRITTEN
-    from toonset.dataset.bundle.transforms_read import transforms_file
-    from toonset.dataset.mesh.load import load_mesh
-    from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
     from toonset.dataset.split_folder.view_labels import front_label
-    from toonset.errors import LandmarkError, PictureError, SheetError, UsageError
-    from toonset.read import check_there
+    from toonset.errors import UsageError
 
     lock = tuple(lock.value for lock in locked or ())
     hints = Hints(labels, landmarks, landmarks_only, init, lock, corrections)
@@ -158,17 +154,9 @@ def calibrate(
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
     Cutting(boxes, grid, background, drop).check()
     printer = Printer(as_json, quiet, verbose)
-    check_there(sheets, "picture", PictureError)
-    check_there([landmarks], "landmark", LandmarkError)
-    check_there([boxes], "boxes", SheetError)
-    if corrections is not None:
-        Given.of(corrections).check_beside(front=front is not None)
-    if init is not None:
-        transforms_file(init)
+    _check_files(sheets, hints, boxes, front=front is not None)
     given = None if str(mesh) == NO_BODY else mesh
-    body: Mesh | Literal["none"] | None = NO_BODY if mesh is not None else None
-    if given is not None:
-        body = load_mesh(given)
+    body = _body(mesh)
     check_output(out, [*sheets, given, landmarks, init, boxes, corrections], WRITTEN, force=force)
     sheet = split_sheet(
         sheets,
@@ -179,9 +167,46 @@ def calibrate(
         labels=labels,
         corrections=corrections,
     )
-
     if front is not None:
         hints = replace(hints, labels=front_label(front, len(sheet.views)))
+    found = _fitted(sheet, body, hints, seed, printer)
+    write_bundle(out, found, force=force)
+    _say_result(found, out, printer)
+    printer.result({"bundle": out, **calibration_dict(found)}, str(out))
+    if not found.is_certain:
+        raise typer.Exit(UNCERTAIN)
+
+
+def _check_files(sheets: list[Path], hints: Hints, boxes: Path | None, *, front: bool) -> None:
+    """Refuse files that are missing, or that say what an option says, too."""
+    from toonset.dataset.bundle.transforms_read import transforms_file
+    from toonset.dataset.split_folder.corrected import Given
+    from toonset.errors import LandmarkError, PictureError, SheetError
+    from toonset.read import check_there
+
+    landmarks = None if hints.landmarks is None else Path(hints.landmarks)
+    check_there(sheets, "picture", PictureError)
+    check_there([landmarks], "landmark", LandmarkError)
+    check_there([boxes], "boxes", SheetError)
+    if hints.corrections is not None:
+        Given.of(hints.corrections).check_beside(front=front)
+    if hints.init is not None:
+        transforms_file(Path(hints.init))
+
+
+def _body(mesh: Path | None) -> Mesh | Literal["none"] | None:
+    """Return the mannequin that --mesh names."""
+    from toonset.dataset.mesh.load import load_mesh
+
+    if mesh is None:
+        return None
+    return NO_BODY if str(mesh) == NO_BODY else load_mesh(mesh)
+
+
+def _fitted(
+    sheet: Sheet, body: Mesh | Literal["none"] | None, hints: Hints, seed: int, printer: Printer
+) -> Calibration:
+    from toonset.calib.calibrate import calibrate as find
 
     @cache
     def say_inputs() -> None:  # once, when nothing of them is refused any more
@@ -193,11 +218,7 @@ def calibrate(
 
     found = find(sheet.views, body, hints, seed=seed, progress=progress)
     say_inputs()
-    write_bundle(out, found, force=force)
-    _say_result(found, out, printer)
-    printer.result({"bundle": out, **calibration_dict(found)}, str(out))
-    if not found.is_certain:
-        raise typer.Exit(UNCERTAIN)
+    return found
 
 
 def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Printer) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -69,7 +71,6 @@ def mesh(
     --variants puts more palettes into one GLB, as variants (KHR_materials_variants) that viewers
     and engines switch between: the run's own, "original", first, then one per file.
     """
-    printer = Printer(as_json, quiet)
     if outline and not texture:
         raise typer.BadParameter("--outline belongs to --texture")
     if nearest and not variants:
@@ -84,13 +85,12 @@ def mesh(
     from toonset.nerf.surface.textured_files import check_textured_files, textured_files
 
     trained = recolored(read_field(run), recolor or [])
-    if texture:
-        check_textured_files(out, outline=outline, force=force, variants=bool(variants))
-    else:
-        check_mesh_files(out, force=force, variants=bool(variants))
+    check = partial(check_textured_files, outline=outline) if texture else check_mesh_files
+    check(out, force=force, variants=bool(variants))
     others = variants_of(trained, variants or [], nearest=nearest)
     if threads is not None:
         torch.set_num_threads(threads)
+    printer = Printer(as_json, quiet)
 
     def progress(step: str, done: float) -> None:
         printer.progress(f"{step} {done:.0%}")
@@ -99,25 +99,27 @@ def mesh(
     if texture:
         textured = textured_surface_of(trained, faces, progress, outline=outline, variants=others)
         surface, files = textured.surface, textured_files(textured, out)
-        by_field = float((textured.source < 0).mean())
-        values = {"texture": list(textured.atlas.size_wh), "by_field": by_field}
+        values["texture"] = list(textured.atlas.size_wh)
+        values["by_field"] = float((textured.source < 0).mean())
     else:
         surface = surface_of(trained, faces, progress, variants=others)
         files = mesh_files(surface, out)
     write_mesh_files(files, out)
     if others:
         values["variants"] = [ORIGINAL, *(name for name, _ in others)]
-    sizes = {name: len(data) for name, data in files.items()}
-    count = len(surface.faces)
-    fewest = " (fewer would open it)" if count > faces else ""
-    drawn = ""
-    if texture:
+    values |= {"faces": len(surface.faces), "vertices": len(surface.vertices)}
+    values["bytes"] = {name: len(data) for name, data in files.items()}
+    printer.result({"out": out, **values}, _text(out, values, faces))
+
+
+def _text(out: Path, values: Mapping[str, Any], faces: int) -> str:
+    """Return in a line what was written; `faces` were asked for."""
+    parts = [f"{values['faces']} faces{' (fewer would open it)' * (values['faces'] > faces)}"]
+    if "texture" in values:
         width, height = values["texture"]
         unseen = f"{values['by_field']:.0%} of the faces in no drawing"
-        drawn = f" texture of {width} x {height} px, {unseen};"
-    colored = f" in the colours {', '.join(values['variants'])};" if others else ""
-    printer.result(
-        {"out": out, "faces": count, "vertices": len(surface.vertices), "bytes": sizes, **values},
-        f"{out}: {count} faces{fewest};{drawn}{colored} "
-        + ", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes.items()),
-    )
+        parts.append(f"texture of {width} x {height} px, {unseen}")
+    if "variants" in values:
+        parts.append(f"in the colours {', '.join(values['variants'])}")
+    sizes = (f"{name} {size / 1e3:.0f} kB" for name, size in values["bytes"].items())
+    return f"{out}: {'; '.join([*parts, ', '.join(sizes)])}"

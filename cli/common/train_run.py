@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -83,15 +84,23 @@ def run(request: Request, printer: Printer) -> int:
     if request.preview_every is not None:
         shutil.rmtree(request.previews, ignore_errors=True)
     printer.result({"run": request.run, **metrics}, summary(request.run, metrics, printer.verbose))
-    doubts = [f"weak: {reason}" for reason in metrics["verdict"]["reasons"]]
     stopped = found.training.stopped
-    if stopped == INTERRUPTED:
-        doubts.append(f"stopped after step {metrics['steps']} of {metrics['steps_asked']}")
-    elif stopped not in FINE:
-        doubts.append(f"training stopped early: {stopped}")
+    doubts = _doubts(metrics, stopped)
     for doubt in doubts:
         printer.doubt(f"{request.run}: {doubt}")
     if stopped == INTERRUPTED:
         return stopper.exit_code
     doubtful = stopped not in FINE or (request.strict and bool(doubts))
     return DOUBTFUL if doubtful else 0
+
+
+def _doubts(metrics: Mapping[str, Any], stopped: str) -> list[str]:
+    """Return what speaks against a run, a line each."""
+    from toonset.nerf.run.monitor import INTERRUPTED
+
+    doubts = [f"weak: {reason}" for reason in metrics["verdict"]["reasons"]]
+    if stopped == INTERRUPTED:
+        doubts.append(f"stopped after step {metrics['steps']} of {metrics['steps_asked']}")
+    elif stopped not in FINE:
+        doubts.append(f"training stopped early: {stopped}")
+    return doubts

@@ -92,17 +92,8 @@ def make_turnaround(
         CameraError: the perspective's camera stands within the mesh.
         SetupError: EGL or Mesa is missing.
     """
-    jitter, sizes, bends, artist = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
-    )
+    yaws, errors, hands, paper = _errors(options, seed)
     following = part_numbers(mesh, options.following_parts)
-    turns = np.arange(options.views) * (2 * math.pi / options.views)
-    spread = math.radians(options.yaw_jitter_deg)
-    yaws = (turns + spread * jitter.uniform(-1, 1, options.views)) % (2 * math.pi)
-    errors = 1 + options.scale_error_percent / 100 * sizes.uniform(-1, 1, options.views)
-    seeds = bends.integers(2**63, size=options.views)
-    paper, *own = artist.spawn(options.views + 1)
-    hands = [Hand(int(s), *hand.spawn(4)) for s, hand in zip(seeds, own, strict=True)]
     limbs, of_body = find_body_parts(mesh, landmarks or {}), options.artist.body
     drawn = [
         turn_parts(deform(mesh, limbs, of_body, yaw, hand.body), following, yaw)
@@ -117,13 +108,9 @@ def make_turnaround(
         draw_cell(posed, paints, camera, JUMP * mesh.height, options, hand)
         for posed, camera, hand in zip(drawn, cameras, hands, strict=True)
     ]
-    grid = _grid(options)
-    pictures = [cell.drawing.rgba for cell in cells]
-    sheet = paste(pictures, grid, options.background_rgb)
-    if options.artist.captions:
-        sheet = with_captions(sheet, grid)
+    grid, pictures = _grid(options), [cell.drawing.rgba for cell in cells]
     return Turnaround(
-        sheet=with_grain(sheet, options.artist.grain_levels, paper),
+        sheet=_sheet(pictures, grid, options, paper),
         views=tuple(
             View(cell.drawing.rgba, grid.box(i), cell.line_px, f"{i:03d}.png")
             for i, cell in enumerate(cells)
@@ -140,6 +127,37 @@ def make_turnaround(
         options=options,
         seed=seed,
     )
+
+
+def _errors(
+    options: SynthOptions, seed: int
+) -> tuple[
+    Float[np.ndarray, " views"], Float[np.ndarray, " views"], list[Hand], np.random.Generator
+]:
+    """Return yaws (radians), factors of size, what draws every view, and the paper's stream."""
+    jitter, sizes, bends, artist = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
+    )
+    turns = np.arange(options.views) * (2 * math.pi / options.views)
+    spread = math.radians(options.yaw_jitter_deg)
+    yaws = (turns + spread * jitter.uniform(-1, 1, options.views)) % (2 * math.pi)
+    factors = 1 + options.scale_error_percent / 100 * sizes.uniform(-1, 1, options.views)
+    seeds = bends.integers(2**63, size=options.views)
+    paper, *own = artist.spawn(options.views + 1)
+    hands = [Hand(int(s), *hand.spawn(4)) for s, hand in zip(seeds, own, strict=True)]
+    return yaws, factors, hands, paper
+
+
+def _sheet(
+    pictures: Sequence[UInt8[np.ndarray, "height width 4"]],
+    grid: CellGrid,
+    options: SynthOptions,
+    paper: np.random.Generator,
+) -> UInt8[np.ndarray, "height width 4"]:
+    sheet = paste(pictures, grid, options.background_rgb)
+    if options.artist.captions:
+        sheet = with_captions(sheet, grid)
+    return with_grain(sheet, options.artist.grain_levels, paper)
 
 
 def _grid(options: SynthOptions) -> CellGrid:

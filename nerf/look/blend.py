@@ -177,7 +177,7 @@ def _box(mask: Bool[np.ndarray, "height width"], room: int = 4) -> tuple[slice, 
 
 
 def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
-    camera, pen, own_color = view.camera, drawings.pen, _straight(view)
+    camera, own_color = view.camera, _straight(view)
     sight = None
     if drawings.shape is not None:
         sight = drawings.shape.seen(camera, normals=drawings.shade is not None)
@@ -195,32 +195,58 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
             covered, view.depth, STEP * drawings.height, SLIVER * figure_px
         )
         color, labels = color[tuple(source)], labels[tuple(source)]
-    scale = camera.scale / cameras[first].scale
-    line_px = pen.width_px * scale if pen else 0.0
-    turn = float(np.arccos(np.clip(cameras[first].rotation[2] @ camera.rotation[2], -1, 1)))
-    part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
-    whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
-    soft = view.alpha + part * (whole[..., 3] - view.alpha)
-    border += float(part) * (SOLID - border)
-    hole_px = HOLE_PX if drawings.bent and sight is None else CRUMB_PX
-    alpha, ink = crisp_outline(soft, border, line_px, figure_px, hole_px)
-    if sight is not None:
-        ink = np.maximum(ink, np.minimum(_inner_lines(drawings, sight, scale), alpha))
     solid = view.alpha > SOLID
     by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
     if solid.any():
         at = nearest(solid)
         color, labels = color[at], labels[at]
-    tone: Float[np.ndarray, "h w 3"] = np.ones((1, 1, 3), np.float32)
     if sight is not None and drawings.shade is not None:
-        tone = drawings.shade.tone(smoothed(sight.normal, figure_px), FINER)
+        color = color * drawings.shade.tone(smoothed(sight.normal, figure_px), FINER)
+    scale = camera.scale / cameras[first].scale
+    turn = float(np.arccos(np.clip(cameras[first].rotation[2] @ camera.rotation[2], -1, 1)))
+    whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
+    part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
+    rgb, alpha, ink = _inked(drawings, view, color, border, scale, sight, whole, part)
+    return DrawnView(rgb, alpha, ink, labels, color, by_field)
+
+
+def _inked(
+    drawings: Drawings,
+    view: Geometry,
+    paint: Float[np.ndarray, "h w 3"],
+    border: float,
+    scale: float,
+    sight: Sight | None,
+    whole: Float[np.ndarray, "h w 4"],
+    part: np.float32,
+) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
+    """Return colour, coverage and ink of paint with its lines.
+
+    Args:
+        drawings: whose lines.
+        view: what is seen of the field.
+        paint: straight colour.
+        border: opacity at the outline.
+        scale: of the view over the nearest drawing's.
+        sight: what the view shows of the mannequin's shape, if the field is one.
+        whole: the nearest drawing, premultiplied, moved to the view.
+        part: of it in the result.
+    """
+    pen = drawings.pen
+    line_px = pen.width_px * scale if pen else 0.0
+    soft = view.alpha + part * (whole[..., 3] - view.alpha)
+    border += float(part) * (SOLID - border)
+    hole_px = HOLE_PX if drawings.bent and sight is None else CRUMB_PX
+    figure_px = drawings.height * view.camera.scale
+    alpha, ink = crisp_outline(soft, border, line_px, figure_px, hole_px)
+    if sight is not None:
+        ink = np.maximum(ink, np.minimum(_inner_lines(drawings, sight, scale), alpha))
     drawn_with = np.array(pen.rgb if pen else (0, 0, 0)) / np.float32(255)
-    paint = color * tone
     rgb = paint * (alpha - ink)[..., None] + ink[..., None] * drawn_with
     if pen == drawings.outline:  # the drawing's own line, too
         rgb = rgb + part * (np.minimum(whole[..., :3], whole[..., 3:]) - rgb)
         alpha = alpha + part * (whole[..., 3] - alpha)
-    return DrawnView(rgb, alpha, ink, labels, paint, by_field)
+    return rgb, alpha, ink
 
 
 def _inner_lines(drawings: Drawings, sight: Sight, scale: float) -> Float[np.ndarray, "h w"]:

@@ -95,8 +95,8 @@ def fit_field(
     generator = torch.Generator().manual_seed(options.seed)
     tell("comparing the drawings")
     ready = prepare(scene, options)
-    if options.steps is None:
-        options = replace(options, steps=STEPS_ON_SHAPE if ready.shape else USUAL_STEPS)
+    usual = STEPS_ON_SHAPE if ready.shape else USUAL_STEPS
+    options = replace(options, steps=usual if options.steps is None else options.steps)
     whole, symmetry = add_mirrored_views(ready.scene) if options.symmetry else (ready.scene, None)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
@@ -108,8 +108,7 @@ def fit_field(
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
         tell("choosing the planes")
-        choice = _choice(ready.scene, hull, weights, options, device, agree=ready.agree)
-        torch.default_generator.manual_seed(options.seed)
+        choice = _choice(ready, hull, weights, options, device)
     cells = choice.cells if choice else options.resolution or finest_cells(scene)
     clock.append(time.perf_counter())
     tell("laying out the rays")
@@ -126,10 +125,8 @@ def fit_field(
     seconds = dict(zip(PARTS, np.diff(clock).tolist(), strict=True))
     seconds["steps"] = history[-1].seconds if history else 0.0  # without what the watch has taken
     counts |= {"views": len(scene.frames), "parameters": sum(p.numel() for p in model.parameters())}
-    result = _finished(start, options)
-    return Training(
-        result, options, tuple(history), stopped, ready, evidence, seconds, counts, symmetry, choice
-    )
+    said = (evidence, seconds, counts, symmetry, choice)
+    return Training(_finished(start, options), options, tuple(history), stopped, ready, *said)
 
 
 def _hull(scene: Scene, options: TrainOptions, ready: Prepared) -> tuple[Hull, HullEvidence]:
@@ -156,19 +153,16 @@ def _height(hull: Hull) -> float:
 
 
 def _choice(
-    scene: Scene,
-    hull: Hull,
-    weights: Weights,
-    options: TrainOptions,
-    device: torch.device,
-    *,
-    agree: bool,
+    ready: Prepared, hull: Hull, weights: Weights, options: TrainOptions, device: torch.device
 ) -> FieldChoice:
-    """Return how fine the planes are that this scene needs."""
+    """Return how fine the planes are that this scene needs; the seed is set anew."""
+    scene, samples = ready.scene, MOST_SAMPLES // TRIAL_STRIDE
     step = TRIAL_STRIDE * float(hull.box.size.max()) / STEPS_ALONG
-    ground = Ground(scene, hull, step, MOST_SAMPLES // TRIAL_STRIDE, weights, options, device)
-
-    return choose_cells(ground, finest_cells(scene), partial(planes_of, hull), agree=agree)
+    ground = Ground(scene, hull, step, samples, weights, options, device)
+    planes = partial(planes_of, hull)
+    choice = choose_cells(ground, finest_cells(scene), planes, agree=ready.agree)
+    torch.default_generator.manual_seed(options.seed)
+    return choice
 
 
 def planes_of(hull: Hull, cells: int) -> TriplaneField:
