@@ -1,4 +1,4 @@
-"""Drawings and a mannequin to cameras: what `toonset calibrate` does between files."""
+"""Calibrate a sheet's cameras: everything `toonset calibrate` does between reading and writing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Views and a mannequin to cameras: coarse hypotheses, contour alignment, the sheet together.
+"""Find a sheet's cameras: template search, contour alignment, joint adjustment, model selection.
 
 1. templates: silhouettes of the mesh over yaw and elevation; the best overlaps start each view, and
    the turns (or labels) that explain the whole sheet start all views

@@ -1,4 +1,4 @@
-"""What a person says of the views, as typed, and what that means for these drawings."""
+"""Parse what a person says of the views, and resolve it for these drawings."""
 
 from __future__ import annotations
 

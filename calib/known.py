@@ -1,4 +1,4 @@
-"""What a person knows before calibration: labels, landmarks, cameras to start from, and locks."""
+"""Hold what is known before calibration: labels, landmarks, initial cameras, locks."""
 
 from __future__ import annotations
 

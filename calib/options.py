@@ -1,4 +1,4 @@
-"""How hard calibration looks. Imports nothing heavy."""
+"""Define the options of calibration. Imports nothing heavy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sheet on its way from drawings to cameras: search, selection, camera model, body, alternatives.
+"""Run the steps of calibration: search, selection, camera model, body, alternatives.
 
 What `toonset.calib.find_cameras` does one after the other, each a step from plain data to plain
 data.

@@ -1,4 +1,4 @@
-"""What calibration returns: cameras, how sure they are, and what else they could be."""
+"""Define the result of calibration: cameras, uncertainties, alternatives."""
 
 from __future__ import annotations
 

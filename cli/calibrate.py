@@ -1,4 +1,4 @@
-"""`toonset calibrate`: drawings to cameras."""
+"""`toonset calibrate`: find the cameras of drawings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`toonset export`: a bundle in another program's format."""
+"""`toonset export`: write a bundle in another program's format."""
 
 from __future__ import annotations
 

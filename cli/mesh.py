@@ -1,4 +1,4 @@
-"""`toonset mesh`: a trained run as a mesh in palette colours."""
+"""`toonset mesh`: write a trained run as a mesh in palette colours."""
 
 from __future__ import annotations
 

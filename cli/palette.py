@@ -1,4 +1,4 @@
-"""`toonset palette`: a character's colours and its label maps; `toonset recolor`: other colours."""
+"""`toonset palette` and `recolor`: find colours and labels; change the drawings' colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`toonset render`: pictures of a trained run from given cameras or all round."""
+"""`toonset render`: render a trained run from given cameras or all round."""
 
 from __future__ import annotations
 

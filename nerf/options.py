@@ -1,4 +1,4 @@
-"""What can be set about training and rendering. Imports nothing heavy."""
+"""Define the options of training and rendering. Imports nothing heavy."""
 
 from __future__ import annotations
 

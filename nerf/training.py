@@ -1,4 +1,4 @@
-"""A scene to a run: what `toonset train` does between reading a bundle and writing the run."""
+"""Train a run on a scene: everything `toonset train` does between reading and writing."""
 
 from __future__ import annotations
 

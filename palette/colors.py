@@ -1,4 +1,4 @@
-"""OKLab: a colour space in which distances match what people see.
+"""Convert colours to OKLab, whose distances match what people see.
 
 Lightness L in [0, 1], a (green to red) and b (blue to yellow) within about +-0.3. A distance of
 0.02 is just noticeable side by side. Source: B. Ottosson, "A perceptual color space for image

@@ -1,4 +1,4 @@
-"""A palette and its label maps as a person corrected them.
+"""Apply a person's corrections to a palette and its label maps.
 
 Every colour that was found has colours that it becomes: itself; the one that it is merged into;
 those that it is split into; all that are left, if it is dropped. A pixel that was labelled with it

@@ -1,4 +1,4 @@
-"""What a person corrects of a palette, as corrections.json has it.
+"""Define the corrections of a palette, as corrections.json has them.
 
 Colours are named by the hex that palette.json has for them.
 """

@@ -1,4 +1,4 @@
-"""How far paints cover every pixel: label maps whose borders are finer than pixels.
+"""Compute how far paints cover every pixel: label maps with sub-pixel borders.
 
 Two ranks per pixel, as Cryptomatte keeps them (Friedman and Jones 2015): the paint that covers most
 of it, the next one, and how far the first covers it. Drawn lines cover what both leave.

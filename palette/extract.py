@@ -1,4 +1,4 @@
-"""Drawings to a palette and label maps: what `toonset palette` does between reading and writing."""
+"""Find and label the drawings' palette: all that `toonset palette` does between files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Colours with names: those of palette files, and plain ones so that people can talk."""
+"""Name colours: names of palette files, and plain ones so that people can talk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawings in other colours of their palette: what `toonset recolor` does between files."""
+"""Recolour drawings by their palette: all that `toonset recolor` does between files."""
 
 from __future__ import annotations
 

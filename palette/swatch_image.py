@@ -1,4 +1,4 @@
-"""A palette as a picture for people: blocks with name, code and share; the left-out ones below."""
+"""Draw a palette for people: blocks with name, code and share; the left-out ones below."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cameras: orthographic and pinhole as one nested model, and the conventions of toonset.
+"""Define cameras, orthographic and pinhole as one nested model, and toonset's conventions.
 
 Conventions, stated once:
 

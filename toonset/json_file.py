@@ -1,4 +1,4 @@
-"""JSON files of a bundle: read strictly, named by a schema, checked against it.
+"""Read JSON files strictly, and validate them against a schema.
 
 A file says what it is in `schema` (see `toonset.read`): readers ignore keys that they do not
 know, for later versions may add some. A camera is the exception: a number more could change where

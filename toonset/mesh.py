@@ -1,4 +1,4 @@
-"""A triangle mesh: the mannequin, in world coordinates."""
+"""Define a triangle mesh: the mannequin, in world coordinates."""
 
 from __future__ import annotations
 

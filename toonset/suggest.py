@@ -1,4 +1,4 @@
-"""What a mistyped word was meant to be."""
+"""Suggest what a mistyped word was meant to be."""
 
 from __future__ import annotations
 

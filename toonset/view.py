@@ -1,4 +1,4 @@
-"""A view: one drawing of the character, cut out of its sheet."""
+"""Define a view: one drawing of the character, cut out of its sheet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writing without half-written results: temporary name, flush to disk, rename."""
+"""Write files without half-written results: temporary name, flush to disk, rename."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the drawings of a sheet say about each other under their cameras, the mannequin aside."""
+"""Measure how far a sheet's silhouettes contradict each other under its cameras, without a mesh."""
 
 from __future__ import annotations
 

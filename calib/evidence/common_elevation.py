@@ -1,4 +1,4 @@
-"""How far all cameras of a sheet look down too little or too much, from the drawings alone.
+"""Estimate the elevation error that all cameras of a sheet share, from the drawings alone.
 
 A common error of elevation is what drawings contradict most (see `coherence_state`): a foot in
 front goes down when seen from above, the same foot goes up when seen from behind, and the profile

@@ -1,4 +1,4 @@
-"""A drawing as a stack of cross-sections: where on the turning body a pixel lies.
+"""Read a figure as a stack of round cross-sections: each pixel's longitude on the turning body.
 
 Every row's widest run of figure pixels is taken for a round cross-section seen from the side: a
 pixel at `t` in [-1, 1] across it lies `asin(t)` to the right of the point that faces the viewer.

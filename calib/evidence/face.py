@@ -1,4 +1,4 @@
-"""Where is the face? What the inside of the head says about yaw, view by view.
+"""Compute each view's likelihood of yaw from facial features inside the head.
 
 A face has skin, more drawing than a back of the head, and small dark spots: eyes, mouth, brows.
 Each of these cues is a density over the head; it says twice where the face is:

@@ -1,4 +1,4 @@
-"""Paint on a turning body: which yaws make the drawings' colours agree.
+"""Compute the likelihood of a sheet's yaws from the colours painted on the turning body.
 
 Outlines have mirror twins: yaw and 180 - yaw look the same under orthography. What is painted on
 the body does not: between two views it moves to the left or to the right, comes round one edge and

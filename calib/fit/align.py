@@ -1,4 +1,4 @@
-"""Contour alignment of one view: robust two-sided point-to-line Gauss-Newton, from one start.
+"""Align one view's contour by robust two-sided point-to-line Gauss-Newton, from one start.
 
 Residuals, in pixels of the working scale: (a) every point of the occluding contour against the
 nearest drawn one, (b) every drawn point against the nearest of the occluding contour, both along

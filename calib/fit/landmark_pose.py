@@ -1,4 +1,4 @@
-"""Camera poses from pairs of a mannequin's point and its pixel: starts and their refinement.
+"""Solve a camera's pose from pairs of 3D points and pixels: closed-form starts and refinement.
 
 Orthographic, n >= 3 points X, pixels U = shift + s R12 X (R12: the first two rows of a rotation):
 

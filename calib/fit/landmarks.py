@@ -1,4 +1,4 @@
-"""Cameras from landmarks: pairs of a mannequin's point and the pixel that shows it, per view.
+"""Solve cameras from landmarks: pairs of a point of the mannequin and its pixel, per view.
 
 Landmarks determine a camera alone, or start the contour fit where the outline is ambiguous. Pairs
 nearly in a plane have two cameras that fit alike; both are returned with their probabilities

@@ -1,4 +1,4 @@
-"""No more camera, and no more body, than the drawings ask for: models from simple to rich, by BIC.
+"""Select the camera model and the body by BIC, from simple to rich.
 
 1. orthographic, one scale: where everything begins
 2. perspective, one distance for the sheet

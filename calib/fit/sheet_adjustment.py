@@ -1,4 +1,4 @@
-"""All views of a sheet at once: Gauss-Newton over every camera, what they share, and the body.
+"""Adjust all cameras of a sheet jointly by Gauss-Newton, with shared parameters and the body.
 
 Unknowns: per view a rotation increment, shift and log scale; then k = 1 / distance (none, one for
 the sheet, or one per view), the outline offset (a drawn contour line lies outside of the

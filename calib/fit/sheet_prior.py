@@ -1,4 +1,4 @@
-"""What the views of a sheet share: elevation, scale, upright figures, an evenly spaced turn.
+"""Build a sheet's hierarchical prior: common elevation and scale, no roll, evenly spaced yaws.
 
 Each shared quantity q_i = mean + deviation_i, deviation_i ~ N(0, spread^2), with the mean free (or
 near a known value) and the spread itself estimated on the sheet: an inverse-gamma prior worth a few

@@ -1,4 +1,4 @@
-"""Bodies that turn from drawing to drawing: what a sheet's own scatter says of its cameras.
+"""Widen sigmas where bodies differ between drawings, by the scatter of elevation and roll.
 
 An artist draws a slightly different body every time: a head turned, arms swung, the whole figure
 leaning a little. To a fit of one body that looks like another camera,

@@ -1,4 +1,4 @@
-"""Which ruled sides of a sheet's figures are cuts: what the mannequin says with and without them.
+"""Decide which straight sides are crops by fitting the mannequin with and without them.
 
 A side that may be a cut is left out of the outlines, and the sheet fitted again. At the picture's
 edge the cut must then explain the rest far better: a whole figure may touch the edge. Within the

@@ -1,4 +1,4 @@
-"""Holes that the drawing from the other side contradicts: they are paint in the paper's colour.
+"""Fill holes that the drawing from the other side contradicts: paint in the paper's colour.
 
 One drawing cannot always tell a gap between arm and body from a white buckle on white paper; the
 splitter assumes (`toonset.dataset.split.holes`). Once cameras are known, a second drawing can tell:

@@ -1,4 +1,4 @@
-"""Drawings that are taller or lower than their width asks for, by as much as the sheet proves.
+"""Estimate drawings' aspect ratios, and the mannequin's, as far as the sheet proves them.
 
 An artist squashes a drawing, a layout program stretches another; and a mannequin has another build
 than the character. One number per drawing, the log of its height over its width, is fitted with the

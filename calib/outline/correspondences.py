@@ -1,4 +1,4 @@
-"""Corresponding points of a drawing and the mannequin's outline at a pose.
+"""Match a drawing's outline with the mannequin's occluding contour at a pose.
 
 Every point of the occluding contour is matched with the nearest drawn one, and every drawn point
 with the nearest occluding one. "Nearest" is measured over position and outline direction together,

@@ -1,4 +1,4 @@
-"""A view's candidate cameras: what contour alignment reaches from several starts, and the twins.
+"""Refine a view's candidate cameras by contour alignment, and add their mirror twins.
 
 A candidate's negative log-likelihood is n / 2 * log(cost), noise profiled out, with the number n of
 independent outline errors.

@@ -1,4 +1,4 @@
-"""Which candidates of the views make a sheet: selections compared by a joint fit.
+"""Select one candidate per view by fitting selections jointly.
 
 Every view brings its candidates. A selection takes one of each, is fitted as a sheet at low
 resolution with a common camera distance, and scored by likelihood and by what is shared (elevation,

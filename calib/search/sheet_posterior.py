@@ -1,4 +1,4 @@
-"""Which candidates of a sheet's views belong together, and how probable each is.
+"""Compute the posterior of a sheet's candidate cameras, over turns and elevations.
 
 Two things tie the views together, both unknown and summed out on a grid:
 

@@ -1,4 +1,4 @@
-"""The templates of a mesh, kept in the user's cache folder between runs.
+"""Cache a mesh's templates in the user's cache folder.
 
 A file is named by the hash of the mesh and of the templates' settings, so it never is out of date.
 Whatever goes wrong with the folder (no home, no permission, a full disk, a damaged file), templates

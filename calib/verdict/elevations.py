@@ -1,4 +1,4 @@
-"""What the elevations of a sheet's cameras say about them: mirrored drawings fit in their twins."""
+"""Check a sheet's elevations for outliers and views from below, as mirrored drawings give."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How sure: probabilities of the alternatives, uncertainties in angles, verdicts in words."""
+"""Judge cameras: probabilities of alternatives, angular uncertainties, verdicts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A calibration as plain data: the content of calibration.json, and one line per view."""
+"""Report a calibration: the content of calibration.json, and one line per view."""
 
 from __future__ import annotations
 

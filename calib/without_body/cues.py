@@ -1,4 +1,4 @@
-"""What drawings show, whatever a person says of them: found once, when it is first asked for.
+"""Compute the drawings' own cues lazily, each once.
 
 A sheet that is corrected is fitted again and again; these are its drawings' own and stay.
 """

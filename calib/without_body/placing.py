@@ -1,4 +1,4 @@
-"""Cameras of a turn without a body: placed by the drawings' boxes, then made to cohere.
+"""Place a turn's cameras by the drawings' boxes, then make the silhouettes coherent.
 
 World frame: +Y up, the axis of the turn; +Z the front; the origin in the middle of the figure,
 which is about 1 high. All cameras of a sheet have one elevation, one perspective and one scale;

@@ -1,4 +1,4 @@
-"""How probable the turns of a sheet are, from all that drawings show without a body.
+"""Compute the posterior of a sheet's turns from paint, faces, shins and outlines.
 
 - **Paint** moves as the body turns: which way round, and where the axis of symmetry lies.
 - **Faces and detail** look to the front: heads have eyes, fronts have buttons.

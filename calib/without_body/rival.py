@@ -1,4 +1,4 @@
-"""A mannequin against no body at all: whose cameras explain the drawings better?"""
+"""Compare a mannequin with no body at all by how well their cameras explain the drawings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Turns that are no even ring: every view's yaw from outlines and paint.
+"""Estimate every view's yaw where a turn is not evenly spaced, from outlines and paint.
 
 Coordinate ascent from several starts: outlines alone know uneven yaws to 13 degrees (five views,
 six characters), with the paint that moves as the body turns to 7 (docs/decisions.md).

@@ -1,4 +1,4 @@
-"""The table of `toonset export`: what each format writes, wants and says."""
+"""List the formats of `toonset export`: writer, inputs and hint of each."""
 
 from __future__ import annotations
 

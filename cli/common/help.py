@@ -1,4 +1,4 @@
-"""Help in plain text: under panels as the verbs name them, without the 0.3 s that rich costs.
+"""Print help in plain text, with panels, without the 0.3 s of importing rich.
 
 Also what a mistyped choice was meant to be.
 """

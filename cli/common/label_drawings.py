@@ -1,4 +1,4 @@
-"""Drawings to their palette and label maps, as a person corrected them: `palette` and `edit`."""
+"""Find and label the drawings' palette with a person's corrections, for `palette` and `edit`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a command prints: results on stdout, progress and reasons on stderr."""
+"""Print results to stdout, progress and reasons to stderr."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One training as the command line asks for it, from reading the bundle to the files of the run."""
+"""Run `toonset train` from reading the bundle to writing the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `toonset train` says at its end."""
+"""Format the summary that `toonset train` prints at its end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""While a field is fitted: what is said, and Ctrl-C, which finishes the step and writes the run.
+"""Print a training's progress; on Ctrl-C finish the step and write the run.
 
 Before the first step there is nothing to write, so the signal ends the program as everywhere else;
 a second one ends it at any time.

@@ -1,4 +1,4 @@
-"""One server per bundle: a file beside it names the process and its port."""
+"""Lock a bundle for one server, by a file beside it that names process and port."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bundle made again from its sheet and corrections, as the command line would make it."""
+"""Rebuild a bundle from its sheet and corrections, as the command line would."""
 
 from __future__ import annotations
 

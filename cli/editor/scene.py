@@ -1,4 +1,4 @@
-"""What the page shows of a sheet and its bundle, as numbers and pictures: see `page/types.js`."""
+"""Collect what the page shows of a sheet and its bundle: see `page/types.js`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page's server: one page and four questions, for one person at this machine.
+"""Serve the page and its four requests to one person at this machine.
 
 The standard library's server is enough, and nothing has to be installed or kept up to date: one
 person asks a few times a minute. It listens on 127.0.0.1 alone, on a port that the system chooses,

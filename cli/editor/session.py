@@ -1,4 +1,4 @@
-"""One bundle that a person corrects: what they did, kept at once, and what it makes of the bundle.
+"""Keep a person's corrections of a bundle on disk, and refit the bundle in a thread.
 
 Whatever comes in is on disk, in corrections.json, before it is answered. Fitting follows in a
 thread of its own: always with the newest corrections, so what comes in meanwhile replaces what

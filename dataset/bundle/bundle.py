@@ -1,4 +1,4 @@
-"""The bundle on disk: what calibration hands to palette, training and other programs.
+"""Read a bundle: what calibration hands to palette, training and other programs.
 
     transforms.json    cameras (see `toonset.dataset.bundle.transforms`)
     images/000.png     RGBA crops, straight alpha

@@ -1,4 +1,4 @@
-"""calibration.json, both ways."""
+"""Read and write calibration.json."""
 
 from __future__ import annotations
 

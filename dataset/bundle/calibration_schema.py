@@ -1,4 +1,4 @@
-"""calibration.json as a schema: what calibration found, how sure it is, and where it comes from.
+"""Define the schema of calibration.json: cameras, uncertainties, inputs.
 
 Angles are degrees, lengths world units or pixels of the view, as each name says. Unknown keys are
 ignored on reading (within a major version keys may be added), except in a camera.

@@ -1,4 +1,4 @@
-"""The exact camera as a record: what stands under a frame's `toonset` key."""
+"""Define the exact camera's record, which stands under a frame's `toonset` key."""
 
 from __future__ import annotations
 

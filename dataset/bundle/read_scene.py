@@ -1,4 +1,4 @@
-"""A scene from disk: pictures, their cameras, and labels where a palette stands beside them."""
+"""Read a scene from disk: pictures, cameras, and labels where there is a palette."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a bundle or any transforms.json folder holds, as plain data, without decoding its pictures.
+"""Summarise a bundle or any transforms.json folder as plain data, without decoding pictures.
 
 A broken part is named under `damaged` and left out; `toonset.dataset.bundle.check` looks at all.
 """

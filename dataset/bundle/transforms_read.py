@@ -1,4 +1,4 @@
-"""transforms.json to cameras and pictures: every frame checked, every path inside the folder."""
+"""Read transforms.json: check every frame, and that every path stays inside the folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a transforms.json may hold: nerfstudio's, instant-ngp's, Blender's, and toonset's own.
+"""Define the schema of transforms.json: keys of nerfstudio, instant-ngp, Blender and toonset.
 
 Unknown keys are other programs' business and are ignored, except lens distortion, which would bend
 what is seen (`toonset.dataset.bundle.transforms_camera` refuses it).

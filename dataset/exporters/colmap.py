@@ -1,4 +1,4 @@
-"""Writing COLMAP datasets with pycolmap: what 3D Gaussian splatting and many others read.
+"""Write a COLMAP dataset with pycolmap, for 3D Gaussian splatting and many others.
 
     images/000.png          RGB over white: COLMAP, GLOMAP and splatting trainers ignore alpha or
                             each treat it in another way

@@ -1,4 +1,4 @@
-"""Lenses that other programs can hold: the principal point in the middle, one lens for all views.
+"""Fit cameras to other programs' lenses: a centred principal point, one lens for all views.
 
 An orthographic view is free to choose: any point of its target's plane may be the principal one,
 and its far pinhole may stand at any distance. So its picture is only ever padded, never resampled.

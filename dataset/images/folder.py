@@ -1,4 +1,4 @@
-"""The pictures of a folder, in the order in which people count."""
+"""List a folder's pictures in natural order: view2 before view10."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures in and out: one safe way to decode, one to encode.
+"""Decode and encode pictures in one safe way.
 
 Pillow decodes behind an allow-list of formats; the size is capped from the header before anything
 is decoded. The format is recognised by content, so a PNG named `.jpg` reads fine and a text file

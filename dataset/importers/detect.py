@@ -1,4 +1,4 @@
-"""Cameras and pictures of other programs: recognised, read, and named for a bundle.
+"""Detect the format of other programs' cameras, and read them.
 
 transforms.json, transforms_train.json ...    nerfstudio, instant-ngp, NeRF's synthetic scenes
 sparse/0, sparse, or a model's own folder     COLMAP (.bin or .txt, old or new layout)

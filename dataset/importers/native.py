@@ -1,4 +1,4 @@
-"""Reading toonset.json beside an export: the exact cameras, preferred to the format's pinholes."""
+"""Read toonset.json beside an export: exact cameras, preferred to the format's pinholes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where an imported view's picture and mask lie: inside the folders that were named."""
+"""Find an imported view's picture and mask inside the folders that were named."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writing imported views as a bundle: RGBA pictures, cameras, and the mannequin if there is one."""
+"""Write imported views as a bundle: RGBA pictures, cameras, and the mannequin if there is one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Landmark files: which pixel of a drawing shows which point of the mannequin.
+"""Read landmark files: which pixel of a drawing shows which point of the mannequin.
 
 JSON:
 

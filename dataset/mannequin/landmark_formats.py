@@ -1,4 +1,4 @@
-"""The two formats of landmark files, JSON and CSV, as plain records; nothing is looked up here."""
+"""Parse landmark files, JSON or CSV, into plain records."""
 
 from __future__ import annotations
 

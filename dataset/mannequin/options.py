@@ -1,4 +1,4 @@
-"""What the default mannequin looks like: proportions and pose. Nothing heavy is imported."""
+"""Define the default mannequin's options, proportions and pose. Imports nothing heavy."""
 
 from __future__ import annotations
 

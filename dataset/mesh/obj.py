@@ -1,4 +1,4 @@
-"""Wavefront OBJ: vertices with colours, polygons, objects and groups, material colours.
+"""Read Wavefront OBJ: vertices with colours, polygons, objects and groups, material colours.
 
 Our own reader: trimesh takes index 0 for the first vertex, counts negative indices from the file's
 end, and names parts by their materials.

@@ -1,4 +1,4 @@
-"""Do the drawings agree with each other under their cameras? Needs no mesh.
+"""Measure how far silhouettes cohere under their cameras, without a mesh.
 
 Under the right cameras every outline point of a view is the picture of some point of the body, and
 that point lies inside (or on the outline of) every other silhouette. With the signed distance D_j

@@ -1,4 +1,4 @@
-"""The drawn outline: sub-pixel contour points with outward normals.
+"""Extract the drawn outline: sub-pixel contour points with outward normals.
 
 The contour is the 0.5 level of the view's alpha (marching squares), holes included, resampled at
 even spacing. Coordinates are pixels of the view, first pixel's centre at (0.5, 0.5).

@@ -1,4 +1,4 @@
-"""How wide the drawn contour line of a figure is."""
+"""Measure the width of a figure's drawn contour line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of a picture is the figure."""
+"""Compute a picture's figure mask from its alpha."""
 
 from __future__ import annotations
 

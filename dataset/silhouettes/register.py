@@ -1,4 +1,4 @@
-"""Moving a sheet's drawings until their outlines are those of one body, as little as it takes.
+"""Register a sheet's drawings: the least displacements that make their outlines one body's.
 
 Minimised over the numbers c_v of all drawings at once, by Gauss-Newton:
 

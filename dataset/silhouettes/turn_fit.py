@@ -1,4 +1,4 @@
-"""Turning, placing and sizing a sheet's cameras until its outlines are those of one body.
+"""Fit yaws, shifts and sizes of a sheet's cameras until its outlines are those of one body.
 
 Minimised over each camera's shift, growth and yaw, by Gauss-Newton:
 

@@ -1,4 +1,4 @@
-"""What of a sheet is background: its colour or its gradient, its noise, and how far pixels are off.
+"""Estimate a sheet's background and its noise, and each pixel's difference from it.
 
 No more is modelled than the border asks for: one colour; else a quadratic gradient; else a smooth
 field (`toonset.dataset.split.background_field`).

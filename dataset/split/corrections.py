@@ -1,4 +1,4 @@
-"""Corrections of a sheet's first look, one after the other: each proposes a better one, or nothing.
+"""Correct a sheet's first segmentation step by step: each proposes a better one, or nothing.
 
 `./run bench split` runs the sheets with each of them left out.
 """

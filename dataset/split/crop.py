@@ -1,4 +1,4 @@
-"""Where each figure of a sheet stands and which pixels are its own, before its edge is softened."""
+"""Crop each figure of a sheet: its box and its own pixels, before the edge is matted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Enclosed patches in the background's colour: holes, or white eyes, shirts and paper?
+"""Tell holes from white eyes, shirts and paper among patches in the background's colour.
 
 A picture alone cannot always tell; these rules say what is assumed. A patch is a hole (the gap
 between arm and body) if all of this holds:

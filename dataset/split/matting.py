@@ -1,4 +1,4 @@
-"""Cutting a figure out of a plain background: soft edge and pure colours.
+"""Matte a figure from a plain background: soft alpha and unmixed colours.
 
 A pixel of the edge is a mixture C = a F + (1 - a) B of the figure's colour F and the background B.
 F is found by walking inwards while the contrast to B still grows and C stays on the line from B to

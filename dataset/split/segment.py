@@ -1,4 +1,4 @@
-"""A look at the whole sheet: what is paint, what is paper, which figures stand where.
+"""Segment the whole sheet: foreground, background, and which figures stand where.
 
 Very large sheets are segmented on cells of a few pixels; cutting out
 (`toonset.dataset.split.sheet`) uses every pixel again.

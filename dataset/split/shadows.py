@@ -1,4 +1,4 @@
-"""Soft shadows that the figures cast on the ground: no part of the character.
+"""Detect soft shadows that the figures cast on the ground.
 
 A shadow is the paper, darker: every channel dimmed by one factor, without inner structure. Grey
 shoes are that, too, so a shadow must also lie as a shadow lies: in the lower half of its figure,

@@ -1,4 +1,4 @@
-"""From a sheet to its views: find the background, the figures, their order; cut each one out.
+"""Split a sheet into its views: find background and figures, and cut each figure out.
 
 The cost grows with the number of pixels, plus a little per figure.
 """

@@ -1,4 +1,4 @@
-"""What a person should look at after a sheet was split, for a view may be wrong."""
+"""Warn of views that may be cut wrongly."""
 
 from __future__ import annotations
 

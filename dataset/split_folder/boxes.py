@@ -1,4 +1,4 @@
-"""Boxes by hand: where the figures of a sheet stand, from a JSON or a CSV file.
+"""Read figures' boxes from a JSON or CSV file.
 
 JSON, any of:
 

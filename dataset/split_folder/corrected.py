@@ -1,4 +1,4 @@
-"""Corrections and the sheet that they belong to: which sheet, which view, what they change.
+"""Match corrections to a sheet's views by their boxes.
 
 A view is found again by its box, whatever its number has become: of all pairs the one that overlaps
 most comes first, each box and each view once, and less than half is no match.

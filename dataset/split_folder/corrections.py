@@ -1,4 +1,4 @@
-"""corrections.json: everything a person corrected of one sheet, in one file.
+"""Read and write corrections.json: everything a person corrected of one sheet.
 
     {"version": 1,
      "sheet": {"name": "sheet.png", "sha256": "...", "size": [1600, 400]},

@@ -1,4 +1,4 @@
-"""What a person says about how sheets are cut, as typed."""
+"""Define the options of how sheets are cut, as a person types them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One sheet with what was found on it: figures in their colours, outlines, numbered boxes.
+"""Draw one sheet with its figures coloured, outlined and numbered.
 
 All but the figures is faded towards the background. Neighbouring figures have different colours,
 so that a part that went to the wrong one shows. What was left out has an orange box with its kind.

@@ -1,4 +1,4 @@
-"""The pictures of one character: of a bundle, a split folder, other folders, or loose files."""
+"""Load one character's pictures: of a bundle, a split folder, other folders, or loose files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The views of one or more sheets together, and where each was cut from."""
+"""Join the views of one or more sheets, with where each was cut from."""
 
 from __future__ import annotations
 

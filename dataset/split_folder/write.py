@@ -1,4 +1,4 @@
-"""A split sheet on disk: what `toonset split` found, for people to look at and to correct.
+"""Write a split folder, for people to look at and to correct.
 
     images/000.png     RGBA crops, straight alpha
     split.json         which sheet each was cut from, where it stood, its line width and label

@@ -1,4 +1,4 @@
-"""What artists do besides drawing smoothly wrong, each with its size; 0 is none of it.
+"""Define the sizes of what artists do besides smooth drawing errors; 0 leaves one out.
 
 No heavy imports: the command line reads the defaults.
 """

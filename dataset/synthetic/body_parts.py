@@ -1,4 +1,4 @@
-"""Where a mesh has its head and arms: by its landmarks, or by the names of its parts.
+"""Find a mesh's head and arms by its landmarks, or by the names of its parts.
 
 With landmarks every vertex belongs to the nearest bone (the segment between two of them) and the
 bones of head and arms are what moves. Without, parts are taken by the words of their names

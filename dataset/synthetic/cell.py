@@ -1,4 +1,4 @@
-"""One cell of a synthetic turnaround: a body that a camera sees, as one hand draws it."""
+"""Draw one cell of a synthetic turnaround: one body, one camera, one hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A synthetic turnaround on disk.
+"""Write a synthetic turnaround to disk.
 
 sheet.png           the drawn sheet; sheet.jpg where it is a JPEG
 views/000.png ..    its cells on transparent ground, with transforms.json (exact cameras)

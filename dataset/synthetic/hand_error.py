@@ -1,4 +1,4 @@
-"""The errors of a hand in the picture: a smooth random displacement, and pens that swell.
+"""Add errors of a hand to a picture: a smooth random displacement, pens that swell.
 
 The displacement is a sum of cosines that fit 1 to 3 half waves into the cell, per axis,
 

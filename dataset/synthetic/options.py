@@ -1,4 +1,4 @@
-"""What a synthetic turnaround looks like. No heavy imports: the command line reads the defaults."""
+"""Define the options of a synthetic turnaround. Imports nothing heavy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A two-tone shadow whose light stands still beside the camera, and colours that are a view's own.
+"""Shade a view in two tones with a light beside the camera, and vary its colours.
 
 A pixel is in shadow where its surface's normal n and the direction l to the light, both in camera
 axes, have n . l < LEAST_LIT; normals are smoothed a little, as a brush is wider than a facet.

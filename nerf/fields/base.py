@@ -1,4 +1,4 @@
-"""What every field has in common, so that one trainer and one renderer serve them all.
+"""Define the interface that all fields share, so that one trainer and one renderer serve them.
 
 A field maps points to density and colour. In training the same points come again and again, so a
 field splits the work: `constants` is what depends on the points alone and is computed once,

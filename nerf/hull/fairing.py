@@ -1,4 +1,4 @@
-"""The fairest surface inside a visual hull that still touches every outline ray.
+"""Fair a visual hull: the smoothest surface inside it that touches every outline ray.
 
 Between the drawn views a visual hull is too large: eight views of a cylinder carve an octagon, 8 %
 wider at its corners. A body is rounder than that. Among all surfaces inside the hull that touch

@@ -1,4 +1,4 @@
-"""The surface that bends least among those that touch every outline ray: the minimiser.
+"""Minimise the fairing energy with Adam and an analytic gradient.
 
 The energy is that of `fairing`, with its gradient written down: the volume is linear in what Adam
 moves, so the gradient is a few more linear operations.

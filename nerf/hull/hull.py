@@ -1,4 +1,4 @@
-"""The visual hull: the part of space that the drawings agree may be filled.
+"""Carve the visual hull: the part of space that the drawings' masks leave.
 
 support(x) = the (missing + 1)-th smallest over the views of alpha_v(project_v(x))
 

@@ -1,4 +1,4 @@
-"""A mannequin's surface, small enough for a run folder, and what a camera sees of it."""
+"""Store a mannequin's surface in a run, and rasterise it for a camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples along rays, kept only inside the hull.
+"""March along rays, and keep the samples inside the hull.
 
 Rays are cut into steps of one fixed length; a step's middle is a sample if the hull's support
 reaches a level there. Marching runs on two grids: blocks of voxels first, voxels then.

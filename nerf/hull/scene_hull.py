@@ -1,4 +1,4 @@
-"""The shape that the drawings' silhouettes ask for, from a scene to its hull."""
+"""Compute a scene's shape: carve, fair and store its hull."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which hull the drawings themselves ask for: leave one view out and predict its mask."""
+"""Choose how many views may contradict the hull, by predicting left-out masks."""
 
 from __future__ import annotations
 

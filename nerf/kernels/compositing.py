@@ -1,4 +1,4 @@
-"""Differentiable volume rendering: samples packed ray after ray, or as many on every ray."""
+"""Composite samples by differentiable volume rendering: packed, or as many on every ray."""
 
 from __future__ import annotations
 

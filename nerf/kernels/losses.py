@@ -1,4 +1,4 @@
-"""The terms of the training loss."""
+"""Compute the terms of the training loss."""
 
 from __future__ import annotations
 

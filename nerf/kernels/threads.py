@@ -1,4 +1,4 @@
-"""How many CPU threads training may use, and what they do at the same time.
+"""Run training's work on two threads side by side.
 
 Torch shares single operations among threads, and a step's are too short for that: two threads are
 slower than one. So two threads work side by side instead, each on its own half of a step, of the

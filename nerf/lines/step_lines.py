@@ -1,4 +1,4 @@
-"""Lines where one part of a figure hides another: which steps in depth an artist draws, and how.
+"""Learn which depth steps an artist draws as lines, and draw them in new views.
 
 The rule is learned from the drawings: steps deeper than `least` have a line, smaller ones have
 none, and lines reach so far onto the nearer and the farther side.

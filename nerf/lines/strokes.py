@@ -1,4 +1,4 @@
-"""The dark lines of one drawing: its outline, and the strokes within the figure one by one."""
+"""Segment the dark lines of a drawing: its outline, and the strokes within the figure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A new view out of the drawings that flank it: colours by labels that they vote on.
+"""Blend a new view from the flanking drawings, by labels that they vote on.
 
 Every place of the surface is looked up in the two drawings beside the view, each shifted towards
 the other by its share of how far they lie apart (`paint_flow`). Their labels and the field's vote;

@@ -1,4 +1,4 @@
-"""Drawings for the drawn look, from those that a field was trained on."""
+"""Build the drawn look's textures from the drawings that a field was trained on."""
 
 from __future__ import annotations
 

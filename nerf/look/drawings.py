@@ -1,4 +1,4 @@
-"""A sheet's drawings as projective textures, and what another view sees of each."""
+"""Project a sheet's drawings as textures into another view, with visibility."""
 
 from __future__ import annotations
 

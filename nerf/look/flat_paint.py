@@ -1,4 +1,4 @@
-"""Drawings as paint alone: without outlines, lines at steps in depth, grain and shadows.
+"""Remove outlines, step lines, grain and shadows from drawings.
 
 Outlines belong to one view only, and new views have their own drawn; so have lines where one part
 hides another, and shadows, where the surface is known well enough to draw them anew. What is left

@@ -1,4 +1,4 @@
-"""Which paints drawings show, and drawings in other paints; shadows are no paints."""
+"""Label drawings by paint, and repaint them; shadows count to their paint."""
 
 from __future__ import annotations
 

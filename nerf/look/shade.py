@@ -1,4 +1,4 @@
-"""Two-tone shading: a shadow whose light stays with the viewer, taken off drawings and cast anew.
+"""Learn a two-tone shadow whose light stays with the viewer; remove it and cast it anew.
 
     shadow where  slope . n + level > 0,     colour in shadow = factor * colour in light
 

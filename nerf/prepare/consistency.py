@@ -1,4 +1,4 @@
-"""How well a sheet's drawings agree: the report that tells an artist which view is off, and where.
+"""Report how well a sheet's drawings agree: which view is off, and where.
 
 Per drawing: the shift and size that its outline asks for, its bend, and how well the shape that
 all drawings share explains its mask; and a map of what no shared shape explains: how far a ray

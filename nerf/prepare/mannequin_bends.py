@@ -1,4 +1,4 @@
-"""Displacements of drawings under which they show the mannequin.
+"""Fit displacements of drawings under which they show the mannequin.
 
 Outlines first, then lines where one part hides another. Minimised over the numbers c of every
 drawing's displacement d, by Gauss-Newton:

@@ -1,4 +1,4 @@
-"""What happens to drawings before a field is fitted to them.
+"""Prepare drawings before a field is fitted to them.
 
 Where the mannequin is the body that was drawn, drawings are bent to show it (`to_mannequin`). Else
 each only where the drawings ask for it: cameras follow drawings that were placed or

@@ -1,4 +1,4 @@
-"""Registering drawings: a shift and a size per drawing, so that their outlines agree.
+"""Register drawings by a shift and a size each, so that their outlines agree.
 
 Artists place and size the views of a sheet by eye. What is moved is each view's camera (its
 principal point and its scale), never a pixel: nothing is resampled, and the correction is exact.

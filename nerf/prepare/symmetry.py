@@ -1,4 +1,4 @@
-"""The other side of a body that is its own mirror image.
+"""Add mirrored drawings of a body that is its own mirror image.
 
 Sheets of half a turn (front, side, back) leave one side undrawn. Where drawings along the mirror
 plane show that left and right are alike, every drawing is one of the other side, too: flipped, from

@@ -1,4 +1,4 @@
-"""Drawings of the mannequin's own body: bent until they show it.
+"""Bend drawings of the mannequin's own body until they show it.
 
 Only where the mannequin predicts drawings better than they predict each other (`mannequin_fit`).
 What every drawing gets wrong is then known from one common shape, and the shape between the drawn

@@ -1,4 +1,4 @@
-"""Bent drawings: a smooth displacement per drawing under which the outlines are one body's.
+"""Unwarp drawings by smooth displacements under which the outlines are one body's.
 
 corrected(x) = drawn(x + d(x)). The rays of the cameras stay; the drawing is resampled once, with
 its alpha and its labels.

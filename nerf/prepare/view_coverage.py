@@ -1,4 +1,4 @@
-"""Which sides of a character no drawing shows: shape and colours there are a guess.
+"""Find the sides of a character that no drawing shows: shape and colours there are a guess.
 
 Drawings from opposite sides share an outline, so that for the shape half a turn is all there is:
 four even views have but two outlines, five have five.

@@ -1,4 +1,4 @@
-"""A trained field read once, at the hull's voxels: what views are rendered from.
+"""Bake a trained field into volumes at the hull's voxels, from which views are rendered.
 
 Values between voxels are trilinear. OpenCV's `remap` interpolates bilinearly at any list of places,
 ten times faster than a field or `grid_sample` answers; so a volume's slices lie side by side in one

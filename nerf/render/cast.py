@@ -1,4 +1,4 @@
-"""Rays through a baked field, for a picture: no work in empty space or behind what is opaque.
+"""Cast a picture's rays through a baked field, skipping empty and hidden space.
 
 The samples are those of `toonset.nerf.hull.march`, so a view shows what was trained. But a picture
 needs only the front of what a ray meets: a ray begins where the hull may begin, goes on a few steps

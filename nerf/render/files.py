@@ -1,4 +1,4 @@
-"""The files of a rendering: a picture per camera and layer, and all of a turn in one file."""
+"""Encode a rendering's files: a picture per camera and layer, and whole turns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which palette colours every pixel shows, and how much of it each covers.
+"""Compute which palette colours cover every pixel, and how far.
 
 A ray that falls between two colours sees a blend of both, and a blend may look like a third:
 between green cloth and light skin lies brown. So what a ray on a border sees, c, is explained in

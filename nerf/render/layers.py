@@ -1,4 +1,4 @@
-"""A rendered view, and its layers as 8-bit pictures."""
+"""Convert a rendered view to 8-bit layers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Views as layers of one OpenRaster file, for paint programs: drawn lines, then a layer per paint.
+"""Write a view as an OpenRaster file for paint programs: lines, then a layer per paint.
 
 A layer takes its share s of colour k off what a pixel shows, c with alpha A (c premultiplied):
 

@@ -1,4 +1,4 @@
-"""A camera's rays through a baked field, and between which depths they may meet anything.
+"""Compute a camera's rays through a baked field, and their depth range.
 
 Depths are past the plane through the hull's middle that is parallel to the picture, world units.
 The voxels round what may be seen are drawn into a coarse picture of the nearest and farthest depth,

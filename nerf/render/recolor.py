@@ -1,4 +1,4 @@
-"""Replacing palette colours of a trained run."""
+"""Replace palette colours of a trained run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rendering new views of a trained field.
+"""Render new views of a trained field.
 
 One ray goes through every pixel that may show the figure, more through pixels on borders: outlines,
 folds, where one colour meets the next. Outlines are soft through the hull's occupancy.

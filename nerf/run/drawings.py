@@ -1,4 +1,4 @@
-"""What the drawn look is made of, on disk.
+"""Write and read the drawn look's files.
 
     drawings.png            the drawings as they were trained on, side by side, tops aligned
     paint.png               the same without outlines and what else new views have drawn anew

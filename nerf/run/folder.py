@@ -1,4 +1,4 @@
-"""A trained run on disk, and back.
+"""Write a trained run to disk, and read it back.
 
     model.safetensors   parameters of field and classifier, and the hull
     config.json         what is needed to build them, and the resolved options

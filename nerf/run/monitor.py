@@ -1,4 +1,4 @@
-"""What looks on while a field is fitted: held-out views, previews, a wish to stop.
+"""Monitor a training: held-out views, previews, a request to stop.
 
 Looking at held-out views may take a tenth of the time, so a cheap look comes often and an expensive
 one seldom. None of it changes the training by a bit.

@@ -1,4 +1,4 @@
-"""The tensors of model.safetensors: a field as small as it can be without changing a rendering.
+"""Pack a field into model.safetensors, as small as renderings allow without change.
 
     field.*, classifier.*     parameters; tables in half precision, as training leaves them
     field.planes              only the rows that a point near the hull can read,

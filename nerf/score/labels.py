@@ -1,4 +1,4 @@
-"""How many pixels a rendering gives the right palette label."""
+"""Score a rendering's palette labels: mIoU and the share of right pixels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well drawings predict each other: each is left out, and drawn from the others.
+"""Measure how well drawings predict each other: each is left out, and drawn from the others.
 
 A drawing's own camera is a new view to the others. What they make of it is compared with the
 drawing as it was drawn, D, both at one size and a little blurred, in CIELAB:

@@ -1,4 +1,4 @@
-"""LPIPS through its own package, where the user has the weights on disk; nothing is downloaded.
+"""Compute LPIPS with its own package, from weights on the user's disk; nothing is downloaded.
 
 The package ships its small linear layers only. The AlexNet below them is read from torch's cache of
 weights if its hash is the one that its name says, and only tensors are read: no code in it is run.

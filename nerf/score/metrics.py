@@ -1,4 +1,4 @@
-"""PSNR and SSIM of a rendering against a drawing, over white and inside the mask."""
+"""Compute PSNR and SSIM of a rendering against a drawing, over white and inside the mask."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every figure of one rendering against its drawing."""
+"""Compute every metric of one rendering against its drawing."""
 
 from __future__ import annotations
 

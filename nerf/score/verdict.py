@@ -1,4 +1,4 @@
-"""What a run says of itself: ok, or weak and why.
+"""Judge a run: ok, or weak and why.
 
 A run is weak where a drawing and what the others make of its side are plainly apart (`left_out`),
 or where no drawing shows a side (`view_coverage`). The bound is where people would be unhappy with

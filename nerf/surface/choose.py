@@ -1,4 +1,4 @@
-"""Which drawing paints which face of a surface: one for each patch, and for each feature.
+"""Choose the drawing that paints each face of a surface, by graph cuts.
 
     cost = sum over faces of   area (1 - how frontal and how far from an edge it is drawn)
          + sum over seams of   length (colours apart + SEAM + FEATURE where an eye or a button is)

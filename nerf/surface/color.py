@@ -1,4 +1,4 @@
-"""Palette probabilities at points of a trained field's surface, as a viewer in front sees them."""
+"""Compute palette probabilities at points of a field's surface, as seen from in front."""
 
 from __future__ import annotations
 

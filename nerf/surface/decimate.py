@@ -1,4 +1,4 @@
-"""Fewer triangles: edges collapse, cheapest first, and colours keep their borders.
+"""Decimate a mesh by quadric error, keeping the borders of colours.
 
 A vertex' cost is its squared distance from the planes of the faces that were merged into it. On an
 edge between two labels stands one more plane, upright on each face, so borders cost what outlines

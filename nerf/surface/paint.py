@@ -1,4 +1,4 @@
-"""A drawing as paint for a surface: without its outlines, and where it is to be trusted.
+"""Prepare a drawing as paint for a surface: without outlines, with a trust per pixel.
 
 Outlines are no paint. Under the silhouette's `Texture` holds the nearest paint already. Those along
 the drawing's own steps in depth are strokes of the outline's colour near such a step; what is round

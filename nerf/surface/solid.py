@@ -1,4 +1,4 @@
-"""What of a trained field is solid: its hull, less what rays pass before they are opaque.
+"""Compute which part of a trained field is solid, by transmittance from all round.
 
 Inside of its hull a field is a mist that is dense enough to look solid from where it was drawn, so
 no density is "the surface". Rays tell: from all round, level, a ray stops where it has gathered

@@ -1,4 +1,4 @@
-"""The surface of a trained field as triangles in palette colours, with crisp borders.
+"""Extract the surface of a trained field as triangles in palette colours.
 
 Marching cubes on what is solid; palette probabilities at the vertices; triangles cut where two
 colours are equally likely. Neighbours share the cuts, so the surface stays closed.

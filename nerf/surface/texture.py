@@ -1,4 +1,4 @@
-"""The drawn look on a surface: a picture for its atlas, put together from the drawings.
+"""Texture a surface with the drawn look: an atlas put together from the drawings.
 
 Every texel lies on a face, every face is painted by one drawing (`choose`), by the field where no
 drawing shows it. Beside a seam the next drawing's colour is mixed in where it has the same label.

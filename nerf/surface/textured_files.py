@@ -1,4 +1,4 @@
-"""A surface with a picture as GLB or OBJ, and the inverted hull that draws its outline.
+"""Write a textured surface as GLB or OBJ, with an inverted hull as its outline.
 
 GLB   one unlit material with the picture, and one per variant. With an outline the surface is
       moved in by half the line's width, and a second mesh, without its small bumps, lies as far

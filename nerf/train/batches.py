@@ -1,4 +1,4 @@
-"""The rays of all drawings, cut once into batches."""
+"""Cut the rays of all drawings into batches."""
 
 from __future__ import annotations
 

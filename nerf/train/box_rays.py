@@ -1,4 +1,4 @@
-"""Classic volume rendering without a hull: stratified samples along the rays through a box.
+"""Sample rays through a box without a hull: classic stratified volume rendering.
 
 Every step draws its samples anew, one per bin of equal length, so nothing can be computed before.
 Source: Mildenhall et al., "NeRF", 2020, equations 2 and 3.

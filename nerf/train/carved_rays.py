@@ -1,4 +1,4 @@
-"""The rays a training draws its steps from.
+"""Sample training rays inside the hull, and hand out a step's batches.
 
 A training asks for a step's batches by their number and by the step, and tells when a step is done.
 """

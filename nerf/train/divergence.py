@@ -1,4 +1,4 @@
-"""The last state of a training that is known to be good, and when a training has gone wrong."""
+"""Keep the last good state of a training, and detect divergence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Palette labels for a scene that comes without."""
+"""Label a scene that comes without a palette."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The training loop: Adam over batches of rays."""
+"""Run the training loop: Adam over batches of rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Short trainings that say how fine the planes need to be.
+"""Search the planes' resolution by short trainings.
 
 For every candidate a field is fitted for a few steps to all drawings but one or two, inside the
 hull of all of them, and compared with what was left out (see

@@ -1,4 +1,4 @@
-"""Fitting a triplane field and a palette classifier to posed drawings.
+"""Fit a triplane field and a palette classifier to posed drawings.
 
     loss = photometric + palette_weight * cross-entropy + smoothness * total variation
 

@@ -1,4 +1,4 @@
-"""What a page needs of a run: numbers as JSON, and all arrays in one deflated blob.
+"""Pack a run for the page: numbers as JSON, and all arrays in one deflated blob.
 
 The field itself goes along, planes and decoder: it is the smallest form that it has, and a page
 reads it once, at the hull's voxels, as `toonset.nerf.render.baked` does.

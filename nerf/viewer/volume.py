@@ -1,4 +1,4 @@
-"""What a page's rays read of a field's hull: where samples may be, and how far is clear.
+"""Pack a field's hull for the page's rays: support and safe steps.
 
 support  (z, y, x)  the hull's support, 0 to 255
 safe_steps (z, y, x)  per block of BLOCK voxels: 0 = the field is read there; n = steps, in any

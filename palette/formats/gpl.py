@@ -1,4 +1,4 @@
-"""GIMP's .gpl, which Krita, Inkscape and Aseprite read and write too.
+"""Read and write GIMP's .gpl, which Krita, Inkscape and Aseprite have, too.
 
 Lines of "red green blue name". Aseprite's variant says `Channels: RGBA` and has a fourth number.
 Sources: GIMP's app/core/gimppalette-load.c; Aseprite's docs/gpl-palette-extension.md.

@@ -1,4 +1,4 @@
-"""Hex lists: one colour per line, as Lospec writes .hex, and paint.net's .txt (AARRGGBB).
+"""Read and write hex lists: Lospec's .hex, and paint.net's .txt (AARRGGBB).
 
 Source: paint.net documentation, "Working with palettes": comments begin with ";", eight digits are
 alpha, red, green, blue.

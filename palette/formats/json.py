@@ -1,4 +1,4 @@
-"""JSON: toonset's own palette.json, and lists of hex colours such as Lospec gives."""
+"""Read and write palette.json; read lists of hex colours such as Lospec's."""
 
 from __future__ import annotations
 

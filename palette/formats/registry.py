@@ -1,4 +1,4 @@
-"""Palettes that people type and that programs exchange: which format is which, read and written."""
+"""Parse typed palettes and choose the format of palette files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From all colours that occur to paints: one paint per colour that a painter would name.
+"""Cluster flat colours into paints by quick shift: one per colour that a painter would name.
 
 Flat pixels are counted in small cells of RGB. Every cell points to the nearest cell that is denser
 than itself, if that lies within a just-noticeable distance; cells that point nowhere are peaks,

@@ -1,4 +1,4 @@
-"""Features: eyes, mouths, buttons, which cover too little for the rule but make the character.
+"""Find features: eyes, mouths, buttons, too small for the 5 % rule but part of the character.
 
 A colour under the rule is a feature if people tell it from every colour of the palette, and if it
 is where the character has it: at the same height in two drawings or more, for turning leaves

@@ -1,4 +1,4 @@
-"""A palette's colours as grainy drawings have them.
+"""Read a palette's colours off grainy drawings, as medians.
 
 Which paints there are shows once grain is smoothed off; but smoothing mixes into a paint what lies
 beside it, so that colours darken near lines. Within a paint grain is as often lighter as darker:

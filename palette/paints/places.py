@@ -1,4 +1,4 @@
-"""Where colours are: patches of them, the largest of each so that a person can look at it."""
+"""Locate colours: their patches, the largest of each for a person to look at."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which paints become the palette: the paper's rule, and what a person wants kept."""
+"""Select the palette from the paints: the paper's rule, and what a person keeps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which pixels are blends: the soft pixels between two colours, which are nobody's colour.
+"""Detect antialiased pixels, which are blends of two colours and have no label.
 
 They lie along the borders between labels. Every pixel there is compared with the colours that begin
 beside it, in units of the picture's own noise: a clean picture tells a blend of one part in a

@@ -1,4 +1,4 @@
-"""Grain of paper and pencil, taken off before pixels are labelled: paints are regions.
+"""Smooth the grain of paper and pencil away before pixels are labelled.
 
 A label map without specks is a Markov field: every pixel's paint is likely by its own colour, and
 by its neighbours' unless the drawing has an edge between. With squared distances to the paints'

@@ -1,4 +1,4 @@
-"""The drawn lines: how much of every pixel is ink of a contour, told from black cloth and hair.
+"""Detect contour lines: how far ink covers every pixel, black cloth and hair excepted.
 
 A line is dark and thin. Closing the picture's lightness with a disc a little wider than the line
 fills the line and nothing that is thicker; what the closing fills, as a share of the way from the

@@ -1,4 +1,4 @@
-"""What covers the pixels between areas: mixtures of two tones, so that borders are sub-pixel.
+"""Unmix the pixels between areas into two tones each, for sub-pixel borders.
 
 A pixel of colour c between areas is a mixture of two tones a and b that are drawn nearby:
 

@@ -1,4 +1,4 @@
-"""Pictures in other colours: a paint's tones and its soft edges move with it, drawn lines stay.
+"""Recolour pictures: tones and soft edges move with their paint, drawn lines stay.
 
     c' = c + k s (m' - m)
 

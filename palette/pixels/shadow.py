@@ -1,4 +1,4 @@
-"""Two-tone shading: the shadow of a sheet, where it lies in the drawings, and the colours in light.
+"""Detect two-tone shading: its factor, its place in the drawings, the colours in light.
 
     colour in shadow = factor * colour in light           levels of sRGB, one factor per sheet
 

@@ -1,4 +1,4 @@
-"""Which patches of a sheet are the bodies of the drawn views, and in which order one reads them.
+"""Find the connected components that are the drawn views' bodies, in reading order.
 
 The views of a turnaround show one character, so they are about equally high: of all heights the one
 counts that explains most of what is drawn, tall things first.

@@ -1,4 +1,4 @@
-"""Which patches of a sheet are parts of a view, and what the others are.
+"""Group connected components into views, and classify the rest.
 
 A patch that is no body of a view is a part of one (a floating hat, a hand apart) if it lies within
 or close to it, or if most views have the like at the same level; else it is left out under a name.

@@ -1,4 +1,4 @@
-"""What a cut through a patch would cross: paint, drawn lines, edges, and where it would begin.
+"""Compute what a cut through a patch crosses: paint, lines, edges, and where it would begin.
 
 Two figures that touch meet in a cleft: a right cut begins and ends where the background is a sharp
 corner (the minima rule), a cut through a limb on a straight side.

@@ -1,4 +1,4 @@
-"""Figures that touch or overlap a little: cut apart where the evidence says that two meet.
+"""Cut apart figures that touch or overlap a little, where the evidence says that two meet.
 
 Cuts are cheap ways from the top to the bottom (`seams`) through what is seen of a patch (`costs`);
 which one is right, and whether a person should look at it, is decided in `selection`.

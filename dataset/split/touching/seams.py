@@ -1,4 +1,4 @@
-"""Ways from the top to the bottom of a picture that cost as little as they can, and distinct ones.
+"""Find distinct seams of least cost from the top to the bottom of a picture.
 
 A way may run along a row as far as it likes but never turns back up: least costs follow row by row,
 as in seam carving with steps of any length.

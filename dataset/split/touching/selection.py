@@ -1,4 +1,4 @@
-"""Which of several cuts through a patch is the right one, and how sure that is.
+"""Select the right cut through a patch, with its probability, by logistic regression.
 
 Evidence is added up as logarithms: what the cut crosses, whether it runs from cleft to cleft, and
 how alike both sides of it are to sides of the sheet's other figures. The weights are those of a
