@@ -10,7 +10,7 @@ Progress = Callable[[str, float], None]  # step, share done
 
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """How hard to look.
+    """Options of calibration.
 
     Attributes:
         starts: coarse hypotheses per view; 6 reach the optimum of clean views always.

@@ -121,7 +121,7 @@ class CutOff:
 
 @dataclass(frozen=True)
 class FilledHole:
-    """A hole that is none.
+    """A false hole: paint in the paper's colour.
 
     Attributes:
         view: the drawing that has it.

@@ -41,7 +41,7 @@ KNOWN_PANEL = "What you know"
 
 
 class Lock(StrEnum):
-    """What may stay as it is given."""
+    """What `--lock` may hold fixed."""
 
     yaw = "yaw"
     elevation = "elevation"

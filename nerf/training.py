@@ -52,7 +52,7 @@ class Listener(Protocol):
 
 
 class _Silence:
-    """A listener to whom nothing matters."""
+    """A listener that ignores everything."""
 
     def say(self, text: str) -> None:
         pass

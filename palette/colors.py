@@ -36,7 +36,7 @@ def linear_from_srgb(srgb: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
 
 
 def srgb_from_linear(linear: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-    """Return sRGB in [0, 1] of linear light, clipped; what is no number is 0."""
+    """Return sRGB in [0, 1] of linear light, clipped; NaN becomes 0."""
     value = np.clip(np.nan_to_num(linear), 0, 1)
     return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
 

@@ -34,7 +34,7 @@ FRACTION_BITS = 4  # of a pixel, in which strokes are drawn
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """What becomes of every colour.
+    """Plan of what every colour becomes.
 
     Attributes:
         old: colours as found.
@@ -212,7 +212,7 @@ def _colors(
 
 
 def _ink(found: Palette, plan: _Plan) -> tuple[ContourColor | None, bool]:
-    """Return the lines' colour, and False if it was a paint and is none: lines have no label."""
+    """Return the lines' colour, and False if it was a paint and no longer is."""
     ink = found.contour
     if ink is None or ink.rgb not in plan.old:
         return ink, True

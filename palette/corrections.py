@@ -89,7 +89,7 @@ class Stroke:
 
 @dataclass(frozen=True)
 class PaletteCorrections:
-    """What a person corrects of a palette; colours as "#rrggbb".
+    """Corrections of a palette; colours as "#rrggbb".
 
     Attributes:
         keep: left-out colours that are paints.

@@ -40,7 +40,7 @@ IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
 
 @dataclass(frozen=True, eq=False)
 class PaintMap:
-    """What every pixel of a drawing is painted with.
+    """Paint of every pixel of a drawing.
 
     Attributes:
         labels: palette index; 255 = background, blend, or a drawn line whose colour is no paint's.
@@ -262,7 +262,7 @@ def paint_maps(
 def in_light(
     pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow | None
 ) -> tuple[list[Picture], list[Mask] | None]:
-    """Return pictures without grain and shadow, and where it lay; None: there is none."""
+    """Return pictures without grain and shadow, and the shadow's place; None without one."""
     smooth = without_grain(pictures)
     if shadow is None:
         return list(smooth), None

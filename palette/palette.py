@@ -90,7 +90,7 @@ class Shadow:
 
 @dataclass(frozen=True)
 class Place:
-    """Where most of a colour is.
+    """Place of a colour's largest patch.
 
     Attributes:
         view: number of the picture, from 0.

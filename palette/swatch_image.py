@@ -26,7 +26,7 @@ AnyColor = PaletteColor | ContourColor | DroppedColor
 
 @dataclass(frozen=True)
 class Size:
-    """How large the cards of one part are, in pixels."""
+    """Size of one part's cards, in pixels."""
 
     block_wh: tuple[int, int]
     font_px: int

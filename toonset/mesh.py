@@ -37,7 +37,7 @@ class Mesh:
     sha256: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what is no surface.
+        """Refuse arrays that are not a surface.
 
         Raises:
             MeshError: no faces, a vertex that is not finite, an index out of range, no extent.

@@ -159,7 +159,7 @@ class InputFile:
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Where the views of one or more sheets come from.
+    """Origin of the views of one or more sheets.
 
     Attributes:
         files: in the order in which they were given.

@@ -217,7 +217,7 @@ def exchange_folders(new: Path, path: Path) -> None:
 
 
 def _exchanged(new: Path, path: Path) -> bool:
-    """Swap two names by Linux' renameat2; False where there is none, or the disk cannot."""
+    """Swap two names by Linux' renameat2; False if kernel or file system lacks it."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):

@@ -100,7 +100,7 @@ FLICKER, VIEW_S = "flicker", "view_s"
 
 @dataclass(frozen=True, eq=False)
 class LookResult:
-    """What one look of one sheet is worth.
+    """Scores of one look of one sheet.
 
     Attributes:
         case: the character.

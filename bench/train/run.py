@@ -31,7 +31,7 @@ Picture = UInt8[np.ndarray, "height width 4"]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What one job found.
+    """Result of one job.
 
     Attributes:
         group: condition that it is summarised under.

@@ -21,7 +21,7 @@ TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly an
 
 @dataclass(frozen=True)
 class SheetState:
-    """What the sheet as a whole says about its views.
+    """Coherence of a sheet's silhouettes as a whole.
 
     Attributes:
         yaw_observable: the mannequin looks different from different sides.

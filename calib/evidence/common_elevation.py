@@ -30,7 +30,7 @@ PROVEN = 0.005  # of the height: contradiction by which both ends must be worse 
 
 @dataclass(frozen=True, eq=False)
 class CommonElevation:
-    """What the drawings say about the elevation of all cameras.
+    """Elevation error common to all cameras of a sheet.
 
     Attributes:
         offset: radians to add to every camera's elevation.

@@ -49,7 +49,7 @@ TEMPER = 0.7
 
 @dataclass(frozen=True, eq=False)
 class FaceEvidence:
-    """What the heads of a sheet say.
+    """Facial evidence of a sheet's heads.
 
     Attributes:
         natural: (views, 2) weights of cos(yaw) and sin(yaw) in the log-likelihood; zeros where

@@ -43,7 +43,7 @@ BROKEN = 0.02  # of sheets the model may not hold at all
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """What the views of a sheet show, cell by cell.
+    """Colours of a sheet's views, cell by cell.
 
     Attributes:
         lab: (bands, views * CELLS, 3) mean OKLab of the cells, about the band's mean.

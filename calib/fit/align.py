@@ -35,7 +35,7 @@ INDEPENDENT_POINTS = 10.0  # outline errors of a view when alternative poses are
 
 @dataclass(frozen=True)
 class ElevationPrior:
-    """What is known of a view's elevation before looking at it, radians."""
+    """Prior of a view's elevation, radians."""
 
     mean: float = np.radians(5.0)  # artists look slightly down
     sigma: float = np.radians(20.0)

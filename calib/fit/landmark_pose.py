@@ -59,7 +59,7 @@ def orthographic_starts(points: Points, pixels: Pixels) -> list[Pose]:
 
 
 def pinhole_starts(points: Points, pixels: Pixels, near: Pose) -> list[Pose]:
-    """Return pinhole poses by EPnP and SQPnP at a few distances; none where both fail.
+    """Return pinhole poses by EPnP and SQPnP at a few distances; empty if both fail.
 
     Args:
         points: at least four, relative to the surface's middle.

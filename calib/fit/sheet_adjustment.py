@@ -46,7 +46,7 @@ Perspective = Literal["none", "given", "shared", "per view"]
 
 @dataclass(frozen=True)
 class SheetModel:
-    """What the cameras of a sheet may be.
+    """Camera model of a sheet.
 
     Attributes:
         perspective: whose k is free; none: orthographic, given: every k stays as it is.
@@ -88,7 +88,7 @@ class JointFit:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Where the iteration stands; poses in working pixels."""
+    """State of the iteration; poses in working pixels."""
 
     poses: tuple[Pose, ...]
     body: Body

@@ -37,7 +37,7 @@ class Spreads:
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """Where the views of a sheet are meant to be seen from.
+    """Nominal yaws of a sheet's views.
 
     Attributes:
         places: (views,) yaw in radians; nan where nothing is known of a view.

@@ -79,7 +79,7 @@ def proven_cuts(
 def _stands_out(
     index: int, cut: CutOff, views: Sequence[View], possible: Cuts, tried: JointFit
 ) -> bool:
-    """Return whether the views that nothing cuts on that side agree with a cut.
+    """Return whether the views that are whole on that side agree with a cut.
 
     Longer legs than the character's reach below all feet, or make the views that end in a ruled
     line larger than the others; where all end so, on a ground line, nothing tells.

@@ -103,7 +103,7 @@ def _behind(
 
 @dataclass(frozen=True, eq=False)
 class _Painted:
-    """What a drawing shows: paint at all, and paint in the paper's colour; a pixel each."""
+    """Masks of a drawing's paint, and of its paint in the paper's colour."""
 
     solid: Bool[np.ndarray, "height width"]
     paper: Bool[np.ndarray, "height width"]

@@ -44,7 +44,7 @@ WIDTHS = np.geomspace(0.05, 0.012, 10)
 
 @dataclass(frozen=True)
 class Stretches:
-    """How drawings and mannequin are stretched; logarithms of height over width.
+    """Stretch of drawings and mannequin; logarithms of height over width.
 
     Attributes:
         views: of every drawing beside the typical one; 0 where that is not proven or clear.
@@ -68,7 +68,7 @@ class Stretches:
 
 
 def nothing_stretched(views: int) -> Stretches:
-    """Return what holds of so many views before anybody has looked."""
+    """Return the identity: no view is stretched."""
     return Stretches((0.0,) * views, 0.0, ())
 
 

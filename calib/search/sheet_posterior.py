@@ -43,7 +43,7 @@ UNLIKELY = 20.0  # nats: hypotheses this far behind are not asked about paint
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Where the views might be meant to be seen from: alternatives.
+    """Alternative turns of a sheet.
 
     Attributes:
         places: (t, views) yaw in radians; nan where an alternative says nothing about a view.
@@ -165,7 +165,7 @@ class SheetPosterior:
         return [posterior @ (w / w.sum(axis=1, keepdims=True)) for w in weights]
 
     def faces_contradict(self, views: Sequence[Candidates]) -> float:
-        """Return the probability that what looks like faces is none, since outlines deny it.
+        """Return the probability that the faces found are false, since outlines contradict them.
 
         High where the outlines can only be explained with the faces at the back: a drawing or a
         mannequin that is mirrored fits in its mirror twins' cameras, and all outlines agree.

@@ -44,7 +44,7 @@ def load_bank(surface: Surface) -> Templates:
 
 
 def bank_path(surface: Surface) -> Path | None:
-    """Return the file of the surface's templates, or None where there is no place for caches."""
+    """Return the file of the surface's templates, or None without a cache folder."""
     folder = _cache_folder()
     if folder is None:
         return None

@@ -14,7 +14,7 @@ LOOKING_UP = np.radians(5.0)  # nobody draws a turnaround from so far below
 
 
 def with_elevations_in_mind(views: Sequence[ViewCalibration]) -> list[ViewCalibration]:
-    """Return the views; none is ok that looks down far more or less than the sheet does.
+    """Downgrade views that look down far more or less than the sheet does.
 
     It may be drawn so; more often it is a mirrored drawing that fits in its twin. Nor is any where
     all look up: the mirror image of a sheet from above is, front and back swapped, one from below.

@@ -115,7 +115,7 @@ def judge_view(
 def with_locks_in_mind(
     views: Sequence[ViewCalibration], pulled: Float[np.ndarray, " views"]
 ) -> list[ViewCalibration]:
-    """Return the views; none is ok that its outline would turn far from what is locked.
+    """Downgrade views whose outline contradicts their locked camera.
 
     A wrong lock can hide in another number (elevation in scale) and its sigma is none, so that the
     outlines alone look well met. Where most views are pulled, all are.
@@ -141,7 +141,7 @@ def with_locks_in_mind(
 def with_places_in_mind(
     views: Sequence[ViewCalibration], off: Float[np.ndarray, " views"]
 ) -> list[ViewCalibration]:
-    """Return the views; none is ok that stands far off its place in the even turn.
+    """Downgrade views that are far from their place in the even turn.
 
     The outline of another body can ask for that; that of one's own is to be believed.
 
@@ -162,7 +162,7 @@ def with_places_in_mind(
 def with_labels_in_mind(
     views: Sequence[ViewCalibration], labels: Sequence[Label]
 ) -> list[ViewCalibration]:
-    """Return the views; none is ok that ended far from what its label says."""
+    """Downgrade views whose camera is far from their label."""
     judged = list(views)
     for i, (view, label) in enumerate(zip(views, labels, strict=False)):
         off = [abs((view.camera.angles[0] - yaw + np.pi) % (2 * np.pi) - np.pi) for yaw in label]
@@ -179,7 +179,7 @@ def with_sheet_in_mind(
     *,
     bent: bool = False,
 ) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where the sheet as a whole is not.
+    """Downgrade all views if the sheet as a whole is inconsistent.
 
     A wrong body can match a side view's outline well, at a wrong angle; a mirrored one matches all
     views, front and back swapped. A failed view has drawn the others along: they were fitted

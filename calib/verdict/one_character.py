@@ -34,7 +34,7 @@ MOST_APART = 0.5
 def with_one_character_in_mind(
     views: Sequence[ViewCalibration], drawings: Sequence[View]
 ) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where the drawings show two characters.
+    """Downgrade all views if the drawings show two characters.
 
     Args:
         views: judged one by one.

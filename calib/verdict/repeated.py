@@ -32,7 +32,7 @@ ELSEWHERE = np.radians(10.0)  # between cameras that see another side
 def with_repeats_in_mind(
     views: Sequence[ViewCalibration], drawings: Sequence[View]
 ) -> tuple[ViewCalibration, ...]:
-    """Return the views; none is ok where one drawing was given cameras on two sides.
+    """Downgrade views if one drawing got cameras on two sides.
 
     At least one of these cameras is wrong, and every other's place in the turn may be. Nor is any
     where all are one drawing: copies confirm nothing.

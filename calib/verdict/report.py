@@ -60,7 +60,7 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
 
 
 def _landmarks_dict(calibration: Calibration) -> dict[str, Any]:
-    """Return what landmarks say, under its key; nothing where there are none."""
+    """Return the landmarks' entry; empty without landmarks."""
     fits = [
         {
             "view": fit.view,

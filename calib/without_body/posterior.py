@@ -43,7 +43,7 @@ PAINT_BROKEN, FACES_BROKEN, SHINS_BROKEN, OUTLINES_BROKEN = 0.02, 0.02, 0.05, 0.
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What a sheet shows without a body.
+    """Evidence of a sheet without a body.
 
     Attributes:
         paint: the colours, band by band.
@@ -102,7 +102,7 @@ def outlines_log_likelihood(figures: Figures, turns: TurnHypotheses) -> Float[np
 
 @dataclass(frozen=True)
 class Doubts:
-    """How probable it is that the chosen turn is wrong, by what is wrong about it.
+    """Probabilities that the chosen turn is wrong, by kind of error.
 
     Attributes:
         front: front and back are confused, the axis is right.
@@ -141,7 +141,7 @@ def view_doubt(
 def _doubted(
     log_likelihood: Float[np.ndarray, " turns"], broken: float
 ) -> Float[np.ndarray, " turns"]:
-    """Return log-likelihoods of a cue that means nothing on some sheets."""
+    """Return log-likelihoods of a cue that is uninformative on some sheets."""
     relative = np.exp(log_likelihood - log_likelihood.max())
     return np.log((1 - broken) * relative + broken)
 

@@ -34,7 +34,7 @@ FEW: dict[int, tuple[tuple[float, ...], ...]] = {  # degrees
 
 @dataclass(frozen=True, eq=False)
 class TurnHypotheses:
-    """Where the views may be seen from: alternatives.
+    """Alternative turns of a sheet, with their prior.
 
     Attributes:
         yaws: (turns, views) radians.

@@ -51,7 +51,7 @@ def uneven_yaws(figures: Figures, paint: Paint) -> tuple[Float[np.ndarray, " vie
 
 @dataclass(frozen=True, eq=False)
 class _Stand:
-    """Where the views are seen from, and what speaks for it.
+    """Yaws of the views, and their evidence.
 
     Attributes:
         yaws: radians.

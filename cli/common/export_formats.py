@@ -18,7 +18,7 @@ BESIDE = ("images", "toonset.json", "mannequin.obj")
 
 
 class Format(StrEnum):
-    """What is written."""
+    """Formats of `toonset export`."""
 
     colmap = "colmap"
     nerfstudio = "nerfstudio"
@@ -31,7 +31,7 @@ class Format(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What is to be written, and how."""
+    """One export: what to write, and how."""
 
     out: Path
     views: Sequence[ExportView]

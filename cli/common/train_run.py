@@ -20,7 +20,7 @@ PREVIEWS = ("preview.png", ".*.tmp")  # in RUN.unfinished
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked for.
+    """One training as asked for.
 
     Attributes:
         bundle: what to train on.

@@ -86,7 +86,7 @@ def for_page(reason: str) -> str:
 
 
 def left_out_of(sheet: Sheet) -> list[dict[str, Any]]:
-    """Return what the splitter saw on a sheet that is no figure."""
+    """Return what the splitter left out of a sheet."""
     left = sheet.split.sources[0].left_out
     return [{"box": list(one.box), "kind": one.kind} for one in left]
 

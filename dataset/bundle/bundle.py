@@ -106,7 +106,7 @@ class Bundle:
 
 
 def _calibration_of(folder: Path) -> CalibrationFile | None:
-    """Return how cameras were found; None where nothing says it."""
+    """Return the calibration; None if the bundle has none."""
     try:
         return read_calibration(transforms_file(folder).parent / CALIBRATION)
     except ToonsetError:

@@ -152,7 +152,7 @@ class CameraModel(_Record):
 
 
 class DrawingError(_Record):
-    """How far drawn outlines are off: a smooth field, and noise from point to point."""
+    """Error of drawn outlines: a smooth field, and noise from point to point."""
 
     smooth: Spread
     white: Spread
@@ -167,7 +167,7 @@ class InputFile(_Record):
 
 
 class LandmarkFit(_Record):
-    """How well a view's landmarks fit one camera."""
+    """Fit of a view's landmarks to one camera."""
 
     view: Annotated[str, Field(min_length=1, max_length=255)]
     rms_px: Spread

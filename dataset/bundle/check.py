@@ -62,7 +62,7 @@ Colors = UInt8[np.ndarray, "colors 3"]
 
 @dataclass(frozen=True)
 class _Frames:
-    """What transforms.json says.
+    """Frames of a transforms.json.
 
     Attributes:
         names: file name of every frame's picture; None where the file cannot be read.

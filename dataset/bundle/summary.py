@@ -75,7 +75,7 @@ def _optional(log: ProblemLog, name: str, read: Any) -> Any:
 
 
 def _calibration(found: CalibrationFile | None) -> dict[str, Any]:
-    """Return what is known of the sheet as a whole; nothing for other programs' cameras."""
+    """Return the sheet's calibration summary; empty for other programs' cameras."""
     if found is None:
         return {}
     content = found.model_dump(mode="json")

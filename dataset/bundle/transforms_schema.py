@@ -25,7 +25,7 @@ Row = tuple[float, float, float, float]
 
 
 class Intrinsics(BaseModel):
-    """What a frame may say of its lens, or the file for all frames; pixels."""
+    """Intrinsics of a frame, or of the file for all frames; pixels."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     w: int | None = None

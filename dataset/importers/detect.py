@@ -31,7 +31,7 @@ Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # ours from a world with 
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """What was read.
+    """Views read from another program's files.
 
     Attributes:
         views: pictures with cameras; names are unique.

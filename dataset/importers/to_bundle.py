@@ -23,7 +23,7 @@ from toonset.write import new_folder, write_bytes, write_json
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What was written.
+    """Report of an import.
 
     Attributes:
         views: names of the pictures.

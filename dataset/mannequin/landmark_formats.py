@@ -28,7 +28,7 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Pair:
-    """What a file says of one point: `world` is None where only its name is given."""
+    """One point of a file: `world` is None if only its name is given."""
 
     name: str
     pixel: Numbers

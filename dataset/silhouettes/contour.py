@@ -91,7 +91,7 @@ def drawn_contour(view: View, spacing_of_height: float = 1 / 256) -> Contour:
 def _is_cut(
     loop: Float[np.ndarray, "n 2"], shape: tuple[int, ...], height: float
 ) -> Bool[np.ndarray, " n"]:
-    """Return which points of an evenly sampled loop are no outline, but the picture's edge.
+    """Return which points of an evenly sampled loop are the picture's edge, not outline.
 
     Short contacts with the edge are those of a closely cropped figure.
     """

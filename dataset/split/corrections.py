@@ -25,7 +25,7 @@ from toonset.dataset.split.touching.cut import Cut, part_touching
 
 @dataclass(frozen=True, eq=False)
 class SheetState:
-    """What is known of a sheet so far, in cells.
+    """Segmentation of a sheet so far, in cells.
 
     Attributes:
         rgba: the sheet.

@@ -29,7 +29,7 @@ PAINTED = 0.12  # of a cell: less is noise
 
 @dataclass(frozen=True, eq=False)
 class SheetLayout:
-    """What a look at the sheet found, in cells of `cell_px` pixels.
+    """Segmentation of a sheet, in cells of `cell_px` pixels.
 
     Attributes:
         cell_px: width and height of a cell.

@@ -223,7 +223,7 @@ def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray, depth
 
 @dataclass(frozen=True, eq=False)
 class Dim:
-    """Where a picture is the paper with less light.
+    """Pixels that are the paper with less light.
 
     Attributes:
         mask: there.

@@ -40,7 +40,7 @@ NAMES = {
 
 @dataclass(frozen=True)
 class SheetOptions:
-    """How a sheet is split.
+    """Options of splitting a sheet.
 
     Attributes:
         margin_px: empty pixels around every figure.
@@ -66,7 +66,7 @@ class SheetOptions:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something on the sheet that is no view.
+    """A patch of the sheet that is not a view.
 
     Attributes:
         box: (x, y, width, height) in the sheet.
@@ -212,7 +212,7 @@ def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View
 
 
 def _left_out(found: SheetLayout) -> tuple[LeftOut, ...]:
-    """Return what was seen but is no view, words as one each."""
+    """Return the patches that are not views, words as one each."""
     boxes = [(line.box, "frame") for line in found.lines]
     kinds = np.array(found.grouping.kinds, dtype=object)
     for kind in NAMES:

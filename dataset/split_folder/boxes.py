@@ -164,7 +164,7 @@ def _box(where: str, entry: object) -> Box:
 
 
 def _numbers(entry: object) -> list[float]:
-    """Return what an entry's numbers are; none where it is no box."""
+    """Return an entry's numbers; empty if it is not a box."""
     if isinstance(entry, dict):
         named = {SHORT.get(key, key): value for key, value in entry.items()}
         entry = named.get("box", [named.get(name) for name in COLUMNS])

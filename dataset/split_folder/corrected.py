@@ -116,7 +116,7 @@ class Given:
         return without(replace(split, views=tuple(views)), dropped), tuple(notes)
 
     def of_views(self, views: Sequence[View]) -> tuple[ViewCorrection | None, ...]:
-        """Return what is said of each view; None where nothing is.
+        """Return each view's correction; None without one.
 
         Args:
             views: of one or more sheets, without those that are excluded.

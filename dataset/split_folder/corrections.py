@@ -55,7 +55,7 @@ Size = Annotated[float, Field(gt=0, le=1e6)]
 
 @dataclass(frozen=True)
 class SheetName:
-    """Which sheet a file of corrections belongs to.
+    """Name and hash of the sheet that corrections belong to.
 
     Attributes:
         name: its file name.
@@ -103,7 +103,7 @@ class PointPair:
 
 @dataclass(frozen=True)
 class ViewCorrection:
-    """What a person said of one view.
+    """Corrections of one view.
 
     Attributes:
         box: (x, y, width, height) of its figure in the sheet.
@@ -194,7 +194,7 @@ def parse_corrections(data: bytes, where: str) -> Corrections:
 
 
 def corrections_json(corrections: Corrections) -> dict[str, Any]:
-    """Return the content of a corrections.json; what says nothing is left out."""
+    """Return the content of a corrections.json; empty entries are left out."""
     said = _SCHEMA.dump_python(corrections, mode="json", exclude_defaults=True)
     return {"version": VERSION, **said}
 

@@ -15,7 +15,7 @@ MOST_CELLS = 1000  # a sheet of letters or a tile map is no character sheet
 
 @dataclass(frozen=True)
 class Cutting:
-    """How sheets are cut.
+    """Options of how sheets are cut.
 
     Attributes:
         boxes: file of boxes.

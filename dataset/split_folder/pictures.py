@@ -46,7 +46,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a picture lies.
+    """Place of a picture in its sheet.
 
     Attributes:
         sheet: the picture that it was cut from.

@@ -35,7 +35,7 @@ Layout = tuple[Line, ...]
 
 
 class Costs:
-    """What must not be covered, as a cost per pixel of the picture."""
+    """Cost per pixel of covering the picture."""
 
     def __init__(self, height: int, width: int) -> None:
         """Start with a picture where everything may be covered."""

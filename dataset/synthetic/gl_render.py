@@ -37,7 +37,7 @@ INSTALL = (
 
 @dataclass(frozen=True, eq=False)
 class LabelPicture:
-    """What a camera sees, one sample per pixel centre, hard edges.
+    """Rendered labels and depth, one sample per pixel centre, hard edges.
 
     Attributes:
         labels: (height, width) label of the nearest face, 255 = nothing.

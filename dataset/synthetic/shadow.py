@@ -24,7 +24,7 @@ Rgb = UInt8[np.ndarray, "colors 3"]
 
 
 def shadow_mask(mesh: Mesh, camera: Camera) -> Bool[np.ndarray, "height width"]:
-    """Return which of a camera's pixels are in shadow; unspecified where there is no body."""
+    """Return which of a camera's pixels are in shadow; unspecified outside of the body."""
     depth, normals = depth_and_normals(mesh.vertices, mesh.faces, camera)
     there = np.isfinite(depth).astype(np.float32)
     lit = (normals @ np.array(TO_LIGHT)).astype(np.float32)

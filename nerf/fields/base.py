@@ -24,7 +24,7 @@ DENSITY_SHIFT = math.log(math.expm1(OPAQUE_AT_START))  # softplus of it is the a
 
 
 class Constants(Protocol):
-    """What a field precomputes about points."""
+    """Precomputed values of a field at points."""
 
     def to(self, device: torch.device) -> Self:
         """Return them on a device."""

@@ -27,7 +27,7 @@ BAND = 5.0  # coarse voxels from the hull's surface within which bending counts
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Where outline rays may touch the surface.
+    """Places where outline rays may touch the surface.
 
     Attributes:
         rows: (n, 8) the voxels round a point, as numbers in the flat volume; packed ray after ray.

@@ -42,7 +42,7 @@ Alpha = Float[np.ndarray, "height width"]
 
 @dataclass(frozen=True)
 class MannequinFit:
-    """How far predicted outlines lie from drawn ones, in shares of the figure's `Square`.
+    """Distances of predicted outlines from drawn ones, in shares of the figure's `Square`.
 
     Attributes:
         mannequin: root mean square distance of the mannequin's; mean of the drawings.

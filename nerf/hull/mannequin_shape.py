@@ -27,7 +27,7 @@ BESIDE_PX = 2  # pixels of room round what is seen
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a camera sees of a shape.
+    """A camera's picture of a shape.
 
     Attributes:
         camera: that looks.

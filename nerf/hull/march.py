@@ -188,7 +188,7 @@ def _march_chunk(rays: Rays, hull: Hull, step: float, most: int, level: float) -
 
 @dataclass(frozen=True, eq=False)
 class _Lattice:
-    """Where samples of some rays may lie; see `march` for the arguments.
+    """Candidate samples of some rays; see `march` for the arguments.
 
     Attributes:
         rays: the rays.

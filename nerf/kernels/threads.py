@@ -22,7 +22,7 @@ SIDES = 2  # threads that work side by side, the calling one included
 
 
 class _Team(threading.local):
-    """What works beside the calling thread, if anything; the others of a team have none."""
+    """Worker beside the calling thread, if any; the others of a team have none."""
 
     pool: ThreadPoolExecutor | None = None
 

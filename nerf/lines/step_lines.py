@@ -35,7 +35,7 @@ Mask = Bool[np.ndarray, "rows columns"]
 
 @dataclass(frozen=True)
 class StepLines:
-    """How steps in depth are drawn.
+    """Learned rule of which depth steps have a line, and how wide.
 
     Attributes:
         least: the smallest step that has a line, of the figure's height.

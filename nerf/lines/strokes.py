@@ -42,7 +42,7 @@ class Lines:
 
 
 def outline_width(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
-    """Return the width in pixels of the dark line round the figure, 0 = there is none."""
+    """Return the width in pixels of the dark line round the figure, 0 without one."""
     alpha = rgba[..., 3:].astype(np.float32) / 255
     over_white = (rgba[..., :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
     light = cv2.cvtColor(over_white, cv2.COLOR_RGB2GRAY)

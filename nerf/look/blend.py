@@ -57,7 +57,7 @@ OWN = 0.12  # radians off a drawing's own camera, in which the view becomes the 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """What a view shows of the field.
+    """Geometry of the field as a view sees it.
 
     Attributes:
         camera: of the view.
@@ -114,7 +114,7 @@ class DrawnView:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """What one source says of every pixel."""
+    """Colour and label of every pixel by one source."""
 
     color: Float[np.ndarray, "h w 3"]
     label: UInt8[np.ndarray, "h w"]

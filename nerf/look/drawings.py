@@ -51,7 +51,7 @@ class Drawing:
 
 @dataclass(frozen=True, eq=False)
 class PairFlow:
-    """How far what two neighbours paint lies apart, seen from half way between them.
+    """Flow between two neighbouring drawings, seen from half way between them.
 
     Attributes:
         pair: the drawings' numbers.
@@ -74,7 +74,7 @@ class PairFlow:
 
 @dataclass(frozen=True, eq=False)
 class Drawings:
-    """What the drawn look is made of.
+    """Drawings and surface of the drawn look.
 
     Attributes:
         views: the drawings that show a figure.
@@ -117,7 +117,7 @@ class Drawings:
 
     @property
     def painted_shadow(self) -> Shadow | None:
-        """Return the shadow that the paint still has; None: it was taken off, or there is none."""
+        """Return the shadow that the paint still has; None if removed or missing."""
         return self.shadow if self.shade is None else None
 
     @property
@@ -149,7 +149,7 @@ class Drawings:
         )
 
     def depth(self, view: Drawing) -> Float[np.ndarray, "height width"]:
-        """Return the depth of the surface that a drawing shows, nan where there is none."""
+        """Return the depth of the surface that a drawing shows, nan beside it."""
         if view.levels is not None:
             return depth_of(view.levels, self.depths)
         assert self.shape is not None
@@ -213,7 +213,7 @@ class Texture:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Where places of the surface lie in one drawing.
+    """Projection of surface points into one drawing.
 
     Attributes:
         x, y: (h, w) column and row, the first pixel's centre at 0.

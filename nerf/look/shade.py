@@ -94,7 +94,7 @@ def smoothed(normal: Normals, height_px: float) -> Normals:
 def learned_shade(
     paints: Sequence[Picture], normals: Sequence[Normals], clear: Sequence[Clear], height_px: float
 ) -> Shade | None:
-    """Return the shadow of a sheet, None where there is none.
+    """Return the shadow of a sheet; None without one.
 
     Args:
         paints: the drawings' colours in [0, 1].

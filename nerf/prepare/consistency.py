@@ -38,7 +38,7 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 @dataclass(frozen=True, eq=False)
 class ViewReport:
-    """How one drawing fits the others.
+    """Report of how one drawing fits the others.
 
     Attributes:
         name: of the picture.
@@ -74,7 +74,7 @@ class ViewReport:
 
 @dataclass(frozen=True, eq=False)
 class Consistency:
-    """How well a sheet's drawings agree.
+    """Report of how well a sheet's drawings agree.
 
     Attributes:
         views: of the drawings that show a figure.

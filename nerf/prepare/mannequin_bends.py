@@ -42,7 +42,7 @@ _BENDS = Bends.expected()
 
 @dataclass(frozen=True, eq=False)
 class InnerLines:
-    """Where a drawing should have lines within its figure, and where it has.
+    """Expected and drawn lines within a figure.
 
     Attributes:
         unit: (n, 2) places of the mannequin's steps in depth, in the drawing's square.

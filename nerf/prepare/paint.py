@@ -60,7 +60,7 @@ _HALF = CONTROLS**2
 
 @dataclass(frozen=True, eq=False)
 class PaintAgreement:
-    """How drawings were changed for their paint to agree.
+    """Changes of drawings that make their paint agree.
 
     Attributes:
         applied: whether they were.

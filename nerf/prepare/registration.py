@@ -24,7 +24,7 @@ ROUNDS = 6  # of Gauss-Newton
 
 @dataclass(frozen=True)
 class ViewMove:
-    """How one drawing was off.
+    """Shift and size of one drawing.
 
     Attributes:
         shift_px: (x, y) by which the drawing sits too far right and down, pixels of the picture.
@@ -43,7 +43,7 @@ class ViewMove:
 
 @dataclass(frozen=True, eq=False)
 class Registration(Alignment):
-    """What was found about the drawings' places and sizes.
+    """Registration of a sheet's drawings.
 
     Attributes:
         views: per frame of the scene, as found (also where not applied).

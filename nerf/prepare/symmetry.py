@@ -30,7 +30,7 @@ MOST_SHIFT = 0.1  # of the picture's width, between its figure's middle and the 
 
 @dataclass(frozen=True)
 class Symmetry:
-    """What the drawings say of left and right.
+    """Evidence of mirror symmetry.
 
     Attributes:
         alike: per facing drawing, the share of the figure's pixels that have their like on the
@@ -50,7 +50,7 @@ class Symmetry:
 
 
 def add_mirrored_views(scene: Scene) -> tuple[Scene, Symmetry | None]:
-    """Return the scene with mirror images of drawings where nothing was drawn, and the evidence.
+    """Add mirror images of drawings where no drawing shows the body; return the evidence, too.
 
     None: no drawing shows both sides, or no mirror image would be new.
     """

@@ -37,7 +37,7 @@ class Warp:
 
     @classmethod
     def none(cls) -> Warp:
-        """Return the warp that moves nothing."""
+        """Return the identity."""
         return cls(Square(np.zeros(2), 1.0), np.zeros(2 * CONTROLS**2))
 
     def at(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
@@ -51,13 +51,13 @@ class Warp:
 
     @property
     def is_none(self) -> bool:
-        """Return whether nothing is moved."""
+        """Return whether the warp is the identity."""
         return not np.any(self.numbers)
 
 
 @dataclass(frozen=True, eq=False)
 class Unbending(Alignment):
-    """What was found about the drawings' bends.
+    """Bends that were taken out of the drawings.
 
     Attributes:
         warps: per frame of the scene, what was applied.
@@ -96,7 +96,7 @@ def warped(frame: Frame, warp: Warp) -> Frame:
 def resampled(
     rgba: UInt8[np.ndarray, "height width 4"], places: Float[np.ndarray, "height width 2"]
 ) -> UInt8[np.ndarray, "height width 4"]:
-    """Return straight-alpha colours taken from `places` (pixels), nothing beyond the edges."""
+    """Return straight-alpha colours at `places` (pixels), transparent beyond the edges."""
     straight = rgba.astype(np.float32) / 255
     straight[..., :3] *= straight[..., 3:]  # what is transparent has no colour to mix in
     # cubic: linear interpolation would blur a line of one pixel to half its depth

@@ -198,7 +198,7 @@ def _shell(near: Bool[Tensor, "x y z"]) -> Float[Tensor, "3 n"]:
 def _paints(
     classifier: PaletteClassifier | None, shown: Float[Tensor, "n 3"]
 ) -> Float[Tensor, "colors 3"]:
-    """Return the median of all colours with each label, nan where there is none."""
+    """Return the median of all colours with each label, nan for unused labels."""
     if classifier is None:
         return torch.zeros(0, 3)
     labels = classifier(shown).argmax(dim=1)

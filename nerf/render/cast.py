@@ -43,7 +43,7 @@ def cast(sight: Sight, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays
 
 @dataclass(frozen=True, eq=False)
 class _Rays:
-    """How far some rays have come.
+    """State of some rays while they are cast.
 
     Attributes:
         ray: (n,) which they are.

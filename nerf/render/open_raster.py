@@ -73,7 +73,7 @@ class PaintLayer:
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
-    """What the layers above have left.
+    """Colour and alpha that the layers above leave.
 
     Attributes:
         color: premultiplied.
@@ -101,7 +101,7 @@ class _Rest:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What a view shows.
+    """Colour, labels and lines of a view.
 
     Attributes:
         shown: its picture.
@@ -282,7 +282,7 @@ def _names(look: _Look) -> list[str]:
 
 
 def _cut(name: str, color: Color, share: Share) -> PaintLayer | None:
-    """Return a layer cut to what it shows, None if that is nothing."""
+    """Return a layer cropped to its visible pixels; None if it is empty."""
     rgba = np.rint(255 * np.dstack([color, share]).clip(0, 1)).astype(np.uint8)
     rgba[rgba[..., 3] == 0] = 0
     if not rgba.any():

@@ -93,7 +93,7 @@ class ShadowRecord(BaseModel):
 
 
 class ShapeRecord(BaseModel):
-    """Where the grid of a `Shape` lies."""
+    """Grid of a `Shape`: its origin and step."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     low: tuple[Number, Number, Number]
@@ -102,7 +102,7 @@ class ShapeRecord(BaseModel):
 
 
 class DrawingsRecord(BaseModel):
-    """What config.json holds of `Drawings`."""
+    """Record of `Drawings` in config.json."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     cameras: list[NativeCamera] = Field(min_length=1, max_length=MOST_VIEWS)

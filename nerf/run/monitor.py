@@ -36,7 +36,7 @@ INTERRUPTED = "interrupted"
 
 @dataclass(frozen=True)
 class MonitorOptions:
-    """What to look at.
+    """Options of the monitor.
 
     Attributes:
         tell: called with the status after every step.
@@ -72,7 +72,7 @@ class Monitor:
         self._test_at, self._preview_at = FIRST_LOOK_S, 0.0
 
     def look(self, moment: Moment) -> str:
-        """Look at a training after a step; return why it should end, or nothing."""
+        """Look at a training after a step; return why it should end, or None."""
         spent = moment.history[-1].seconds
         unfinished = len(moment.history) < moment.of
         if self.looking.stop() and unfinished:

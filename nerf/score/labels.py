@@ -29,7 +29,7 @@ class LabelScore:
 
 
 def score_labels(rendered: Labels, true: Labels) -> LabelScore | None:
-    """Return the score over pixels that are labelled in both; None where there is none.
+    """Return the score over pixels that are labelled in both; None without any.
 
     In the truth these are the pixels that are no blends, in the rendering those of the figure.
     """

@@ -68,7 +68,7 @@ class LeftOut:
 
 
 def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
-    """Return every drawing as the others predict it; nothing of fewer than FEWEST drawings.
+    """Return every drawing as the others predict it; empty for fewer than FEWEST drawings.
 
     Where people are shown the field's own colours, the drawing counts as far off as those, if that
     is farther.

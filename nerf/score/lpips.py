@@ -26,7 +26,7 @@ Lpips = Callable[[np.ndarray, np.ndarray], float | None]
 
 
 def load_lpips() -> Lpips | str:
-    """Return the distance of two sRGB pictures over white, or why there is none.
+    """Return the distance function of two sRGB pictures over white, or why it is missing.
 
     The pictures are (height, width, 3) in [0, 1]; for those smaller than 32 px it is None.
     """

@@ -31,7 +31,7 @@ NOTHING = "the field shows no figure: look at preview.png, and train longer or c
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run is worth.
+    """Verdict of a run.
 
     Attributes:
         verdict: OK or WEAK.
@@ -117,7 +117,7 @@ def _remedy(training: Training, worst: LeftOut, *, stands_out: bool) -> str:
 
 
 def blended(scene: Scene) -> float:
-    """Return the share of the figures' pixels that are no palette colour; 0 without labels."""
+    """Return the share of the figures' pixels without a palette colour; 0 without labels."""
     figure, blends = 0, 0
     for frame in scene.frames:
         if frame.labels is not None:

@@ -23,7 +23,7 @@ HIDDEN_BELOW = 0.01  # light that reaches a sample which nobody sees any more
 
 
 class TrainingRays(Protocol):
-    """Where a training's batches come from."""
+    """Source of a training's batches."""
 
     def __len__(self) -> int:
         """Return how many steps go through all rays once."""

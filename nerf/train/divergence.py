@@ -28,7 +28,7 @@ class LastGood:
         self._kept, self._kept_step = _copied(model), 0
 
     def wrong(self, loss: Tensor, value: float, step: int) -> str:
-        """Return why the training must end before this step's update, or nothing.
+        """Return why the training must end before this step's update, or None.
 
         Args:
             loss: of the step.
@@ -45,7 +45,7 @@ class LastGood:
         return ""
 
     def wrong_at_end(self, step: int) -> str:
-        """Return what is wrong after the last update, or nothing."""
+        """Return what is wrong after the last update, or None."""
         if not all(bool(torch.isfinite(p).all()) for p in self._model.parameters()):
             return self._back("parameters not finite at the end")
         return self._judge(step)

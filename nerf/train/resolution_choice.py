@@ -36,7 +36,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class FieldChoice:
-    """Which planes were chosen, and on what evidence.
+    """Chosen resolution of the planes, and its evidence.
 
     Attributes:
         cells: along the longest side.

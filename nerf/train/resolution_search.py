@@ -43,7 +43,7 @@ Batches = Sequence[tuple[Batch, ...]]
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What all candidates are fitted to, and how.
+    """Scene and settings that all candidates share.
 
     Attributes:
         scene: drawings as they are fitted, without mirror images.

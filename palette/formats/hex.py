@@ -42,7 +42,7 @@ def to_hex(palette: Palette) -> str:
 
 
 def _color(word: str, paint_net: bool, where: str) -> NamedColor | None:
-    """Return the colour; None for paint.net's fully transparent one, which is none."""
+    """Return the colour; None for paint.net's fully transparent one."""
     match = WITH_ALPHA.fullmatch(word) if paint_net else None
     if match is None:
         return NamedColor(rgb_of_hex(word, where))

@@ -64,7 +64,7 @@ class Found:
 
 
 def find_paints(histogram: Histogram) -> Found:
-    """Return the paints, and what is none but unlike all of them."""
+    """Return the paints, and rare colours that are unlike all of them."""
     ink = find_ink(histogram)
     cells, cell_of = _cells(histogram, ink)
     peaks = _peaks(cells)

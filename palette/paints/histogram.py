@@ -54,7 +54,7 @@ class Picture:
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """How often every colour occurs in the opaque pixels.
+    """Histogram of the opaque pixels' colours.
 
     Attributes:
         colors: (n, 3) sRGB, each once, sorted by blue, then green, then red.

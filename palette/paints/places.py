@@ -47,7 +47,7 @@ def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) 
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
-    """Where some colours are in a picture.
+    """Pixels of some colours in a picture.
 
     Attributes:
         view: number of the picture.

@@ -39,7 +39,7 @@ Tones = Int16[np.ndarray, "height width"]
 
 @dataclass(frozen=True, eq=False)
 class Mixtures:
-    """What covers some pixels.
+    """Two tones that cover each of some pixels.
 
     Attributes:
         first, second: (n,) tones; the number of tones stands for a drawn line.

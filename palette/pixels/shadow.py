@@ -69,7 +69,7 @@ class _Borders:
 
 
 def find_shadow(pictures: Sequence[Picture], contours: Sequence[Map]) -> Shadow | None:
-    """Return the shadow that the pictures of a character share; None where there is none.
+    """Return the shadow that the pictures of a character share; None without one.
 
     Args:
         pictures: the drawings.

@@ -40,7 +40,7 @@ DISC = (0.74, 0.83)  # of its box that a disc fills
 
 @dataclass(frozen=True, eq=False)
 class Grouping:
-    """Which figure every patch belongs to.
+    """Figure of every patch.
 
     Attributes:
         figure_of_blob: (blobs,) number of the figure in reading order; -1 = none.

@@ -27,7 +27,7 @@ SURE = 0.9  # chance of being right: a cut that has less is worth a look
 
 @dataclass(frozen=True)
 class Cut:
-    """Where two figures were cut apart.
+    """Cut between two figures.
 
     Attributes:
         box: (x, y, width, height) of the two together, in the cells of the labels.
