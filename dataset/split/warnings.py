@@ -20,7 +20,7 @@ NEARER = 1.2  # times the gap between parts and their bodies: so near a part may
 WIDE = 1.8  # times the median width: two figures that touch
 
 
-def border_doubts(ground: Background, found: SheetLayout) -> tuple[str, ...]:
+def border_warnings(ground: Background, found: SheetLayout) -> tuple[str, ...]:
     """Return a line if the background is hardly one."""
     if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:  # a frame explains it
         return ()
