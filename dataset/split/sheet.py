@@ -20,7 +20,7 @@ from toonset.dataset.split.figures.text_and_swatches import words
 from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
-from toonset.dataset.split.warnings import border_warnings, figure_doubts
+from toonset.dataset.split.warnings import border_warnings, figure_warnings
 from toonset.errors import SheetError
 from toonset.view import Box, View
 
@@ -126,7 +126,7 @@ def split_picture(
         tuple(views),
         ground.rgb,
         ground.sure,
-        border_warnings(ground, found) + (() if by_hand else figure_doubts(found, views, rgba)),
+        border_warnings(ground, found) + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
     )

@@ -27,7 +27,7 @@ def border_warnings(ground: Background, found: SheetLayout) -> tuple[str, ...]:
     return (f"only {100 * ground.sure:.0f} % of the sheet's border is background",)
 
 
-def figure_doubts(
+def figure_warnings(
     found: SheetLayout, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
 ) -> tuple[str, ...]:
     """Return a line for every cut in doubt, every wide view, all left out that may be views."""
