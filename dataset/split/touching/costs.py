@@ -26,7 +26,7 @@ TOLL = 0.015  # of the height: cost of a cut that begins at a straight side
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class CutCosts:
     """A patch on a small picture.
 
     Attributes:
@@ -72,7 +72,7 @@ def look_at(
     mask: Bool[np.ndarray, "height width"],
     paint: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
-) -> Sight:
+) -> CutCosts:
     """Return a patch as cuts see it, at most `MOST_ROWS` high."""
     shrink = min(1.0, MOST_ROWS / len(mask))
     size = max(8, round(mask.shape[1] * shrink)), max(8, round(mask.shape[0] * shrink))
@@ -80,7 +80,7 @@ def look_at(
         cv2.resize(picture.astype(np.float32), size, interpolation=cv2.INTER_AREA)
         for picture in (mask, paint, _lines(rgb), _edges(rgb))
     )
-    return Sight(solid, drawn, lines, edges, _openness(drawn > 0.5))
+    return CutCosts(solid, drawn, lines, edges, _openness(drawn > 0.5))
 
 
 def _openness(inside: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.split.figures.blobs import shared_colors
-from toonset.dataset.split.touching.costs import Sight
+from toonset.dataset.split.touching.costs import CutCosts
 from toonset.dataset.split.touching.profiles import largest_piece, right_flank, unlikeness
 from toonset.dataset.split.touching.seams import Way, distinct_ways
 
@@ -61,7 +61,7 @@ class Option:
 
 
 def find_options(
-    sight: Sight,
+    sight: CutCosts,
     colors: UInt8[np.ndarray, "height width 3"],
     others: Sequence[Float[np.ndarray, " rows"]],
 ) -> list[Option]:
@@ -85,7 +85,7 @@ def find_options(
 
 
 def _option(
-    sight: Sight, colors: np.ndarray, others: Sequence[np.ndarray], way: Way
+    sight: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], way: Way
 ) -> Option | None:
     """Return a way as a cut, None if it does not leave two figures."""
     height, width = sight.drawn.shape
@@ -105,7 +105,7 @@ def _option(
     return Option(way, right, evidence, crossed, (ends[0] / height, ends[1] / height))
 
 
-def _are_same(a: Option, b: Option, sight: Sight) -> bool:
+def _are_same(a: Option, b: Option, sight: CutCosts) -> bool:
     inside = sight.drawn > 0.5
     return bool((a.is_right != b.is_right)[inside].sum() < SAME * inside.sum())
 
@@ -121,7 +121,7 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
     return best, float(chances[alike].sum() / chances.sum())
 
 
-def _crossing(sight: Sight, way: Way) -> tuple[float, float, float]:
+def _crossing(sight: CutCosts, way: Way) -> tuple[float, float, float]:
     height = len(sight.drawn)
     by_lines, by_edges = sight.by_lines(), sight.by_edges()
     gap = 0.1 * np.maximum(sight.solid - sight.drawn, 0)
