@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.dataset.split.figures.blobs import shared_colors
 from toonset.dataset.split.touching.costs import CutCosts
 from toonset.dataset.split.touching.profiles import largest_piece, right_flank, unlikeness
-from toonset.dataset.split.touching.seams import Way, distinct_ways
+from toonset.dataset.split.touching.seams import Seam, distinct_ways
 
 DEAREST = 0.3  # of the height in paint: a way that costs more is not looked at
 MOST_CROSSED = 0.4  # of the height in paint, lines or not: figures touch, they do not merge
@@ -48,7 +48,7 @@ class Option:
         ends: in heights, where the left figure ends and where the right one begins.
     """
 
-    way: Way
+    way: Seam
     is_right: Bool[np.ndarray, "height width"]
     evidence: tuple[float, float, float, float, float]
     crossed: float
@@ -85,7 +85,7 @@ def find_options(
 
 
 def _option(
-    sight: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], way: Way
+    sight: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], way: Seam
 ) -> Option | None:
     """Return a way as a cut, None if it does not leave two figures."""
     height, width = sight.drawn.shape
@@ -121,7 +121,7 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
     return best, float(chances[alike].sum() / chances.sum())
 
 
-def _crossing(sight: CutCosts, way: Way) -> tuple[float, float, float]:
+def _crossing(sight: CutCosts, way: Seam) -> tuple[float, float, float]:
     height = len(sight.drawn)
     by_lines, by_edges = sight.by_lines(), sight.by_edges()
     gap = 0.1 * np.maximum(sight.solid - sight.drawn, 0)
