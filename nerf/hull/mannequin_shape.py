@@ -26,7 +26,7 @@ BESIDE_PX = 2  # pixels of room round what is seen
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class ShapeView:
     """A camera's picture of a shape.
 
     Attributes:
@@ -84,7 +84,7 @@ class Shape:
             sides.append(slice(first, last))
         return sides[0], sides[1]
 
-    def seen(self, camera: Camera, *, normals: bool = False) -> Sight:
+    def seen(self, camera: Camera, *, normals: bool = False) -> ShapeView:
         """Return what a camera sees of the shape; with `normals`, which way its faces look."""
         width, height = camera.size_wh
         depth = depth_map(self.vertices, self.faces, camera.resized(FINER))
@@ -103,7 +103,7 @@ class Shape:
                     ~there, return_distances=False, return_indices=True
                 )
                 normal = np.where((cover > 0)[..., None], normal[tuple(np.asarray(at))], 0)
-        return Sight(camera, cover, fine[middle, middle], fine, normal)
+        return ShapeView(camera, cover, fine[middle, middle], fine, normal)
 
 
 def shape_of(mesh: Mesh, cameras: Sequence[Camera]) -> Shape:

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
-from toonset.nerf.hull.mannequin_shape import FINER, Sight
+from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.lines.nearest import nearest
 from toonset.nerf.lines.step_lines import drawn_steps
 from toonset.nerf.look.drawings import (
@@ -223,7 +223,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     return DrawnView(rgb, alpha, ink, labels, paint, by_field)
 
 
-def _inner_lines(drawings: Drawings, sight: Sight, scale: float) -> Float[np.ndarray, "h w"]:
+def _inner_lines(drawings: Drawings, sight: ShapeView, scale: float) -> Float[np.ndarray, "h w"]:
     """Return how far lines cover every pixel where one part of the figure hides another."""
     pen, outline, style = drawings.pen, drawings.outline, drawings.steps
     if pen is None or outline is None or style is None:

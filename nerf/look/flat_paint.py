@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.hull.mannequin_shape import FINER, Sight
+from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
 from toonset.nerf.lines.step_lines import (
     StepLines,
@@ -64,7 +64,7 @@ class FlatPaint:
 def flat_paint(
     drawings: Sequence[Picture],
     outline: Outline | None,
-    sights: Sequence[Sight] | None,
+    sights: Sequence[ShapeView] | None,
     height: float,
 ) -> FlatPaint:
     """Return the paint of drawings.
@@ -102,7 +102,7 @@ def flat_paint(
     return FlatPaint(paints, steps, shade)
 
 
-def pixels_on_steps(sight: Sight, least: float) -> Mask:
+def pixels_on_steps(sight: ShapeView, least: float) -> Mask:
     """Return the pixels on steps in depth of at least `least` world units."""
     near, far = step_sides(sight.fine, least)
     edge = (near | far).astype(np.float32)
@@ -117,7 +117,7 @@ def _inner(rgba: Picture, width: float) -> Mask:
 
 
 def _at_steps(
-    cover: Float[np.ndarray, "height width"], sight: Sight, steps: StepLines, height: float
+    cover: Float[np.ndarray, "height width"], sight: ShapeView, steps: StepLines, height: float
 ) -> Mask:
     """Return the pixels with ink of lines at steps, which may be drawn a little beside them."""
     least = steps.least * height
@@ -179,7 +179,7 @@ def _without_grain(paint: Paint, inside: Mask) -> Float[np.ndarray, "height widt
     return (clean / 255).clip(0, 1)
 
 
-def _clear(rgba: Picture, sight: Sight, width: float, height: float) -> Mask:
+def _clear(rgba: Picture, sight: ShapeView, width: float, height: float) -> Mask:
     """Return pixels that show paint of the shape, away from all edges."""
     edge = np.minimum(depth_inside(mask_of(rgba)) - width, depth_inside(sight.alpha >= 0.5))
     to_step = distance_to(pixels_on_steps(sight, SAME * height))

@@ -20,7 +20,7 @@ from toonset.dataset.silhouettes.outlines import OUTLINE_POINTS, ROOM, Outlines,
 from toonset.dataset.silhouettes.register import Fit
 from toonset.nerf.hull.hull import LEVEL
 from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired, parts_left
-from toonset.nerf.hull.mannequin_shape import FINER, Shape, Sight, shape_of
+from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView, shape_of
 from toonset.nerf.lines.step_lines import learned_steps, step_places
 from toonset.nerf.lines.strokes import outline_width
 from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
@@ -180,7 +180,7 @@ def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
 
 
 def _inner_lines(
-    frames: list[Frame], sights: list[Sight], squares: list[Square], fit: Fit
+    frames: list[Frame], sights: list[ShapeView], squares: list[Square], fit: Fit
 ) -> list[InnerLines] | None:
     """Return where drawings should have lines at steps in depth; None: their artist draws none.
 
@@ -229,7 +229,7 @@ def _moved(
     return cv2.remap(cover, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
 
-def _height(sights: list[Sight]) -> float:
+def _height(sights: list[ShapeView]) -> float:
     """Return the figure's height, world units."""
     tall = [np.flatnonzero((sight.alpha > 0).any(axis=1)) for sight in sights]
     heights = [
@@ -239,6 +239,6 @@ def _height(sights: list[Sight]) -> float:
     return float(np.median(heights))
 
 
-def _depth_inside(sight: Sight) -> Float[np.ndarray, "height width"]:
+def _depth_inside(sight: ShapeView) -> Float[np.ndarray, "height width"]:
     inside = np.pad(sight.alpha >= 0.5, 1).astype(np.uint8)
     return cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
