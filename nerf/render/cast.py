@@ -18,7 +18,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.rays import Paths, Sight
+from toonset.nerf.render.rays import Paths, ViewRays
 
 RAYS_PER_CHUNK = 1 << 14  # a chunk's arrays stay in a core's cache
 FEWEST_STEPS, MOST_STEPS = 12, 32  # of a ray that are looked up together: more as rays get fewer
@@ -28,7 +28,7 @@ OPAQUE_FROM = 0.98  # opacity at which a ray ends; the colour seen until then st
 FAINTEST = 1e-12  # weight of steps whose mean place is asked for
 
 
-def cast(sight: Sight, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays"]:
+def cast(sight: ViewRays, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays"]:
     """Return premultiplied colour, opacity, and depth times opacity of rays through pixels.
 
     A ray that reaches OPAQUE_FROM ends and counts as opaque.

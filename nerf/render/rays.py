@@ -46,7 +46,7 @@ class Paths:
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class ViewRays:
     """A baked field as a camera sees it.
 
     Attributes:
@@ -64,7 +64,7 @@ class Sight:
     reach: Float[Tensor, "2 rows columns"]
 
     @classmethod
-    def of(cls, baked: Baked, camera: Camera) -> Sight:
+    def of(cls, baked: Baked, camera: Camera) -> ViewRays:
         """Return what `camera` sees."""
         hull, (width, height) = baked.trained.hull, camera.size_wh
         middle = float(camera.rotation[2] @ ((hull.box.low + hull.box.high) / 2 - camera.target))

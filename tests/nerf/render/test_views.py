@@ -18,7 +18,7 @@ from toonset.nerf.hull.march import clip, rays_of
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import OPAQUE_FROM, cast
 from toonset.nerf.render.normals import normal_picture, normals_of
-from toonset.nerf.render.rays import Sight
+from toonset.nerf.render.rays import ViewRays
 from toonset.nerf.render.recolor import repainted
 from toonset.nerf.render.views import borders, places_within, render
 
@@ -51,7 +51,7 @@ def ball(density: float = 1.0) -> TrainedField:
 def fast(trained: TrainedField, camera: Camera) -> np.ndarray:
     """Return what is cast through every pixel."""
     pixels = torch.as_tensor(camera.pixel_grid().reshape(-1, 2).T, dtype=torch.float32)
-    return cast(Sight.of(Baked.of(trained), camera), pixels).T.numpy()
+    return cast(ViewRays.of(Baked.of(trained), camera), pixels).T.numpy()
 
 
 def slow(
