@@ -10,7 +10,7 @@ from typing import Any
 from toonset.cli.common.host import keep_freed_memory
 from toonset.cli.common.output import Printer
 from toonset.cli.common.train_summary import summary
-from toonset.cli.common.train_watch import Stopper, Voice
+from toonset.cli.common.train_watch import Stopper, TrainPrinter
 from toonset.write import check_output
 
 DOUBTFUL = 3  # exit code: written, but weak (--strict), or training was cut short
@@ -67,7 +67,7 @@ def run(request: Request, printer: Printer) -> int:
     keep_freed_memory()
     stopper = Stopper(printer)
     looking = MonitorOptions(
-        Voice(printer).tell, stopper, test, request.previews, request.preview_every
+        TrainPrinter(printer).tell, stopper, test, request.previews, request.preview_every
     )
     with stopper.listening():
         found = train(

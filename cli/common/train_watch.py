@@ -98,7 +98,7 @@ class Pace:
         return True
 
 
-class Voice:
+class TrainPrinter:
     """Says where a training stands."""
 
     def __init__(self, printer: Printer) -> None:
