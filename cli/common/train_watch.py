@@ -74,7 +74,7 @@ class Stopper:
 
 
 @dataclass
-class Pace:
+class RateLimit:
     """When a line is due.
 
     Attributes:
@@ -103,7 +103,7 @@ class TrainPrinter:
 
     def __init__(self, printer: Printer) -> None:
         """Speak through the command's printer."""
-        self._printer, self._pace = printer, Pace(sys.stderr.isatty())
+        self._printer, self._pace = printer, RateLimit(sys.stderr.isatty())
 
     def tell(self, status: Status) -> None:
         """Say where a training stands, if that is due."""
