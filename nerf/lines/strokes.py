@@ -11,7 +11,7 @@ from jaxtyping import Bool, Int, UInt8
 from skimage.morphology import skeletonize
 
 from toonset.nerf.lines.nearest import depth_inside, nearest, parts
-from toonset.palette.pixels.ink_lines import find_contour, rim_line_px
+from toonset.palette.pixels.ink_lines import find_contour, outline_line_px
 
 FEWEST_OUTLINED = 0.5  # of a sheet's views must have an outline, for the sheet to have one
 INK_QUANTILE = 0.2  # darkest part of the rim: the rest is mixed with what it surrounds
@@ -46,7 +46,7 @@ def outline_width(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
     alpha = rgba[..., 3:].astype(np.float32) / 255
     over_white = (rgba[..., :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
     light = cv2.cvtColor(over_white, cv2.COLOR_RGB2GRAY)
-    return rim_line_px(light, rgba[..., 3] >= FIGURE)
+    return outline_line_px(light, rgba[..., 3] >= FIGURE)
 
 
 def ink_color(rims: Iterable[UInt8[np.ndarray, "n 3"]]) -> tuple[int, int, int]:

@@ -56,7 +56,7 @@ def find_contour(
     light = _lightness(rgba)
     mask = rgba[..., 3] >= 128
     none = np.zeros(mask.shape, dtype=np.uint8)
-    width = rim_line_px(light, mask) if line_width_px is None else line_width_px
+    width = outline_line_px(light, mask) if line_width_px is None else line_width_px
     if width <= 0 or not mask.any():
         return none
     closed = _closed(light, _reach(width))
@@ -80,7 +80,7 @@ def find_contours(
     return [find_contour(picture) for picture in without_grain(pictures)]
 
 
-def rim_line_px(
+def outline_line_px(
     light: UInt8[np.ndarray, "height width"], mask: Bool[np.ndarray, "height width"]
 ) -> float:
     """Return the width of the dark line round the figure: 0 where less than half of it has one.
@@ -99,7 +99,7 @@ def rim_line_px(
         size = max(1, round(light.shape[1] / shrink)), max(1, round(light.shape[0] / shrink))
         small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
         covered = cv2.resize(mask.view(np.uint8), size, interpolation=cv2.INTER_AREA) > 0
-        return shrink * rim_line_px(small, covered)
+        return shrink * outline_line_px(small, covered)
     rims = _dark_rims(light, mask, int(SOFT * tall))
     widths = (_width_at(light, rim, int(WIDEST * tall / 2) + 1) for rim in rims)
     return next((width for width in widths if width > 0), 0.0)
