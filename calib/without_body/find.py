@@ -26,7 +26,12 @@ from toonset.calib.verdict.one_character import with_one_character_in_mind
 from toonset.calib.verdict.repeated import with_repeats_in_mind
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.placing import Figures, SheetCameras
-from toonset.calib.without_body.posterior import Doubts, doubts, outlines_log_likelihood, view_doubt
+from toonset.calib.without_body.posterior import (
+    ErrorProbabilities,
+    doubts,
+    outlines_log_likelihood,
+    view_doubt,
+)
 from toonset.calib.without_body.turns import (
     NEAR,
     P_FRONT_FIRST,
@@ -200,7 +205,12 @@ def _judged(
 
 
 def _verdict(
-    found: Found, labels: Sequence[Label], apart: float, wrong: float, doubt: Doubts, against: float
+    found: Found,
+    labels: Sequence[Label],
+    apart: float,
+    wrong: float,
+    doubt: ErrorProbabilities,
+    against: float,
 ) -> tuple[Verdict, str]:
     views, has_label = len(found.placed.cameras), any(labels)
     scale = scale_apart(found.placed.cameras)
@@ -242,7 +252,7 @@ def scale_apart(cameras: Sequence[Camera]) -> float:
     return float(np.exp(np.abs(logs - np.median(logs)).max()))
 
 
-def _doubts_text(doubt: Doubts) -> str:
+def _doubts_text(doubt: ErrorProbabilities) -> str:
     return (
         f"without a body; in doubt: front or back {doubt.front:.2f}, which way round "
         f"{doubt.way:.2f}, spacing {doubt.spacing:.2f}"

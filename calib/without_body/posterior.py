@@ -101,7 +101,7 @@ def outlines_log_likelihood(figures: Figures, turns: TurnHypotheses) -> Float[np
 
 
 @dataclass(frozen=True)
-class Doubts:
+class ErrorProbabilities:
     """Probabilities that the chosen turn is wrong, by kind of error.
 
     Attributes:
@@ -115,7 +115,9 @@ class Doubts:
     spacing: float
 
 
-def doubts(turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen: int) -> Doubts:
+def doubts(
+    turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen: int
+) -> ErrorProbabilities:
     """Return the doubts about a turn."""
     yaws = turns.yaws[chosen]
 
@@ -127,7 +129,7 @@ def doubts(turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen
     way = mass(2 * yaws[0] - yaws) + mass(2 * yaws[0] + np.pi - yaws)
     if np.abs(wrapped(2 * (yaws - yaws[0]))).max() < NEAR:  # front and back only
         way = 0.0
-    return Doubts(front, way, max(0.0, 1 - right - front - way))
+    return ErrorProbabilities(front, way, max(0.0, 1 - right - front - way))
 
 
 def view_doubt(
