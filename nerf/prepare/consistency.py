@@ -24,7 +24,7 @@ from toonset.dataset.silhouettes.tangency import Placed, touch
 from toonset.errors import BundleError
 from toonset.nerf.prepare.prepare import aligned
 from toonset.nerf.prepare.registration import Registration
-from toonset.nerf.prepare.unwarp import Unbending, Warp
+from toonset.nerf.prepare.unwarp import Unwarping, Warp
 
 UNEXPLAINED = 0.01  # of the figure's size: a ray that misses the shared shape by more is a fault
 ODD = 0.03  # share of a figure that may still be so after shift, size and bend
@@ -90,7 +90,7 @@ class Consistency:
     frames: tuple[Frame, ...]
     heat_px: tuple[Float[np.ndarray, "height width"], ...]
     registration: Registration
-    unbending: Unbending
+    unbending: Unwarping
     odd: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.registration import Registration, register_drawings
 from toonset.nerf.prepare.to_mannequin import Posed, posed
-from toonset.nerf.prepare.unwarp import Unbending, unwarp_drawings
+from toonset.nerf.prepare.unwarp import Unwarping, unwarp_drawings
 
 AGREE_PX = 0.1  # outlines this near agree (docs/decisions.md)
 
@@ -39,7 +39,7 @@ class Prepared:
     scene: Scene
     drawn: Scene
     registration: Registration | None
-    unbending: Unbending | None
+    unbending: Unwarping | None
     paint: PaintAgreement | None = None
     mannequin: MannequinFit | None = None
     shape: Shape | None = None
@@ -112,7 +112,7 @@ def with_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
 
 def aligned(
     scene: Scene, register: bool = True, unwarp: bool = True
-) -> tuple[Scene, Registration | None, Unbending | None]:
+) -> tuple[Scene, Registration | None, Unwarping | None]:
     """Return the scene with drawings set right that disagree, and what was found of each kind.
 
     Bends hold shifts and sizes, too: cameras are moved only where the drawings are more likely

@@ -24,7 +24,7 @@ from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView, shape_of
 from toonset.nerf.lines.step_lines import learned_steps, step_places
 from toonset.nerf.lines.strokes import outline_width
 from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
-from toonset.nerf.prepare.unwarp import MOST, Unbending, Warp, warped
+from toonset.nerf.prepare.unwarp import MOST, Unwarping, Warp, warped
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED
 
@@ -49,7 +49,7 @@ class Posed:
     drawn: Scene
     shape: Shape | None
     fit: MannequinFit | None
-    unbending: Unbending | None = None
+    unbending: Unwarping | None = None
 
     @classmethod
     def left_alone(cls, scene: Scene, fit: MannequinFit | None = None) -> Posed:
@@ -139,7 +139,7 @@ def _outside(scene: Scene, shape: Shape) -> float:
     return found if max(sure, OUTSIDE * width) < found < MOST_OUTSIDE * width else 0.0
 
 
-def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
+def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unwarping]:
     """Return the scene with its drawings bent to show the mannequin, and how.
 
     Drawings that show it within an outline's own error are returned as they are, to the bit.
@@ -166,7 +166,7 @@ def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
         )
         for i, square, own in zip(shown, squares, fit.numbers, strict=True):
             warps[i] = Warp(square, own)
-    found = Unbending(
+    found = Unwarping(
         fit.gain_nats > 0,
         fit.gain_nats,
         fit.tau * squares[0].size,

@@ -56,7 +56,7 @@ class Warp:
 
 
 @dataclass(frozen=True, eq=False)
-class Unbending(Alignment):
+class Unwarping(Alignment):
     """Bends that were taken out of the drawings.
 
     Attributes:
@@ -66,7 +66,7 @@ class Unbending(Alignment):
     warps: tuple[Warp, ...]
 
 
-def unwarp_drawings(scene: Scene) -> tuple[Scene, Unbending]:
+def unwarp_drawings(scene: Scene) -> tuple[Scene, Unwarping]:
     """Take the bends out of a scene's drawings; return it, and what was found.
 
     Drawings that agree within an outline's own error are returned as they are, to the bit; so are
@@ -82,7 +82,7 @@ def unwarp_drawings(scene: Scene) -> tuple[Scene, Unbending]:
         for i, (square, own) in numbers.items():
             warps[i] = Warp(square, own)
             changed[i] = warped(changed[i], warps[i])
-    unbending = Unbending(**vars(found), warps=tuple(warps))
+    unbending = Unwarping(**vars(found), warps=tuple(warps))
     return (replace(scene, frames=tuple(changed)) if found.applied else scene), unbending
 
 
