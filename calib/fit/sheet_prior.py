@@ -51,7 +51,7 @@ class Turn:
 
 
 @dataclass(frozen=True, eq=False)
-class Tie:
+class SharedPrior:
     """One shared quantity: its values, derivatives, and how its deviations are measured.
 
     Attributes:
@@ -87,7 +87,7 @@ class Tie:
 
 def sheet_ties(
     poses: Sequence[Pose], turn: Turn | None, yaw_spread: float, size: int
-) -> dict[str, Tie]:
+) -> dict[str, SharedPrior]:
     """Return the ties of a sheet by the name of their spread.
 
     Args:
@@ -107,9 +107,9 @@ def sheet_ties(
     about_mean = np.eye(views) - 1 / views
     ones = np.ones(views)
     ties = {
-        "roll": Tie(np.array([a[0] for a, _ in tilts]), slopes[0], np.eye(views), ones),
-        "elevation": Tie(np.array([a[1] for a, _ in tilts]), slopes[1], about_mean, ones),
-        "scale": Tie(np.log([pose.scale for pose in poses]), slopes[2], about_mean, ones),
+        "roll": SharedPrior(np.array([a[0] for a, _ in tilts]), slopes[0], np.eye(views), ones),
+        "elevation": SharedPrior(np.array([a[1] for a, _ in tilts]), slopes[1], about_mean, ones),
+        "scale": SharedPrior(np.log([pose.scale for pose in poses]), slopes[2], about_mean, ones),
     }
     if turn is not None and np.isfinite(turn.places).any():
         ties["yaw"] = _yaw_tie(poses, turn, slopes[3], yaw_spread)
@@ -117,24 +117,31 @@ def sheet_ties(
 
 
 def anchors(
-    ties: dict[str, Tie], turn: Turn | None, prior: ElevationPrior
-) -> list[tuple[Tie, float]]:
+    ties: dict[str, SharedPrior], turn: Turn | None, prior: ElevationPrior
+) -> list[tuple[SharedPrior, float]]:
     """Return what is known of the sheet's means: (tie of one row, sigma)."""
     elevation = ties["elevation"]
     views = len(elevation.values)
     mean = np.full((1, views), 1 / views)
-    known = [(Tie(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)), prior.sigma)]
+    known = [
+        (
+            SharedPrior(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)),
+            prior.sigma,
+        )
+    ]
     if turn is not None and turn.anchored and "yaw" in ties:
         yaw = ties["yaw"]
         placed = np.array(turn.named) if turn.named else np.isfinite(turn.places)
         over = (placed / placed.sum())[None]
-        known.append((Tie(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
+        known.append((SharedPrior(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
     return known
 
 
 def locks(
-    ties: dict[str, Tie], poses: Sequence[Pose], values: Mapping[str, Float[np.ndarray, " views"]]
-) -> list[tuple[Tie, float]]:
+    ties: dict[str, SharedPrior],
+    poses: Sequence[Pose],
+    values: Mapping[str, Float[np.ndarray, " views"]],
+) -> list[tuple[SharedPrior, float]]:
     """Return ties that keep views' yaw, elevation or log scale at given values; nan is free."""
     kept = []
     views = len(poses)
@@ -149,7 +156,7 @@ def locks(
             slopes, off = ties[name].slopes, ties[name].values - wanted
         held = np.isfinite(wanted)
         off = np.where(held, off, 0.0)
-        kept.append((Tie(off, slopes, np.eye(views), held.astype(float)), LOCK_SIGMA))
+        kept.append((SharedPrior(off, slopes, np.eye(views), held.astype(float)), LOCK_SIGMA))
     return kept
 
 
@@ -186,9 +193,9 @@ def _off_places(poses: Sequence[Pose], turn: Turn) -> tuple[Float[np.ndarray, " 
 
 def _yaw_tie(
     poses: Sequence[Pose], turn: Turn, slopes: Float[np.ndarray, "views unknowns"], spread: float
-) -> Tie:
+) -> SharedPrior:
     placed = np.isfinite(turn.places)
     off, mean = _off_places(poses, turn)
     centre = np.diag(placed.astype(float)) - np.outer(placed, placed) / placed.sum()
     weights = (TAIL + 1) / (TAIL + ((off - mean) / spread) ** 2)
-    return Tie(off, slopes, centre, np.where(placed, np.minimum(weights, 1.0), 0.0))
+    return SharedPrior(off, slopes, centre, np.where(placed, np.minimum(weights, 1.0), 0.0))
