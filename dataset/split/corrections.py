@@ -15,7 +15,7 @@ from jaxtyping import Bool, Int, UInt8
 from toonset.dataset.split.figures.blobs import (
     Blobs,
     find_blobs,
-    find_mains,
+    find_main_blobs,
     with_blocks,
     without_strangers,
 )
@@ -37,7 +37,7 @@ class SheetState:
         shadow: cells of cast shadows.
         paper: cells that the border reaches through background.
         blobs: patches of figures and other things.
-        bodies: numbers of the patches that are bodies of views; None: as `find_mains` says.
+        bodies: numbers of the patches that are bodies of views; None: as `find_main_blobs` says.
         cuts: where touching figures were cut apart.
     """
 
@@ -72,7 +72,7 @@ class SheetState:
     @property
     def mains(self) -> Int[np.ndarray, " bodies"]:
         """Return the numbers of the patches that are bodies of views."""
-        return find_mains(self.blobs) if self.bodies is None else self.bodies
+        return find_main_blobs(self.blobs) if self.bodies is None else self.bodies
 
 
 def remove_shadows(state: SheetState) -> SheetState | None:

@@ -66,7 +66,7 @@ def as_box(numbers: Int[np.ndarray, " 4"]) -> Box:
     return x, y, width, height
 
 
-def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
+def find_main_blobs(blobs: Blobs) -> Int[np.ndarray, " mains"]:
     """Return the numbers of the patches that are the bodies of the views, in no order."""
     large = np.flatnonzero(blobs.areas >= LEAST_SPECK)
     letters = np.zeros(len(blobs.areas), dtype=bool)

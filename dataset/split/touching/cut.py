@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import Blobs, find_mains
+from toonset.dataset.split.figures.blobs import Blobs, find_main_blobs
 from toonset.dataset.split.touching.costs import look_at
 from toonset.dataset.split.touching.profiles import flanks, largest_piece
 from toonset.dataset.split.touching.selection import WIDE_ALONE, Option, best_option, find_options
@@ -90,7 +90,7 @@ def part_touching(
         painted: pixels that are not of the background's colour.
         rgb: the sheet.
     """
-    mains, cuts = find_mains(blobs), list[Cut]()
+    mains, cuts = find_main_blobs(blobs), list[Cut]()
     patches = _Patches(blobs.labels.copy(), painted, rgb, {}, {})
     for number in mains:
         patches.measure(int(number) + 1, blobs.window(int(number)))
