@@ -116,12 +116,14 @@ def _part(patches: _Patches, label: int, new: int) -> Cut | None:
     if paint.sum() < mask.sum() * (1 - MOST_ENCLOSED):
         paint = mask  # a line drawing: its inside is paper, too
     rgb = patches.rgb[window]
-    sight = look_at(mask, paint, rgb)
-    small = cv2.resize(rgb, sight.drawn.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    options = find_options(sight, small, [side for two in patches.sides.values() for side in two])
+    cut_costs = look_at(mask, paint, rgb)
+    small = cv2.resize(rgb, cut_costs.drawn.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    options = find_options(
+        cut_costs, small, [side for two in patches.sides.values() for side in two]
+    )
     if not options:
         return None
-    best, sure = best_option(options, sight.drawn > 0.5)
+    best, sure = best_option(options, cut_costs.drawn > 0.5)
     if best.badness > WORST:
         return None
     box = patches.boxes[label]

@@ -61,23 +61,23 @@ class Option:
 
 
 def find_options(
-    sight: CutCosts,
+    cut_costs: CutCosts,
     colors: UInt8[np.ndarray, "height width 3"],
     others: Sequence[Float[np.ndarray, " rows"]],
 ) -> list[Option]:
     """Return the cuts that come into question.
 
     Args:
-        sight: the patch.
+        cut_costs: the patch.
         colors: of its cells.
         others: sides of the sheet's figures that are known, those of this patch included.
     """
     found: list[Option] = []
-    height, width = sight.drawn.shape
-    for ways in distinct_ways(sight.prices(), sight.drawn, DEAREST * height):
+    height, width = cut_costs.drawn.shape
+    for ways in distinct_ways(cut_costs.prices(), cut_costs.drawn, DEAREST * height):
         for way in ways:
-            option = _option(sight, colors, others, way)
-            if option is not None and not any(_are_same(option, o, sight) for o in found):
+            option = _option(cut_costs, colors, others, way)
+            if option is not None and not any(_are_same(option, o, cut_costs) for o in found):
                 found.append(option)
         if not found and width < TWO_WIDE * height:  # one look is enough at a single figure
             break
@@ -85,14 +85,14 @@ def find_options(
 
 
 def _option(
-    sight: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], way: Seam
+    cut_costs: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], way: Seam
 ) -> Option | None:
     """Return a way as a cut, None if it does not leave two figures."""
-    height, width = sight.drawn.shape
-    crossed = float(way.along(sight.drawn).sum()) / height
+    height, width = cut_costs.drawn.shape
+    crossed = float(way.along(cut_costs.drawn).sum()) / height
     if crossed > MOST_CROSSED:
         return None
-    inside, right = sight.drawn > 0.5, way.is_right(width)
+    inside, right = cut_costs.drawn > 0.5, way.is_right(width)
     if not (inside & right).any() or not (inside & ~right).any():
         return None
     one, two = largest_piece(inside & ~right), largest_piece(inside & right)
@@ -101,12 +101,12 @@ def _option(
     sides = right_flank(one), right_flank(two[:, ::-1])
     unlike = unlikeness(sides[0], [*others, sides[1]]), unlikeness(sides[1], [*others, sides[0]])
     ends = np.flatnonzero(one.any(axis=0))[-1], np.flatnonzero(two.any(axis=0))[0]
-    evidence = (*_crossing(sight, way), *unlike)
+    evidence = (*_crossing(cut_costs, way), *unlike)
     return Option(way, right, evidence, crossed, (ends[0] / height, ends[1] / height))
 
 
-def _are_same(a: Option, b: Option, sight: CutCosts) -> bool:
-    inside = sight.drawn > 0.5
+def _are_same(a: Option, b: Option, cut_costs: CutCosts) -> bool:
+    inside = cut_costs.drawn > 0.5
     return bool((a.is_right != b.is_right)[inside].sum() < SAME * inside.sum())
 
 
@@ -121,14 +121,14 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
     return best, float(chances[alike].sum() / chances.sum())
 
 
-def _crossing(sight: CutCosts, way: Seam) -> tuple[float, float, float]:
-    height = len(sight.drawn)
-    by_lines, by_edges = sight.by_lines(), sight.by_edges()
-    gap = 0.1 * np.maximum(sight.solid - sight.drawn, 0)
-    met = way.along(sight.drawn) > 0.5
+def _crossing(cut_costs: CutCosts, way: Seam) -> tuple[float, float, float]:
+    height = len(cut_costs.drawn)
+    by_lines, by_edges = cut_costs.by_lines(), cut_costs.by_edges()
+    gap = 0.1 * np.maximum(cut_costs.solid - cut_costs.drawn, 0)
+    met = way.along(cut_costs.drawn) > 0.5
     ends = np.diff(np.concatenate([[0], met.astype(np.int8), [0]]))
     first, last = np.flatnonzero(ends == 1), np.flatnonzero(ends == -1) - 1
-    opened = way.along(sight.open)
+    opened = way.along(cut_costs.open)
     return (
         float(way.along(by_lines + gap).sum()) / height,
         float(way.along(by_edges).sum()) / height,
