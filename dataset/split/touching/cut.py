@@ -140,7 +140,7 @@ def _enlarged(option: Option, shape: tuple[int, ...]) -> Int[np.ndarray, " heigh
     """Return the column right of a cut for every row of the sheet."""
     rows, columns = option.is_right.shape
     each = np.minimum(np.arange(shape[0]) * rows // shape[0], rows - 1)
-    return np.rint(option.way.columns[each] * shape[1] / columns).astype(int)
+    return np.rint(option.seam.columns[each] * shape[1] / columns).astype(int)
 
 
 def _crossed(

@@ -73,9 +73,9 @@ def distinct_ways(
             for column in _valleys(np.where(inner, through, np.inf))[:MOST_WAYS]:
                 if through[column] > dearest:
                     break
-                way = _way(down[kind], up[kind], column)
-                _make_dearer(price, drawn, way)
-                ways.append(way)
+                seam = _way(down[kind], up[kind], column)
+                _make_dearer(price, drawn, seam)
+                ways.append(seam)
         yield ways
 
 
@@ -138,9 +138,9 @@ def _climbed(costs: np.ndarray, column: int) -> list[tuple[int, int]]:
     return cells
 
 
-def _make_dearer(price: np.ndarray, drawn: np.ndarray, way: Seam) -> None:
+def _make_dearer(price: np.ndarray, drawn: np.ndarray, seam: Seam) -> None:
     crossed = np.zeros(drawn.shape, dtype=np.uint8)
-    crossed[way.rows_met, way.columns_met] = way.along(drawn) > 0.3
+    crossed[seam.rows_met, seam.columns_met] = seam.along(drawn) > 0.3
     size = 2 * max(1, round(AROUND * len(drawn))) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     price += DEARER * cv2.dilate(crossed, disc) * drawn

@@ -40,7 +40,7 @@ class Option:
     """A cut that leaves something like a figure on each side.
 
     Attributes:
-        way: where it runs.
+        seam: where it runs.
         is_right: which cells lie right of it.
         evidence: paint crossed beside lines and beside edges in heights, places where it begins or
             ends on a straight side, unlikeness of its left and its right side: all 0 at best.
@@ -48,7 +48,7 @@ class Option:
         ends: in heights, where the left figure ends and where the right one begins.
     """
 
-    way: Seam
+    seam: Seam
     is_right: Bool[np.ndarray, "height width"]
     evidence: tuple[float, float, float, float, float]
     crossed: float
@@ -75,8 +75,8 @@ def find_options(
     found: list[Option] = []
     height, width = cut_costs.drawn.shape
     for ways in distinct_ways(cut_costs.prices(), cut_costs.drawn, DEAREST * height):
-        for way in ways:
-            option = _option(cut_costs, colors, others, way)
+        for seam in ways:
+            option = _option(cut_costs, colors, others, seam)
             if option is not None and not any(_are_same(option, o, cut_costs) for o in found):
                 found.append(option)
         if not found and width < TWO_WIDE * height:  # one look is enough at a single figure
@@ -85,14 +85,14 @@ def find_options(
 
 
 def _option(
-    cut_costs: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], way: Seam
+    cut_costs: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], seam: Seam
 ) -> Option | None:
     """Return a way as a cut, None if it does not leave two figures."""
     height, width = cut_costs.drawn.shape
-    crossed = float(way.along(cut_costs.drawn).sum()) / height
+    crossed = float(seam.along(cut_costs.drawn).sum()) / height
     if crossed > MOST_CROSSED:
         return None
-    inside, right = cut_costs.drawn > 0.5, way.is_right(width)
+    inside, right = cut_costs.drawn > 0.5, seam.is_right(width)
     if not (inside & right).any() or not (inside & ~right).any():
         return None
     one, two = largest_piece(inside & ~right), largest_piece(inside & right)
@@ -101,8 +101,8 @@ def _option(
     sides = right_flank(one), right_flank(two[:, ::-1])
     unlike = unlikeness(sides[0], [*others, sides[1]]), unlikeness(sides[1], [*others, sides[0]])
     ends = np.flatnonzero(one.any(axis=0))[-1], np.flatnonzero(two.any(axis=0))[0]
-    evidence = (*_crossing(cut_costs, way), *unlike)
-    return Option(way, right, evidence, crossed, (ends[0] / height, ends[1] / height))
+    evidence = (*_crossing(cut_costs, seam), *unlike)
+    return Option(seam, right, evidence, crossed, (ends[0] / height, ends[1] / height))
 
 
 def _are_same(a: Option, b: Option, cut_costs: CutCosts) -> bool:
@@ -121,17 +121,17 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
     return best, float(chances[alike].sum() / chances.sum())
 
 
-def _crossing(cut_costs: CutCosts, way: Seam) -> tuple[float, float, float]:
+def _crossing(cut_costs: CutCosts, seam: Seam) -> tuple[float, float, float]:
     height = len(cut_costs.drawn)
     by_lines, by_edges = cut_costs.by_lines(), cut_costs.by_edges()
     gap = 0.1 * np.maximum(cut_costs.solid - cut_costs.drawn, 0)
-    met = way.along(cut_costs.drawn) > 0.5
+    met = seam.along(cut_costs.drawn) > 0.5
     ends = np.diff(np.concatenate([[0], met.astype(np.int8), [0]]))
     first, last = np.flatnonzero(ends == 1), np.flatnonzero(ends == -1) - 1
-    opened = way.along(cut_costs.open)
+    opened = seam.along(cut_costs.open)
     return (
-        float(way.along(by_lines + gap).sum()) / height,
-        float(way.along(by_edges).sum()) / height,
+        float(seam.along(by_lines + gap).sum()) / height,
+        float(seam.along(by_edges).sum()) / height,
         float(opened[first].sum() + opened[last].sum()),
     )
 

@@ -73,7 +73,7 @@ def test_ways_cost_what_was_promised_and_reach_both_ends() -> None:
     assert (first.rows_met[0], first.rows_met[-1]) == (0, 29)
     aside = (np.diff(first.columns_met) != 0).sum()
     assert first.along(drawn).sum() + DETOUR * aside >= cheapest.min() - 1e-9
-    assert len({way.columns.tobytes() for ways in rounds for way in ways}) > len(rounds[0])
+    assert len({seam.columns.tobytes() for ways in rounds for seam in ways}) > len(rounds[0])
 
 
 def test_a_cleft_is_less_open_than_a_side() -> None:
