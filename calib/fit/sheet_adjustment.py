@@ -273,14 +273,17 @@ class JointProblem:
     ) -> Spreads:
         """Add the ties; return the spreads, estimated anew where an expectation is given."""
         spreads = state.spreads
-        ties = sheet_ties(state.poses, self.turn, spreads.yaw, len(gradient))
+        priors = sheet_ties(state.poses, self.turn, spreads.yaw, len(gradient))
         if expected is not None and state.covariance is not None:
             spreads = replace(
                 spreads,
-                **{n: t.spread(state.covariance, getattr(expected, n)) for n, t in ties.items()},
+                **{n: t.spread(state.covariance, getattr(expected, n)) for n, t in priors.items()},
             )
-        terms = [(tie, getattr(spreads, name)) for name, tie in ties.items()]
-        known = [*anchors(ties, self.turn, self.elevation), *locks(ties, state.poses, self.kept)]
+        terms = [(tie, getattr(spreads, name)) for name, tie in priors.items()]
+        known = [
+            *anchors(priors, self.turn, self.elevation),
+            *locks(priors, state.poses, self.kept),
+        ]
         for tie, sigma in [*terms, *known]:
             matrix, slope = tie.equations(sigma)
             normal += matrix

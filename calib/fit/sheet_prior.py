@@ -106,21 +106,21 @@ def sheet_ties(
         slopes[3, i, own] = yaw_slope(pose)
     about_mean = np.eye(views) - 1 / views
     ones = np.ones(views)
-    ties = {
+    priors = {
         "roll": SharedPrior(np.array([a[0] for a, _ in tilts]), slopes[0], np.eye(views), ones),
         "elevation": SharedPrior(np.array([a[1] for a, _ in tilts]), slopes[1], about_mean, ones),
         "scale": SharedPrior(np.log([pose.scale for pose in poses]), slopes[2], about_mean, ones),
     }
     if turn is not None and np.isfinite(turn.places).any():
-        ties["yaw"] = _yaw_tie(poses, turn, slopes[3], yaw_spread)
-    return ties
+        priors["yaw"] = _yaw_tie(poses, turn, slopes[3], yaw_spread)
+    return priors
 
 
 def anchors(
-    ties: dict[str, SharedPrior], turn: Turn | None, prior: ElevationPrior
+    priors: dict[str, SharedPrior], turn: Turn | None, prior: ElevationPrior
 ) -> list[tuple[SharedPrior, float]]:
     """Return what is known of the sheet's means: (tie of one row, sigma)."""
-    elevation = ties["elevation"]
+    elevation = priors["elevation"]
     views = len(elevation.values)
     mean = np.full((1, views), 1 / views)
     known = [
@@ -129,8 +129,8 @@ def anchors(
             prior.sigma,
         )
     ]
-    if turn is not None and turn.anchored and "yaw" in ties:
-        yaw = ties["yaw"]
+    if turn is not None and turn.anchored and "yaw" in priors:
+        yaw = priors["yaw"]
         placed = np.array(turn.named) if turn.named else np.isfinite(turn.places)
         over = (placed / placed.sum())[None]
         known.append((SharedPrior(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
@@ -138,7 +138,7 @@ def anchors(
 
 
 def locks(
-    ties: dict[str, SharedPrior],
+    priors: dict[str, SharedPrior],
     poses: Sequence[Pose],
     values: Mapping[str, Float[np.ndarray, " views"]],
 ) -> list[tuple[SharedPrior, float]]:
@@ -147,13 +147,13 @@ def locks(
     views = len(poses)
     for name, wanted in values.items():
         if name == "yaw":
-            slopes = np.zeros_like(ties["roll"].slopes)
+            slopes = np.zeros_like(priors["roll"].slopes)
             for i, pose in enumerate(poses):
                 slopes[i, PARAMETERS * i : PARAMETERS * i + 3] = yaw_slope(pose)
             now = np.array([angles_from_rotation(pose.rotation)[0] for pose in poses])
             off = (now - wanted + np.pi) % (2 * np.pi) - np.pi
         else:
-            slopes, off = ties[name].slopes, ties[name].values - wanted
+            slopes, off = priors[name].slopes, priors[name].values - wanted
         held = np.isfinite(wanted)
         off = np.where(held, off, 0.0)
         kept.append((SharedPrior(off, slopes, np.eye(views), held.astype(float)), LOCK_SIGMA))
