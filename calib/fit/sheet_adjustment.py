@@ -30,7 +30,7 @@ from toonset.calib.fit.drawing_error import (
     next_noise,
 )
 from toonset.calib.fit.proportions import Body
-from toonset.calib.fit.sheet_prior import Spreads, Turn, anchors, locks, sheet_ties
+from toonset.calib.fit.sheet_prior import Spreads, Turn, anchors, locks, sheet_priors
 from toonset.calib.outline.correspondences import Drawing, match
 from toonset.calib.outline.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
 
@@ -273,7 +273,7 @@ class JointProblem:
     ) -> Spreads:
         """Add the ties; return the spreads, estimated anew where an expectation is given."""
         spreads = state.spreads
-        priors = sheet_ties(state.poses, self.turn, spreads.yaw, len(gradient))
+        priors = sheet_priors(state.poses, self.turn, spreads.yaw, len(gradient))
         if expected is not None and state.covariance is not None:
             spreads = replace(
                 spreads,

@@ -85,7 +85,7 @@ class SharedPrior:
         return float(np.sqrt((PRIOR_VIEWS * expected**2 + squared) / (PRIOR_VIEWS + count)))
 
 
-def sheet_ties(
+def sheet_priors(
     poses: Sequence[Pose], turn: Turn | None, yaw_spread: float, size: int
 ) -> dict[str, SharedPrior]:
     """Return the ties of a sheet by the name of their spread.
