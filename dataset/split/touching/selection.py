@@ -114,9 +114,9 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
     """Return the most probable cut and its chance to be right among those between two figures."""
     best = min(options, key=lambda option: option.badness)
     limit = ELSEWHERE * inside.sum()
-    rivals = [o for o in options if (o.is_right != best.is_right)[inside].sum() <= limit]
-    chances = np.array([np.exp(best.badness - option.badness) for option in rivals])
-    ends = np.array([option.ends for option in rivals])
+    alternatives = [o for o in options if (o.is_right != best.is_right)[inside].sum() <= limit]
+    chances = np.array([np.exp(best.badness - option.badness) for option in alternatives])
+    ends = np.array([option.ends for option in alternatives])
     alike = (np.abs(ends - best.ends) <= AS_GOOD).all(axis=1)
     return best, float(chances[alike].sum() / chances.sum())
 
