@@ -70,7 +70,7 @@ class SheetState:
         return cls(*known, paper, find_blobs(~paper))
 
     @property
-    def mains(self) -> Int[np.ndarray, " bodies"]:
+    def main_blobs(self) -> Int[np.ndarray, " bodies"]:
         """Return the numbers of the patches that are bodies of views."""
         return find_main_blobs(self.blobs) if self.bodies is None else self.bodies
 
@@ -80,7 +80,7 @@ def remove_shadows(state: SheetState) -> SheetState | None:
     if not len(state.blobs.areas):
         return None
     seen = state.rgba, state.ground, state.tolerance
-    shadow = find_shadows(state.blobs, state.mains, *seen)
+    shadow = find_shadows(state.blobs, state.main_blobs, *seen)
     if not shadow.any():
         return None
     paper = joined(~state.painted | state.ruled | shadow, state.ring)
@@ -96,14 +96,16 @@ def cut_touching_figures(state: SheetState) -> SheetState | None:
 
 def add_blocky_figures(state: SheetState) -> SheetState | None:
     """Propose rectangles as views that stand with the others in the same colours."""
-    mains = with_blocks(state.blobs, state.mains, state.painted, state.rgba[..., :3])
-    return replace(state, bodies=mains) if len(mains) > len(state.mains) else None
+    main_blobs = with_blocks(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
+    return replace(state, bodies=main_blobs) if len(main_blobs) > len(state.main_blobs) else None
 
 
 def drop_strangers(state: SheetState) -> SheetState | None:
     """Propose smaller figures in other colours, such as weapons, as no views."""
-    mains = without_strangers(state.blobs, state.mains, state.painted, state.rgba[..., :3])
-    return replace(state, bodies=mains) if len(mains) < len(state.mains) else None
+    main_blobs = without_strangers(
+        state.blobs, state.main_blobs, state.painted, state.rgba[..., :3]
+    )
+    return replace(state, bodies=main_blobs) if len(main_blobs) < len(state.main_blobs) else None
 
 
 CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {

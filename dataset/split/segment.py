@@ -98,7 +98,7 @@ def find_layout(
     for name, propose in CORRECTIONS.items():
         if name not in without:
             state = propose(state) or state
-    grouping = group_blobs(state.blobs, state.mains, state.rgba[..., :3])
+    grouping = group_blobs(state.blobs, state.main_blobs, state.rgba[..., :3])
     return SheetLayout(
         *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
         *(state.blobs, grouping, state.cuts),

@@ -90,9 +90,9 @@ def part_touching(
         painted: pixels that are not of the background's colour.
         rgb: the sheet.
     """
-    mains, cuts = find_main_blobs(blobs), list[Cut]()
+    main_blobs, cuts = find_main_blobs(blobs), list[Cut]()
     patches = _Patches(blobs.labels.copy(), painted, rgb, {}, {})
-    for number in mains:
+    for number in main_blobs:
         patches.measure(int(number) + 1, blobs.window(int(number)))
     queue, top = list(patches.boxes), len(blobs.areas)
     while queue:
