@@ -279,13 +279,13 @@ class JointProblem:
                 spreads,
                 **{n: t.spread(state.covariance, getattr(expected, n)) for n, t in priors.items()},
             )
-        terms = [(tie, getattr(spreads, name)) for name, tie in priors.items()]
+        terms = [(shared, getattr(spreads, name)) for name, shared in priors.items()]
         known = [
             *anchors(priors, self.turn, self.elevation),
             *locks(priors, state.poses, self.kept),
         ]
-        for tie, sigma in [*terms, *known]:
-            matrix, slope = tie.equations(sigma)
+        for shared, sigma in [*terms, *known]:
+            matrix, slope = shared.equations(sigma)
             normal += matrix
             gradient += slope
         return spreads
