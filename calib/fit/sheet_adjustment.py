@@ -271,7 +271,7 @@ class JointProblem:
         gradient: Float[np.ndarray, " u"],
         expected: Spreads | None,
     ) -> Spreads:
-        """Add the ties; return the spreads, estimated anew where an expectation is given."""
+        """Add the priors; return the spreads, estimated anew where an expectation is given."""
         spreads = state.spreads
         priors = sheet_priors(state.poses, self.turn, spreads.yaw, len(gradient))
         if expected is not None and state.covariance is not None:

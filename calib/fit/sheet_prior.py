@@ -88,7 +88,7 @@ class SharedPrior:
 def sheet_priors(
     poses: Sequence[Pose], turn: Turn | None, yaw_spread: float, size: int
 ) -> dict[str, SharedPrior]:
-    """Return the ties of a sheet by the name of their spread.
+    """Return the priors of a sheet by the name of their spread.
 
     Args:
         poses: of the views, whose unknowns come first, six each.
@@ -119,7 +119,7 @@ def sheet_priors(
 def anchors(
     priors: dict[str, SharedPrior], turn: Turn | None, prior: ElevationPrior
 ) -> list[tuple[SharedPrior, float]]:
-    """Return what is known of the sheet's means: (tie of one row, sigma)."""
+    """Return what is known of the sheet's means: (prior of one row, sigma)."""
     elevation = priors["elevation"]
     views = len(elevation.values)
     mean = np.full((1, views), 1 / views)
@@ -142,7 +142,7 @@ def locks(
     poses: Sequence[Pose],
     values: Mapping[str, Float[np.ndarray, " views"]],
 ) -> list[tuple[SharedPrior, float]]:
-    """Return ties that keep views' yaw, elevation or log scale at given values; nan is free."""
+    """Return priors that keep views' yaw, elevation or log scale at given values; nan is free."""
     kept = []
     views = len(poses)
     for name, wanted in values.items():
