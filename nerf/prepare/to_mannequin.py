@@ -42,14 +42,14 @@ class Posed:
         drawn: what was bent: as drawn, with room round the figures.
         shape: the mannequin, where it is taken for the character's shape; None: it is not.
         fit: what speaks for it; None: it could not be asked.
-        unbending: how drawings were bent; None: they were not asked.
+        unwarping: how drawings were bent; None: they were not asked.
     """
 
     scene: Scene
     drawn: Scene
     shape: Shape | None
     fit: MannequinFit | None
-    unbending: Unwarping | None = None
+    unwarping: Unwarping | None = None
 
     @classmethod
     def left_alone(cls, scene: Scene, fit: MannequinFit | None = None) -> Posed:
@@ -76,13 +76,13 @@ def posed(scene: Scene, *, unwarp: bool = True) -> Posed:
     if fit is None or not fit.chosen:
         return Posed.left_alone(scene, fit)
     drawn = _with_room(scene)
-    bent, unbending = bent_to(drawn, shape)  # even if not kept: what no bend explains is a part
+    bent, unwarping = bent_to(drawn, shape)  # even if not kept: what no bend explains is a part
     fit = replace(fit, left=parts_left(_beside(_in_pictures(bent, scene), shape)))
     if not fit.chosen:
         return Posed.left_alone(scene, fit)
-    if not unwarp or not unbending.applied:
-        return Posed(scene, scene, shape, fit, unbending if unwarp else None)
-    return Posed(bent, drawn, shape, fit, unbending)
+    if not unwarp or not unwarping.applied:
+        return Posed(scene, scene, shape, fit, unwarping if unwarp else None)
+    return Posed(bent, drawn, shape, fit, unwarping)
 
 
 def _in_pictures(bent: Scene, scene: Scene) -> list[Frame]:

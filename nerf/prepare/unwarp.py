@@ -82,8 +82,8 @@ def unwarp_drawings(scene: Scene) -> tuple[Scene, Unwarping]:
         for i, (square, own) in numbers.items():
             warps[i] = Warp(square, own)
             changed[i] = warped(changed[i], warps[i])
-    unbending = Unwarping(**vars(found), warps=tuple(warps))
-    return (replace(scene, frames=tuple(changed)) if found.applied else scene), unbending
+    unwarping = Unwarping(**vars(found), warps=tuple(warps))
+    return (replace(scene, frames=tuple(changed)) if found.applied else scene), unwarping
 
 
 def warped(frame: Frame, warp: Warp) -> Frame:
