@@ -1,4 +1,4 @@
-"""What a sheet's views share: ties, labels, turns, proportions, the ladder's parts."""
+"""What a sheet's views share: priors, labels, turns, proportions, model selection."""
 
 import math
 from dataclasses import replace

@@ -17,7 +17,7 @@ VIEWS, SIGMA = 8, np.radians(0.3)
 RING = np.arange(VIEWS) * 2 * np.pi / VIEWS
 TURN = Turn(RING)
 BODY = as_it_is(prepare_surface(random_body(0)))
-LOOSE = Spreads(1.0, 1.0, 1.0, 1.0)  # ties that hold nothing
+LOOSE = Spreads(1.0, 1.0, 1.0, 1.0)  # priors that hold nothing
 
 
 def fit_of(angles) -> JointFit:
