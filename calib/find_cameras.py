@@ -25,7 +25,7 @@ from toonset.calib.fit.sheet_prior import Turn, off_places
 from toonset.calib.flaws.stretched import (
     as_drawn,
     nothing_stretched,
-    stretched_mannequin,
+    stretch_mannequin,
     unstretched,
 )
 from toonset.calib.known import Known
@@ -83,7 +83,7 @@ def find_cameras(
         if more.is_none:
             break
         taken = [unstretched(*pair) for pair in zip(views, stretches.views, strict=True)]
-        mannequin = stretched_mannequin(mesh, stretches)
+        mannequin = stretch_mannequin(mesh, stretches)
         fitted = _fitted(taken, mannequin, options, progress, known, seconds)
     found = _judged(fitted, stretches.tried, seconds)
     return as_drawn(found, taken, views)

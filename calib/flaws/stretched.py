@@ -137,7 +137,7 @@ def _model_tests(rich: JointFit, price: float, margin: float) -> tuple[ModelTest
     return apart, model_test(TALLER, typical, BIC_MARGIN)
 
 
-def stretched_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:
+def stretch_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:
     """Return the mannequin as tall as the drawings have it; its feet stay where they are."""
     ground = mesh.vertices[:, 1].min()
     vertices = mesh.vertices.copy()

@@ -12,7 +12,7 @@ from bench.cases.bodies import random_body
 from bench.stability.damage import stretched
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import BIC_MARGIN, STRETCHED, TALLER
-from toonset.calib.flaws.stretched import Stretches, as_drawn, stretched_mannequin, unstretched
+from toonset.calib.flaws.stretched import Stretches, as_drawn, stretch_mannequin, unstretched
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.result import Calibration, CutOff, FlatSide
 from toonset.camera import rotation_distance
@@ -67,7 +67,7 @@ def test_drawing_error_is_no_stretch(seed: int, looks: str) -> None:
 
 
 def test_a_lower_mannequin_is_made_as_tall_as_the_drawings(made: Turnaround) -> None:
-    low = stretched_mannequin(made.mesh, Stretches((), np.log(0.85), ()))
+    low = stretch_mannequin(made.mesh, Stretches((), np.log(0.85), ()))
     found = find_cameras(made.views, low)
     assert proven(found) == {TALLER}
     assert found.verdict == "ok"
