@@ -22,12 +22,7 @@ import numpy as np
 from toonset.calib.evidence.coherence_state import state_of
 from toonset.calib.fit.model_selection import ModelTest
 from toonset.calib.fit.sheet_prior import Turn, off_places
-from toonset.calib.flaws.stretched import (
-    as_drawn,
-    nothing_stretched,
-    stretch_mannequin,
-    unstretched,
-)
+from toonset.calib.flaws.stretched import as_drawn, nothing_stretched, stretch_mannequin, unstretch
 from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.pipeline import Problem, SheetFit
@@ -82,7 +77,7 @@ def find_cameras(
         stretches = stretches.and_then(more)
         if more.is_none:
             break
-        taken = [unstretched(*pair) for pair in zip(views, stretches.views, strict=True)]
+        taken = [unstretch(*pair) for pair in zip(views, stretches.views, strict=True)]
         mannequin = stretch_mannequin(mesh, stretches)
         fitted = _fitted(taken, mannequin, options, progress, known, seconds)
     found = _judged(fitted, stretches.tried, seconds)

@@ -145,7 +145,7 @@ def stretch_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:
     return replace(mesh, vertices=vertices)
 
 
-def unstretched(view: View, stretch: float) -> View:
+def unstretch(view: View, stretch: float) -> View:
     """Return a drawing without its stretch: the shorter way of its picture is made longer."""
     if not stretch:
         return view
