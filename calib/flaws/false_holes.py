@@ -34,7 +34,7 @@ MOST_PLACES = 400  # pixels of a hole that are looked along
 DEPTHS = 9  # places along each of their rays
 
 
-def without_false_holes(
+def fill_false_holes(
     views: Sequence[View],
     found: Sequence[ViewCalibration],
     vertices: Float[np.ndarray, "vertices 3"],
