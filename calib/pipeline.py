@@ -34,7 +34,7 @@ from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetMode
 from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.fit.turned_bodies import with_turned_bodies
 from toonset.calib.flaws.cropped import ending_at
-from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, proven_cuts
+from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, prove_cuts
 from toonset.calib.flaws.stretched import Stretches, find_stretches, nothing_stretched
 from toonset.calib.known import Known, weighed_by_landmarks
 from toonset.calib.options import CalibrationOptions, Progress
@@ -236,7 +236,7 @@ class Problem:
             ended = self._ending_at(possible)
             fitted = ended.rigid(whole.joint, turn)
             both, differs = (costs, ended._costs(fitted)), whole.differs
-            proven = proven_cuts(self.views, possible, fitted.joint, both, differs=differs)
+            proven = prove_cuts(self.views, possible, fitted.joint, both, differs=differs)
             if not proven:
                 ended, fitted = self, whole
             elif len(proven) < len(possible):

@@ -46,7 +46,7 @@ def possible_cuts(
     return known, possible
 
 
-def proven_cuts(
+def prove_cuts(
     views: Sequence[View],
     possible: Cuts,
     tried: JointFit,
