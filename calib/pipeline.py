@@ -45,11 +45,11 @@ from toonset.calib.result import CutOff
 from toonset.calib.search.alternatives import refine_alternatives
 from toonset.calib.search.hypotheses import (
     Candidates,
+    add_twins,
     half_turned,
     level_twins,
     looks_alike_from_behind,
     refine,
-    with_twins,
 )
 from toonset.calib.search.selection import RANKING_WIDTHS, TogetherSearch, with_k
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
@@ -287,7 +287,7 @@ class Problem:
         from_behind = looks_alike_from_behind(bent, joint.poses)
         found = []
         for i, (pose, view) in enumerate(zip(joint.poses, candidates, strict=True)):
-            starts = _alternative_starts(pose, view) + with_twins([half_turned(pose)]) * from_behind
+            starts = _alternative_starts(pose, view) + add_twins([half_turned(pose)]) * from_behind
             final = refine(drawings[i], bent, starts, FINE_WIDTHS)
             final = refine_alternatives(drawings[i], joint, i, final)
             seen = pose if model.is_perspective else replace(pose, k=0.0)
@@ -333,4 +333,4 @@ class Problem:
 
 def _alternative_starts(pose: Pose, candidates: Candidates) -> list[Pose]:
     """Return the chosen pose, its twin and the best candidates, all with the chosen k."""
-    return with_k(with_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)
+    return with_k(add_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)

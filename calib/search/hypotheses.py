@@ -59,7 +59,7 @@ def refine(
     return Candidates.of(align_all(drawing, surface, starts, widths))
 
 
-def with_twins(poses: Sequence[Pose]) -> list[Pose]:
+def add_twins(poses: Sequence[Pose]) -> list[Pose]:
     """Return the poses and their mirror twins."""
     return [*poses, *(pose.twin() for pose in poses)]
 

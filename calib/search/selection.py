@@ -20,7 +20,7 @@ from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetMode
 from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
-from toonset.calib.search.hypotheses import SAME_POSE, Candidates, refine, with_twins
+from toonset.calib.search.hypotheses import SAME_POSE, Candidates, add_twins, refine
 from toonset.calib.search.sheet_posterior import SheetPosterior
 from toonset.calib.search.turntable_starts import TurnStart
 from toonset.camera import rotation_distance
@@ -97,7 +97,7 @@ class TogetherSearch:
         surface = self.body.surface
         again = []
         for i, (drawing, found) in enumerate(zip(self.drawings, candidates, strict=True)):
-            starts = with_k(with_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
+            starts = with_k(add_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
             again.append(self.informed(refine(drawing, surface, starts, RECHECK_WIDTHS), i))
         return again
 
