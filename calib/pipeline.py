@@ -46,10 +46,10 @@ from toonset.calib.search.alternatives import refine_alternatives
 from toonset.calib.search.hypotheses import (
     Candidates,
     add_twins,
-    half_turned,
     level_twins,
     looks_alike_from_behind,
     refine,
+    turn_half,
 )
 from toonset.calib.search.selection import RANKING_WIDTHS, TogetherSearch, with_k
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
@@ -287,7 +287,7 @@ class Problem:
         from_behind = looks_alike_from_behind(bent, joint.poses)
         found = []
         for i, (pose, view) in enumerate(zip(joint.poses, candidates, strict=True)):
-            starts = _alternative_starts(pose, view) + add_twins([half_turned(pose)]) * from_behind
+            starts = _alternative_starts(pose, view) + add_twins([turn_half(pose)]) * from_behind
             final = refine(drawings[i], bent, starts, FINE_WIDTHS)
             final = refine_alternatives(drawings[i], joint, i, final)
             seen = pose if model.is_perspective else replace(pose, k=0.0)

@@ -69,14 +69,14 @@ def is_twin(pose: Pose, other: Pose) -> bool:
     return rotation_distance(pose.twin().rotation, other.rotation) < MIRROR
 
 
-def half_turned(pose: Pose) -> Pose:
+def turn_half(pose: Pose) -> Pose:
     """Return the pose that sees the other side: turned by 180 degrees about the vertical."""
     return replace(pose, rotation=pose.rotation @ np.diag([-1.0, 1.0, -1.0]))
 
 
 def looks_alike_from_behind(surface: Surface, poses: Sequence[Pose]) -> bool:
     """Return whether no view tells the body from itself turned by 180 degrees: a stack of boxes."""
-    return all(_look_alike(surface, pose, half_turned(pose)) for pose in poses)
+    return all(_look_alike(surface, pose, turn_half(pose)) for pose in poses)
 
 
 def level_twins(
@@ -98,7 +98,7 @@ def level_twins(
     if always or _look_alike(surface, pose, pose.twin()):
         alike.append(pose.twin())
     if from_behind:
-        alike += [half_turned(p) for p in alike]
+        alike += [turn_half(p) for p in alike]
     if len(alike) == 1:
         return view
     pair = [
