@@ -51,7 +51,7 @@ from toonset.calib.search.hypotheses import (
     refine,
     turn_half,
 )
-from toonset.calib.search.selection import RANKING_WIDTHS, TogetherSearch, with_k
+from toonset.calib.search.selection import RANKING_WIDTHS, TogetherSearch, set_distance
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.search.templates import Templates, find_hypotheses
@@ -161,7 +161,7 @@ class Problem:
             starts = [h.pose for h in found]
             starts = [*starts, starts[0].twin(), *(turn.poses[i] for turn in together)]
             own = marked[i] if marked else None
-            starts += with_k(own.poses, 0.0) if own else []
+            starts += set_distance(own.poses, 0.0) if own else []
             placed = self.known.placed[i] if self.known.placed else None
             starts += [placed] if placed else []
             reached = refine(self.coarse[i], self.surface, starts, COARSE_WIDTHS)
@@ -333,4 +333,4 @@ class Problem:
 
 def _alternative_starts(pose: Pose, candidates: Candidates) -> list[Pose]:
     """Return the chosen pose, its twin and the best candidates, all with the chosen k."""
-    return with_k(add_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)
+    return set_distance(add_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)

@@ -97,7 +97,7 @@ class TogetherSearch:
         surface = self.body.surface
         again = []
         for i, (drawing, found) in enumerate(zip(self.drawings, candidates, strict=True)):
-            starts = with_k(add_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
+            starts = set_distance(add_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
             again.append(self.informed(refine(drawing, surface, starts, RECHECK_WIDTHS), i))
         return again
 
@@ -125,6 +125,6 @@ def _same(poses: Sequence[Pose], others: Sequence[Pose]) -> bool:
     return max(turns) < SAME_POSE
 
 
-def with_k(poses: Sequence[Pose], k: float) -> list[Pose]:
+def set_distance(poses: Sequence[Pose], k: float) -> list[Pose]:
     """Return the poses at another camera distance."""
     return [replace(pose, k=k) for pose in poses]
