@@ -56,7 +56,7 @@ from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.search.templates import Templates, find_hypotheses
 from toonset.calib.search.turntable_starts import TurnStart, likely_turns
-from toonset.calib.verdict.judge import measured, typical_coverage
+from toonset.calib.verdict.judge import measure_outlines, typical_coverage
 from toonset.camera import Camera, rotation_distance
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh
@@ -256,7 +256,7 @@ class Problem:
         return find_stretches(problem, fitted.joint, name, doubtful=fitted.differs)
 
     def _costs(self, fitted: SheetFit) -> list[float]:
-        return [fit.cost for fit in measured(self.fine, fitted.joint)]
+        return [fit.cost for fit in measure_outlines(self.fine, fitted.joint)]
 
     def _ending_at(self, cuts: Cuts) -> Problem:
         views, fine = list(self.views), list(self.fine)

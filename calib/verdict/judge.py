@@ -33,7 +33,7 @@ FAR_FROM_LABEL = np.radians(60.0)  # three quarters is neither front nor side
 WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach another camera
 
 
-def measured(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
+def measure_outlines(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
     """Return how well the outlines of a sheet meet under its fit, view by view."""
     return [
         measure(drawing, joint.body.surface, drawing.pose_in(pose))
@@ -43,7 +43,7 @@ def measured(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
 
 def typical_coverage(drawings: Sequence[Drawing], joint: JointFit) -> float:
     """Return the share of the outlines that meet, in the sheet's typical view."""
-    return float(np.median([fit.coverage for fit in measured(drawings, joint)]))
+    return float(np.median([fit.coverage for fit in measure_outlines(drawings, joint)]))
 
 
 def judge_view(
