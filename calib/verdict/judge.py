@@ -159,7 +159,7 @@ def with_places_in_mind(
     ]
 
 
-def with_labels_in_mind(
+def downgrade_by_labels(
     views: Sequence[ViewCalibration], labels: Sequence[Label]
 ) -> list[ViewCalibration]:
     """Downgrade views whose camera is far from their label."""

@@ -10,8 +10,8 @@ from toonset.calib.evidence.coherence_state import CONFIRMING, TELLING_VIEWS, Sh
 from toonset.calib.result import Sigmas, ViewCalibration
 from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
+    downgrade_by_labels,
     judge_sheet,
-    with_labels_in_mind,
     with_locks_in_mind,
     with_places_in_mind,
     with_sheet_in_mind,
@@ -58,7 +58,7 @@ def test_a_sheet_that_looks_up_is_not_ok():
 def test_a_view_far_from_its_label_is_not_ok_and_no_label_says_nothing():
     views = [seen_from(yaw_deg=y) for y in (20, 170, 170)]
     labels = [(0.0,), (0.0,), ()]
-    assert verdicts(with_labels_in_mind(views, labels)) == ["ok", "weak", "ok"]
+    assert verdicts(downgrade_by_labels(views, labels)) == ["ok", "weak", "ok"]
 
 
 def test_views_that_turn_without_their_lock_are_not_ok():
