@@ -32,9 +32,9 @@ from toonset.calib.search.templates import turns_visibly
 from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
     downgrade_by_labels,
+    downgrade_by_locks,
     judge_sheet,
     judge_view,
-    with_locks_in_mind,
     with_places_in_mind,
     with_sheet_in_mind,
 )
@@ -149,7 +149,7 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         if differs and even:
             each = with_places_in_mind(each, off_places(joint.poses, fitted.turn))
         each = downgrade_by_labels(with_elevations_in_mind(each), labels)
-        each = with_locks_in_mind(each, problem.pulled(joint, model, fitted.turn))
+        each = downgrade_by_locks(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)
         judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)
         judged = with_repeats_in_mind(judged, problem.views)

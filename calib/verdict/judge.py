@@ -112,7 +112,7 @@ def judge_view(
     )
 
 
-def with_locks_in_mind(
+def downgrade_by_locks(
     views: Sequence[ViewCalibration], pulled: Float[np.ndarray, " views"]
 ) -> list[ViewCalibration]:
     """Downgrade views whose outline contradicts their locked camera.

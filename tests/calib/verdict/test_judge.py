@@ -11,8 +11,8 @@ from toonset.calib.result import Sigmas, ViewCalibration
 from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
     downgrade_by_labels,
+    downgrade_by_locks,
     judge_sheet,
-    with_locks_in_mind,
     with_places_in_mind,
     with_sheet_in_mind,
 )
@@ -63,8 +63,8 @@ def test_a_view_far_from_its_label_is_not_ok_and_no_label_says_nothing():
 
 def test_views_that_turn_without_their_lock_are_not_ok():
     views = [seen_from() for _ in range(3)]
-    assert verdicts(with_locks_in_mind(views, np.radians([1, 2, 9]))) == ["ok", "ok", "weak"]
-    assert verdicts(with_locks_in_mind(views, np.radians([9, 2, 9]))) == ["weak"] * 3
+    assert verdicts(downgrade_by_locks(views, np.radians([1, 2, 9]))) == ["ok", "ok", "weak"]
+    assert verdicts(downgrade_by_locks(views, np.radians([9, 2, 9]))) == ["weak"] * 3
 
 
 def state(views: int = 3, contradiction: float = 0.0, elevation: float = 0.1) -> SheetState:
