@@ -33,9 +33,9 @@ from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
     downgrade_by_labels,
     downgrade_by_locks,
+    downgrade_by_places,
     judge_sheet,
     judge_view,
-    with_places_in_mind,
     with_sheet_in_mind,
 )
 from toonset.calib.verdict.one_character import with_one_character_in_mind
@@ -147,7 +147,7 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         labels = problem.known.labels  # of every view they are no even steps
         even = np.isfinite(fitted.turn.places).all() and not (labels and all(labels))
         if differs and even:
-            each = with_places_in_mind(each, off_places(joint.poses, fitted.turn))
+            each = downgrade_by_places(each, off_places(joint.poses, fitted.turn))
         each = downgrade_by_labels(with_elevations_in_mind(each), labels)
         each = downgrade_by_locks(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)

@@ -138,7 +138,7 @@ def downgrade_by_locks(
     ]
 
 
-def with_places_in_mind(
+def downgrade_by_places(
     views: Sequence[ViewCalibration], off: Float[np.ndarray, " views"]
 ) -> list[ViewCalibration]:
     """Downgrade views that are far from their place in the even turn.

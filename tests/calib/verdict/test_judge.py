@@ -12,8 +12,8 @@ from toonset.calib.verdict.elevations import with_elevations_in_mind
 from toonset.calib.verdict.judge import (
     downgrade_by_labels,
     downgrade_by_locks,
+    downgrade_by_places,
     judge_sheet,
-    with_places_in_mind,
     with_sheet_in_mind,
 )
 from toonset.camera import Camera
@@ -42,10 +42,10 @@ def test_a_view_that_looks_up_where_the_sheet_looks_down_is_not_ok():
 
 def test_a_view_that_leaves_the_even_turn_is_not_ok():
     views = [seen_from(yaw_deg=y) for y in (23, 90, 181, 270)]
-    judged = with_places_in_mind(views, np.radians([23, 0, 0, 0]))
+    judged = downgrade_by_places(views, np.radians([23, 0, 0, 0]))
     assert verdicts(judged) == ["weak", "ok", "ok", "ok"]
     assert "23 degrees" in judged[0].reason
-    assert verdicts(with_places_in_mind(views, np.radians([11, -1, 1, 0]))) == ["ok"] * 4
+    assert verdicts(downgrade_by_places(views, np.radians([11, -1, 1, 0]))) == ["ok"] * 4
 
 
 def test_a_sheet_that_looks_up_is_not_ok():
