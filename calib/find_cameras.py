@@ -34,9 +34,9 @@ from toonset.calib.verdict.judge import (
     downgrade_by_labels,
     downgrade_by_locks,
     downgrade_by_places,
+    downgrade_by_sheet,
     judge_sheet,
     judge_view,
-    with_sheet_in_mind,
 )
 from toonset.calib.verdict.one_character import with_one_character_in_mind
 from toonset.calib.verdict.repeated import with_repeats_in_mind
@@ -151,7 +151,7 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         each = downgrade_by_labels(with_elevations_in_mind(each), labels)
         each = downgrade_by_locks(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)
-        judged = with_sheet_in_mind(each, state, contradict, bent=model.bends_mannequin)
+        judged = downgrade_by_sheet(each, state, contradict, bent=model.bends_mannequin)
         judged = with_repeats_in_mind(judged, problem.views)
         judged = with_one_character_in_mind(judged, problem.views)
     verdict, reason = judge_sheet(judged, state)

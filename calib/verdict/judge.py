@@ -172,7 +172,7 @@ def downgrade_by_labels(
     return judged
 
 
-def with_sheet_in_mind(
+def downgrade_by_sheet(
     views: Sequence[ViewCalibration],
     sheet: SheetState,
     faces_contradict: float = 0.0,

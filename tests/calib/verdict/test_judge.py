@@ -13,8 +13,8 @@ from toonset.calib.verdict.judge import (
     downgrade_by_labels,
     downgrade_by_locks,
     downgrade_by_places,
+    downgrade_by_sheet,
     judge_sheet,
-    with_sheet_in_mind,
 )
 from toonset.camera import Camera
 
@@ -81,22 +81,22 @@ def test_no_view_is_ok_where_the_sheet_is_not(how):
     if how == "failed":
         views[0] = replace(views[0], verdict="failed")
     faces = 0.9 if how == "faces" else 0.0
-    judged = with_sheet_in_mind(views, state(), faces, bent=how == "bent")
+    judged = downgrade_by_sheet(views, state(), faces, bent=how == "bent")
     assert judged[2].verdict == "weak"
     assert judged[2].reason
-    assert verdicts(with_sheet_in_mind([seen_from()] * 3, state())) == ["ok"] * 3
+    assert verdicts(downgrade_by_sheet([seen_from()] * 3, state())) == ["ok"] * 3
 
 
 @pytest.mark.parametrize("bent", [True, False])
 def test_another_shape_is_no_reason_to_doubt_where_many_drawings_agree(bent):
     views = [replace(seen_from(), coverage=0.85) for _ in range(TELLING_VIEWS)]
     agreeing = state(TELLING_VIEWS)
-    assert verdicts(with_sheet_in_mind(views, agreeing, bent=bent)) == ["ok"] * len(views)
+    assert verdicts(downgrade_by_sheet(views, agreeing, bent=bent)) == ["ok"] * len(views)
     verdict, said = judge_sheet(views, agreeing)
     assert verdict == "ok"
     assert "15 %" in said
     steep = state(TELLING_VIEWS, elevation=math.radians(40))
     for other in (state(TELLING_VIEWS - 1), state(TELLING_VIEWS, 1.01 * CONFIRMING), steep):
-        judged = with_sheet_in_mind(views, other, bent=bent)
+        judged = downgrade_by_sheet(views, other, bent=bent)
         assert verdicts(judged) == ["weak"] * len(views)
         assert other.unconfirmed in judged[0].reason
