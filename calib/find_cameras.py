@@ -29,7 +29,7 @@ from toonset.calib.pipeline import Problem, SheetFit
 from toonset.calib.result import Calibration, CutOff
 from toonset.calib.search.hypotheses import Candidates
 from toonset.calib.search.templates import turns_visibly
-from toonset.calib.verdict.elevations import with_elevations_in_mind
+from toonset.calib.verdict.elevations import downgrade_by_elevations
 from toonset.calib.verdict.judge import (
     downgrade_by_labels,
     downgrade_by_locks,
@@ -148,7 +148,7 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         even = np.isfinite(fitted.turn.places).all() and not (labels and all(labels))
         if differs and even:
             each = downgrade_by_places(each, off_places(joint.poses, fitted.turn))
-        each = downgrade_by_labels(with_elevations_in_mind(each), labels)
+        each = downgrade_by_labels(downgrade_by_elevations(each), labels)
         each = downgrade_by_locks(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)
         judged = downgrade_by_sheet(each, state, contradict, bent=model.bends_mannequin)

@@ -13,7 +13,7 @@ FAR_FROM_LEVEL = np.radians(12.0)  # four times what the views of a sheet differ
 LOOKING_UP = np.radians(5.0)  # nobody draws a turnaround from so far below
 
 
-def with_elevations_in_mind(views: Sequence[ViewCalibration]) -> list[ViewCalibration]:
+def downgrade_by_elevations(views: Sequence[ViewCalibration]) -> list[ViewCalibration]:
     """Downgrade views that look down far more or less than the sheet does.
 
     It may be drawn so; more often it is a mirrored drawing that fits in its twin. Nor is any where

@@ -8,7 +8,7 @@ import pytest
 
 from toonset.calib.evidence.coherence_state import CONFIRMING, TELLING_VIEWS, SheetState
 from toonset.calib.result import Sigmas, ViewCalibration
-from toonset.calib.verdict.elevations import with_elevations_in_mind
+from toonset.calib.verdict.elevations import downgrade_by_elevations
 from toonset.calib.verdict.judge import (
     downgrade_by_labels,
     downgrade_by_locks,
@@ -35,7 +35,7 @@ def verdicts(views) -> list[str]:
 
 def test_a_view_that_looks_up_where_the_sheet_looks_down_is_not_ok():
     views = [seen_from(elevation_deg=e) for e in (10, 8, 12, -10)]
-    judged = with_elevations_in_mind(views)
+    judged = downgrade_by_elevations(views)
     assert verdicts(judged) == ["ok", "ok", "ok", "weak"]
     assert "mirrored" in judged[3].reason
 
@@ -49,10 +49,10 @@ def test_a_view_that_leaves_the_even_turn_is_not_ok():
 
 
 def test_a_sheet_that_looks_up_is_not_ok():
-    judged = with_elevations_in_mind([seen_from(elevation_deg=e) for e in (-7, -8, -9, 8)])
+    judged = downgrade_by_elevations([seen_from(elevation_deg=e) for e in (-7, -8, -9, 8)])
     assert verdicts(judged) == ["weak"] * 4
     assert "mirrored" in judged[0].reason
-    assert verdicts(with_elevations_in_mind([seen_from(elevation_deg=-3)])) == ["ok"]
+    assert verdicts(downgrade_by_elevations([seen_from(elevation_deg=-3)])) == ["ok"]
 
 
 def test_a_view_far_from_its_label_is_not_ok_and_no_label_says_nothing():
