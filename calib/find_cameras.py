@@ -38,7 +38,7 @@ from toonset.calib.verdict.judge import (
     judge_sheet,
     judge_view,
 )
-from toonset.calib.verdict.one_character import with_one_character_in_mind
+from toonset.calib.verdict.one_character import downgrade_by_characters
 from toonset.calib.verdict.repeated import with_repeats_in_mind
 from toonset.mesh import Mesh
 from toonset.view import View
@@ -153,7 +153,7 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         contradict = problem.sheet.faces_contradict(final)
         judged = downgrade_by_sheet(each, state, contradict, bent=model.bends_mannequin)
         judged = with_repeats_in_mind(judged, problem.views)
-        judged = with_one_character_in_mind(judged, problem.views)
+        judged = downgrade_by_characters(judged, problem.views)
     verdict, reason = judge_sheet(judged, state)
     return Calibration(
         judged,

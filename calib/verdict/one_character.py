@@ -31,7 +31,7 @@ FEWEST_PIXELS = 200  # that lie deeper than the contour's ink; fewer, and ink co
 MOST_APART = 0.5
 
 
-def with_one_character_in_mind(
+def downgrade_by_characters(
     views: Sequence[ViewCalibration], drawings: Sequence[View]
 ) -> tuple[ViewCalibration, ...]:
     """Downgrade all views if the drawings show two characters.

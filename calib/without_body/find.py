@@ -22,7 +22,7 @@ from toonset.calib.known import Known
 from toonset.calib.options import Progress
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.verdict.judge import SURE, judge_sheet
-from toonset.calib.verdict.one_character import with_one_character_in_mind
+from toonset.calib.verdict.one_character import downgrade_by_characters
 from toonset.calib.verdict.repeated import with_repeats_in_mind
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.placing import Figures, SheetCameras
@@ -180,7 +180,7 @@ def _judged(
                 reason,
             )
         )
-    judged = with_one_character_in_mind(with_repeats_in_mind(each, views), views)
+    judged = downgrade_by_characters(with_repeats_in_mind(each, views), views)
     state = SheetState(True, float("nan"), odd, len(views), placed.elevation)
     verdict, reason = judge_sheet(judged, state)
     reason = "" if verdict == "ok" else reason
