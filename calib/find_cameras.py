@@ -39,7 +39,7 @@ from toonset.calib.verdict.judge import (
     judge_view,
 )
 from toonset.calib.verdict.one_character import downgrade_by_characters
-from toonset.calib.verdict.repeated import with_repeats_in_mind
+from toonset.calib.verdict.repeated import downgrade_by_repeats
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -152,7 +152,7 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         each = downgrade_by_locks(each, problem.pulled(joint, model, fitted.turn))
         contradict = problem.sheet.faces_contradict(final)
         judged = downgrade_by_sheet(each, state, contradict, bent=model.bends_mannequin)
-        judged = with_repeats_in_mind(judged, problem.views)
+        judged = downgrade_by_repeats(judged, problem.views)
         judged = downgrade_by_characters(judged, problem.views)
     verdict, reason = judge_sheet(judged, state)
     return Calibration(

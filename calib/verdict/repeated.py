@@ -29,7 +29,7 @@ PLAIN = 4.0  # levels: standard deviation of one colour with a file's noise
 ELSEWHERE = np.radians(10.0)  # between cameras that see another side
 
 
-def with_repeats_in_mind(
+def downgrade_by_repeats(
     views: Sequence[ViewCalibration], drawings: Sequence[View]
 ) -> tuple[ViewCalibration, ...]:
     """Downgrade views if one drawing got cameras on two sides.

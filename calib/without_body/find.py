@@ -23,7 +23,7 @@ from toonset.calib.options import Progress
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.verdict.judge import SURE, judge_sheet
 from toonset.calib.verdict.one_character import downgrade_by_characters
-from toonset.calib.verdict.repeated import with_repeats_in_mind
+from toonset.calib.verdict.repeated import downgrade_by_repeats
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.placing import Figures, SheetCameras
 from toonset.calib.without_body.posterior import (
@@ -180,7 +180,7 @@ def _judged(
                 reason,
             )
         )
-    judged = downgrade_by_characters(with_repeats_in_mind(each, views), views)
+    judged = downgrade_by_characters(downgrade_by_repeats(each, views), views)
     state = SheetState(True, float("nan"), odd, len(views), placed.elevation)
     verdict, reason = judge_sheet(judged, state)
     reason = "" if verdict == "ok" else reason
