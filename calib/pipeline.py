@@ -26,8 +26,8 @@ from toonset.calib.fit.model_selection import (
     QUICK_TEST_MARGIN,
     QUICK_TEST_WIDTHS,
     ModelChoice,
+    fit_proportions,
     select_model,
-    with_proportions,
 )
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
@@ -206,7 +206,7 @@ class Problem:
         """Return the fit with the mannequin bent, if that is proven, its sigmas made true."""
         fit, widths = rigid, BODY_WIDTHS
         if not rigid.differs and len(self.views) >= FEWEST_TO_TEST:
-            _, model = with_proportions(
+            _, model = fit_proportions(
                 rigid.problem, rigid.joint, rigid.model, QUICK_TEST_WIDTHS, QUICK_TEST_MARGIN
             )
             if model.bends_mannequin:
@@ -215,7 +215,7 @@ class Problem:
                 fit = replace(rigid, model=model)
         joint, model = fit.joint, fit.model
         if fit.differs:
-            joint, model = with_proportions(self._level(fit.problem, joint), joint, model, widths)
+            joint, model = fit_proportions(self._level(fit.problem, joint), joint, model, widths)
         factor = SIGMA_OF_ANOTHER_BODY if fit.differs else SIGMA_OF_SAME_BODY
         joint = replace(joint, covariance=factor**2 * joint.covariance)
         if not fit.differs and not self.known.locked - {"fov"}:

@@ -148,7 +148,7 @@ def select_model(
     return fit, ModelChoice(model, _distances(fit), tuple(tried), samples)
 
 
-def with_proportions(
+def fit_proportions(
     problem: JointProblem,
     fit: JointFit,
     choice: ModelChoice,
