@@ -32,7 +32,7 @@ from toonset.calib.fit.model_selection import (
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
 from toonset.calib.fit.sheet_prior import Turn
-from toonset.calib.fit.turned_bodies import with_turned_bodies
+from toonset.calib.fit.turned_bodies import account_for_turned_bodies
 from toonset.calib.flaws.cropped import ending_at
 from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, prove_cuts
 from toonset.calib.flaws.stretched import Stretches, find_stretches, nothing_stretched
@@ -219,7 +219,7 @@ class Problem:
         factor = SIGMA_OF_ANOTHER_BODY if fit.differs else SIGMA_OF_SAME_BODY
         joint = replace(joint, covariance=factor**2 * joint.covariance)
         if not fit.differs and not self.known.locked - {"fov"}:
-            joint = with_turned_bodies(joint, turn, self.known.kept)
+            joint = account_for_turned_bodies(joint, turn, self.known.kept)
         return replace(fit, joint=joint, model=model)
 
     def cut_off(self, whole: SheetFit, turn: Turn) -> tuple[Problem, SheetFit, tuple[CutOff, ...]]:

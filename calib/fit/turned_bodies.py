@@ -42,7 +42,7 @@ FEWEST = 4  # views whose scatter tells
 TIED = 0.3  # least share of a variance that the drawings decide
 
 
-def with_turned_bodies(joint: JointFit, turn: Turn, kept: Sequence[bool] = ()) -> JointFit:
+def account_for_turned_bodies(joint: JointFit, turn: Turn, kept: Sequence[bool] = ()) -> JointFit:
     """Return the fit with its rotations and their covariance as bodies that turn ask for.
 
     Unchanged where elevation or roll scatter no more than they are uncertain.
