@@ -27,7 +27,7 @@ def alpha_of(frame: Frame) -> Float[np.ndarray, "height width"]:
     return frame.rgba[..., 3] / np.float32(255)
 
 
-def widened(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+def widen_thin_parts(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
     """Return the coverage with thin parts as wide as they cover pixels.
 
     Interpolated between pixel centres, a line that covers the share a of its pixels is in the mask
