@@ -87,7 +87,7 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
         numbers = flat.reshape(views, count)
         normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
         if round_ >= SETTLED:
-            tau = learned(energy(normal.matrix, precision, flat, tau), len(flat))
+            tau = learn_error_size(energy(normal.matrix, precision, flat, tau), len(flat))
     spent = normal.cost + flat @ precision @ flat / tau**2
     volume = log_volume(normal.matrix, moves.covariance * tau**2, views)
     gain = (first.cost - spent - volume) / 2
@@ -212,7 +212,7 @@ def energy(
     return float(numbers @ precision @ numbers) + trace
 
 
-def learned(whole: float, count: int) -> float:
+def learn_error_size(whole: float, count: int) -> float:
     """Return the size of errors that the energy of `count` numbers speaks for."""
     return float(np.clip(np.sqrt(whole / count), LEAST, MOST))
 

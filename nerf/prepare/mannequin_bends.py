@@ -28,7 +28,7 @@ from toonset.dataset.silhouettes.register import (
     SETTLED,
     Fit,
     energy,
-    learned,
+    learn_error_size,
     log_volume,
 )
 from toonset.nerf.lines.step_lines import lines_across
@@ -126,7 +126,7 @@ def fit_bends(
                 energy(n.matrix, precision, own, tau)
                 for own, n in zip(numbers, normal, strict=True)
             )
-            tau = learned(spent, numbers.size)
+            tau = learn_error_size(spent, numbers.size)
     gain = 0.0
     for own, before, after in zip(numbers, first, normal, strict=True):
         paid = after.cost + own @ precision @ own / tau**2
