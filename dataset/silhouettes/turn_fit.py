@@ -98,7 +98,7 @@ def fit_turns(
     return Fit(flat.reshape(views, OWN), tau, gain, apart)
 
 
-def camera_moved(camera: Camera, square: Square, own: Float[np.ndarray, " 4"]) -> Camera:
+def move_camera(camera: Camera, square: Square, own: Float[np.ndarray, " 4"]) -> Camera:
     """Return the camera of a drawing after its numbers; `square` in the camera's pixels."""
     yaw, elevation, roll = camera.angles
     rotation = rotation_from_angles(yaw + float(own[YAW]), elevation, roll)
@@ -148,7 +148,7 @@ def _linearised(outlines: Outlines, flat: np.ndarray, free: Bool[np.ndarray, " m
     """Return the normal equations at `flat`; numbers that are not free have no slope."""
     own = flat.reshape(-1, OWN)
     views = tuple(
-        replace(view, camera=camera_moved(view.camera, view.square, numbers))
+        replace(view, camera=move_camera(view.camera, view.square, numbers))
         for view, numbers in zip(outlines.views, own, strict=True)
     )
     aside = [
@@ -185,8 +185,8 @@ def _aside(outline: Outline, own: np.ndarray, movable: Bool[np.ndarray, " 4"]) -
     """Return a camera a STEP ahead and behind in each number that may move."""
     return [
         (
-            camera_moved(outline.camera, outline.square, own + step),
-            camera_moved(outline.camera, outline.square, own - step),
+            move_camera(outline.camera, outline.square, own + step),
+            move_camera(outline.camera, outline.square, own - step),
         )
         if free
         else None
