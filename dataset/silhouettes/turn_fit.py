@@ -102,10 +102,10 @@ def move_camera(camera: Camera, square: Square, own: Float[np.ndarray, " 4"]) ->
     """Return the camera of a drawing after its numbers; `square` in the camera's pixels."""
     yaw, elevation, roll = camera.angles
     rotation = rotation_from_angles(yaw + float(own[YAW]), elevation, roll)
-    return moved(replace(camera, rotation=rotation), square, own[PLACE])
+    return displace_camera(replace(camera, rotation=rotation), square, own[PLACE])
 
 
-def moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
+def displace_camera(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
     """Return the camera whose pixel of a point is the moved one: u + d(u), exactly."""
     growth = 1 + 2 * own[2]
     middle = square.low + square.size / 2

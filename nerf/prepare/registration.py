@@ -17,7 +17,7 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.alignment import Alignment, alignment_of
 from toonset.dataset.silhouettes.displacement import ShiftAndScale
 from toonset.dataset.silhouettes.outlines import Square
-from toonset.dataset.silhouettes.turn_fit import moved
+from toonset.dataset.silhouettes.turn_fit import displace_camera
 
 ROUNDS = 6  # of Gauss-Newton
 
@@ -73,7 +73,7 @@ def register_drawings(scene: Scene) -> tuple[Scene, Registration]:
     frames = list(scene.frames)
     views = [ViewMove((0.0, 0.0), 1.0)] * len(frames)
     for i, (square, own) in numbers.items():
-        frames[i] = replace(frames[i], camera=moved(frames[i].camera, square, own))
+        frames[i] = replace(frames[i], camera=displace_camera(frames[i].camera, square, own))
         views[i] = ViewMove.of(square, own)
     registration = Registration(**vars(found), views=tuple(views))
     return (replace(scene, frames=tuple(frames)) if found.applied else scene), registration
