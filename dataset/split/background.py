@@ -116,7 +116,7 @@ def is_transparent(rgba: UInt8[np.ndarray, "height width 4"]) -> bool:
     return float(np.count_nonzero(rgba[..., 3] < 128)) / rgba[..., 3].size > TRANSPARENT
 
 
-def flattened(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
+def flatten(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
     """Return an opaque picture: what is see-through shows white paper."""
     if (rgba[..., 3] == 255).all():
         return rgba

@@ -13,7 +13,7 @@ from jaxtyping import Bool, UInt8
 from pydantic import Field
 
 from toonset.dataset.silhouettes.line_width import contour_width_px
-from toonset.dataset.split.background import Background, find_background, flattened, is_transparent
+from toonset.dataset.split.background import Background, find_background, flatten, is_transparent
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
@@ -114,7 +114,7 @@ def split_picture(
     """
     options = options or SheetOptions()
     if options.background_rgb is not None or not is_transparent(rgba):
-        rgba = flattened(rgba)
+        rgba = flatten(rgba)
     ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
     found = find_layout(rgba, paint, ground, options.without)
