@@ -14,9 +14,9 @@ from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import (
     Blobs,
+    add_blocks,
     find_blobs,
     find_main_blobs,
-    with_blocks,
     without_strangers,
 )
 from toonset.dataset.split.shadows import find_shadows
@@ -96,7 +96,7 @@ def cut_touching_figures(state: SheetState) -> SheetState | None:
 
 def add_blocky_figures(state: SheetState) -> SheetState | None:
     """Propose rectangles as views that stand with the others in the same colours."""
-    main_blobs = with_blocks(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
+    main_blobs = add_blocks(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
     return replace(state, bodies=main_blobs) if len(main_blobs) > len(state.main_blobs) else None
 
 

@@ -80,7 +80,7 @@ def find_main_blobs(blobs: Blobs) -> Int[np.ndarray, " main_blobs"]:
     return large
 
 
-def with_blocks(
+def add_blocks(
     blobs: Blobs,
     main_blobs: Int[np.ndarray, " main_blobs"],
     painted: Bool[np.ndarray, "height width"],
