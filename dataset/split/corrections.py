@@ -17,7 +17,7 @@ from toonset.dataset.split.figures.blobs import (
     add_blocks,
     find_blobs,
     find_main_blobs,
-    without_strangers,
+    remove_strangers,
 )
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
@@ -102,9 +102,7 @@ def add_blocky_figures(state: SheetState) -> SheetState | None:
 
 def drop_strangers(state: SheetState) -> SheetState | None:
     """Propose smaller figures in other colours, such as weapons, as no views."""
-    main_blobs = without_strangers(
-        state.blobs, state.main_blobs, state.painted, state.rgba[..., :3]
-    )
+    main_blobs = remove_strangers(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
     return replace(state, bodies=main_blobs) if len(main_blobs) < len(state.main_blobs) else None
 
 

@@ -111,7 +111,7 @@ def add_blocks(
     return np.concatenate([main_blobs, np.array(views, dtype=main_blobs.dtype)])
 
 
-def without_strangers(
+def remove_strangers(
     blobs: Blobs,
     main_blobs: Int[np.ndarray, " main_blobs"],
     painted: Bool[np.ndarray, "height width"],
