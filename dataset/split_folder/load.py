@@ -24,7 +24,7 @@ from toonset.dataset.split_folder.cutting import Cutting
 from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
-from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
+from toonset.dataset.split_folder.views import Split, join_splits, split_of_sheet, without
 from toonset.errors import PictureError, SheetError, UsageError
 from toonset.palette.names import rgb_of_hex
 from toonset.read import read_whole
@@ -252,7 +252,7 @@ def _uneven_cells(
 
 
 def _joined(parts: Sequence[Sheet]) -> Sheet:
-    split = joined([part.split for part in parts])
+    split = join_splits([part.split for part in parts])
     return Sheet(
         split,
         len(split.views),

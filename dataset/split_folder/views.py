@@ -75,7 +75,7 @@ def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segm
     return Split((source,), sheet.views, (0,) * len(sheet.views))
 
 
-def joined(parts: Sequence[Split]) -> Split:
+def join_splits(parts: Sequence[Split]) -> Split:
     """Return several splits as one, views numbered through."""
     sources: list[Source] = []
     views: list[View] = []
