@@ -50,7 +50,7 @@ def read_json(file: Path) -> Any:
     return parse_json(data, str(file), BundleError)
 
 
-def validated(schema: type[Record], content: Any, file: Path) -> Record:
+def validate(schema: type[Record], content: Any, file: Path) -> Record:
     """Return the content of a file as its schema has it.
 
     Raises:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.errors import BundleError
-from toonset.json_file import read_json, validated
+from toonset.json_file import read_json, validate
 from toonset.read import schema_version
 
 SCHEMA, VERSION = "toonset-transforms", 1
@@ -61,4 +61,4 @@ def read_records(file: Path) -> TransformsFile:
     content = read_json(file)
     if isinstance(content, dict) and str(content.get("schema", "")).startswith("toonset-"):
         schema_version(content, SCHEMA, VERSION, str(file), BundleError)
-    return validated(TransformsFile, content, file)
+    return validate(TransformsFile, content, file)
