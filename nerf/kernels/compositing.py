@@ -38,7 +38,7 @@ def compositing_weights(
     return torch.exp(-before) * -torch.expm1(-optical_depth)
 
 
-def padded(
+def pad(
     packed: Float[Tensor, "n channels"],
     ray: Int[Tensor, " n"],
     order: Int[Tensor, " n"],
