@@ -166,7 +166,7 @@ def learned_steps(
     return StepLines(STEPS[level], near_px, far_px) if near_px + far_px > THINNEST_PX else None
 
 
-def drawn_steps(depth: Depth, style: StepLines, height: float, finer: int, scale: float) -> Cover:
+def draw_steps(depth: Depth, style: StepLines, height: float, finer: int, scale: float) -> Cover:
     """Return how far lines at steps cover every pixel of a view.
 
     Args:

@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.lines.nearest import nearest
-from toonset.nerf.lines.step_lines import drawn_steps
+from toonset.nerf.lines.step_lines import draw_steps
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
@@ -229,7 +229,7 @@ def _inner_lines(drawings: Drawings, sight: ShapeView, scale: float) -> Float[np
     if pen is None or outline is None or style is None:
         return np.zeros(sight.alpha.shape, np.float32)
     wider = pen.width_px / max(outline.width_px, 1e-6)
-    return drawn_steps(sight.fine, style, drawings.height, FINER, scale * wider)
+    return draw_steps(sight.fine, style, drawings.height, FINER, scale * wider)
 
 
 def _border(drawings: Drawings, view: Geometry) -> float:

@@ -9,7 +9,7 @@ from tests.nerf.bodies import FINE, HEIGHT, LINE_PX, STEPS, Hand, body, depths, 
 from toonset.nerf.hull.mannequin_shape import FINER, shape_of
 from toonset.nerf.lines.step_lines import (
     StepLines,
-    drawn_steps,
+    draw_steps,
     learned_steps,
     lines_across,
     step_places,
@@ -67,11 +67,11 @@ def test_a_line_is_found_where_it_lies() -> None:
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_lines_are_as_wide_as_told_on_either_side(scale: float) -> None:
     fine = np.repeat(np.repeat(stair(0.1), 3, axis=0), 3, axis=1)
-    line = drawn_steps(fine, StepLines(0.05, 2.0, 1.0), 1.0, 3, scale)
+    line = draw_steps(fine, StepLines(0.05, 2.0, 1.0), 1.0, 3, scale)
     middle = line[10:30].mean(axis=0)
     assert middle[:30].sum() == pytest.approx(2.0 * scale, abs=0.2)
     assert middle[30:].sum() == pytest.approx(1.0 * scale, abs=0.2)
-    assert not drawn_steps(fine, StepLines(0.2, 2.0, 1.0), 1.0, 3, scale).any()
+    assert not draw_steps(fine, StepLines(0.2, 2.0, 1.0), 1.0, 3, scale).any()
 
 
 def test_the_rule_of_a_sheet_is_learned() -> None:
@@ -99,9 +99,9 @@ def test_lines_of_a_shape_are_those_of_the_drawing() -> None:
     """What was drawn with these lines is drawn with them again."""
     camera = ring()[1]
     sight = shape_of(body(), ring()).seen(camera)
-    line = drawn_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
+    line = draw_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
     exact = depths(body(), camera.resized(FINE))
-    truth = drawn_steps(exact, STEPS, HEIGHT, FINE, 1.0)
+    truth = draw_steps(exact, STEPS, HEIGHT, FINE, 1.0)
     assert truth.sum() > 20
     assert np.abs(line - truth).sum() < 0.1 * truth.sum()
 
