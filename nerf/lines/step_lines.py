@@ -134,7 +134,7 @@ def lines_across(
     return np.where(found.max(axis=1) > FAINT, offs[best], np.nan)
 
 
-def learned_steps(
+def learn_steps(
     covers: Sequence[Cover], depths: Sequence[Depth], height: float, width_px: float
 ) -> StepLines | None:
     """Return how steps are drawn, None where they are not.

@@ -19,7 +19,7 @@ from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
 from toonset.nerf.lines.step_lines import (
     StepLines,
-    learned_steps,
+    learn_steps,
     lines_across,
     step_places,
     step_sides,
@@ -80,7 +80,7 @@ def flat_paint(
     steps = shade = None
     covers = [find_contour(rgba, width) / np.float32(255) for rgba in drawings] if width else []
     if sights and covers:
-        steps = learned_steps(covers, [sight.depth for sight in sights], height, width)
+        steps = learn_steps(covers, [sight.depth for sight in sights], height, width)
     found = []
     for number, rgba in enumerate(drawings):
         kept = _inner(rgba, width)

@@ -21,7 +21,7 @@ from toonset.dataset.silhouettes.register import Fit
 from toonset.nerf.hull.hull import LEVEL
 from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired, parts_left
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView, shape_of
-from toonset.nerf.lines.step_lines import learned_steps, step_places
+from toonset.nerf.lines.step_lines import learn_steps, step_places
 from toonset.nerf.lines.strokes import outline_width
 from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
 from toonset.nerf.prepare.unwarp import MOST, Unwarping, Warp, warped
@@ -199,7 +199,7 @@ def _inner_lines(
         for cover, frame, square, own in zip(covers, frames, squares, fit.numbers, strict=True)
     ]
     height = _height(sights)
-    style = learned_steps(moved, [sight.depth for sight in sights], height, width)
+    style = learn_steps(moved, [sight.depth for sight in sights], height, width)
     if style is None:
         return None
     found = []

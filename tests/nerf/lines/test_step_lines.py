@@ -10,7 +10,7 @@ from toonset.nerf.hull.mannequin_shape import FINER, shape_of
 from toonset.nerf.lines.step_lines import (
     StepLines,
     draw_steps,
-    learned_steps,
+    learn_steps,
     lines_across,
     step_places,
     step_sides,
@@ -78,7 +78,7 @@ def test_the_rule_of_a_sheet_is_learned() -> None:
     scene = sheet(body(), Hand())
     covers = [find_contour(frame.rgba, LINE_PX) / 255.0 for frame in scene.frames]
     seen = [depths(body(), camera) for camera in ring()]
-    found = learned_steps(covers, seen, HEIGHT, LINE_PX)
+    found = learn_steps(covers, seen, HEIGHT, LINE_PX)
     assert found is not None
     assert found.least <= STEPS.least * 1.2
     assert found.width_px == pytest.approx(STEPS.width_px, abs=0.8)
@@ -89,10 +89,10 @@ def test_an_artist_who_draws_no_steps_has_no_rule() -> None:
     scene = sheet(body(), Hand(lines=False))
     seen = [depths(body(), camera) for camera in ring()]
     covers = [find_contour(frame.rgba, LINE_PX) / 255.0 for frame in scene.frames]
-    assert learned_steps(covers, seen, HEIGHT, LINE_PX) is None
-    assert learned_steps(covers, seen, HEIGHT, 0.0) is None
+    assert learn_steps(covers, seen, HEIGHT, LINE_PX) is None
+    assert learn_steps(covers, seen, HEIGHT, 0.0) is None
     flat = [np.zeros_like(depth) for depth in seen]
-    assert learned_steps(covers, flat, HEIGHT, LINE_PX) is None
+    assert learn_steps(covers, flat, HEIGHT, LINE_PX) is None
 
 
 def test_lines_of_a_shape_are_those_of_the_drawing() -> None:
@@ -113,6 +113,6 @@ def test_lines_of_any_width_are_measured(width: int) -> None:
     depth[:4] = depth[-4:] = np.nan
     cover = np.zeros((400, 400))
     cover[:, 200 - width // 2 : 200 + width // 2] = 1
-    found = learned_steps([cover], [depth], 2.0, float(width))
+    found = learn_steps([cover], [depth], 2.0, float(width))
     assert found is not None
     assert found.width_px == pytest.approx(width, abs=1.5)
