@@ -144,7 +144,7 @@ def flanking(cameras: list[Camera], camera: Camera) -> tuple[int, int, float]:
     return first, second, 1 - min(1.0, float(along[second] / whole[second]))
 
 
-def drawn_view(drawings: Drawings, view: Geometry) -> DrawnView:
+def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
     """Return a view of the field in the look of its drawings, in the colours that they show."""
     height, width = view.alpha.shape
     result = DrawnView(

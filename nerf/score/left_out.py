@@ -28,7 +28,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import has_figure
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.blend import SOLID, Geometry, drawn_view, flanking
+from toonset.nerf.look.blend import SOLID, Geometry, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import default_layer
@@ -120,7 +120,7 @@ def predicted(
     frame, others = frames[number], drawings.without(number)
     names = [own.name for i, own in enumerate(frames) if i != number]
     first, second, _ = flanking([one.camera for one in others.views], view.camera)
-    found = drawn_view(others, view)
+    found = blend_view(others, view)
     size = view.camera.size_wh
     drawn = cv2.resize(over_white(frame.rgba), size, interpolation=cv2.INTER_AREA)
     apart = difference(_over_white(found.rgb, found.alpha), drawn)

@@ -20,7 +20,7 @@ from tests.nerf.look.painted import camera_at, drawings, geometry
 from tests.nerf.look.test_shaped import drawn, misty
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.errors import BundleError, ToonsetError
-from toonset.nerf.look.blend import drawn_view
+from toonset.nerf.look.blend import blend_view
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
@@ -48,7 +48,7 @@ def test_views_are_the_same_after_loading(folder: Path, egg: Drawings) -> None:
     loaded = read_field(folder).drawings
     assert loaded is not None
     shown = geometry(camera_at(0.4))
-    a, b = drawn_view(egg, shown), drawn_view(loaded, shown)
+    a, b = blend_view(egg, shown), blend_view(loaded, shown)
     np.testing.assert_array_equal(a.rgb, b.rgb)
     np.testing.assert_array_equal(a.ink, b.ink)
     assert loaded.outline == egg.outline
@@ -73,7 +73,7 @@ def test_a_mannequins_shape_lines_and_shadow_are_the_same_after_loading(
     assert loaded is not None
     assert loaded.steps == shaped.steps
     assert loaded.shade == shaped.shade
-    a, b = (drawn_view(one, misty(body_camera(0.4))) for one in (shaped, loaded))
+    a, b = (blend_view(one, misty(body_camera(0.4))) for one in (shaped, loaded))
     np.testing.assert_array_equal(a.rgb, b.rgb)
     assert loaded.shape is not None
 
