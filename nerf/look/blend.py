@@ -30,7 +30,7 @@ from toonset.nerf.look.drawings import (
     crisp_depth,
     filled,
     look_up,
-    taken,
+    sample_picture,
 )
 from toonset.nerf.look.outline import CRUMB_PX, crisp_outline
 from toonset.nerf.look.paint_flow import NEIGHBOURS
@@ -270,7 +270,7 @@ def _candidates(
         own = own or seen
         mask = seen.mask & there
         places = seen.moved(flow, part)
-        trust = _trust(taken(texture.to_edge, places, cv2.INTER_LINEAR)) * _feathered(mask)
+        trust = _trust(sample_picture(texture.to_edge, places, cv2.INTER_LINEAR)) * _feathered(mask)
         candidates.append(_candidate(texture, places, np.float32(weight) * trust))
         covered |= mask
     assert own is not None
@@ -297,8 +297,8 @@ def _others(drawings: Drawings, camera: Camera, used: tuple[int, int]) -> list[i
 def _candidate(
     texture: Texture, places: tuple[np.ndarray, np.ndarray], weight: Float[np.ndarray, "h w"]
 ) -> _Candidate:
-    color = taken(texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
-    return _Candidate(color, taken(texture.labels, places, cv2.INTER_NEAREST), weight)
+    color = sample_picture(texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
+    return _Candidate(color, sample_picture(texture.labels, places, cv2.INTER_NEAREST), weight)
 
 
 def _straight(view: Geometry) -> Float[np.ndarray, "h w 3"]:

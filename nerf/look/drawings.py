@@ -69,7 +69,7 @@ class PairFlow:
         """Return F at world points; beyond the picture that of its edge."""
         pixels, _, _ = self.camera.project(points)
         x, y = (np.nan_to_num(pixels[..., k] - 0.5).astype(np.float32) for k in (0, 1))
-        return taken(self.flow.astype(np.float32), (x, y), cv2.INTER_LINEAR)
+        return sample_picture(self.flow.astype(np.float32), (x, y), cv2.INTER_LINEAR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +317,7 @@ def look_up(
     return Seen(x, y, without_crumbs(mask, least_px))
 
 
-def taken(
+def sample_picture(
     picture: Shaped[np.ndarray, "height width *channels"], places: Places, mode: int
 ) -> Shaped[np.ndarray, "h w *channels"]:
     """Return a picture's values at places; beyond its edges those of the edge."""

@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from toonset.camera import Camera
 from toonset.dataset.mesh.rasterize import depth_map
-from toonset.nerf.look.drawings import SQUARE, Places, taken
+from toonset.nerf.look.drawings import SQUARE, Places, sample_picture
 from toonset.nerf.surface.paint import Paint
 from toonset.nerf.surface.unwrap import areas, neighbours
 
@@ -71,7 +71,7 @@ def merits(
         seen = (depth <= limit + BEHIND * height) & (cover > 0.5)
         ways = camera.rotation[2] + camera.k * (points[:, 0] - camera.target)
         frontal = -(normal * ways).sum(axis=1) / np.linalg.norm(ways, axis=1)
-        good = frontal * taken(paint.trust, (x, y), cv2.INTER_LINEAR).mean(axis=1)
+        good = frontal * sample_picture(paint.trust, (x, y), cv2.INTER_LINEAR).mean(axis=1)
         shown = (seen.mean(axis=1) >= SHOWN) & (frontal > GRAZING)
         result[:, number] = np.where(shown, good, 0)
     return result
@@ -150,8 +150,8 @@ def _seams(
     colors, features = [], []
     for paint in paints:
         places, _ = _places(paint.texture.camera, points)
-        colors.append(taken(paint.texture.paint, places, cv2.INTER_LINEAR))
-        on = taken(paint.feature.astype(np.float32), places, cv2.INTER_NEAREST)
+        colors.append(sample_picture(paint.texture.paint, places, cv2.INTER_LINEAR))
+        on = sample_picture(paint.feature.astype(np.float32), places, cv2.INTER_NEAREST)
         features.append(on.mean(axis=1))
     color = np.stack([*colors, np.mean(colors, axis=0)])
     return _Seams(one, other, length, color, np.stack([*features, np.zeros(len(ends))]))

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.mesh.rasterize import depth_map
 from toonset.errors import BundleError
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.look.drawings import Drawings, Places, taken
+from toonset.nerf.look.drawings import Drawings, Places, sample_picture
 from toonset.nerf.options import FACES
 from toonset.nerf.surface.choose import chosen, merits
 from toonset.nerf.surface.files import Surface
@@ -181,6 +181,6 @@ def _looked_up(
     padded = np.zeros((max(1, -(-count // ROW)), ROW, 2), dtype=np.float32)
     padded.reshape(-1, 2)[:count] = np.nan_to_num(pixels - 0.5, nan=-1e4)
     places: Places = (padded[..., 0].copy(), padded[..., 1].copy())
-    color = taken(paint.texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
-    label = taken(paint.texture.labels, places, cv2.INTER_NEAREST)
+    color = sample_picture(paint.texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
+    label = sample_picture(paint.texture.labels, places, cv2.INTER_NEAREST)
     return color.reshape(-1, 3)[:count], label.ravel()[:count]
