@@ -93,7 +93,7 @@ def prepare(scene: Scene, options: TrainOptions) -> Prepared:
     return Prepared(straight, given.drawn, registration, unwarping, None, given.fit, given.shape)
 
 
-def with_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
+def agree_on_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
     """Return bent drawings bent and tinted further, so that their paint agrees over a hull.
 
     Args:
