@@ -21,7 +21,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import working_threads
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.symmetry import with_all_mirrored
+from toonset.nerf.prepare.symmetry import mirror_all
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.folder import WRITTEN
@@ -154,7 +154,7 @@ def train(
         told.detail(f"{count} CPU thread{'s' * (count > 1)}")
         scene = _with_palette(scene, told) if palette else without_palette(scene)
         monitor = Monitor(looking or MonitorOptions(test=test))
-        for guess in guesses(with_all_mirrored(scene) if options.symmetry else scene):
+        for guess in guesses(mirror_all(scene) if options.symmetry else scene):
             told.say(guess)
         training = fit_field(scene, options, told.progress, monitor)
         told.progress("laying the drawings over the field")

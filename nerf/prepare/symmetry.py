@@ -79,7 +79,7 @@ def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
     return replace(scene, frames=(*scene.frames, *more))
 
 
-def with_all_mirrored(scene: Scene) -> Scene:
+def mirror_all(scene: Scene) -> Scene:
     """Return the scene with every drawing's mirror image: all that symmetry could ever show."""
     names = tuple(frame.name for frame in scene.frames)
     return with_mirrored(scene, Symmetry((), 0.0, names))
