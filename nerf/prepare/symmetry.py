@@ -66,10 +66,10 @@ def add_mirrored_views(scene: Scene) -> tuple[Scene, Symmetry | None]:
     if min(alike) < ALIKE:
         return scene, Symmetry(alike, plane_x, ())
     found = Symmetry(alike, plane_x, tuple(frame.name for frame in new))
-    return with_mirrored(scene, found), found
+    return mirror_found(scene, found), found
 
 
-def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
+def mirror_found(scene: Scene, found: Symmetry | None) -> Scene:
     """Return the scene with the mirror images that were found to be drawings of it."""
     if found is None or not found.mirrored:
         return scene
@@ -82,7 +82,7 @@ def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
 def mirror_all(scene: Scene) -> Scene:
     """Return the scene with every drawing's mirror image: all that symmetry could ever show."""
     names = tuple(frame.name for frame in scene.frames)
-    return with_mirrored(scene, Symmetry((), 0.0, names))
+    return mirror_found(scene, Symmetry((), 0.0, names))
 
 
 def mirrored(frame: Frame, plane_x: float) -> Frame:

@@ -33,7 +33,7 @@ from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
-from toonset.nerf.prepare.symmetry import add_mirrored_views, with_mirrored
+from toonset.nerf.prepare.symmetry import add_mirrored_views, mirror_found
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
@@ -103,7 +103,7 @@ def fit_field(
     hull, evidence = _hull(whole, options, ready)
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
-    scene = with_mirrored(ready.scene, symmetry)
+    scene = mirror_found(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
