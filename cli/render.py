@@ -114,7 +114,7 @@ def render(
     import torch
 
     from toonset.nerf.render.animation import check_mp4
-    from toonset.nerf.render.files import rendered_files
+    from toonset.nerf.render.files import render_files
     from toonset.nerf.render.layers import default_layer
     from toonset.nerf.render.recolor import recolored, repainted, with_pen
     from toonset.nerf.run.folder import read_field
@@ -133,7 +133,7 @@ def render(
     trained = with_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     check_output(out, [run, cameras], WRITTEN, force=force)
-    files = rendered_files(trained, named, wanted, together, printer.progress, printer.say)
+    files = render_files(trained, named, wanted, together, printer.progress, printer.say)
     sizes: dict[str, int] = {}
     with new_folder(out, force=force) as folder:
         for name, data in files:

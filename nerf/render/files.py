@@ -22,7 +22,7 @@ UNSEEN = 0.05  # of a view in the drawn look: worth a word
 DEPTH_FILE = "depth.json"  # the scale of depth pictures
 
 
-def rendered_files(
+def render_files(
     trained: TrainedField,
     named: Sequence[tuple[str, Camera]],
     layers: Sequence[str] = ("rgb",),
