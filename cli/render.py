@@ -116,7 +116,7 @@ def render(
     from toonset.nerf.render.animation import check_mp4
     from toonset.nerf.render.files import render_files
     from toonset.nerf.render.layers import default_layer
-    from toonset.nerf.render.recolor import recolored, repainted, with_pen
+    from toonset.nerf.render.recolor import change_pen, recolored, repainted
     from toonset.nerf.run.folder import read_field
     from toonset.write import new_folder, write_bytes
 
@@ -130,7 +130,7 @@ def render(
     wanted = layers or [default_layer(trained) if views else "rgb"]
     wanted = ["palette"] if repaint and wanted == ["rgb"] else wanted
     trained = _style(trained, wanted, lines=lines)
-    trained = with_pen(trained, ink_width, ink_color)
+    trained = change_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     check_output(out, [run, cameras], WRITTEN, force=force)
     files = render_files(trained, named, wanted, together, printer.progress, printer.say)

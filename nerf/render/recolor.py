@@ -36,7 +36,7 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
     return _in_colors(trained, changed_colors(trained.palette, changes))
 
 
-def with_pen(trained: TrainedField, width_px: float | None, color: str | None) -> TrainedField:
+def change_pen(trained: TrainedField, width_px: float | None, color: str | None) -> TrainedField:
     """Return the run with the outline of its drawn look drawn by another pen.
 
     Args:
