@@ -28,7 +28,7 @@ Triangles = tuple[
 ]
 
 
-def decimated(
+def decimate(
     vertices: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "f 3"],
     labels: Int[np.ndarray, " f"],
