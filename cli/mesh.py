@@ -80,7 +80,7 @@ def mesh(
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
-    from toonset.nerf.surface.texture import textured_surface_of
+    from toonset.nerf.surface.texture import texture_surface
     from toonset.nerf.surface.textured_files import check_textured_files, textured_files
 
     trained = recolored(read_field(run), recolor or [])
@@ -97,7 +97,7 @@ def mesh(
 
     values: dict[str, Any] = {}
     if texture:
-        textured = textured_surface_of(trained, faces, progress, outline=outline, variants=others)
+        textured = texture_surface(trained, faces, progress, outline=outline, variants=others)
         surface, files = textured.surface, textured_files(textured, out)
         by_field = float((textured.source < 0).mean())
         values = {"texture": list(textured.atlas.size_wh), "by_field": by_field}

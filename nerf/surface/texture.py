@@ -40,7 +40,7 @@ NO_DRAWINGS = "run: holds no drawings to paint the mesh with; train again, or le
 NO_OUTLINE = "run: its drawings have no outline; leave --outline out"
 
 
-def textured_surface_of(
+def texture_surface(
     trained: TrainedField,
     faces: int | None = FACES,
     progress: Callable[[str, float], None] = lambda step, done: None,
