@@ -81,7 +81,7 @@ def mesh(
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
     from toonset.nerf.surface.texture import texture_surface
-    from toonset.nerf.surface.textured_files import check_textured_files, textured_files
+    from toonset.nerf.surface.textured_files import check_textured_files, encode_textured_files
 
     trained = recolored(read_field(run), recolor or [])
     if texture:
@@ -98,7 +98,7 @@ def mesh(
     values: dict[str, Any] = {}
     if texture:
         textured = texture_surface(trained, faces, progress, outline=outline, variants=others)
-        surface, files = textured.surface, textured_files(textured, out)
+        surface, files = textured.surface, encode_textured_files(textured, out)
         by_field = float((textured.source < 0).mean())
         values = {"texture": list(textured.atlas.size_wh), "by_field": by_field}
     else:
