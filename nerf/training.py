@@ -27,7 +27,7 @@ from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.folder import WRITTEN
 from toonset.nerf.run.monitor import Monitor, MonitorOptions
 from toonset.nerf.run.report import preview, write_run
-from toonset.nerf.train.labelling import labelled, without_palette
+from toonset.nerf.train.labelling import label_scene, without_palette
 from toonset.nerf.train.result import HeldOut, Training
 from toonset.nerf.train.train import device_of, fit_field
 from toonset.palette.names import hex_of
@@ -180,7 +180,7 @@ def _with_palette(scene: Scene, told: Listener) -> Scene:
     """Return the scene with a palette, its own where it has one."""
     if scene.palette is not None and any(frame.labels is not None for frame in scene.frames):
         return scene
-    scene, found = labelled(scene)
+    scene, found = label_scene(scene)
     told.say(f"palette, extracted: {' '.join(hex_of(color.rgb) for color in found.colors)}")
     for warning in found.warnings:
         told.say(f"palette: {warning}")

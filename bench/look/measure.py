@@ -30,7 +30,7 @@ from toonset.nerf.render.views import render
 from toonset.nerf.score.evaluate import label_figures
 from toonset.nerf.score.metrics import Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.train import fit_field
 from toonset.nerf.training import with_drawings
 from toonset.view import over_white
@@ -146,7 +146,7 @@ def bench_look(
 def _laid(scene: Scene, recipe: Recipe, seed: int) -> tuple[TrainedField, float, float]:
     """Return a field with its drawings, and CPU seconds: of the fit, of the drawings."""
     began = time.process_time()
-    ready, _ = labelled(scene)
+    ready, _ = label_scene(scene)
     training = fit_field(ready, replace(recipe.options, seed=seed), agree=recipe.paint)
     fitted = time.process_time()
     trained = with_drawings(training, ready)

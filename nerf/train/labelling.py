@@ -14,7 +14,7 @@ from toonset.palette.pixels.grain import without_grain
 from toonset.palette.pixels.labels import label_pixels
 
 
-def labelled(scene: Scene) -> tuple[Scene, Palette]:
+def label_scene(scene: Scene) -> tuple[Scene, Palette]:
     """Return the scene with palette and labels extracted from its own pictures."""
     palette = find_palette([frame.rgba for frame in scene.frames])
     return relabelled(scene, palette.rgb), palette

@@ -25,7 +25,7 @@ from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.run.report import write_run
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.result import Training
 
 CONFIG, PICTURES, PAINT = "config.json", "drawings.png", "paint.png"
@@ -40,7 +40,7 @@ def egg() -> Drawings:
 @pytest.fixture
 def folder(tmp_path: Path, training: Training, egg: Drawings) -> Path:
     result = replace(training.result, drawings=egg)
-    write_run(tmp_path, replace(training, result=result), labelled(train_scene())[0])
+    write_run(tmp_path, replace(training, result=result), label_scene(train_scene())[0])
     return tmp_path
 
 
@@ -62,7 +62,7 @@ def shaped() -> Drawings:
 @pytest.fixture
 def shaped_folder(tmp_path: Path, training: Training, shaped: Drawings) -> Path:
     result = replace(training.result, drawings=shaped)
-    write_run(tmp_path, replace(training, result=result), labelled(train_scene())[0])
+    write_run(tmp_path, replace(training, result=result), label_scene(train_scene())[0])
     return tmp_path
 
 
@@ -90,7 +90,7 @@ def test_a_shape_takes_the_place_of_depth(shaped_folder: Path) -> None:
 
 
 def test_a_run_without_drawings_says_how_to_get_them(training: Training, tmp_path: Path) -> None:
-    write_run(tmp_path, training, labelled(train_scene())[0])
+    write_run(tmp_path, training, label_scene(train_scene())[0])
     old = read_field(tmp_path)
     assert old.drawings is None
     view = render(old, train_scene().frames[0].camera)

@@ -20,7 +20,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.recolor import recolored
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.training import train
 from toonset.nerf.viewer.build import run_scene
 from toonset.nerf.viewer.page import page_html
@@ -36,8 +36,8 @@ SIGHTS = ((0.0, 0.0), (70.0, 20.0), (200.0, -15.0))  # yaw, elevation, degrees
 @pytest.fixture(scope="module")
 def fields() -> dict[str, TrainedField]:
     """Return a field, and one whose surface is that of the character's own body."""
-    scene = labelled(sheet(body(), Hand()))[0]
-    shaded = replace(labelled(sheet(body(), Hand(shadow=0.7)))[0], mannequin=body())
+    scene = label_scene(sheet(body(), Hand()))[0]
+    shaded = replace(label_scene(sheet(body(), Hand(shadow=0.7)))[0], mannequin=body())
     return {"field": train(scene, QUICK).field, "body": train(shaded, QUICK).field}
 
 
