@@ -17,10 +17,10 @@ from toonset.palette.pixels.labels import label_pixels
 def label_scene(scene: Scene) -> tuple[Scene, Palette]:
     """Return the scene with palette and labels extracted from its own pictures."""
     palette = find_palette([frame.rgba for frame in scene.frames])
-    return relabelled(scene, palette.rgb), palette
+    return relabel_scene(scene, palette.rgb), palette
 
 
-def relabelled(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
+def relabel_scene(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
     """Return the scene with a palette and every pixel's label by it."""
     pictures = without_grain([frame.rgba for frame in scene.frames])
     frames = tuple(
