@@ -27,7 +27,7 @@ from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.folder import WRITTEN
 from toonset.nerf.run.monitor import Monitor, MonitorOptions
 from toonset.nerf.run.report import preview, write_run
-from toonset.nerf.train.labelling import label_scene, without_palette
+from toonset.nerf.train.labelling import drop_palette, label_scene
 from toonset.nerf.train.result import HeldOut, Training
 from toonset.nerf.train.train import device_of, fit_field
 from toonset.palette.names import hex_of
@@ -152,7 +152,7 @@ def train(
         _memory_errors(),
     ):
         told.detail(f"{count} CPU thread{'s' * (count > 1)}")
-        scene = _with_palette(scene, told) if palette else without_palette(scene)
+        scene = _with_palette(scene, told) if palette else drop_palette(scene)
         monitor = Monitor(looking or MonitorOptions(test=test))
         for guess in guesses(mirror_all(scene) if options.symmetry else scene):
             told.say(guess)

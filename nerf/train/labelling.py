@@ -30,7 +30,7 @@ def relabel_scene(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene
     return replace(scene, palette=palette, frames=frames)
 
 
-def without_palette(scene: Scene) -> Scene:
+def drop_palette(scene: Scene) -> Scene:
     """Return the scene without palette and labels."""
     return replace(
         scene, palette=None, frames=tuple(replace(frame, labels=None) for frame in scene.frames)
