@@ -158,11 +158,11 @@ def train(
             told.say(guess)
         training = fit_field(scene, options, told.progress, monitor)
         told.progress("laying the drawings over the field")
-        training = replace(training, result=with_drawings(training, scene))
+        training = replace(training, result=add_drawings(training, scene))
     return Run(training.result, training, scene, test, monitor.held_out, count)
 
 
-def with_drawings(training: Training, scene: Scene) -> TrainedField:
+def add_drawings(training: Training, scene: Scene) -> TrainedField:
     """Return the field with what the drawn look is made of."""
     ready, baked = training.prepared, baked_of(training.result)
     drawn = [frame.rgba for frame in scene.frames]

@@ -32,7 +32,7 @@ from toonset.nerf.score.metrics import Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
 from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.train import fit_field
-from toonset.nerf.training import with_drawings
+from toonset.nerf.training import add_drawings
 from toonset.view import over_white
 
 Layer = Literal["drawn", "rgb", "palette"]
@@ -149,7 +149,7 @@ def _laid(scene: Scene, recipe: Recipe, seed: int) -> tuple[TrainedField, float,
     ready, _ = label_scene(scene)
     training = fit_field(ready, replace(recipe.options, seed=seed), agree=recipe.paint)
     fitted = time.process_time()
-    trained = with_drawings(training, ready)
+    trained = add_drawings(training, ready)
     return trained, fitted - began, time.process_time() - fitted
 
 
