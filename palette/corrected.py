@@ -56,7 +56,7 @@ class _Plan:
         return self.final.index(found[1])
 
 
-def corrected(
+def correct_palette(
     pictures: Sequence[Picture],
     contours: Sequence[Map],
     found: Palette,
