@@ -19,7 +19,7 @@ from toonset.palette.formats.registry import (
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
-from toonset.palette.paints.grainy_colors import with_drawn_colors
+from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import with_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
@@ -197,7 +197,7 @@ def _chosen(
         palette = _in_light(lit, options, lines, shadow)
         if noise_levels(pictures) >= LEAST_LEVELS:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
-            palette = with_drawn_colors(palette, pictures, lit, apart)
+            palette = read_drawn_colors(palette, pictures, lit, apart)
     if shadow is None:
         return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]

@@ -29,7 +29,7 @@ RGB = tuple[int, int, int]
 Named = TypeVar("Named", PaletteColor, ContourColor)
 
 
-def with_drawn_colors(
+def read_drawn_colors(
     palette: Palette, drawings: Pictures, smooth: Pictures, apart: Sequence[Bool[np.ndarray, "_ _"]]
 ) -> Palette:
     """Return a palette of smoothed drawings with the colours of the drawings themselves.
