@@ -20,7 +20,7 @@ from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
-from toonset.palette.paints.places import with_places
+from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
 from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, without_grain
@@ -181,7 +181,7 @@ def _chosen(
     if picked is not None and not names_tones(colors or ""):
         return pick_palette(pictures, picked, lines)
     if method == "extcolors":
-        return with_places(extcolors_palette(pictures, options), pictures)
+        return add_places(extcolors_palette(pictures, options), pictures)
     smooth = without_grain(pictures)
     shadow = find_shadow(smooth, contours)
     if picked is not None and shadow is None:
@@ -218,7 +218,7 @@ def _in_light(
     if found:
         wider = replace(options, keep=(*options.keep, *found))
         palette = replace(find_palette(pictures, wider, lines), features=found)
-    return with_places(palette, pictures)
+    return add_places(palette, pictures)
 
 
 def with_tones(

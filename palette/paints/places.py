@@ -20,7 +20,7 @@ Members = Int[np.ndarray, " members"]
 Box = tuple[int, int, int, int]
 
 
-def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Palette:
+def add_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Palette:
     """Return the palette with the place of every left-out colour's largest patch, if it lacks one.
 
     It is looked for in the picture with most of the colour's pixels, each pixel taken for the
