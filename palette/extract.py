@@ -23,7 +23,7 @@ from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
-from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, without_grain
+from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.shadow import find_shadow, find_tones, lit_pictures, shaded
@@ -182,7 +182,7 @@ def _chosen(
         return pick_palette(pictures, picked, lines)
     if method == "extcolors":
         return add_places(extcolors_palette(pictures, options), pictures)
-    smooth = without_grain(pictures)
+    smooth = remove_grain(pictures)
     shadow = find_shadow(smooth, contours)
     if picked is not None and shadow is None:
         return pick_palette(pictures, picked, lines)
@@ -263,7 +263,7 @@ def in_light(
     pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow | None
 ) -> tuple[list[Picture], list[Mask] | None]:
     """Return pictures without grain and shadow, and the shadow's place; None without one."""
-    smooth = without_grain(pictures)
+    smooth = remove_grain(pictures)
     if shadow is None:
         return list(smooth), None
     dark = find_tones(smooth, contours, shadow)

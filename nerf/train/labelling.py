@@ -10,7 +10,7 @@ from jaxtyping import UInt8
 from toonset.dataset.bundle.scene import Scene
 from toonset.palette.paints.extract import find_palette
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.grain import without_grain
+from toonset.palette.pixels.grain import remove_grain
 from toonset.palette.pixels.labels import label_pixels
 
 
@@ -22,7 +22,7 @@ def label_scene(scene: Scene) -> tuple[Scene, Palette]:
 
 def relabel_scene(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
     """Return the scene with a palette and every pixel's label by it."""
-    pictures = without_grain([frame.rgba for frame in scene.frames])
+    pictures = remove_grain([frame.rgba for frame in scene.frames])
     frames = tuple(
         replace(frame, labels=label_pixels(picture, palette))
         for frame, picture in zip(scene.frames, pictures, strict=True)

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from toonset.palette.pixels.grain import without_grain
+from toonset.palette.pixels.grain import remove_grain
 
 Morphology = Callable[..., np.ndarray]  # cv2.dilate or cv2.erode
 
@@ -77,7 +77,7 @@ def find_contours(
     pictures: Sequence[UInt8[np.ndarray, "height width 4"]],
 ) -> list[UInt8[np.ndarray, "height width"]]:
     """Return how far the drawn lines cover every pixel of a sheet's drawings, grain taken off."""
-    return [find_contour(picture) for picture in without_grain(pictures)]
+    return [find_contour(picture) for picture in remove_grain(pictures)]
 
 
 def outline_line_px(
