@@ -13,7 +13,7 @@ from toonset.palette.extract import IN_SHADOW, PaintMap
 from toonset.palette.formats.hex import is_color, rgb_of_typed
 from toonset.palette.names import RGB, hex_of, name_of
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
+from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -78,4 +78,4 @@ def recolored_drawing(
     dark = None if paint.tones is None else paint.tones == IN_SHADOW
     tones = tone_map(paint.labels, dark, contour, len(colors))
     old, new = (tones_of(one, palette.shadow) for one in (palette.rgb, colors))
-    return recolored(picture, tones, contour, old, new)
+    return recolor(picture, tones, contour, old, new)

@@ -57,7 +57,7 @@ def tone_map(
     return own
 
 
-def recolored(picture: Picture, tones: Tones, contour: Map, old: Colors, new: Colors) -> Picture:
+def recolor(picture: Picture, tones: Tones, contour: Map, old: Colors, new: Colors) -> Picture:
     """Return a picture with its tones' colours changed; the same picture if none changes.
 
     Args:

@@ -12,7 +12,7 @@ from toonset.palette.extract import PaintMap, extract_palette, paint_maps
 from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
-from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
+from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
 from toonset.palette.recolor import changed_colors, recolored_drawing
 
 GREEN = (40, 140, 70)
@@ -93,7 +93,7 @@ def test_soft_edges_are_mixed_as_before_and_lines_and_eyes_stay() -> None:
     old = np.array([red, blue], dtype=np.uint8)
     new = np.array([green, blue], dtype=np.uint8)
     tones = tone_map(labels, None, contour, 2)
-    after = recolored(picture, tones, contour, tones_of(old, None), tones_of(new, None))
+    after = recolor(picture, tones, contour, tones_of(old, None), tones_of(new, None))
     assert np.abs(after[9, 8:13, :3] - ((1 - share) * green + share * blue)).max() <= 1.5
     assert np.array_equal(after[15:17], picture[15:17])
     assert np.array_equal(after[4, 3], picture[4, 3])
