@@ -202,7 +202,7 @@ def recolor(
     """
     from toonset.dataset.images.picture import encode_png
     from toonset.dataset.split_folder.pictures import check_pictures
-    from toonset.palette.recolor import changed_colors, recolored_drawing
+    from toonset.palette.recolor import changed_colors, recolor_drawing
     from toonset.write import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
@@ -216,7 +216,7 @@ def recolor(
     colors = changed_colors(found.rgb, changes, [color.name for color in found.colors])
     with new_folder(out, force=force) as folder:
         for one in drawings:
-            new = recolored_drawing(one.picture, one.paint, one.contour, found, colors)
+            new = recolor_drawing(one.picture, one.paint, one.contour, found, colors)
             write_bytes(folder / one.name, encode_png(new))
     names = [one.name for one in drawings]
     count = "1 picture" if len(names) == 1 else f"{len(names)} pictures"

@@ -61,7 +61,7 @@ def _unique(names: Sequence[str], colors: Sequence[RGB]) -> dict[str, RGB]:
     return {name: color for name, color in zip(names, colors, strict=True) if count[name] == 1}
 
 
-def recolored_drawing(
+def recolor_drawing(
     picture: Picture, paint: PaintMap, contour: Map, palette: Palette, colors: Colors
 ) -> Picture:
     """Return a drawing in other colours: see `toonset.palette.pixels.recolor`.

@@ -13,7 +13,7 @@ from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
-from toonset.palette.recolor import changed_colors, recolored_drawing
+from toonset.palette.recolor import changed_colors, recolor_drawing
 
 GREEN = (40, 140, 70)
 
@@ -34,7 +34,7 @@ def test_the_same_colours_are_the_same_bytes(shadow: bool) -> None:
     drawn = drawings(shadow=shadow, noisy=True, views=2)
     palette, maps, contours = found(drawn)
     for one, paint, contour in zip(drawn, maps, contours, strict=True):
-        same = recolored_drawing(one.rgba, paint, contour, palette, palette.rgb)
+        same = recolor_drawing(one.rgba, paint, contour, palette, palette.rgb)
         assert same.tobytes() == one.rgba.tobytes()
 
 
@@ -46,7 +46,7 @@ def test_a_paint_has_its_new_colour_with_the_sheets_shadow_and_others_stay() -> 
     colors = palette.rgb
     colors[tunic] = GREEN
     for one, paint, contour in zip(drawn, maps, contours, strict=True):
-        new = recolored_drawing(one.rgba, paint, contour, palette, colors)
+        new = recolor_drawing(one.rgba, paint, contour, palette, colors)
         assert np.array_equal(new[..., 3], one.rgba[..., 3])
         sure = cv2.erode((one.paint == 1).astype(np.uint8), np.ones((7, 7))) > 0
         for part, factor in ((sure & ~one.dark, (1, 1, 1)), (sure & one.dark, FACTOR)):
@@ -71,8 +71,8 @@ def test_recolouring_back_restores() -> None:
         ),
     )
     for one, paint, contour in zip(drawn, maps, contours, strict=True):
-        new = recolored_drawing(one.rgba, paint, contour, palette, colors)
-        back = recolored_drawing(new, paint, contour, changed, palette.rgb)
+        new = recolor_drawing(one.rgba, paint, contour, palette, colors)
+        back = recolor_drawing(new, paint, contour, changed, palette.rgb)
         off = np.abs(back.astype(int) - one.rgba).max(axis=2)
         assert (off > 2).mean() < 1e-4
 
