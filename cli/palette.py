@@ -202,7 +202,7 @@ def recolor(
     """
     from toonset.dataset.images.picture import encode_png
     from toonset.dataset.split_folder.pictures import check_pictures
-    from toonset.palette.recolor import changed_colors, recolor_drawing
+    from toonset.palette.recolor import change_colors, recolor_drawing
     from toonset.write import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
@@ -213,7 +213,7 @@ def recolor(
     pictures = [folder / name for folder in folders for name in ("images", *FOLDERS)]
     check_output(out, [*places, *pictures], ("*.png",), force=force)
     found, drawings = _painted(places, printer)
-    colors = changed_colors(found.rgb, changes, [color.name for color in found.colors])
+    colors = change_colors(found.rgb, changes, [color.name for color in found.colors])
     with new_folder(out, force=force) as folder:
         for one in drawings:
             new = recolor_drawing(one.picture, one.paint, one.contour, found, colors)

@@ -20,7 +20,7 @@ Map = UInt8[np.ndarray, "height width"]
 Colors = UInt8[np.ndarray, "colors 3"]
 
 
-def changed_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] = ()) -> Colors:
+def change_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] = ()) -> Colors:
     """Return a palette's colours with some replaced; all changes happen at once.
 
     Args:

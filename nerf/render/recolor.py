@@ -15,7 +15,7 @@ from toonset.nerf.options import ORIGINAL
 from toonset.palette.formats.hex import rgb_of_typed
 from toonset.palette.formats.registry import palette_names, parse_colors
 from toonset.palette.pixels.labels import nearest_colors
-from toonset.palette.recolor import changed_colors
+from toonset.palette.recolor import change_colors
 
 
 def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
@@ -33,7 +33,7 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
         return trained
     if trained.palette is None:
         raise PaletteError(NO_PALETTE)
-    return _in_colors(trained, changed_colors(trained.palette, changes))
+    return _in_colors(trained, change_colors(trained.palette, changes))
 
 
 def change_pen(trained: TrainedField, width_px: float | None, color: str | None) -> TrainedField:

@@ -13,7 +13,7 @@ from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
-from toonset.palette.recolor import changed_colors, recolor_drawing
+from toonset.palette.recolor import change_colors, recolor_drawing
 
 GREEN = (40, 140, 70)
 
@@ -120,11 +120,11 @@ def test_a_shadow_of_a_new_colour_stays_within_8_bits() -> None:
 )
 def test_a_change_that_means_nothing_is_refused(change: str, words: str) -> None:
     with pytest.raises(PaletteError, match=words):
-        changed_colors(np.array(PAINTS, dtype=np.uint8), [change])
+        change_colors(np.array(PAINTS, dtype=np.uint8), [change])
 
 
 def test_a_colour_is_replaced_once() -> None:
     colors = np.array(PAINTS, dtype=np.uint8)
     first = hex_of(tuple(colors[0].tolist()))
     with pytest.raises(PaletteError, match=f"{first} is replaced twice; drop one"):
-        changed_colors(colors, [f"{first}=#111111", f"{first}=#222222"])
+        change_colors(colors, [f"{first}=#111111", f"{first}=#222222"])
