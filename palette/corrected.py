@@ -22,7 +22,7 @@ from toonset.palette.names import RGB, hex_of, name_of, rgb_of_hex
 from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
-from toonset.palette.pixels.shadow import shaded
+from toonset.palette.pixels.shadow import apply_shadow
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -204,7 +204,7 @@ def _colors(
         share, in_shadow = float(total[number]), float(dark[number])
         tones: tuple[Tone, ...] = ()
         if found.shadow is not None:
-            red, green, blue = shaded(np.array(rgb), found.shadow.factor).tolist()
+            red, green, blue = apply_shadow(np.array(rgb), found.shadow.factor).tolist()
             both = Tone(rgb, share - in_shadow), Tone((red, green, blue), in_shadow)
             tones = both if in_shadow > 0 else both[:1]
         colors.append(PaletteColor(rgb, share, name, tones))

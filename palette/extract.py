@@ -26,7 +26,7 @@ from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, T
 from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
-from toonset.palette.pixels.shadow import find_shadow, find_tones, lit_pictures, shaded
+from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -246,7 +246,7 @@ def with_tones(
 
 def _tones(color: PaletteColor, shadow: Shadow, in_shadow: float) -> tuple[Tone, ...]:
     """Return a colour's tones that occur, the light one first."""
-    red, green, blue = shaded(np.array(color.rgb), shadow.factor).tolist()
+    red, green, blue = apply_shadow(np.array(color.rgb), shadow.factor).tolist()
     dark = Tone((red, green, blue), in_shadow * color.share)
     light = Tone(color.rgb, (1 - in_shadow) * color.share)
     return (light, dark) if in_shadow > 0 else (light,)

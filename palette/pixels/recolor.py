@@ -20,7 +20,7 @@ from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.mixtures import LINE, NONE, alone, colors_as_drawn, find_mixtures
-from toonset.palette.pixels.shadow import DRAWN, FLOOR, shaded
+from toonset.palette.pixels.shadow import DRAWN, FLOOR, apply_shadow
 
 WINDOW = 7  # pixels: a soft edge is three wide, with a tone on either side
 SHADE = 0.06  # in OKLab
@@ -34,7 +34,7 @@ Colors = UInt8[np.ndarray, "n 3"]
 
 def tones_of(colors: UInt8[np.ndarray, "colors 3"], shadow: Shadow | None) -> Colors:
     """Return colours in light, then in shadow; within 8 bits."""
-    dark = colors if shadow is None else shaded(colors, shadow.factor)
+    dark = colors if shadow is None else apply_shadow(colors, shadow.factor)
     return np.concatenate([colors, dark])
 
 

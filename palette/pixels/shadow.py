@@ -290,7 +290,7 @@ def lit_pictures(
 
 def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
     rgb = smoothed(picture)
-    light = np.where(dark[..., None], shaded(rgb, 1 / np.array(shadow.factor)), rgb)
+    light = np.where(dark[..., None], apply_shadow(rgb, 1 / np.array(shadow.factor)), rgb)
     edge = _beside(dark)
     pure = _clear(picture, contour) & ~edge
     if pure.any():
@@ -301,7 +301,7 @@ def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
     return lit
 
 
-def shaded(
+def apply_shadow(
     rgb: np.ndarray, factor: Sequence[float] | Float[np.ndarray, " 3"]
 ) -> UInt8[np.ndarray, "*n 3"]:
     """Return colours multiplied by a shadow's factor, or by its inverse: in light again."""
