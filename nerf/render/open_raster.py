@@ -33,7 +33,7 @@ from toonset.nerf.lines.nearest import nearest
 from toonset.nerf.render.animation import check_one_size
 from toonset.nerf.render.layers import Rendering
 from toonset.palette.names import hex_of, name_of
-from toonset.view import premultiplied, straight
+from toonset.view import premultiply, straight
 
 PAINTED = ("drawn", "rgb", "palette")  # what can be seen in layers
 LINES, INK = "lines", "ink"  # layers' names; ink: painted lines of no palette colour
@@ -331,4 +331,4 @@ def _thumbnail(picture: Picture) -> Picture:
     height, width = picture.shape[:2]
     by = min(1.0, THUMBNAIL_PX / max(height, width))
     size = (max(1, round(by * width)), max(1, round(by * height)))
-    return straight(cv2.resize(premultiplied(picture), size, interpolation=cv2.INTER_AREA))
+    return straight(cv2.resize(premultiply(picture), size, interpolation=cv2.INTER_AREA))
