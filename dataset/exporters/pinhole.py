@@ -24,7 +24,7 @@ SAME_PX = 1e-3  # a shift or a growth of a picture below this is none
 Pair = tuple[float, float]
 
 
-def centred(view: ExportView) -> ExportView:
+def centre_view(view: ExportView) -> ExportView:
     """Return the view with its principal point in the middle of its picture.
 
     An orthographic view keeps its picture. A pinhole's is padded with nothing to the smallest
