@@ -76,14 +76,14 @@ def mesh(
         raise typer.BadParameter("--nearest belongs to --variants")
     import torch
 
-    from toonset.nerf.render.recolor import recolored, variants_of
+    from toonset.nerf.render.recolor import recolor_run, variants_of
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
     from toonset.nerf.surface.texture import texture_surface
     from toonset.nerf.surface.textured_files import check_textured_files, encode_textured_files
 
-    trained = recolored(read_field(run), recolor or [])
+    trained = recolor_run(read_field(run), recolor or [])
     if texture:
         check_textured_files(out, outline=outline, force=force, variants=bool(variants))
     else:

@@ -18,7 +18,7 @@ from toonset.palette.pixels.labels import nearest_colors
 from toonset.palette.recolor import change_colors
 
 
-def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
+def recolor_run(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
     """Return the run with palette colours replaced; all changes happen at once.
 
     Args:

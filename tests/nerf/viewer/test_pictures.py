@@ -17,7 +17,7 @@ from tests.nerf.bodies import Hand, body, sheet
 from tests.nerf.ellipsoids import QUICK
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.render.recolor import recolored
+from toonset.nerf.render.recolor import recolor_run
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.train.labelling import label_scene
@@ -98,7 +98,7 @@ def test_another_colour_changes_only_that_paint(
     assert trained.palette is not None
     colors = trained.palette.tolist()
     new = [40, 220, 60]
-    changed = recolored(trained, [f"{hex_of(tuple(colors[0]))}={hex_of((40, 220, 60))}"])
+    changed = recolor_run(trained, [f"{hex_of(tuple(colors[0]))}={hex_of((40, 220, 60))}"])
     camera = camera_at(trained, 40.0, 5.0)
     before = drawn_by_page(page, trained, camera, layer)
     after = drawn_by_page(page, trained, camera, layer, colors=[new, *colors[1:]])
