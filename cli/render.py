@@ -116,7 +116,7 @@ def render(
     from toonset.nerf.render.animation import check_mp4
     from toonset.nerf.render.files import render_files
     from toonset.nerf.render.layers import default_layer
-    from toonset.nerf.render.recolor import change_pen, recolor_run, repainted
+    from toonset.nerf.render.recolor import change_pen, recolor_run, repaint_run
     from toonset.nerf.run.folder import read_field
     from toonset.write import new_folder, write_bytes
 
@@ -126,7 +126,7 @@ def render(
     if threads is not None:
         torch.set_num_threads(threads)
     trained = recolor_run(read_field(run), recolor or [])
-    trained = repainted(trained, palette, nearest=nearest) if palette else trained
+    trained = repaint_run(trained, palette, nearest=nearest) if palette else trained
     wanted = layers or [default_layer(trained) if views else "rgb"]
     wanted = ["palette"] if repaint and wanted == ["rgb"] else wanted
     trained = _style(trained, wanted, lines=lines)

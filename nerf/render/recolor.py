@@ -58,7 +58,7 @@ def change_pen(trained: TrainedField, width_px: float | None, color: str | None)
     return replace(trained, drawings=replace(trained.drawings, pen=pen))
 
 
-def repainted(
+def repaint_run(
     trained: TrainedField, palette: str, *, nearest: bool = False, flag: str = "--palette"
 ) -> TrainedField:
     """Return the run in the colours of another palette, without training again.
@@ -95,12 +95,12 @@ def variants_of(
     Args:
         trained: the run.
         palettes: palette files, or typed colours.
-        nearest: see `repainted`.
+        nearest: see `repaint_run`.
 
     Raises:
-        PaletteError: see `repainted`.
+        PaletteError: see `repaint_run`.
     """
-    fields = [repainted(trained, one, nearest=nearest, flag="--variants") for one in palettes]
+    fields = [repaint_run(trained, one, nearest=nearest, flag="--variants") for one in palettes]
     return list(zip(palette_names(palettes, ORIGINAL), fields, strict=True))
 
 
