@@ -25,7 +25,7 @@ def coverage_map(
 
     Red is the palette index of the paint that covers most of it and green that of another one
     there, 255 = none; blue is how far the first covers it, 255 = wholly. The second, or where there
-    is none a drawn line whose colour is no paint, covers the rest.
+    is none a drawn line whose colour is not a paint, covers the rest.
 
     Args:
         picture: sRGB with straight alpha.

@@ -43,7 +43,7 @@ def read_json(file: Path) -> Any:
     """Return the content of a JSON file of bounded size.
 
     Raises:
-        BundleError: the file cannot be read, is too large, or is no JSON (see
+        BundleError: the file cannot be read, is too large, or is not JSON (see
             `toonset.read`).
     """
     data = read_whole(file, "JSON", BundleError, MAX_JSON_BYTES)

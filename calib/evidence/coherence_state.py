@@ -13,7 +13,7 @@ from toonset.view import View
 
 # Sheets with cameras that are right contradict themselves by 0.4 to 0.9 %, wrong ones by 1.8 % on
 MOST_CONTRADICTION = 0.012
-# Under it a mannequin of another shape is no reason to doubt the cameras (docs/decisions.md)
+# Under it a mannequin of another shape is not a reason to doubt the cameras (docs/decisions.md)
 CONFIRMING = 0.008
 STEEP = np.radians(30.0)  # turnarounds are drawn from about eye level, none of ours from above 20
 TELLING_VIEWS = 5  # fewer silhouettes cut out a hull that contradicts hardly anything

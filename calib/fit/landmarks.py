@@ -87,7 +87,7 @@ def solve_landmarks(landmarks: Landmarks, surface: Surface) -> LandmarkFit:
     points, pixels = landmarks.world - surface.middle, landmarks.pixels
     _check_spread(landmarks, points, surface.radius)
     kept, best, gain = choose(points, pixels)
-    freedom = max(best.freedom, 1)  # three pairs: what does not fit exactly is no optimum
+    freedom = max(best.freedom, 1)  # three pairs: what does not fit exactly is not an optimum
     weights = np.exp(-0.5 * freedom * np.log(np.array(best.errors) / best.errors[0]))
     probable = weights / weights.sum()
     count = int((probable >= LEAST_PROBABILITY).sum())

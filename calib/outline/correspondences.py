@@ -86,7 +86,7 @@ class Drawing:
     def inset(self, offset: float) -> Drawing:
         """Return the drawing with its outline moved inwards by `offset` heights.
 
-        A drawn line lies outside of the body: what a sheet's views share of that is no misfit.
+        A drawn line lies outside of the body: what a sheet's views share of that is not misfit.
         """
         other = copy.copy(self)
         other.points = self.points - offset * self.height * self.normals

@@ -85,12 +85,12 @@ def level_twins(
     """Return the candidates with equal energies for `pose` and those that look the same.
 
     Both outlines of a symmetric body are one curve, but sampled at other points; what their costs
-    differ by is no evidence, and would add up over the views of a sheet.
+    differ by is not evidence, and would add up over the views of a sheet.
 
     Args:
         view: the candidates.
         surface: the mannequin.
-        pose: the chosen one; with k = 0 where perspective is no evidence.
+        pose: the chosen one; with k = 0 where perspective is not evidence.
         always: the mannequin is not the character: its asymmetries are no evidence either.
         from_behind: the body looks alike from behind.
     """

@@ -6,7 +6,7 @@ Two things tie the views together, both unknown and summed out on a grid:
   -elevation) unless all views flip together;
 - where the views are meant to be seen from: what a person says (labels), else an evenly spaced
   turn, yaw_i = start +- i * 360 / views, in either direction. Most sheets are one (and most start
-  at the front), but a sheet that is none stays possible: "no turn" is one of the alternatives, and
+  at the front), but an uneven sheet stays possible: "no turn" is one of the alternatives, and
   evidence decides.
 
 What is drawn inside the outlines adds to that: the face, and paint that moves as the body turns.

@@ -26,7 +26,7 @@ from toonset.calib.search.templates import Templates, build_templates
 from toonset.errors import OutputError
 from toonset.write import write_bytes
 
-VERSION = 1  # of the file, and of anything in `build_templates` that is no setting
+VERSION = 1  # of the file, and of anything in `build_templates` that is not a setting
 MOST_FILES = 100
 MOST_BYTES = 10_000_000  # a whole file has a fraction of this
 

@@ -23,7 +23,7 @@ from toonset.view import View
 SURE = 0.95  # probability of the chosen camera below which it is called ambiguous
 WEAK_COVERAGE = 0.93  # of both outlines within 5 % of the height of each other
 FAILED_COVERAGE = 0.70
-# Of the probability that faces are none: at most 0.2 on sheets with right cameras
+# Of the probability that faces are false: at most 0.2 on sheets with right cameras
 MOST_FACES_CONTRADICT = 0.5
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 # 2 characters, 3 to 8 views: at most 4 degrees under true locks, 6 on under ones 16 degrees off
@@ -117,7 +117,7 @@ def downgrade_by_locks(
 ) -> list[ViewCalibration]:
     """Downgrade views whose outline contradicts their locked camera.
 
-    A wrong lock can hide in another number (elevation in scale) and its sigma is none, so that the
+    A wrong lock can hide in another number (elevation in scale) and has no sigma, so that the
     outlines alone look well met. Where most views are pulled, all are.
 
     Args:

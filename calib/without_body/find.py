@@ -48,7 +48,7 @@ from toonset.dataset.silhouettes.coherence import coherence
 from toonset.dataset.split_folder.view_labels import Label
 from toonset.view import View
 
-FREE_VIEWS = (5, 6, 7)  # which may be no even ring; four and eight views hardly ever are none
+FREE_VIEWS = (5, 6, 7)  # which may be no even ring; four and eight views hardly ever are uneven
 FREE_YAW = np.radians(3.0)  # sigma of a view about the yaw that paint and outlines gave it
 LEAST_GAIN = 2.0  # nats, of free yaws over an even ring
 # Of yaws: what artists are off where all coheres, and what more where outlines are apart

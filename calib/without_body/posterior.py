@@ -33,7 +33,7 @@ from toonset.view import View
 HEIGHT_PX = 160  # working height of a figure
 RIM_PX = 3.0
 DETAIL = 1.0  # nats per relative difference of detail
-FAINTEST = 0.005  # OKLab per pixel: detail below is none
+FAINTEST = 0.005  # OKLab per pixel: less is not detail
 ROUGH = 0.006  # of the height: outlines whose places are not fitted are this far apart
 SHINS_FROM, SHINS_TO = 0.05, 0.2  # of the height, from the ground
 BEHIND = 30.0  # nats per height by which they stand behind the figure's middle

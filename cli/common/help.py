@@ -29,7 +29,7 @@ class Verb(TyperCommand):
             raise typer.BadParameter(str(error), ctx=ctx) from error
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; a value that is no choice is told the choice most like it."""
+        """Parse the arguments; a value that is not a choice is told the choice most like it."""
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as error:

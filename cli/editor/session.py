@@ -104,7 +104,7 @@ class Session:
 
         Raises:
             StaleError: they follow on other than the newest ones.
-            ToonsetError: they are none, the disk is full, or somebody else has written the file.
+            ToonsetError: they are invalid, the disk is full, or somebody else has written the file.
         """
         data = file_of(corrections)
         parse_corrections(data, CORRECTIONS)

@@ -63,7 +63,7 @@ def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:
     """Return the mesh of a file that was given, else the folder's own, else None.
 
     Raises:
-        MeshError: the file is no mesh.
+        MeshError: the file is not a mesh.
     """
     own = folder / MANNEQUIN
     file = given or (own if own.is_file() else None)

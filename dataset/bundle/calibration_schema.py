@@ -51,7 +51,7 @@ class CalibratedCamera(_Record):
         """Return the camera.
 
         Raises:
-            CameraError, BundleError: it is none, none that can be computed with, or not as it is
+            CameraError, BundleError: not a valid camera, out of range, or not as it is
                 described.
         """
         camera = NativeCamera(
@@ -121,7 +121,7 @@ class ViewRecord(_Record):
         """Refuse what no calibration writes.
 
         Raises:
-            CameraError, BundleError: a camera is none, or the covariance is none.
+            CameraError, BundleError: a camera or a covariance is invalid.
         """
         for camera in (self.camera, self.twin, *(other.camera for other in self.alternatives)):
             camera.camera()

@@ -51,7 +51,7 @@ class NativeCamera(BaseModel):
         """Return the camera of the record.
 
         Raises:
-            CameraError: the record is no camera.
+            CameraError: the record is not a camera.
             BundleError: its numbers are beyond what is computed with, or `model` contradicts k.
         """
         numbers = [*np.ravel(self.rotation), *self.target, *self.center]

@@ -85,7 +85,7 @@ def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
     """Return a frame's label map; None if missing.
 
     Raises:
-        PictureError: it is no indexed PNG.
+        PictureError: it is not an indexed PNG.
         BundleError: it has another size than its camera, or a label without a colour.
     """
     file = member(root, f"labels/{label_name(frame)}")

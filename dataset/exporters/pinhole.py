@@ -20,7 +20,7 @@ from toonset.dataset.images.picture import MAX_PIXELS
 from toonset.errors import BundleError
 
 LARGEST_FACTOR = 4.0  # a picture that must be enlarged by more has no business with the others
-SAME_PX = 1e-3  # a shift or a growth of a picture below this is none
+SAME_PX = 1e-3  # a smaller shift or growth of a picture is left out
 Pair = tuple[float, float]
 
 

@@ -54,7 +54,7 @@ def read_landmark_file(path: Path) -> LandmarkFile:
     """Return the content of a .csv file, or of JSON with any other ending.
 
     Raises:
-        LandmarkError: the file is missing or broken, or a number is none.
+        LandmarkError: the file is missing or broken, or a number is invalid.
     """
     data = read_whole(path, "landmark", LandmarkError, MAX_BYTES)
     try:

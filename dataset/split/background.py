@@ -26,14 +26,14 @@ STEADY = 1.5  # times the 99th percentile of noise: the 99.99th of a normal dist
 RIPPLED = 2.0  # the same in JPEG, whose ripples are stronger near figures than in the border
 GRAIN = 2.0  # levels: paper with more has grain all over, beside which no ripples are seen
 RARE = 3.0  # times the 80th percentile of noise: where its 99th may lie
-LEAST_SURE = 0.3  # of the border: less in one colour is no background
+LEAST_SURE = 0.3  # of the border: less in one colour is not background
 WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
 WORTH_LEVELS = 2.0  # and less by so many levels
 WORTH_SHARE = 0.05  # of the border: or explain so much more of it
 CLEARLY = 0.98  # of the border in one colour with less noise than that: nothing to gain
 RING = 0.02  # of the shorter side: the border that is looked at
 INSETS = (0.0, 0.02, 0.04, 0.06, 0.08)  # of the shorter side: where it is looked for
-COMMON = 0.3  # of the sheet: a colour that covers less is no background but a frame
+COMMON = 0.3  # of the sheet: a colour that covers less is not background but a frame
 MOST_SAMPLES = 200_000  # border pixels that are looked at
 
 

@@ -104,7 +104,7 @@ def open_holes(
         enclosed: its patches in the background's colour.
         background: that colour behind the crop.
         outline: what the outlines of all figures of the sheet look like.
-        least_share: of the figure's area; a smaller patch is no hole.
+        least_share: of the figure's area; a smaller patch is not a hole.
     """
     area = int(mask.sum())
     if not enclosed.any() or int(enclosed.sum()) > LINE_ART * area:

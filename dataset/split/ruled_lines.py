@@ -2,7 +2,7 @@
 
 A line is a thin straight run with paper along most of it, or a row of dashes. It counts if it
 crosses most of the sheet, or if it closes a rectangle with other lines; so a spear, a belt or a
-letter is none.
+letter is not a ruled line.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class SheetOptions:
         margin_px: empty pixels around every figure.
         least_hole: share of the figure's area from which an enclosed patch in the background's
             colour is a hole.
-        most_figures: more are refused; a sheet of letters or a pattern is no character sheet.
+        most_figures: more are refused; a sheet of letters or a pattern is not a character sheet.
         background_rgb: the background's colour, where a person knows it.
         boxes: (x, y, width, height) of the figures where a person gives them; one view each, in
             this order.
@@ -87,7 +87,7 @@ class Segmentation:
         background: the sheet's colour; None where it is transparent.
         sure: share of the sheet's border that is background, 0 to 1.
         warnings: what a person should look at, for a view may be wrong.
-        left_out: what was seen but is no view.
+        left_out: what was seen but is not a view.
         remarks: what was done besides, for people.
     """
 

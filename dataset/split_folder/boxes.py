@@ -36,7 +36,7 @@ def read_boxes(path: Path) -> tuple[tuple[Box, ...], ...]:
     Only the split.json of several sheets speaks of more than one.
 
     Raises:
-        SheetError: the file is missing, broken or without boxes, or a box is none.
+        SheetError: the file is missing, broken or without boxes, or a box is invalid.
     """
     data = read_whole(path, "boxes", SheetError, MAX_BYTES)
     if data.removeprefix(BOM).lstrip()[:1] in (b"[", b"{"):

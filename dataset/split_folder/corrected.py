@@ -1,7 +1,7 @@
 """Match corrections to a sheet's views by their boxes.
 
 A view is found again by its box, whatever its number has become: of all pairs the one that overlaps
-most comes first, each box and each view once, and less than half is no match.
+most comes first, each box and each view once, and less than half is not a match.
 """
 
 from __future__ import annotations

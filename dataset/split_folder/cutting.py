@@ -10,7 +10,7 @@ from typing import Any
 from toonset.errors import PaletteError, SheetError, UsageError
 from toonset.palette.formats.hex import rgb_of_typed
 
-MOST_CELLS = 1000  # a sheet of letters or a tile map is no character sheet
+MOST_CELLS = 1000  # a sheet of letters or a tile map is not a character sheet
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Cutting:
 
         Raises:
             UsageError: both boxes and a grid.
-            SheetError: a word that is no number, colour or grid.
+            SheetError: a word that is not a number, colour or grid.
         """
         if self.boxes is not None and self.grid:
             raise UsageError("--boxes and --grid both say where the figures are; drop one")

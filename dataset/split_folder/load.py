@@ -67,7 +67,7 @@ class Sheet:
 
         All warnings count: of the splitter (figures that touch or are cut, a background that is
         not plain) and of the files (copies, cells that do not divide the sheet, a changed folder).
-        What was left out of a sheet (text, frames, specks, dropped views) is no warning: it is
+        What was left out of a sheet (text, frames, specks, dropped views) is not a warning: it is
         ordinary, and the overlay shows it. Nor is what a split folder says of its sheets: a person
         has had the chance to look.
         """
@@ -100,7 +100,7 @@ def split_sheet(
         corrections: file of what a person corrected of one of the sheets (docs/formats.md).
 
     Raises:
-        ToonsetError: a file is no picture or shows no figure, is given twice, a split folder is
+        ToonsetError: a file is not a picture or shows no figure, is given twice, a split folder is
             broken, or an argument cannot be understood or does not fit the sheets.
     """
     paths = [sheet] if isinstance(sheet, str | Path) else sheet

@@ -26,7 +26,7 @@ class Source:
         size_wh: pixels.
         background: its colour; None where it is transparent.
         warnings: what was doubtful in it, for people.
-        left_out: what was seen in it but is no view.
+        left_out: what was seen in it but is not a view.
         remarks: what was done besides, for people.
     """
 

@@ -54,7 +54,7 @@ class SynthOptions:
         """Refuse what cannot be drawn.
 
         Raises:
-            SheetError: a number is out of its range, the background is no colour, or there is no
+            SheetError: a number is out of its range, the background is not a colour, or there is no
                 paper for what would be on it.
         """
         limits = {

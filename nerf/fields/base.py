@@ -48,7 +48,7 @@ class Field(nn.Module, ABC):
     Colour does not depend on the viewing direction: a drawing has no highlights that move.
     """
 
-    decoder_rate = 0.05  # Adam's, for everything that is no table
+    decoder_rate = 0.05  # Adam's, for everything that is not a table
 
     @abstractmethod
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Constants:

@@ -24,7 +24,7 @@ APART = (
     2.0  # times the line's width and a pixel, from outlines and deeper steps: lines of their own
 )
 WIDEST_PX, WIDEST = 12, 2.0  # from a step, in which its line is measured; times the outline's width
-THINNEST_PX = 0.3  # thinner lines are none
+THINNEST_PX = 0.3  # thinner ones do not count
 GAP_PX = 0.5  # between places at which a line is looked for
 FAINT = 0.3  # coverage from which there is a line
 
@@ -216,7 +216,7 @@ def _reaches(
         lined += int((_spread(cover, widest / 2)[there] >= LINE).sum())
         count += int(there.sum())
     share = inked / np.maximum(seen, 1)
-    beside = float(share[:, -widest // 4 :].mean(axis=1).min())  # ink that is no step's
+    beside = float(share[:, -widest // 4 :].mean(axis=1).min())  # ink that is not a step's
     near_px, far_px = np.maximum(share - beside, 0).sum(axis=1) * (count / max(lined, 1))
     return float(near_px), float(far_px)
 

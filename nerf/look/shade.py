@@ -25,7 +25,7 @@ from scipy.ndimage import uniform_filter
 from toonset.nerf.lines.nearest import nearest
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
-FLAT = 0.03  # logarithms per pixel: steeper is no flat paint
+FLAT = 0.03  # logarithms per pixel: steeper is not a flat paint
 BETWEEN = 0.1  # logarithms: a line between the sides is darker than both by more
 LEAST_DROP = 0.1  # logarithms, mean of the channels: weaker shadows are noise
 CELL, MOST_DROP = 0.05, 1.4  # logarithms: of the ratios' histogram

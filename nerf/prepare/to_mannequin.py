@@ -29,7 +29,7 @@ from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED
 
 OUTSIDE = 0.25  # of an outline's width: lines that reach farther beyond the silhouette lie about it
-MOST_OUTSIDE = 1.5  # of its width: what is farther out is no line
+MOST_OUTSIDE = 1.5  # of its width: what is farther out is not a line
 SURE = 2.5  # standard errors, from drawing to drawing
 
 

@@ -46,7 +46,7 @@ def change_pen(trained: TrainedField, width_px: float | None, color: str | None)
 
     Raises:
         BundleError: its drawings have no outline, or lines are switched off.
-        PaletteError: `color` is none.
+        PaletteError: `color` is not a colour.
     """
     if width_px is None and color is None:
         return trained

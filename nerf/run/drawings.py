@@ -163,8 +163,8 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
 
     Raises:
         BundleError: a file is missing or damaged, or does not belong to the record.
-        CameraError: a camera's record is none.
-        PictureError: a picture is none.
+        CameraError: a camera's record is invalid.
+        PictureError: a picture is invalid.
     """
     cameras = [camera.camera() for camera in record.cameras]
     rgba, paint = (_apart(_picture(folder / name, cameras), cameras) for name in (PICTURES, PAINT))

@@ -16,7 +16,7 @@ STILL_GOOD = 2.0  # times the best window's loss: worth keeping
 class LastGood:
     """Looks at the loss before every update; a model that has gone wrong goes back.
 
-    A field can go wrong without a loss that is no number: colours and opacities have limits, so
+    A field can go wrong without a loss that is not a number: colours and opacities have limits, so
     parameters that run away show as a loss that stays high.
     """
 

@@ -24,7 +24,7 @@ def read_gpl(data: bytes, where: str) -> list[NamedColor]:
     """Return the colours of a .gpl, without Aseprite's fully transparent ones.
 
     Raises:
-        PaletteError: not a .gpl, or a line that is no colour.
+        PaletteError: not a .gpl, or a line that is not a colour.
     """
     lines = lines_of(data, where)
     if not lines[0].startswith(MAGIC):

@@ -26,7 +26,7 @@ def read_json(data: bytes, where: str) -> list[NamedColor]:
     An entry is "#rrggbb", or an object with "hex" and perhaps "name" and "tones".
 
     Raises:
-        PaletteError: no JSON, no such list, or an entry that is no colour.
+        PaletteError: no JSON, no such list, or an entry that is not a colour.
     """
     content = parse_json(data, where, PaletteError)
     entries = content.get("colors") if isinstance(content, dict) else content

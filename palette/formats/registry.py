@@ -71,7 +71,7 @@ WRITTEN = tuple(kind.extensions[0] for kind in FORMATS if kind.write is not None
 def parse_colors(text_or_path: str) -> UInt8[np.ndarray, "colors 3"]:
     """Return the sRGB colours of a typed list or of a palette file; repeated ones count once.
 
-    Swatches that a file names as another one's tone in shadow are none of them.
+    Swatches that a file names as another one's tone in shadow are left out.
 
     Args:
         text_or_path: "#aabbcc,#123,white" (commas or spaces, # may be left out), or the path of a

@@ -25,7 +25,7 @@ CELL = 4  # levels per side of a counting cell
 EXACT = 0.2  # of a paint: so frequent an exact colour is the paint itself
 MOST_CELLS = 4096  # the fullest; the others, of noisy pictures, join the nearest paint
 TOUCHING = 1.5 * JUST_NOTICEABLE  # shades with a wider gap between them are not of one paint
-LEAST_PEAK = 0.002  # of the flat pixels; less is no paint, but joins the nearest
+LEAST_PEAK = 0.002  # of the flat pixels; less is not a paint, but joins the nearest
 UNLIKE = 4 * JUST_NOTICEABLE  # from all paints' shades: nobody takes it for one of them
 FEW = 4  # flat pixels: a block of 2 x 2
 

@@ -90,7 +90,7 @@ def patches_of(places: Sequence[Pixels], thickness_px: int = THIN) -> list[Place
 
     Args:
         places: the pixels, per picture.
-        thickness_px: what is thinner is no patch.
+        thickness_px: what is thinner is not a patch.
     """
     found = []
     for own in places:

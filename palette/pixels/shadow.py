@@ -26,7 +26,7 @@ from toonset.palette.pixels.antialias import OPAQUE
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
 NARROWEST_PX = 2 * SIDE_PX  # a picture; there is no border in it to look across
-FLAT = 0.03  # logarithms per pixel: steeper is no flat paint
+FLAT = 0.03  # logarithms per pixel: steeper is not a flat paint
 BETWEEN = 0.1  # logarithms: a line between the sides is darker than both by more
 LEAST_DROP, MOST_DROP = 0.1, 1.4  # logarithms: weaker is noise, deeper is another paint
 ALIKE = 0.12  # logarithms that a channel's ratio may be off the factor
