@@ -121,7 +121,7 @@ def aligned(
     Args:
         scene: posed drawings.
         register: whether cameras may move; else there is no registration.
-        unwarp: whether drawings may be bent; else there is no unbending.
+        unwarp: whether drawings may be bent; else there is no unwarping.
 
     Raises:
         BundleError: the cameras do not belong together (see `box_of_masks`).
