@@ -90,7 +90,7 @@ class Hints:
 
 
 def known_of(hints: Hints, views: Sequence[View], points: Mapping[str, Sequence[float]]) -> Known:
-    """Return what is known of the views before they are looked at.
+    """Resolve the hints for these views.
 
     Args:
         hints: as typed.

@@ -282,7 +282,7 @@ class Problem:
         *,
         differs: bool,
     ) -> list[Candidates]:
-        """Return what else every view could be, refined to `drawings`, those of full resolution."""
+        """Return every view's alternatives, refined to `drawings`, those of full resolution."""
         bent = joint.body.surface
         from_behind = looks_alike_from_behind(bent, joint.poses)
         found = []

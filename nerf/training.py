@@ -163,7 +163,7 @@ def train(
 
 
 def add_drawings(training: Training, scene: Scene) -> TrainedField:
-    """Return the field with what the drawn look is made of."""
+    """Add the drawings of the drawn look to a field."""
     ready, baked = training.prepared, baked_of(training.result)
     drawn = [frame.rgba for frame in scene.frames]
 

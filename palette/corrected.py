@@ -115,7 +115,7 @@ def correct_palette(
 
 
 def _plan(found: Palette, wanted: PaletteCorrections, where: str) -> _Plan:
-    """Return what becomes of every colour; `where` is the file and "palette"."""
+    """Plan what every colour becomes; `where` is the file and "palette"."""
     old = tuple(color.rgb for color in found.colors)
     gone: dict[int, str] = {}
     becomes: dict[int, tuple[RGB, ...]] = {i: (rgb,) for i, rgb in enumerate(old)}

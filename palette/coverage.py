@@ -21,7 +21,7 @@ Map = UInt8[np.ndarray, "height width"]
 def coverage_map(
     picture: UInt8[np.ndarray, "height width 4"], paint: PaintMap, contour: Map, palette: Palette
 ) -> UInt8[np.ndarray, "height width 3"]:
-    """Return what covers every pixel of a drawing, its alpha left aside.
+    """Return the coverage map of a drawing, its alpha left aside.
 
     Red is the palette index of the paint that covers most of it and green that of another one
     there, 255 = none; blue is how far the first covers it, 255 = wholly. The second, or where there

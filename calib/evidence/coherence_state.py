@@ -67,7 +67,7 @@ class SheetState:
 def state_of(
     views: Sequence[View], cameras: Sequence[Camera], *, yaw_observable: bool = True
 ) -> SheetState:
-    """Return what the drawings say about each other under these cameras.
+    """Return the coherence of the drawings under these cameras.
 
     Args:
         views: the drawings, at least one.

@@ -78,7 +78,7 @@ def align_all(
     starts: Sequence[Pose],
     widths: Float[np.ndarray, " iterations"],
 ) -> list[Fit]:
-    """Return what `align` makes of the starts, without those that ran into a better one."""
+    """Align from every start; drop those that end at a better one."""
     poses = [drawing.pose_in(start) for start in starts]
     for width in widths:
         before, poses = poses, []

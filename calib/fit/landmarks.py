@@ -62,7 +62,7 @@ class LandmarkFit:
 def landmark_starts(
     landmarks: Sequence[Landmarks | None], surface: Surface
 ) -> tuple[LandmarkFit | None, ...]:
-    """Return what the landmarks of every view say about its camera; None for too few or none.
+    """Fit a camera to the landmarks of every view; None if they are too few.
 
     Raises:
         LandmarkError: a view's pairs lie on a line or in one place, or far from the mannequin.

@@ -155,7 +155,7 @@ def fit_proportions(
     widths: Float[np.ndarray, " rounds"] = BODY_WIDTHS,
     margin: float = BIC_MARGIN,
 ) -> tuple[JointFit, ModelChoice]:
-    """Return the fit with the mannequin's proportions free, if the drawings prove them.
+    """Fit the mannequin's proportions, too, if the drawings prove them.
 
     Args:
         problem: the drawings at the working scale.

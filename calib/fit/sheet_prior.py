@@ -119,7 +119,7 @@ def sheet_priors(
 def anchors(
     priors: dict[str, SharedPrior], turn: Turn | None, prior: ElevationPrior
 ) -> list[tuple[SharedPrior, float]]:
-    """Return what is known of the sheet's means: (prior of one row, sigma)."""
+    """Return priors on the sheet's means: (prior of one row, sigma)."""
     elevation = priors["elevation"]
     views = len(elevation.values)
     mean = np.full((1, views), 1 / views)

@@ -43,7 +43,7 @@ TIED = 0.3  # least share of a variance that the drawings decide
 
 
 def account_for_turned_bodies(joint: JointFit, turn: Turn, kept: Sequence[bool] = ()) -> JointFit:
-    """Return the fit with its rotations and their covariance as bodies that turn ask for.
+    """Shrink the fit's rotations and widen their covariance for bodies that turn.
 
     Unchanged where elevation or roll scatter no more than they are uncertain.
 

@@ -39,7 +39,7 @@ def fill_false_holes(
     found: Sequence[ViewCalibration],
     vertices: Float[np.ndarray, "vertices 3"],
 ) -> tuple[tuple[View, ...], tuple[FilledHole, ...]]:
-    """Return the drawings with the holes filled that another one contradicts, and which those are.
+    """Fill the holes that another drawing contradicts; return the drawings and those holes.
 
     Args:
         views: the drawings, as cut out; where the paper behind one is not known, nothing is filled

@@ -75,7 +75,7 @@ def nothing_stretched(views: int) -> Stretches:
 def find_stretches(
     problem: JointProblem, fit: JointFit, model: str, *, doubtful: bool
 ) -> Stretches:
-    """Return what the drawings of a sheet prove.
+    """Return the stretches that the drawings of a sheet prove.
 
     Args:
         problem: the drawings at the working scale.

@@ -103,7 +103,7 @@ class TogetherSearch:
 
 
 def _nearest(candidates: Sequence[Candidates], starts: Sequence[Pose]) -> list[Pose]:
-    """Return what each view's start became, or the start where its view ran away from it."""
+    """Return each view's refined start, or the start where refinement diverged."""
     poses = []
     for view, start in zip(candidates, starts, strict=True):
         turns = [rotation_distance(fit.pose.rotation, start.rotation) for fit in view.fits]

@@ -213,7 +213,7 @@ class SheetPosterior:
         return all_of_them
 
     def _unasked(self, poses: Sequence[Pose], index: int) -> Float[np.ndarray, " n"]:
-        """Return what poses cost that are not where a person put the view."""
+        """Return the cost of poses that contradict a person's camera."""
         if self.asked is None:
             return np.zeros(len(poses))
         off = np.array([_yaw(pose) for pose in poses]) - self.asked[index]

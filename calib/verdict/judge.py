@@ -34,7 +34,7 @@ WEAK_ANGLE = OTHER / 3  # one sigma of yaw or elevation: three of them reach ano
 
 
 def measure_outlines(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
-    """Return how well the outlines of a sheet meet under its fit, view by view."""
+    """Measure how well the outlines of a sheet meet under its fit, view by view."""
     return [
         measure(drawing, joint.body.surface, drawing.pose_in(pose))
         for drawing, pose in zip(drawings, joint.poses, strict=True)

@@ -130,7 +130,7 @@ def _improved(normal: _Normal, deviation: np.ndarray, flat: np.ndarray) -> np.nd
 
 
 def _learned(matrix: np.ndarray, deviation: np.ndarray, flat: np.ndarray, tau: float) -> float:
-    """Return the size of wrong places that the numbers and their uncertainty speak for."""
+    """Return the size of placing errors, by the numbers and their uncertainty."""
     spread = np.linalg.inv(deviation[:, None] * matrix * deviation + np.eye(len(flat)))
     place = np.arange(len(flat)).reshape(-1, OWN)[:, PLACE].reshape(-1)
     unit = flat[place] / deviation[place]

@@ -74,7 +74,7 @@ def find_layout(
     ground: Background,
     without: Sequence[str] = (),
 ) -> SheetLayout:
-    """Return what stands where on a sheet; `without` names corrections that are left out.
+    """Segment a sheet; `without` names corrections that are left out.
 
     Raises:
         SheetError: there is no such correction.

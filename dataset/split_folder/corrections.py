@@ -157,7 +157,7 @@ _SCHEMA: TypeAdapter[Corrections] = TypeAdapter(Corrections)
 
 
 def read_corrections(path: str | Path) -> Corrections:
-    """Return what a corrections.json says.
+    """Read a corrections.json.
 
     Raises:
         SheetError: the file cannot be read, is larger than 8 MB, or says what cannot be meant.
@@ -167,7 +167,7 @@ def read_corrections(path: str | Path) -> Corrections:
 
 
 def parse_corrections(data: bytes, where: str) -> Corrections:
-    """Return what the bytes of a corrections.json say.
+    """Parse the bytes of a corrections.json.
 
     Args:
         data: of the file.

@@ -118,7 +118,7 @@ def write_split(
 
 
 def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ...]]:
-    """Return what split.json says of the sheets and of the views.
+    """Read split.json's records of sheets and views.
 
     Raises:
         SheetError: the file is missing, of another version, broken, or speaks of a sheet that it

@@ -52,7 +52,7 @@ class Field(nn.Module, ABC):
 
     @abstractmethod
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Constants:
-        """Return what depends on the points alone."""
+        """Precompute what depends on the points alone."""
 
     @abstractmethod
     def shade(self, constants: Constants) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:

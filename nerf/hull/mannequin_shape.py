@@ -85,7 +85,7 @@ class Shape:
         return sides[0], sides[1]
 
     def seen(self, camera: Camera, *, normals: bool = False) -> ShapeView:
-        """Return what a camera sees of the shape; with `normals`, which way its faces look."""
+        """Rasterise the shape for a camera; with `normals`, its faces' normals, too."""
         width, height = camera.size_wh
         depth = depth_map(self.vertices, self.faces, camera.resized(FINER))
         fine = _grown(

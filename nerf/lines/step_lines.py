@@ -137,7 +137,7 @@ def lines_across(
 def learn_steps(
     covers: Sequence[Cover], depths: Sequence[Depth], height: float, width_px: float
 ) -> StepLines | None:
-    """Return how steps are drawn, None where they are not.
+    """Learn which depth steps are drawn as lines; None if there are no such lines.
 
     Args:
         covers: how far lines cover every pixel of each drawing, 0 to 1.
@@ -167,7 +167,7 @@ def learn_steps(
 
 
 def draw_steps(depth: Depth, style: StepLines, height: float, finer: int, scale: float) -> Cover:
-    """Return how far lines at steps cover every pixel of a view.
+    """Draw lines at depth steps: how far they cover every pixel of a view.
 
     Args:
         depth: `finer` samples per pixel and axis, nan where nothing is.

@@ -145,7 +145,7 @@ def flanking(cameras: list[Camera], camera: Camera) -> tuple[int, int, float]:
 
 
 def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
-    """Return a view of the field in the look of its drawings, in the colours that they show."""
+    """Blend a view of the field from its drawings, in the colours that they show."""
     height, width = view.alpha.shape
     result = DrawnView(
         np.zeros((height, width, 3), np.float32),
@@ -251,7 +251,7 @@ def _candidates(
     own_color: Float[np.ndarray, "h w 3"],
     between: tuple[int, int, float],
 ) -> tuple[list[_Candidate], Bool[np.ndarray, "h w"], Seen]:
-    """Return what drawings and field say, the pixels that drawings show, and the first's places."""
+    """Return candidates of drawings and field, the pixels shown, and the first's places."""
     first, second, share = between
     there = np.isfinite(view.depth)
     textures = drawings.textures

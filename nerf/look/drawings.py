@@ -265,7 +265,7 @@ def levels_of(
 def depth_of(
     levels: UInt8[np.ndarray, "height width"], depths: tuple[float, float]
 ) -> Float[np.ndarray, "height width"]:
-    """Return what `levels_of` has rounded."""
+    """Return the depths of levels: the inverse of `levels_of`."""
     low, high = depths
     return np.where(levels > 0, low + (levels - 1.0) / 254 * (high - low), np.nan)
 

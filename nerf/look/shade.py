@@ -69,7 +69,7 @@ class Shade:
         return np.asarray(normal @ np.array(self.slope, np.float32) + np.float32(self.level))
 
     def tone(self, normal: Normals, finer: int) -> Picture:
-        """Return what a view's colours in light are multiplied by; borders lie between pixels.
+        """Return the factor of a view's colours in light; borders lie between pixels.
 
         Args:
             normal: `smoothed`.

@@ -94,7 +94,7 @@ def prepare(scene: Scene, options: TrainOptions) -> Prepared:
 
 
 def agree_on_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
-    """Return bent drawings bent and tinted further, so that their paint agrees over a hull.
+    """Bend and tint bent drawings further until their paint agrees over a hull.
 
     Args:
         ready: where its drawings did not bend, it is returned as it is.

@@ -70,7 +70,7 @@ def add_mirrored_views(scene: Scene) -> tuple[Scene, Symmetry | None]:
 
 
 def mirror_found(scene: Scene, found: Symmetry | None) -> Scene:
-    """Return the scene with the mirror images that were found to be drawings of it."""
+    """Add the mirror images that were found to be drawings of the scene."""
     if found is None or not found.mirrored:
         return scene
     sources = (frame for frame in scene.frames if frame.name in found.mirrored)
@@ -80,7 +80,7 @@ def mirror_found(scene: Scene, found: Symmetry | None) -> Scene:
 
 
 def mirror_all(scene: Scene) -> Scene:
-    """Return the scene with every drawing's mirror image: all that symmetry could ever show."""
+    """Add every drawing's mirror image: all that symmetry could ever show."""
     names = tuple(frame.name for frame in scene.frames)
     return mirror_found(scene, Symmetry((), 0.0, names))
 

@@ -67,7 +67,7 @@ class Unwarping(Alignment):
 
 
 def unwarp_drawings(scene: Scene) -> tuple[Scene, Unwarping]:
-    """Take the bends out of a scene's drawings; return it, and what was found.
+    """Unwarp a scene's drawings; return the scene and the fit.
 
     Drawings that agree within an outline's own error are returned as they are, to the bit; so are
     pictures without a figure, and scenes with fewer than FEWEST_VIEWS.

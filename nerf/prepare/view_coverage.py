@@ -34,7 +34,7 @@ class Gap:
 
 
 def guesses(scene: Scene) -> list[str]:
-    """Return what must be guessed of a character, a line each, for people."""
+    """Describe the sides of a character that no drawing shows, a line each, for people."""
     scene = replace(scene, frames=tuple(frame for frame in scene.frames if figure_px(frame)))
     if len(scene.frames) < 2:
         return []

@@ -162,7 +162,7 @@ def layered(view: Rendering, layer: str, picture: Picture) -> list[PaintLayer]:
 
 
 def _look(view: Rendering, layer: str, picture: Picture) -> _Look:
-    """Return what is to be divided."""
+    """Return the view that is divided into layers."""
     alpha = picture[..., 3] / 255.0
     shown = _Rest(picture[..., :3] / 255.0 * alpha[..., None], alpha, np.ones_like(alpha))
     palette, shares = view.field.palette, view.shares

@@ -65,7 +65,7 @@ class ViewRays:
 
     @classmethod
     def of(cls, baked: Baked, camera: Camera) -> ViewRays:
-        """Return what `camera` sees."""
+        """Compute the rays of a camera."""
         hull, (width, height) = baked.trained.hull, camera.size_wh
         middle = float(camera.rotation[2] @ ((hull.box.low + hull.box.high) / 2 - camera.target))
         corner = camera.rotation @ (hull.low - hull.voxel / 2 - camera.target) - [0, 0, middle]

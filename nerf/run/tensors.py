@@ -30,7 +30,7 @@ SLACK = 1e-3  # cells: where single precision may round a point to
 
 
 def packed(trained: TrainedField) -> dict[str, Tensor]:
-    """Return what model.safetensors holds of a field."""
+    """Pack a field into the tensors of model.safetensors."""
     result = {}
     for name, values in parameters_of(trained).items():
         result[name] = values.half() if values.numel() >= HALF_FROM else values.clone()

@@ -59,7 +59,7 @@ class Verdict:
 
 
 def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> Verdict:
-    """Return what a run is worth.
+    """Judge a run.
 
     Args:
         training: the run, its field with the drawings laid over it.
@@ -96,7 +96,7 @@ def _measured(worst: LeftOut) -> str:
 
 
 def _remedy(training: Training, worst: LeftOut, *, stands_out: bool) -> str:
-    """Return what helps, by what is most likely the cause."""
+    """Return advice, by the most likely cause."""
     done = len(training.history)
     usual = STEPS_ON_SHAPE if training.prepared.shape else USUAL_STEPS
     ended = training.stopped in ("steps", "budget")

@@ -129,7 +129,7 @@ class _Seams:
     def cost(
         self, first: Int[np.ndarray, " e"], second: Int[np.ndarray, " e"]
     ) -> Int[np.ndarray, " e"]:
-        """Return what each edge costs; a metric over the drawings."""
+        """Return the cost of each edge; a metric over the drawings."""
         edge = np.arange(len(self.one))
         apart = np.abs(self.color[first, edge] - self.color[second, edge]).mean(axis=(1, 2))
         feature = self.feature[first, edge] + self.feature[second, edge]

@@ -133,7 +133,7 @@ def fit_field(
 
 
 def _hull(scene: Scene, options: TrainOptions, ready: Prepared) -> tuple[Hull, HullEvidence]:
-    """Return where the field is, and what speaks for how drawings carve it."""
+    """Return the field's hull, and the evidence for how drawings carve it."""
     if not options.carve:
         return open_box(scene), NO_EVIDENCE
     if ready.shape is None:

@@ -163,7 +163,7 @@ def _weights(layer: torch.nn.Linear) -> dict[str, Any]:
 
 
 def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
-    """Return what the drawn look is made of."""
+    """Return the page's record of the drawn look."""
     textures = drawings.textures
     paint, whole, about = _atlases(drawings, textures)
     shape = drawings.shape

@@ -40,7 +40,7 @@ def read_json(data: bytes, where: str) -> list[NamedColor]:
 
 
 def json_title(data: bytes) -> str:
-    """Return what an object calls itself, as toonset and Lospec write it; "" if it does not."""
+    """Return an object's title, as toonset and Lospec write it; "" if missing."""
     content = parse_json(data, "palette", PaletteError)
     said = [content.get(key) for key in ("title", "name")] if isinstance(content, dict) else []
     return next((clean_name(text) for text in said if isinstance(text, str)), "")

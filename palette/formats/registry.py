@@ -116,7 +116,7 @@ def names_tones(text_or_path: str) -> bool:
 
 
 def palette_title(text_or_path: str) -> str:
-    """Return what a palette file calls itself; "" where it does not, and of typed colours."""
+    """Return a palette file's title; "" if missing, and of typed colours."""
     path = Path(text_or_path)
     if path.suffix.lower() not in EXTENSIONS:
         return ""

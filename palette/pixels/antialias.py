@@ -90,7 +90,7 @@ def _inner(padded: UInt8[np.ndarray, "height width"]) -> np.ndarray:
 
 
 def _paints(padded: np.ndarray, inner: np.ndarray, rgba: np.ndarray, palette: np.ndarray) -> Paints:
-    """Return what the palette's colours look like in the picture, and its noise beside edges."""
+    """Return the palette's colours as drawn in the picture, and its noise beside edges."""
     edge = ((padded != NONE) & ~inner).astype(np.uint8)
     ring = np.flatnonzero(inner & (cv2.dilate(edge, np.ones((5, 5), dtype=np.uint8)) > 0))
     ring = ring[:: max(1, len(ring) // SAMPLE)]

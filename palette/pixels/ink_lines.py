@@ -171,7 +171,7 @@ def _ink(light: np.ndarray, filled: np.ndarray) -> float:
 
 
 def _coverage(light: np.ndarray, closed: np.ndarray, ink: float) -> np.ndarray:
-    """Return what was filled as a share of the way from the surroundings to the ink."""
+    """Return the filled part as a share of the way from the surroundings to the ink."""
     cover = np.zeros_like(light)
     for rows in _bands(light):
         filled = closed[rows] - light[rows]

@@ -87,7 +87,7 @@ def find_mixtures(
     drawn: Float[np.ndarray, "tones 3"],
     at: Bool[np.ndarray, "height width"],
 ) -> Mixtures:
-    """Return what covers the chosen pixels.
+    """Unmix the chosen pixels.
 
     Args:
         picture: sRGB with straight alpha.

@@ -44,17 +44,17 @@ class CutCosts:
     open: Float[np.ndarray, "height width"]
 
     def prices(self) -> Float[np.ndarray, "3 height width"]:
-        """Return what a cut costs per cell: from cleft to cleft along lines, or edges; plainly."""
+        """Return a cut's costs per cell: from cleft to cleft along lines, or edges; plainly."""
         gaps, tolls = GAP * np.maximum(self.solid - self.drawn, 0), self._tolls()
         costs = self.by_lines() + tolls, self.by_edges() + tolls, self.drawn
         return np.stack(costs) + gaps
 
     def by_lines(self) -> Float[np.ndarray, "height width"]:
-        """Return what paint costs per cell if lines are cheap."""
+        """Return the cost of paint per cell if lines are cheap."""
         return self.drawn * (1 - LINE * self.lines)
 
     def by_edges(self) -> Float[np.ndarray, "height width"]:
-        """Return what paint costs per cell if lines and edges are cheap."""
+        """Return the cost of paint per cell if lines and edges are cheap."""
         return self.drawn * (1 - np.maximum(LINE * self.lines, EDGE * self.edges))
 
     def _tolls(self) -> Float[np.ndarray, "height width"]:
