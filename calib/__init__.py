@@ -1,1 +1,1 @@
-"""Views and a mannequin to cameras, and how sure they are."""
+"""Find the camera of every drawing from views and a mannequin, with uncertainty and verdict."""

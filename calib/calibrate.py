@@ -1,4 +1,4 @@
-"""Drawings and a mannequin to cameras: what `toonset calibrate` does between files."""
+"""Calibrate a sheet's cameras: everything `toonset calibrate` does between reading and writing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.flaws.cropped import at_cuts
-from toonset.calib.flaws.false_holes import without_false_holes
+from toonset.calib.flaws.false_holes import fill_false_holes
 from toonset.calib.from_landmarks import calibrate_by_landmarks
 from toonset.calib.hints import Hints, known_of
 from toonset.calib.known import Known
@@ -94,7 +94,7 @@ def calibrate(
             if better is not None:
                 return _alone(views, better, hints, seed, options)
     drawings, found = at_cuts(views, found)
-    drawings, filled = without_false_holes(drawings, found.views, found.mannequin)
+    drawings, filled = fill_false_holes(drawings, found.views, found.mannequin)
     return replace(
         found,
         filled_holes=filled,

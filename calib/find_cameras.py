@@ -1,4 +1,4 @@
-"""Views and a mannequin to cameras: coarse hypotheses, contour alignment, the sheet together.
+"""Find a sheet's cameras: template search, contour alignment, joint adjustment, model selection.
 
 1. templates: silhouettes of the mesh over yaw and elevation; the best overlaps start each view, and
    the turns (or labels) that explain the whole sheet start all views
@@ -22,12 +22,7 @@ import numpy as np
 from toonset.calib.evidence.coherence_state import state_of
 from toonset.calib.fit.model_selection import ModelTest
 from toonset.calib.fit.sheet_prior import Turn, off_places
-from toonset.calib.flaws.stretched import (
-    as_drawn,
-    nothing_stretched,
-    stretched_mannequin,
-    unstretched,
-)
+from toonset.calib.flaws.stretched import as_drawn, nothing_stretched, stretch_mannequin, unstretch
 from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.pipeline import Problem, SheetFit
@@ -73,8 +68,8 @@ def find_cameras(
         stretches = stretches.and_then(more)
         if more.is_none:
             break
-        taken = [unstretched(*pair) for pair in zip(views, stretches.views, strict=True)]
-        mannequin = stretched_mannequin(mesh, stretches)
+        taken = [unstretch(*pair) for pair in zip(views, stretches.views, strict=True)]
+        mannequin = stretch_mannequin(mesh, stretches)
         fitted = _fitted(taken, mannequin, options, progress, known, seconds)
     found = _judged(fitted, stretches.tried, seconds)
     return as_drawn(found, taken, views)

@@ -1,4 +1,4 @@
-"""Cameras from landmarks alone: for drawings whose outline is not the mannequin's.
+"""Calibrate from landmarks alone, for drawings whose outline is not the mannequin's.
 
 Every view is solved by itself (`toonset.calib.fit.landmarks`). How far its outline is from
 the mannequin's is reported, and judges nothing: who clicks points of a body under a cloak knows.

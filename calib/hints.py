@@ -1,4 +1,4 @@
-"""What a person says of the views, as typed, and what that means for these drawings."""
+"""Parse what a person says of the views, and resolve it for these drawings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SQUARE = 1e-3  # a pixel may be this much higher than wide: rounding of a file
 
 @dataclass(frozen=True)
 class Hints:
-    """What is known of the views; everything may be left out.
+    """Hints about the views; all are optional.
 
     Attributes:
         labels: what each view shows, in sheet order: "front,3q,side,back", yaws in degrees, "?"
@@ -75,7 +75,7 @@ class Hints:
                 raise UsageError(f"{name} does nothing beside --landmarks-only; drop one")
 
     def label_text(self, views: Sequence[View]) -> str:
-        """Return what each view shows; the views' own labels where nothing was said here."""
+        """Return each view's label, its own where the hints have none."""
         if self.labels or not any(view.label for view in views):
             return self.labels
         return ",".join(view.label or "?" for view in views)
@@ -90,7 +90,7 @@ class Hints:
 
 
 def known_of(hints: Hints, views: Sequence[View], points: Mapping[str, Sequence[float]]) -> Known:
-    """Return what is known of the views before they are looked at.
+    """Resolve the hints for these views.
 
     Args:
         hints: as typed.
@@ -116,7 +116,7 @@ def known_of(hints: Hints, views: Sequence[View], points: Mapping[str, Sequence[
 
 
 def _corrected(known: Known, given: Given, views: Sequence[View]) -> Known:
-    """Return what is known with what was said of single views; empty where nothing was."""
+    """Return the hints merged with the corrections of single views."""
     said = given.of_views(views)
     if not any(said):
         return known

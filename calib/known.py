@@ -1,4 +1,4 @@
-"""What a person knows before calibration: labels, landmarks, cameras to start from, and locks."""
+"""Hold what is known before calibration: labels, landmarks, initial cameras, locks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAIR_OF_HEIGHT = 0.015  # error of a landmark under a candidate's camera, propor
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known beforehand.
+    """Prior knowledge of the views.
 
     Attributes:
         labels: possible yaws of every view; empty for nothing.

@@ -1,4 +1,4 @@
-"""Coloured points of the mannequin for an export: its surface and its contour in every view."""
+"""Sample coloured points of the mannequin for an export: its surface and every view's contour."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sheet on its way from drawings to cameras: search, selection, camera model, body, alternatives.
+"""Run the steps of calibration: search, selection, camera model, body, alternatives.
 
 What `toonset.calib.find_cameras` does one after the other, each a step from plain data to plain
 data.
@@ -25,15 +25,15 @@ from toonset.calib.fit.model_selection import (
     QUICK_TEST_MARGIN,
     QUICK_TEST_WIDTHS,
     ModelChoice,
+    fit_proportions,
     select_model,
-    with_proportions,
 )
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
 from toonset.calib.fit.sheet_prior import Turn
-from toonset.calib.fit.turned_bodies import with_turned_bodies
+from toonset.calib.fit.turned_bodies import account_for_turned_bodies
 from toonset.calib.flaws.cropped import ending_at
-from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, proven_cuts
+from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, prove_cuts
 from toonset.calib.flaws.stretched import Stretches, find_stretches, nothing_stretched
 from toonset.calib.known import Known, weighed_by_landmarks
 from toonset.calib.options import CalibrationOptions, Progress
@@ -44,18 +44,18 @@ from toonset.calib.result import CutOff
 from toonset.calib.search.alternatives import refine_alternatives
 from toonset.calib.search.hypotheses import (
     Candidates,
-    half_turned,
+    add_twins,
     level_twins,
     looks_alike_from_behind,
     refine,
-    with_twins,
+    turn_half,
 )
-from toonset.calib.search.selection import RANKING_WIDTHS, TogetherSearch, with_k
+from toonset.calib.search.selection import RANKING_WIDTHS, TogetherSearch, set_distance
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.search.templates import Templates, find_hypotheses
 from toonset.calib.search.turntable_starts import TurnStart, likely_turns
-from toonset.calib.verdict.judge import measured, typical_coverage
+from toonset.calib.verdict.judge import measure_outlines, typical_coverage
 from toonset.camera import Camera, rotation_distance
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh
@@ -160,7 +160,7 @@ class Problem:
             starts = [h.pose for h in found]
             starts = [*starts, starts[0].twin(), *(turn.poses[i] for turn in together)]
             own = marked[i] if marked else None
-            starts += with_k(own.poses, 0.0) if own else []
+            starts += set_distance(own.poses, 0.0) if own else []
             placed = self.known.placed[i] if self.known.placed else None
             starts += [placed] if placed else []
             reached = refine(self.coarse[i], self.surface, starts, COARSE_WIDTHS)
@@ -205,7 +205,7 @@ class Problem:
         """Return the fit with the mannequin bent, if that is proven, its sigmas made true."""
         fit, widths = rigid, BODY_WIDTHS
         if not rigid.differs and len(self.views) >= FEWEST_TO_TEST:
-            _, model = with_proportions(
+            _, model = fit_proportions(
                 rigid.problem, rigid.joint, rigid.model, QUICK_TEST_WIDTHS, QUICK_TEST_MARGIN
             )
             if model.bends_mannequin:
@@ -214,11 +214,11 @@ class Problem:
                 fit = replace(rigid, model=model)
         joint, model = fit.joint, fit.model
         if fit.differs:
-            joint, model = with_proportions(self._level(fit.problem, joint), joint, model, widths)
+            joint, model = fit_proportions(self._level(fit.problem, joint), joint, model, widths)
         factor = SIGMA_OF_ANOTHER_BODY if fit.differs else SIGMA_OF_SAME_BODY
         joint = replace(joint, covariance=factor**2 * joint.covariance)
         if not fit.differs and not self.known.locked - {"fov"}:
-            joint = with_turned_bodies(joint, turn, self.known.kept)
+            joint = account_for_turned_bodies(joint, turn, self.known.kept)
         return replace(fit, joint=joint, model=model)
 
     def cut_off(self, whole: SheetFit, turn: Turn) -> tuple[Problem, SheetFit, tuple[CutOff, ...]]:
@@ -235,7 +235,7 @@ class Problem:
             ended = self._ending_at(possible)
             fitted = ended.rigid(whole.joint, turn)
             both, differs = (costs, ended._costs(fitted)), whole.differs
-            proven = proven_cuts(self.views, possible, fitted.joint, both, differs=differs)
+            proven = prove_cuts(self.views, possible, fitted.joint, both, differs=differs)
             if not proven:
                 ended, fitted = self, whole
             elif len(proven) < len(possible):
@@ -255,7 +255,7 @@ class Problem:
         return find_stretches(problem, fitted.joint, name, doubtful=fitted.differs)
 
     def _costs(self, fitted: SheetFit) -> list[float]:
-        return [fit.cost for fit in measured(self.fine, fitted.joint)]
+        return [fit.cost for fit in measure_outlines(self.fine, fitted.joint)]
 
     def _ending_at(self, cuts: Cuts) -> Problem:
         views, fine = list(self.views), list(self.fine)
@@ -281,12 +281,12 @@ class Problem:
         *,
         differs: bool,
     ) -> list[Candidates]:
-        """Return what else every view could be, refined to `drawings`, those of full resolution."""
+        """Return every view's alternatives, refined to `drawings`, those of full resolution."""
         bent = joint.body.surface
         from_behind = looks_alike_from_behind(bent, joint.poses)
         found = []
         for i, (pose, view) in enumerate(zip(joint.poses, candidates, strict=True)):
-            starts = _alternative_starts(pose, view) + with_twins([half_turned(pose)]) * from_behind
+            starts = _alternative_starts(pose, view) + add_twins([turn_half(pose)]) * from_behind
             final = refine(drawings[i], bent, starts, FINE_WIDTHS)
             final = refine_alternatives(drawings[i], joint, i, final)
             seen = pose if model.is_perspective else replace(pose, k=0.0)
@@ -335,4 +335,4 @@ class Problem:
 
 def _alternative_starts(pose: Pose, candidates: Candidates) -> list[Pose]:
     """Return the chosen pose, its twin and the best candidates, all with the chosen k."""
-    return with_k(with_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)
+    return set_distance(add_twins([pose]) + [fit.pose for fit in candidates.fits[:4]], pose.k)

@@ -1,4 +1,4 @@
-"""What calibration returns: cameras, how sure they are, and what else they could be."""
+"""Define the result of calibration: cameras, uncertainties, alternatives."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class CutOff:
 
 @dataclass(frozen=True)
 class FilledHole:
-    """A hole that is none.
+    """A false hole: paint in the paper's colour.
 
     Attributes:
         view: the drawing that has it.

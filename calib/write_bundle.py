@@ -1,4 +1,4 @@
-"""A calibration as a bundle on disk, with or without the palette of its drawings."""
+"""Write a calibration as a bundle, with or without the palette of its drawings."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The command line: parse, call, print."""
+"""Parse the command line, call the stages, print."""

@@ -1,4 +1,4 @@
-"""`toonset calibrate`: drawings to cameras."""
+"""`toonset calibrate`: find the cameras of drawings."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ KNOWN_PANEL = "What you know"
 
 
 class Lock(StrEnum):
-    """What may stay as it is given."""
+    """What `--lock` may hold fixed."""
 
     yaw = "yaw"
     elevation = "elevation"

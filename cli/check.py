@@ -1,4 +1,4 @@
-"""`toonset info` and `check`: what a bundle, a run or a split folder holds, and what is wrong."""
+"""`toonset info` and `check`: summarise a bundle, run or split folder; list its problems."""
 
 from __future__ import annotations
 

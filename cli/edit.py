@@ -1,4 +1,4 @@
-"""`toonset edit`: a page on which a person corrects what calibration and palette got wrong."""
+"""`toonset edit`: correct calibration and palette on a page in the browser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`toonset evaluate`: how near renderings come to pictures; `toonset consistency`: of drawings."""
+"""`toonset evaluate` and `consistency`: score renderings, and drawings against each other."""
 
 from __future__ import annotations
 

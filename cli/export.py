@@ -1,4 +1,4 @@
-"""`toonset export`: a bundle in another program's format."""
+"""`toonset export`: write a bundle in another program's format."""
 
 from __future__ import annotations
 
@@ -76,14 +76,14 @@ def export(
     from toonset.dataset.bundle.bundle import mannequin_of
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.exporters.common import read_views
-    from toonset.dataset.exporters.pinhole import centred
+    from toonset.dataset.exporters.pinhole import centre_view
 
     printer, target = Printer(as_json, quiet), TARGETS[to]
     views = read_views(bundle)
     body = mannequin_of(transforms_file(bundle).parent, mesh)
     check_output(out, [bundle, mesh], target.written, force=force)
     if centre:
-        views = tuple(centred(view) for view in views)
+        views = tuple(centre_view(view) for view in views)
     points = None
     if target.wants_points:
         printer.progress("colouring points")

@@ -1,4 +1,4 @@
-"""`toonset import`: cameras and pictures of another program become a bundle."""
+"""`toonset import`: make a bundle of another program's cameras and pictures."""
 
 from __future__ import annotations
 

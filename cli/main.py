@@ -1,4 +1,4 @@
-"""The `toonset` program: verbs, errors to exit codes, nothing heavy imported before a verb runs.
+"""Run the `toonset` program: load a verb when it is called, turn errors into exit codes.
 
 Exit codes: 0 fine; 1 our bug; 2 bad input or usage; 3 done, but a person should look (a view or a
 run is not ok, a cut is doubtful, a drawing contradicts the others); 130 interrupted.

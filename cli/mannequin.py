@@ -1,4 +1,4 @@
-"""`toonset mannequin`: a plain body to calibrate with, where nobody has modelled one."""
+"""`toonset mannequin`: make a plain body to calibrate with."""
 
 from __future__ import annotations
 

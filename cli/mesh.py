@@ -1,4 +1,4 @@
-"""`toonset mesh`: a trained run as a mesh in palette colours."""
+"""`toonset mesh`: write a trained run as a mesh in palette colours."""
 
 from __future__ import annotations
 
@@ -77,14 +77,14 @@ def mesh(
         raise typer.BadParameter("--nearest belongs to --variants")
     import torch
 
-    from toonset.nerf.render.recolor import recolored, variants_of
+    from toonset.nerf.render.recolor import recolor_run, variants_of
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.surface.files import check_mesh_files, mesh_files, write_mesh_files
     from toonset.nerf.surface.surface import surface_of
-    from toonset.nerf.surface.texture import textured_surface_of
-    from toonset.nerf.surface.textured_files import check_textured_files, textured_files
+    from toonset.nerf.surface.texture import texture_surface
+    from toonset.nerf.surface.textured_files import check_textured_files, encode_textured_files
 
-    trained = recolored(read_field(run), recolor or [])
+    trained = recolor_run(read_field(run), recolor or [])
     check = partial(check_textured_files, outline=outline) if texture else check_mesh_files
     check(out, force=force, variants=bool(variants))
     others = variants_of(trained, variants or [], nearest=nearest)
@@ -97,8 +97,8 @@ def mesh(
 
     values: dict[str, Any] = {}
     if texture:
-        textured = textured_surface_of(trained, faces, progress, outline=outline, variants=others)
-        surface, files = textured.surface, textured_files(textured, out)
+        textured = texture_surface(trained, faces, progress, outline=outline, variants=others)
+        surface, files = textured.surface, encode_textured_files(textured, out)
         values["texture"] = list(textured.atlas.size_wh)
         values["by_field"] = float((textured.source < 0).mean())
     else:

@@ -1,4 +1,4 @@
-"""`toonset palette`: a character's colours and its label maps; `toonset recolor`: other colours."""
+"""`toonset palette` and `recolor`: find colours and labels; change the drawings' colours."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ def recolor(
     """
     from toonset.dataset.images.picture import encode_png
     from toonset.dataset.split_folder.pictures import check_pictures
-    from toonset.palette.recolor import changed_colors, recolored_drawing
+    from toonset.palette.recolor import change_colors, recolor_drawing
     from toonset.write import new_folder, write_bytes
 
     printer = Printer(as_json, quiet)
@@ -213,10 +213,10 @@ def recolor(
     pictures = [folder / name for folder in folders for name in ("images", *FOLDERS)]
     check_output(out, [*places, *pictures], ("*.png",), force=force)
     found, drawings = _painted(places, printer)
-    colors = changed_colors(found.rgb, changes, [color.name for color in found.colors])
+    colors = change_colors(found.rgb, changes, [color.name for color in found.colors])
     with new_folder(out, force=force) as folder:
         for one in drawings:
-            new = recolored_drawing(one.picture, one.paint, one.contour, found, colors)
+            new = recolor_drawing(one.picture, one.paint, one.contour, found, colors)
             write_bytes(folder / one.name, encode_png(new))
     names = [one.name for one in drawings]
     count = "1 picture" if len(names) == 1 else f"{len(names)} pictures"

@@ -1,4 +1,4 @@
-"""`toonset render`: pictures of a trained run from given cameras or all round."""
+"""`toonset render`: render a trained run from given cameras or all round."""
 
 from __future__ import annotations
 
@@ -114,9 +114,9 @@ def render(
     import torch
 
     from toonset.nerf.render.animation import check_mp4
-    from toonset.nerf.render.files import rendered_files
+    from toonset.nerf.render.files import render_files
     from toonset.nerf.render.layers import default_layer
-    from toonset.nerf.render.recolor import recolored, repainted, with_pen
+    from toonset.nerf.render.recolor import change_pen, recolor_run, repaint_run
     from toonset.nerf.run.folder import read_field
     from toonset.write import new_folder, write_bytes
 
@@ -125,15 +125,15 @@ def render(
         check_mp4()
     if threads is not None:
         torch.set_num_threads(threads)
-    trained = recolored(read_field(run), recolor or [])
-    trained = repainted(trained, palette, nearest=nearest) if palette else trained
+    trained = recolor_run(read_field(run), recolor or [])
+    trained = repaint_run(trained, palette, nearest=nearest) if palette else trained
     wanted = layers or [default_layer(trained) if views else "rgb"]
     wanted = ["palette"] if repaint and wanted == ["rgb"] else wanted
     trained = _style(trained, wanted, lines=lines)
-    trained = with_pen(trained, ink_width, ink_color)
+    trained = change_pen(trained, ink_width, ink_color)
     named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
     check_output(out, [run, cameras], WRITTEN, force=force)
-    files = rendered_files(trained, named, wanted, together, printer.progress, printer.say)
+    files = render_files(trained, named, wanted, together, printer.progress, printer.say)
     sizes: dict[str, int] = {}
     with new_folder(out, force=force) as folder:
         for name, data in files:

@@ -1,4 +1,4 @@
-"""`toonset split`: a sheet to its views, shown so that a person can see and correct the cut."""
+"""`toonset split`: cut a sheet into views that a person can see and correct."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`toonset synth`: a mesh to a drawn turnaround with its exact truth."""
+"""`toonset synth`: draw a turnaround of a mesh, with its ground truth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`toonset train`: a bundle becomes a field that can be rendered from anywhere."""
+"""`toonset train`: fit a radiance field to a bundle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`toonset view`: a run in the browser, as one page."""
+"""`toonset view`: write a run or bundle as one HTML page."""
 
 from __future__ import annotations
 

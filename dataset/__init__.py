@@ -1,1 +1,1 @@
-"""Sheets to views, bundles on disk, synthetic turnarounds."""
+"""Split sheets into views, read and write bundles, draw synthetic turnarounds."""

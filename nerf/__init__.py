@@ -1,1 +1,1 @@
-"""Bundles to triplane radiance fields, renders and figures of merit."""
+"""Train triplane radiance fields on bundles, render and score them."""

@@ -1,4 +1,4 @@
-"""What can be set about training and rendering. Imports nothing heavy."""
+"""Define the options of training and rendering. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from toonset.errors import UsageError
 
 
 class Layer(StrEnum):
-    """What can be seen of a rendering."""
+    """Layers of a rendering."""
 
     drawn = "drawn"
     rgb = "rgb"
@@ -86,7 +86,7 @@ class TrainOptions:
     symmetry: bool = True
 
     def check(self) -> None:
-        """Refuse what means nothing.
+        """Refuse options out of range.
 
         Raises:
             UsageError: a number out of range, a switch that is neither on nor off, no such field

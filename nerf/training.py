@@ -1,4 +1,4 @@
-"""A scene to a run: what `toonset train` does between reading a bundle and writing the run."""
+"""Train a run on a scene: everything `toonset train` does between reading and writing."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import working_threads
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.symmetry import with_all_mirrored
+from toonset.nerf.prepare.symmetry import mirror_all
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.folder import WRITTEN
 from toonset.nerf.run.monitor import Monitor, MonitorOptions
 from toonset.nerf.run.report import preview, write_run
-from toonset.nerf.train.labelling import labelled, without_palette
+from toonset.nerf.train.labelling import drop_palette, label_scene
 from toonset.nerf.train.result import HeldOut, Training
 from toonset.nerf.train.train import device_of, fit_field
 from toonset.palette.names import hex_of
@@ -52,7 +52,7 @@ class Listener(Protocol):
 
 
 class _Silence:
-    """A listener to whom nothing matters."""
+    """A listener that ignores everything."""
 
     def say(self, text: str) -> None:
         pass
@@ -152,18 +152,18 @@ def train(
         _memory_errors(),
     ):
         told.detail(f"{count} CPU thread{'s' * (count > 1)}")
-        scene = _with_palette(scene, told) if palette else without_palette(scene)
+        scene = _with_palette(scene, told) if palette else drop_palette(scene)
         monitor = Monitor(looking or MonitorOptions(test=test))
-        for guess in guesses(with_all_mirrored(scene) if options.symmetry else scene):
+        for guess in guesses(mirror_all(scene) if options.symmetry else scene):
             told.say(guess)
         training = fit_field(scene, options, told.progress, monitor)
         told.progress("laying the drawings over the field")
-        training = replace(training, result=with_drawings(training, scene))
+        training = replace(training, result=add_drawings(training, scene))
     return Run(training.result, training, scene, test, monitor.held_out, count)
 
 
-def with_drawings(training: Training, scene: Scene) -> TrainedField:
-    """Return the field with what the drawn look is made of."""
+def add_drawings(training: Training, scene: Scene) -> TrainedField:
+    """Add the drawings of the drawn look to a field."""
     ready, baked = training.prepared, baked_of(training.result)
     drawn = [frame.rgba for frame in scene.frames]
 
@@ -180,7 +180,7 @@ def _with_palette(scene: Scene, told: Listener) -> Scene:
     """Return the scene with a palette, its own where it has one."""
     if scene.palette is not None and any(frame.labels is not None for frame in scene.frames):
         return scene
-    scene, found = labelled(scene)
+    scene, found = label_scene(scene)
     told.say(f"palette, extracted: {' '.join(hex_of(color.rgb) for color in found.colors)}")
     for warning in found.warnings:
         told.say(f"palette: {warning}")

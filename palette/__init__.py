@@ -1,1 +1,1 @@
-"""Colours in, a palette and labels out."""
+"""Find a character's palette, and label its pixels."""

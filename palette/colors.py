@@ -1,4 +1,4 @@
-"""OKLab: a colour space in which distances match what people see.
+"""Convert colours to OKLab, whose distances match what people see.
 
 Lightness L in [0, 1], a (green to red) and b (blue to yellow) within about +-0.3. A distance of
 0.02 is just noticeable side by side. Source: B. Ottosson, "A perceptual color space for image
@@ -36,7 +36,7 @@ def linear_from_srgb(srgb: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
 
 
 def srgb_from_linear(linear: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-    """Return sRGB in [0, 1] of linear light, clipped; what is no number is 0."""
+    """Return sRGB in [0, 1] of linear light, clipped; NaN becomes 0."""
     value = np.clip(np.nan_to_num(linear), 0, 1)
     return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
 

@@ -1,4 +1,4 @@
-"""A palette and its label maps as a person corrected them.
+"""Apply a person's corrections to a palette and its label maps.
 
 Every colour that was found has colours that it becomes: itself; the one that it is merged into;
 those that it is split into; all that are left, if it is dropped. A pixel that was labelled with it
@@ -22,7 +22,7 @@ from toonset.palette.names import RGB, hex_of, name_of, rgb_of_hex
 from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
-from toonset.palette.pixels.shadow import shaded
+from toonset.palette.pixels.shadow import apply_shadow
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -34,7 +34,7 @@ FRACTION_BITS = 4  # of a pixel, in which strokes are drawn
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """What becomes of every colour.
+    """Plan of what every colour becomes.
 
     Attributes:
         old: colours as found.
@@ -56,7 +56,7 @@ class _Plan:
         return self.final.index(found[1])
 
 
-def corrected(
+def correct_palette(
     pictures: Sequence[Picture],
     contours: Sequence[Map],
     found: Palette,
@@ -115,7 +115,7 @@ def corrected(
 
 
 def _plan(found: Palette, wanted: PaletteCorrections, where: str) -> _Plan:
-    """Return what becomes of every colour; `where` is the file and "palette"."""
+    """Plan what every colour becomes; `where` is the file and "palette"."""
     old = tuple(color.rgb for color in found.colors)
     gone: dict[int, str] = {}
     becomes: dict[int, tuple[RGB, ...]] = {i: (rgb,) for i, rgb in enumerate(old)}
@@ -204,7 +204,7 @@ def _colors(
         share, in_shadow = float(total[number]), float(dark[number])
         tones: tuple[Tone, ...] = ()
         if found.shadow is not None:
-            red, green, blue = shaded(np.array(rgb), found.shadow.factor).tolist()
+            red, green, blue = apply_shadow(np.array(rgb), found.shadow.factor).tolist()
             both = Tone(rgb, share - in_shadow), Tone((red, green, blue), in_shadow)
             tones = both if in_shadow > 0 else both[:1]
         colors.append(PaletteColor(rgb, share, name, tones))
@@ -212,7 +212,7 @@ def _colors(
 
 
 def _ink(found: Palette, plan: _Plan) -> tuple[ContourColor | None, bool]:
-    """Return the lines' colour, and False if it was a paint and is none: lines have no label."""
+    """Return the lines' colour, and False if it was a paint and no longer is."""
     ink = found.contour
     if ink is None or ink.rgb not in plan.old:
         return ink, True

@@ -1,4 +1,4 @@
-"""What a person corrects of a palette, as corrections.json has it.
+"""Define the corrections of a palette, as corrections.json has them.
 
 Colours are named by the hex that palette.json has for them.
 """
@@ -22,7 +22,7 @@ def hex_word(text: str) -> str:
     """Return "#rrggbb" in small letters.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is invalid.
     """
     if len(text) != 7 or text[0] != "#" or set(text[1:].lower()) - set("0123456789abcdef"):
         raise ValueError(f"{text[:40]!r} is no colour; write it as #rrggbb")
@@ -89,11 +89,11 @@ class Stroke:
 
 @dataclass(frozen=True)
 class PaletteCorrections:
-    """What a person corrects of a palette; colours as "#rrggbb".
+    """Corrections of a palette; colours as "#rrggbb".
 
     Attributes:
         keep: left-out colours that are paints.
-        drop: colours that are none: their pixels get the nearest other.
+        drop: colours that are not paints: their pixels get the nearest other.
         merge: colours that are one; the first of each group stays.
         split: colours that are several.
         names: by colour.

@@ -1,4 +1,4 @@
-"""How far paints cover every pixel: label maps whose borders are finer than pixels.
+"""Compute how far paints cover every pixel: label maps with sub-pixel borders.
 
 Two ranks per pixel, as Cryptomatte keeps them (Friedman and Jones 2015): the paint that covers most
 of it, the next one, and how far the first covers it. Drawn lines cover what both leave.
@@ -21,11 +21,11 @@ Map = UInt8[np.ndarray, "height width"]
 def coverage_map(
     picture: UInt8[np.ndarray, "height width 4"], paint: PaintMap, contour: Map, palette: Palette
 ) -> UInt8[np.ndarray, "height width 3"]:
-    """Return what covers every pixel of a drawing, its alpha left aside.
+    """Return the coverage map of a drawing, its alpha left aside.
 
     Red is the palette index of the paint that covers most of it and green that of another one
     there, 255 = none; blue is how far the first covers it, 255 = wholly. The second, or where there
-    is none a drawn line whose colour is no paint, covers the rest.
+    is none a drawn line whose colour is not a paint, covers the rest.
 
     Args:
         picture: sRGB with straight alpha.

@@ -1,4 +1,4 @@
-"""Drawings to a palette and label maps: what `toonset palette` does between reading and writing."""
+"""Find and label the drawings' palette: all that `toonset palette` does between files."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from toonset.palette.formats.registry import (
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
-from toonset.palette.paints.grainy_colors import with_drawn_colors
-from toonset.palette.paints.places import with_places
+from toonset.palette.paints.grainy_colors import read_drawn_colors
+from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
-from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, without_grain
+from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
-from toonset.palette.pixels.shadow import find_shadow, find_tones, lit_pictures, shaded
+from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -40,7 +40,7 @@ IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
 
 @dataclass(frozen=True, eq=False)
 class PaintMap:
-    """What every pixel of a drawing is painted with.
+    """Paint of every pixel of a drawing.
 
     Attributes:
         labels: palette index; 255 = background, blend, or a drawn line whose colour is no paint's.
@@ -181,8 +181,8 @@ def _chosen(
     if picked is not None and not names_tones(colors or ""):
         return pick_palette(pictures, picked, lines)
     if method == "extcolors":
-        return with_places(extcolors_palette(pictures, options), pictures)
-    smooth = without_grain(pictures)
+        return add_places(extcolors_palette(pictures, options), pictures)
+    smooth = remove_grain(pictures)
     shadow = find_shadow(smooth, contours)
     if picked is not None and shadow is None:
         return pick_palette(pictures, picked, lines)
@@ -197,7 +197,7 @@ def _chosen(
         palette = _in_light(lit, options, lines, shadow)
         if noise_levels(pictures) >= LEAST_LEVELS:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
-            palette = with_drawn_colors(palette, pictures, lit, apart)
+            palette = read_drawn_colors(palette, pictures, lit, apart)
     if shadow is None:
         return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
@@ -218,7 +218,7 @@ def _in_light(
     if found:
         wider = replace(options, keep=(*options.keep, *found))
         palette = replace(find_palette(pictures, wider, lines), features=found)
-    return with_places(palette, pictures)
+    return add_places(palette, pictures)
 
 
 def with_tones(
@@ -246,7 +246,7 @@ def with_tones(
 
 def _tones(color: PaletteColor, shadow: Shadow, in_shadow: float) -> tuple[Tone, ...]:
     """Return a colour's tones that occur, the light one first."""
-    red, green, blue = shaded(np.array(color.rgb), shadow.factor).tolist()
+    red, green, blue = apply_shadow(np.array(color.rgb), shadow.factor).tolist()
     dark = Tone((red, green, blue), in_shadow * color.share)
     light = Tone(color.rgb, (1 - in_shadow) * color.share)
     return (light, dark) if in_shadow > 0 else (light,)
@@ -262,8 +262,8 @@ def paint_maps(
 def in_light(
     pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow | None
 ) -> tuple[list[Picture], list[Mask] | None]:
-    """Return pictures without grain and shadow, and where it lay; None: there is none."""
-    smooth = without_grain(pictures)
+    """Return pictures without grain and shadow, and the shadow's place; None without one."""
+    smooth = remove_grain(pictures)
     if shadow is None:
         return list(smooth), None
     dark = find_tones(smooth, contours, shadow)

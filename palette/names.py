@@ -1,4 +1,4 @@
-"""Colours with names: those of palette files, and plain ones so that people can talk."""
+"""Name colours: names of palette files, and plain ones so that people can talk."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def levels_of(words: Sequence[str], count: int, where: str) -> list[int]:
     """Return the first `count` words as 8-bit levels.
 
     Raises:
-        PaletteError: fewer words, or one that is no whole number from 0 to 255.
+        PaletteError: fewer words, or one that is not a whole number from 0 to 255.
     """
     numbers = [int(word) for word in words[:count] if LEVEL.fullmatch(word)]
     if len(numbers) != count or max(numbers) > 255:

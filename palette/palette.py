@@ -1,4 +1,4 @@
-"""What a palette is: named colours with their shares, and what was left out.
+"""Define a palette: named colours with their shares, and what was left out.
 
 The annotations say what palette.json may hold, too, and how it is written: colours as hex, numbers
 with so many decimals. Within a version keys may be added (see `toonset.read`): give a new one a
@@ -90,7 +90,7 @@ class Shadow:
 
 @dataclass(frozen=True)
 class Place:
-    """Where most of a colour is.
+    """Place of a colour's largest patch.
 
     Attributes:
         view: number of the picture, from 0.

@@ -1,4 +1,4 @@
-"""Drawings in other colours of their palette: what `toonset recolor` does between files."""
+"""Recolour drawings by their palette: all that `toonset recolor` does between files."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from toonset.palette.extract import IN_SHADOW, PaintMap
 from toonset.palette.formats.hex import is_color, rgb_of_typed
 from toonset.palette.names import RGB, hex_of, name_of
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
+from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
 Colors = UInt8[np.ndarray, "colors 3"]
 
 
-def changed_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] = ()) -> Colors:
+def change_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] = ()) -> Colors:
     """Return a palette's colours with some replaced; all changes happen at once.
 
     Args:
@@ -61,7 +61,7 @@ def _unique(names: Sequence[str], colors: Sequence[RGB]) -> dict[str, RGB]:
     return {name: color for name, color in zip(names, colors, strict=True) if count[name] == 1}
 
 
-def recolored_drawing(
+def recolor_drawing(
     picture: Picture, paint: PaintMap, contour: Map, palette: Palette, colors: Colors
 ) -> Picture:
     """Return a drawing in other colours: see `toonset.palette.pixels.recolor`.
@@ -78,4 +78,4 @@ def recolored_drawing(
     dark = None if paint.tones is None else paint.tones == IN_SHADOW
     tones = tone_map(paint.labels, dark, contour, len(colors))
     old, new = (tones_of(one, palette.shadow) for one in (palette.rgb, colors))
-    return recolored(picture, tones, contour, old, new)
+    return recolor(picture, tones, contour, old, new)

@@ -1,4 +1,4 @@
-"""A palette as a picture for people: blocks with name, code and share; the left-out ones below."""
+"""Draw a palette for people: blocks with name, code and share; the left-out ones below."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ AnyColor = PaletteColor | ContourColor | DroppedColor
 
 @dataclass(frozen=True)
 class Size:
-    """How large the cards of one part are, in pixels."""
+    """Size of one part's cards, in pixels."""
 
     block_wh: tuple[int, int]
     font_px: int

@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import toonset as ts
 from toonset.nerf.kernels.threads import working_threads
-from toonset.nerf.surface.texture import textured_surface_of
+from toonset.nerf.surface.texture import texture_surface
 
 FEW = {"steps": 20, "device": "cpu"}
 TIMINGS = {"seconds", "versions", "threads"}  # keys of JSON files that differ from run to run
@@ -187,7 +187,7 @@ def test_evaluate_and_surface_give_what_the_commands_write(
 
     line = ("mesh", run, "-o", tmp_path / "drawn.glb", "--faces", 500, "--texture")
     assert toonset(*line).code == 0
-    textured_surface_of(field, 500).save(tmp_path / "painted.glb")
+    texture_surface(field, 500).save(tmp_path / "painted.glb")
     assert (tmp_path / "painted.glb").read_bytes() == (tmp_path / "drawn.glb").read_bytes()
 
 
@@ -339,15 +339,12 @@ NO_MEANING = [
     ),
     (lambda s, f: ts.turntable(f, 0), "0 views"),
     (lambda s, f: ts.surface_of(f, -5), "faces: -5; 100 or more"),
-    (lambda s, f: textured_surface_of(f, -5), "faces: -5; 100 or more"),
+    (lambda s, f: texture_surface(f, -5), "faces: -5; 100 or more"),
     (
-        lambda s, f: textured_surface_of(replace(f, drawings=None)),
+        lambda s, f: texture_surface(replace(f, drawings=None)),
         "holds no drawings to paint the mesh with; train again",
     ),
-    (
-        lambda s, f: textured_surface_of(without_pen(f), outline=True),
-        "no outline; leave --outline out",
-    ),
+    (lambda s, f: texture_surface(without_pen(f), outline=True), "no outline; leave --outline out"),
     (lambda s, f: ts.render(f, ts.turntable(f, 1)[0]).picture("ink"), "no contour lines"),
 ]
 NO_OPTIONS = [

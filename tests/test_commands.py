@@ -6,6 +6,7 @@ commands must not stand in each other's way. Exit code 3 is fine: written, but l
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 import shlex
@@ -16,7 +17,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
+from tests.bench.stand_ins import measure_nothing
 from tests.test_documents import DOCUMENTS, text_of
 from toonset.cli.main import VERBS
 
@@ -26,7 +30,7 @@ ELSEWHERE = {  # commands that do not run here, and where they do
     "./run demo": "tests/test_run.py has its steps, the README the same commands",
     "./run test": "would run this test",
     "./run lint": "every change runs it: .ci/run",
-    "./run bench": "minutes to hours; tests/test_documents.py checks verbs and options",
+    "./run bench": "minutes to hours: `test_benches_run_as_they_stand` measures next to nothing",
     "python -m bench": "as ./run bench",
     "pip install": "needs a package index",
     "uv pip": "needs a package index",
@@ -206,6 +210,32 @@ def test_no_command_is_left_out_silently() -> None:
     assert len(known) > 60
     others = [c for c in shown if c not in known and runs_here(c)]
     assert others == []
+
+
+def bench_commands() -> list[str]:
+    shown = {c for name in DOCUMENTS for c in commands(name) if not is_form(c)}
+    return sorted(c for c in shown if c.startswith(("./run bench", "python -m bench")))
+
+
+@pytest.mark.parametrize("command", bench_commands())
+def test_benches_run_as_they_stand(
+    command: str, bench: Toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only the quick bench of palettes measures; the others' measuring functions are replaced."""
+    monkeypatch.chdir(tmp_path)
+    module, *words = shlex.split(command.replace("./run", "python -m"))[2:]
+    asked = [] if words == ["palette", "--quick"] else measure_nothing(monkeypatch, tmp_path)
+    if module == "bench":
+        done = bench(*words)
+        assert done.code == 0, (command, done)
+    else:
+        app = typer.Typer()
+        app.command()(importlib.import_module(f"{module}.__main__").main)
+        assert CliRunner().invoke(app, words).exit_code == 0, command
+    subject = {"--check": "check", "--renew": "check"}.get((words or [""])[0], (words or [""])[0])
+    assert set(asked) <= {subject if module == "bench" else module.removeprefix("bench.")}
+    assert asked or words == ["palette", "--quick"]
+    assert subject == "check" or len(list(tmp_path.glob("bench-results/**/*.*"))) > 1
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""toonset: character sheets to cameras, palettes and radiance fields.
+"""Turn character sheets into cameras, palettes and radiance fields.
 
 import toonset as ts
 

@@ -1,4 +1,4 @@
-"""Cameras: orthographic and pinhole as one nested model, and the conventions of toonset.
+"""Define cameras, orthographic and pinhole as one nested model, and toonset's conventions.
 
 Conventions, stated once:
 
@@ -121,7 +121,7 @@ class Camera:
                 choice in front of the camera gives the same projection.
 
         Raises:
-            CameraError: skew, or a matrix that is no rigid pose.
+            CameraError: skew, or a matrix that is not a rigid pose.
         """
         pose = np.asarray(world_from_camera, dtype=np.float64)
         if abs(K[0, 1]) > 1e-9 * abs(K[0, 0]):

@@ -1,4 +1,4 @@
-"""The errors a user can cause, as one tree.
+"""Define the errors a user can cause, as one tree.
 
 ToonsetError            exit code 2: bad input or usage, one line says where, what, and what to do
 |- CameraError          a camera that cannot exist

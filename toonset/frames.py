@@ -1,4 +1,4 @@
-"""Conversions between OpenCV and OpenGL conventions: the only place that knows them.
+"""Convert between OpenCV and OpenGL conventions: the only place that knows them.
 
 Inside toonset: OpenCV camera axes (x right, y down, z forward), first pixel's centre (0.5, 0.5).
 

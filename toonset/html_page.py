@@ -1,4 +1,4 @@
-"""One HTML file of a template, its modules and styles, and data; nothing comes from elsewhere.
+"""Build one self-contained HTML file of a template, its modules and styles, and data.
 
 A content security policy sees to that: scripts and styles are allowed by their hashes, pictures
 only from the file itself. The modules are plain ES modules in a folder `page/`, which may import

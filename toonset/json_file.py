@@ -1,4 +1,4 @@
-"""JSON files of a bundle: read strictly, named by a schema, checked against it.
+"""Read JSON files strictly, and validate them against a schema.
 
 A file says what it is in `schema` (see `toonset.read`): readers ignore keys that they do not
 know, for later versions may add some. A camera is the exception: a number more could change where
@@ -43,14 +43,14 @@ def read_json(file: Path) -> Any:
     """Return the content of a JSON file of bounded size.
 
     Raises:
-        BundleError: the file cannot be read, is too large, or is no JSON (see
+        BundleError: the file cannot be read, is too large, or is not JSON (see
             `toonset.read`).
     """
     data = read_whole(file, "JSON", BundleError, MAX_JSON_BYTES)
     return parse_json(data, str(file), BundleError)
 
 
-def validated(schema: type[Record], content: Any, file: Path) -> Record:
+def validate(schema: type[Record], content: Any, file: Path) -> Record:
     """Return the content of a file as its schema has it.
 
     Raises:

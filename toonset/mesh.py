@@ -1,4 +1,4 @@
-"""A triangle mesh: the mannequin, in world coordinates."""
+"""Define a triangle mesh: the mannequin, in world coordinates."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Mesh:
     sha256: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what is no surface.
+        """Refuse arrays that are not a surface.
 
         Raises:
             MeshError: no faces, a vertex that is not finite, an index out of range, no extent.

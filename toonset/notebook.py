@@ -1,4 +1,4 @@
-"""What notebooks show of a result: a table in HTML, without scripts, foreign text escaped."""
+"""Show results in notebooks: an HTML table without scripts, foreign text escaped."""
 
 from __future__ import annotations
 

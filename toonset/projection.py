@@ -1,4 +1,4 @@
-"""The camera model of `toonset.camera` in torch: batched over views, differentiable, any device.
+"""Project points with the camera model in torch: batched, differentiable, on any device.
 
 Rotations are kornia's `So3`, the division is its `project_points_z1`: with the homogeneous depth
 1 + k z_c the pinhole and the orthographic camera are one expression, and k = 0 is a regular point.

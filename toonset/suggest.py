@@ -1,4 +1,4 @@
-"""What a mistyped word was meant to be."""
+"""Suggest what a mistyped word was meant to be."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from difflib import get_close_matches
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
-    """Return "did you mean 'front'?" with the choice most like a word; "" if none is like it."""
+    """Return "did you mean 'front'?" with the nearest choice; "" if none is near."""
     near = get_close_matches(word, list(choices), 1)
     return f"did you mean {near[0]!r}?" if near else ""

@@ -1,4 +1,4 @@
-"""A view: one drawing of the character, cut out of its sheet."""
+"""Define a view: one drawing of the character, cut out of its sheet."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class View:
         height, width = self.rgba.shape[:2]
         by = np.array(size_wh) / (width, height)
         way = cv2.INTER_AREA if by.min() < 1 else cv2.INTER_LINEAR
-        rgba = straight(cv2.resize(premultiplied(self.rgba), size_wh, interpolation=way))
+        rgba = straight(cv2.resize(premultiply(self.rgba), size_wh, interpolation=way))
         left, top, right, bottom = np.array(self.ends) * np.tile(by, 2)
         return replace(
             self, rgba=rgba, box=(*self.box[:2], *size_wh), ends=(left, top, right, bottom)
@@ -94,7 +94,7 @@ def visible_box(rgba: UInt8[np.ndarray, "height width 4"], box: Box) -> Box:
     return x, y, int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
 
 
-def premultiplied(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "height width 4"]:
+def premultiply(rgba: UInt8[np.ndarray, "height width 4"]) -> Float[np.ndarray, "height width 4"]:
     """Return a picture with colours times alpha, 0 to 255 as they were."""
     values = rgba.astype(np.float32)
     values[..., :3] *= values[..., 3:] / 255
@@ -130,7 +130,7 @@ def small_png(
         size = (max(1, round(by * width)), max(1, round(by * height)))
         small = rgba
         if size != (width, height):
-            small = straight(cv2.resize(premultiplied(rgba), size, interpolation=cv2.INTER_AREA))
+            small = straight(cv2.resize(premultiply(rgba), size, interpolation=cv2.INTER_AREA))
         data = cv2.imencode(".png", cv2.cvtColor(small, cv2.COLOR_RGBA2BGRA))[1].tobytes()
         if len(data) <= most or size == (1, 1):
             return data
@@ -159,7 +159,7 @@ class InputFile:
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Where the views of one or more sheets come from.
+    """Origin of the views of one or more sheets.
 
     Attributes:
         files: in the order in which they were given.

@@ -1,4 +1,4 @@
-"""Writing without half-written results: temporary name, flush to disk, rename."""
+"""Write files without half-written results: temporary name, flush to disk, rename."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def exchange_folders(new: Path, path: Path) -> None:
 
 
 def _exchanged(new: Path, path: Path) -> bool:
-    """Swap two names by Linux' renameat2; False where there is none, or the disk cannot."""
+    """Swap two names by Linux' renameat2; False if kernel or file system lacks it."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):

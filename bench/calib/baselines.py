@@ -98,7 +98,7 @@ def by_landmarks(case: CalibCase, seed: int, *, noise: float) -> list[Rotation |
 def solved(
     points: Float[np.ndarray, "n 3"], pixels: Float[np.ndarray, "n 2"], K: Float[np.ndarray, "3 3"]
 ) -> Rotation | None:
-    """Return the rotation by SQPnP and Levenberg-Marquardt; None where there is none."""
+    """Return the rotation by SQPnP and Levenberg-Marquardt; None if there is no solution."""
     try:
         found, turn, offset = cv2.solvePnP(points, pixels, K, None, flags=cv2.SOLVEPNP_SQPNP)
         if not found:

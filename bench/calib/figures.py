@@ -67,7 +67,7 @@ def angle_between(a: float, b: float) -> float:
 
 
 def verdict_records(verdicts: Sequence[str], recorder: Recorder) -> list[Record]:
-    """Return the share of every verdict; nothing where no verdict was given."""
+    """Return the share of every verdict; empty if no verdict was given."""
     judged = [verdict for verdict in verdicts if verdict in SEVERITY]
     return [
         record

@@ -56,7 +56,7 @@ views so far off that are not ok. z: spread of yaw error / sigma, 1 is right. ok
 
 @dataclass(frozen=True)
 class Method:
-    """How a sheet is calibrated.
+    """A way of calibrating a sheet.
 
     Attributes:
         options: search effort.

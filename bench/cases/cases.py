@@ -36,7 +36,7 @@ STRANGER = 1_000_000  # seeds this far from the drawn body's are other bodies
 
 @dataclass(frozen=True)
 class Condition:
-    """How synthetic sheets of one kind are made.
+    """Recipe of one kind of synthetic sheets.
 
     Attributes:
         options: of the drawing.

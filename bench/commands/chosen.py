@@ -14,7 +14,7 @@ DEFAULT_COUNT = 4
 
 
 class Subject(StrEnum):
-    """What is measured."""
+    """A subject that is measured."""
 
     calib = "calib"
     train = "train"
@@ -27,7 +27,7 @@ class Subject(StrEnum):
 
 @dataclass(frozen=True)
 class Chosen:
-    """What the command line asks for."""
+    """Choices of the command line."""
 
     subject: Subject
     cases: Path | None = None
@@ -40,7 +40,7 @@ class Chosen:
 
     @property
     def none_of(self) -> BundleError:
-        """Return what is said where nothing has the name that is asked for."""
+        """Return the message for an unknown name."""
         return BundleError(f"no case's name contains {self.only!r}; correct --only")
 
     def check(self) -> None:

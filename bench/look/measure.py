@@ -30,9 +30,9 @@ from toonset.nerf.render.views import render
 from toonset.nerf.score.evaluate import label_figures
 from toonset.nerf.score.metrics import Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.train import fit_field
-from toonset.nerf.training import with_drawings
+from toonset.nerf.training import add_drawings
 from toonset.view import over_white
 
 Layer = Literal["drawn", "rgb", "palette"]
@@ -100,7 +100,7 @@ FLICKER, VIEW_S = "flicker", "view_s"
 
 @dataclass(frozen=True, eq=False)
 class LookResult:
-    """What one look of one sheet is worth.
+    """Scores of one look of one sheet.
 
     Attributes:
         case: the character.
@@ -146,10 +146,10 @@ def bench_look(
 def _laid(scene: Scene, recipe: Recipe, seed: int) -> tuple[TrainedField, float, float]:
     """Return a field with its drawings, and CPU seconds: of the fit, of the drawings."""
     began = time.process_time()
-    ready, _ = labelled(scene)
+    ready, _ = label_scene(scene)
     training = fit_field(ready, replace(recipe.options, seed=seed), agree=recipe.paint)
     fitted = time.process_time()
-    trained = with_drawings(training, ready)
+    trained = add_drawings(training, ready)
     return trained, fitted - began, time.process_time() - fitted
 
 

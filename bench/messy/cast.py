@@ -38,7 +38,7 @@ Style = Callable[[Figure], Figure]
 
 @dataclass(frozen=True)
 class Brief:
-    """What is to be drawn: figures in each row, their height, the contour's width (0 = none)."""
+    """Brief of a sheet: figures in each row, their height, the contour's width (0 = none)."""
 
     rows: tuple[int, ...]
     figure_px: int

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float, Shaped, UInt8
 
-from toonset.view import premultiplied, straight
+from toonset.view import premultiply, straight
 
 Rgb = tuple[int, int, int]
 Stamp = UInt8[np.ndarray, "height width 4"]  # straight RGBA
@@ -76,7 +76,7 @@ def cut_figure(rgba: UInt8[np.ndarray, "h w 4"], ink: UInt8[np.ndarray, "h w"]) 
 def resized(figure: Figure, factor: float) -> Figure:
     """Return the figure drawn smaller (lines become thinner with it); factors up to 1."""
     size = max(round(figure.width * factor), 1), max(round(figure.height * factor), 1)
-    rgba = straight(cv2.resize(premultiplied(figure.rgba), size, interpolation=cv2.INTER_AREA))
+    rgba = straight(cv2.resize(premultiply(figure.rgba), size, interpolation=cv2.INTER_AREA))
     ink, paper = (
         cv2.resize(layer, size, interpolation=cv2.INTER_AREA)
         for layer in (figure.ink, figure.paper)

@@ -51,7 +51,7 @@ EXCLUSIVE = (
 
 @dataclass(frozen=True)
 class MessyOptions:
-    """How messy sheets are drawn.
+    """Options of messy sheets.
 
     Attributes:
         figure_px: smallest and largest height of the figures; many are drawn smaller than few.

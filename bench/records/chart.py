@@ -46,7 +46,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Chart:
-    """What a chart shows.
+    """Content of a chart.
 
     Attributes:
         subject: what was measured, e.g. "train".
@@ -166,7 +166,7 @@ def quantity(value: float, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Plot:
-    """How a subject's records are charted.
+    """Axes and methods of a subject's chart.
 
     Attributes:
         merits: metrics on the y axis; a group has one of them.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Entry:
-    """What must be known of a method to read a chart.
+    """Description of a method for a chart's reader.
 
     Attributes:
         told: what it knows more than the default; then it is shown and not compared.

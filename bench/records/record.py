@@ -110,7 +110,7 @@ class Column:
     scale: float = 1.0
 
     def cell(self, record: Record | None) -> str:
-        """Return what stands in it; "-" where there is no record."""
+        """Return the cell's text; "-" without a record."""
         return (
             "-"
             if record is None

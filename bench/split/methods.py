@@ -24,7 +24,7 @@ LEAST_AREA = 0.1  # of the largest patch
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a method makes of a sheet: figures in its order, whether it warns, what it left out."""
+    """A method's split of a sheet: figures in order, whether it warns, what it left out."""
 
     figures: tuple[Drawn, ...]
     warned: bool

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
 from toonset.camera import Camera
-from toonset.view import View, premultiplied, straight
+from toonset.view import View, premultiply, straight
 
 Drawn = tuple[View, Camera]
 Nearest = tuple[Float[np.ndarray, "height width"], Int[np.ndarray, "2 height width"]]
@@ -140,7 +140,7 @@ def with_ball(
     away = np.linalg.norm(camera.pixel_grid() - at[0], axis=-1)
     cover = np.clip(radius_px - away + 0.5, 0, 1)[..., None]
     ball = np.array([*color, 255], dtype=np.float64)
-    below = premultiplied(view.rgba)
+    below = premultiply(view.rgba)
     return replace(view, rgba=straight(cover * ball + (1 - cover) * below)), camera
 
 

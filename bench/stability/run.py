@@ -37,7 +37,7 @@ Steps = dict[tuple[str, str], tuple[Trial, ...]]  # by page and step
 
 @dataclass(frozen=True)
 class Key:
-    """What finished steps depend on: sheets a step of cameras has, bodies one of the others."""
+    """Key of finished steps: sheets for a step of cameras, bodies for the others."""
 
     version: str
     seed: int

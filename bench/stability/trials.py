@@ -42,7 +42,7 @@ Tried = tuple[tuple[Trial, ...], bytes]  # of one sheet, and a PNG of its worst
 
 @dataclass(frozen=True)
 class Kind:
-    """What the trials of some pages are.
+    """Kind of the trials of some pages.
 
     Attributes:
         subject: e.g. "calibration".

@@ -71,7 +71,7 @@ METHODS: dict[str, Method] = {
 
 @dataclass(frozen=True)
 class Scope:
-    """What a bench runs.
+    """Scope of a bench.
 
     Attributes:
         methods: names in `METHODS`.

@@ -22,7 +22,7 @@ from toonset.nerf.run.folder import model_of
 from toonset.nerf.score.evaluate import LAYERS, ScoredView, score_views
 from toonset.nerf.score.metrics import Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of
-from toonset.nerf.train.labelling import labelled, relabelled, without_palette
+from toonset.nerf.train.labelling import drop_palette, label_scene, relabel_scene
 from toonset.nerf.train.train import finest_cells, fit_field
 
 Look = Callable[[Job, TrainedField, Sequence[ScoredView]], None]
@@ -31,7 +31,7 @@ Picture = UInt8[np.ndarray, "height width 4"]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What one job found.
+    """Result of one job.
 
     Attributes:
         group: condition that it is summarised under.
@@ -103,10 +103,10 @@ def _trained(
 
 def _with_palette(scene: Scene, palette: PaletteChoice) -> Scene:
     if palette == "automatic palette":
-        return labelled(scene)[0]
+        return label_scene(scene)[0]
     if palette == "no palette" or scene.palette is None:
-        return without_palette(scene)
-    return relabelled(scene, scene.palette)
+        return drop_palette(scene)
+    return relabel_scene(scene, scene.palette)
 
 
 def _nearest(scene: Scene, frame: Frame) -> Picture:

@@ -1,1 +1,1 @@
-"""What else tells cameras apart: face, paint, coherence of the drawings."""
+"""Measure what else tells cameras apart: face, texture, coherence of the silhouettes."""

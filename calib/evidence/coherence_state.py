@@ -1,4 +1,4 @@
-"""What the drawings of a sheet say about each other under their cameras, the mannequin aside."""
+"""Measure how far a sheet's silhouettes contradict each other under its cameras, without a mesh."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from toonset.view import View
 
 @dataclass(frozen=True)
 class SheetState:
-    """What the sheet as a whole says about its views.
+    """Coherence of a sheet's silhouettes as a whole.
 
     Attributes:
         yaw_observable: the mannequin looks different from different sides.
@@ -69,7 +69,7 @@ def state_of(
     *,
     yaw_observable: bool = True,
 ) -> SheetState:
-    """Return what the drawings say about each other under these cameras.
+    """Return the coherence of the drawings under these cameras.
 
     Args:
         views: the drawings, at least one.

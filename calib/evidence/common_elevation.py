@@ -1,4 +1,4 @@
-"""How far all cameras of a sheet look down too little or too much, from the drawings alone.
+"""Estimate the elevation error that all cameras of a sheet share, from the drawings alone.
 
 A common error of elevation is what drawings contradict most (see `coherence_state`): a foot in
 front goes down when seen from above, the same foot goes up when seen from behind, and the profile
@@ -30,7 +30,7 @@ PROVEN = 0.005  # of the height: contradiction by which both ends must be worse 
 
 @dataclass(frozen=True, eq=False)
 class CommonElevation:
-    """What the drawings say about the elevation of all cameras.
+    """Elevation error common to all cameras of a sheet.
 
     Attributes:
         offset: radians to add to every camera's elevation.

@@ -1,8 +1,8 @@
-"""A drawing as a stack of cross-sections: where on the turning body a pixel lies.
+"""Read a figure as a stack of round cross-sections: each pixel's longitude on the turning body.
 
 Every row's widest run of figure pixels is taken for a round cross-section seen from the side: a
 pixel at `t` in [-1, 1] across it lies `asin(t)` to the right of the point that faces the viewer.
-Rough as it is (a body is no stack of discs), all cues about the turn read the picture this way.
+Rough as it is (a body is not a stack of discs), all cues about the turn read the picture this way.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 from toonset.palette.colors import oklab_from_rgb
 from toonset.view import View
 
-THIN = 1 / 40  # of the figure's height: what an opening with this radius removes is no body
+THIN = 1 / 40  # of the figure's height: what an opening with this radius removes is not a body
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Where is the face? What the inside of the head says about yaw, view by view.
+"""Compute each view's likelihood of yaw from facial features inside the head.
 
 A face has skin, more drawing than a back of the head, and small dark spots: eyes, mouth, brows.
 Each of these cues is a density over the head; it says twice where the face is:
@@ -49,7 +49,7 @@ TEMPER = 0.7
 
 @dataclass(frozen=True, eq=False)
 class FaceEvidence:
-    """What the heads of a sheet say.
+    """Facial evidence of a sheet's heads.
 
     Attributes:
         natural: (views, 2) weights of cos(yaw) and sin(yaw) in the log-likelihood; zeros where

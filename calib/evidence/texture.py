@@ -1,4 +1,4 @@
-"""Paint on a turning body: which yaws make the drawings' colours agree.
+"""Compute the likelihood of a sheet's yaws from the colours painted on the turning body.
 
 Outlines have mirror twins: yaw and 180 - yaw look the same under orthography. What is painted on
 the body does not: between two views it moves to the left or to the right, comes round one edge and
@@ -43,7 +43,7 @@ BROKEN = 0.02  # of sheets the model may not hold at all
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """What the views of a sheet show, cell by cell.
+    """Colours of a sheet's views, cell by cell.
 
     Attributes:
         lab: (bands, views * CELLS, 3) mean OKLab of the cells, about the band's mean.

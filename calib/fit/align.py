@@ -1,4 +1,4 @@
-"""Contour alignment of one view: robust two-sided point-to-line Gauss-Newton, from one start.
+"""Align one view's contour by robust two-sided point-to-line Gauss-Newton, from one start.
 
 Residuals, in pixels of the working scale: (a) every point of the occluding contour against the
 nearest drawn one, (b) every drawn point against the nearest of the occluding contour, both along
@@ -35,7 +35,7 @@ INDEPENDENT_POINTS = 10.0  # outline errors of a view when alternative poses are
 
 @dataclass(frozen=True)
 class ElevationPrior:
-    """What is known of a view's elevation before looking at it, radians."""
+    """Prior of a view's elevation, radians."""
 
     mean: float = np.radians(5.0)  # artists look slightly down
     sigma: float = np.radians(20.0)
@@ -78,7 +78,7 @@ def align_all(
     starts: Sequence[Pose],
     widths: Float[np.ndarray, " iterations"],
 ) -> list[Fit]:
-    """Return what `align` makes of the starts, without those that ran into a better one."""
+    """Align from every start; drop those that end at a better one."""
     poses = [drawing.pose_in(start) for start in starts]
     for width in widths:
         before, poses = poses, []

@@ -1,4 +1,4 @@
-"""The error of a drawing, and how a fit looks through it: a smooth field, marginalised.
+"""Model a drawing's error as a smooth random field and marginalise it out of a fit.
 
 A hand-drawn outline is not off by independent noise. Its error drifts over a body part, so a long
 arc is wrong the same way and a hundred points on it say no more than a few. Residuals r across the

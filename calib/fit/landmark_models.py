@@ -1,4 +1,4 @@
-"""Which camera model, and which of a view's pairs: explanations of landmarks, compared.
+"""Select a view's camera model and its outlying landmark pairs by their likelihood.
 
 The orthographic camera on all pairs is the first explanation. It is extended, one step at a time
 and as long as that pays, by what explains the pixels best: perspective (one more number), or a

@@ -1,4 +1,4 @@
-"""Camera poses from pairs of a mannequin's point and its pixel: starts and their refinement.
+"""Solve a camera's pose from pairs of 3D points and pixels: closed-form starts and refinement.
 
 Orthographic, n >= 3 points X, pixels U = shift + s R12 X (R12: the first two rows of a rotation):
 
@@ -59,7 +59,7 @@ def orthographic_starts(points: Points, pixels: Pixels) -> list[Pose]:
 
 
 def pinhole_starts(points: Points, pixels: Pixels, near: Pose) -> list[Pose]:
-    """Return pinhole poses by EPnP and SQPnP at a few distances; none where both fail.
+    """Return pinhole poses by EPnP and SQPnP at a few distances; empty if both fail.
 
     Args:
         points: at least four, relative to the surface's middle.

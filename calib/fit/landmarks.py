@@ -1,4 +1,4 @@
-"""Cameras from landmarks: pairs of a mannequin's point and the pixel that shows it, per view.
+"""Solve cameras from landmarks: pairs of a point of the mannequin and its pixel, per view.
 
 Landmarks determine a camera alone, or start the contour fit where the outline is ambiguous. Pairs
 nearly in a plane have two cameras that fit alike; both are returned with their probabilities
@@ -62,7 +62,7 @@ class LandmarkFit:
 def landmark_starts(
     landmarks: Sequence[Landmarks | None], surface: Surface
 ) -> tuple[LandmarkFit | None, ...]:
-    """Return what the landmarks of every view say about its camera; None for too few or none.
+    """Fit a camera to the landmarks of every view; None if they are too few.
 
     Raises:
         LandmarkError: a view's pairs lie on a line or in one place, or far from the mannequin.
@@ -87,7 +87,7 @@ def solve_landmarks(landmarks: Landmarks, surface: Surface) -> LandmarkFit:
     points, pixels = landmarks.world - surface.middle, landmarks.pixels
     _check_spread(landmarks, points, surface.radius)
     kept, best, gain = choose(points, pixels)
-    freedom = max(best.freedom, 1)  # three pairs: what does not fit exactly is no optimum
+    freedom = max(best.freedom, 1)  # three pairs: what does not fit exactly is not an optimum
     weights = np.exp(-0.5 * freedom * np.log(np.array(best.errors) / best.errors[0]))
     probable = weights / weights.sum()
     count = int((probable >= LEAST_PROBABILITY).sum())

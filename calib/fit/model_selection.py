@@ -1,4 +1,4 @@
-"""No more camera, and no more body, than the drawings ask for: models from simple to rich, by BIC.
+"""Select the camera model and the body by BIC, from simple to rich.
 
 1. orthographic, one scale: where everything begins
 2. perspective, one distance for the sheet
@@ -148,14 +148,14 @@ def select_model(
     return fit, ModelChoice(model, _distances(fit), tuple(tried), samples)
 
 
-def with_proportions(
+def fit_proportions(
     problem: JointProblem,
     fit: JointFit,
     choice: ModelChoice,
     widths: Float[np.ndarray, " rounds"] = BODY_WIDTHS,
     margin: float = BIC_MARGIN,
 ) -> tuple[JointFit, ModelChoice]:
-    """Return the fit with the mannequin's proportions free, if the drawings prove them.
+    """Fit the mannequin's proportions, too, if the drawings prove them.
 
     Args:
         problem: the drawings at the working scale.

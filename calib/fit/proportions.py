@@ -1,4 +1,4 @@
-"""Proportions: how a mannequin's body differs from the character's, in a few numbers per sheet.
+"""Deform the mannequin to the character's proportions, by a few numbers per sheet.
 
 The mannequin is bent as a whole, symmetrically about its own x = 0 plane, by bands of its height
 (feet to crown): how wide, how deep, how high and how far forward each band is, and how long, how

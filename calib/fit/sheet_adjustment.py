@@ -1,4 +1,4 @@
-"""All views of a sheet at once: Gauss-Newton over every camera, what they share, and the body.
+"""Adjust all cameras of a sheet jointly by Gauss-Newton, with shared parameters and the body.
 
 Unknowns: per view a rotation increment, shift and log scale; then k = 1 / distance (none, one for
 the sheet, or one per view), the outline offset (a drawn contour line lies outside of the
@@ -31,7 +31,7 @@ from toonset.calib.fit.drawing_error import (
     next_noise,
 )
 from toonset.calib.fit.proportions import Body
-from toonset.calib.fit.sheet_prior import Spreads, Turn, anchors, locks, sheet_ties
+from toonset.calib.fit.sheet_prior import Spreads, Turn, anchors, locks, sheet_priors
 from toonset.calib.outline.correspondences import Drawing, Matches, match
 from toonset.calib.outline.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
 
@@ -47,7 +47,7 @@ Perspective = Literal["none", "given", "shared", "per view"]
 
 @dataclass(frozen=True)
 class SheetModel:
-    """What the cameras of a sheet may be.
+    """Camera model of a sheet.
 
     Attributes:
         perspective: whose k is free; none: orthographic, given: every k stays as it is.
@@ -89,7 +89,7 @@ class JointFit:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Where the iteration stands; poses in working pixels."""
+    """State of the iteration; poses in working pixels."""
 
     poses: tuple[Pose, ...]
     body: Body
@@ -225,7 +225,7 @@ class JointProblem:
             normal[np.ix_(where, where)] += view.normal
             gradient[where] += view.gradient
             views.append(view)
-        spreads = self._add_ties(state, normal, gradient, model.spreads if settled else None)
+        spreads = self._add_priors(state, normal, gradient, model.spreads if settled else None)
         first = _first_shared(model, len(views))
         normal[first, first] += OFFSET_OF_HEIGHT**-2
         gradient[first] += state.offset / OFFSET_OF_HEIGHT**2
@@ -242,25 +242,28 @@ class JointProblem:
         noise = next_noise(views, least_white(self.drawings), width)
         return _System(normal, gradient, energy, noise, spreads)
 
-    def _add_ties(
+    def _add_priors(
         self,
         state: _State,
         normal: Float[np.ndarray, "u u"],
         gradient: Float[np.ndarray, " u"],
         expected: Spreads | None,
     ) -> Spreads:
-        """Add the ties; return the spreads, estimated anew where an expectation is given."""
+        """Add the priors; return the spreads, estimated anew where an expectation is given."""
         spreads = state.spreads
-        ties = sheet_ties(state.poses, self.turn, spreads.yaw, len(gradient))
+        priors = sheet_priors(state.poses, self.turn, spreads.yaw, len(gradient))
         if expected is not None and state.covariance is not None:
             spreads = replace(
                 spreads,
-                **{n: t.spread(state.covariance, getattr(expected, n)) for n, t in ties.items()},
+                **{n: t.spread(state.covariance, getattr(expected, n)) for n, t in priors.items()},
             )
-        terms = [(tie, getattr(spreads, name)) for name, tie in ties.items()]
-        known = [*anchors(ties, self.turn, self.elevation), *locks(ties, state.poses, self.kept)]
-        for tie, sigma in [*terms, *known]:
-            matrix, slope = tie.equations(sigma)
+        terms = [(shared, getattr(spreads, name)) for name, shared in priors.items()]
+        known = [
+            *anchors(priors, self.turn, self.elevation),
+            *locks(priors, state.poses, self.kept),
+        ]
+        for shared, sigma in [*terms, *known]:
+            matrix, slope = shared.equations(sigma)
             normal += matrix
             gradient += slope
         return spreads

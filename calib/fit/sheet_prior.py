@@ -1,4 +1,4 @@
-"""What the views of a sheet share: elevation, scale, upright figures, an evenly spaced turn.
+"""Build a sheet's hierarchical prior: common elevation and scale, no roll, evenly spaced yaws.
 
 Each shared quantity q_i = mean + deviation_i, deviation_i ~ N(0, spread^2), with the mean free (or
 near a known value) and the spread itself estimated on the sheet: an inverse-gamma prior worth a few
@@ -37,7 +37,7 @@ class Spreads:
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """Where the views of a sheet are meant to be seen from.
+    """Nominal yaws of a sheet's views.
 
     Attributes:
         places: (views,) yaw in radians; nan where nothing is known of a view.
@@ -51,7 +51,7 @@ class Turn:
 
 
 @dataclass(frozen=True, eq=False)
-class Tie:
+class SharedPrior:
     """One shared quantity: its values, derivatives, and how its deviations are measured.
 
     Attributes:
@@ -85,10 +85,10 @@ class Tie:
         return float(np.sqrt((PRIOR_VIEWS * expected**2 + squared) / (PRIOR_VIEWS + count)))
 
 
-def sheet_ties(
+def sheet_priors(
     poses: Sequence[Pose], turn: Turn | None, yaw_spread: float, size: int
-) -> dict[str, Tie]:
-    """Return the ties of a sheet by the name of their spread.
+) -> dict[str, SharedPrior]:
+    """Return the priors of a sheet by the name of their spread.
 
     Args:
         poses: of the views, whose unknowns come first, six each.
@@ -106,50 +106,57 @@ def sheet_ties(
         slopes[3, i, own] = yaw_slope(pose)
     about_mean = np.eye(views) - 1 / views
     ones = np.ones(views)
-    ties = {
-        "roll": Tie(np.array([a[0] for a, _ in tilts]), slopes[0], np.eye(views), ones),
-        "elevation": Tie(np.array([a[1] for a, _ in tilts]), slopes[1], about_mean, ones),
-        "scale": Tie(np.log([pose.scale for pose in poses]), slopes[2], about_mean, ones),
+    priors = {
+        "roll": SharedPrior(np.array([a[0] for a, _ in tilts]), slopes[0], np.eye(views), ones),
+        "elevation": SharedPrior(np.array([a[1] for a, _ in tilts]), slopes[1], about_mean, ones),
+        "scale": SharedPrior(np.log([pose.scale for pose in poses]), slopes[2], about_mean, ones),
     }
     if turn is not None and np.isfinite(turn.places).any():
-        ties["yaw"] = _yaw_tie(poses, turn, slopes[3], yaw_spread)
-    return ties
+        priors["yaw"] = _yaw_tie(poses, turn, slopes[3], yaw_spread)
+    return priors
 
 
 def anchors(
-    ties: dict[str, Tie], turn: Turn | None, prior: ElevationPrior
-) -> list[tuple[Tie, float]]:
-    """Return what is known of the sheet's means: (tie of one row, sigma)."""
-    elevation = ties["elevation"]
+    priors: dict[str, SharedPrior], turn: Turn | None, prior: ElevationPrior
+) -> list[tuple[SharedPrior, float]]:
+    """Return priors on the sheet's means: (prior of one row, sigma)."""
+    elevation = priors["elevation"]
     views = len(elevation.values)
     mean = np.full((1, views), 1 / views)
-    known = [(Tie(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)), prior.sigma)]
-    if turn is not None and turn.anchored and "yaw" in ties:
-        yaw = ties["yaw"]
+    known = [
+        (
+            SharedPrior(elevation.values - prior.mean, elevation.slopes, mean, np.ones(1)),
+            prior.sigma,
+        )
+    ]
+    if turn is not None and turn.anchored and "yaw" in priors:
+        yaw = priors["yaw"]
         placed = np.array(turn.named) if turn.named else np.isfinite(turn.places)
         over = (placed / placed.sum())[None]
-        known.append((Tie(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
+        known.append((SharedPrior(yaw.values, yaw.slopes, over, np.ones(1)), LABEL_SIGMA))
     return known
 
 
 def locks(
-    ties: dict[str, Tie], poses: Sequence[Pose], values: Mapping[str, Float[np.ndarray, " views"]]
-) -> list[tuple[Tie, float]]:
-    """Return ties that keep views' yaw, elevation or log scale at given values; nan is free."""
+    priors: dict[str, SharedPrior],
+    poses: Sequence[Pose],
+    values: Mapping[str, Float[np.ndarray, " views"]],
+) -> list[tuple[SharedPrior, float]]:
+    """Return priors that keep views' yaw, elevation or log scale at given values; nan is free."""
     kept = []
     views = len(poses)
     for name, wanted in values.items():
         if name == "yaw":
-            slopes = np.zeros_like(ties["roll"].slopes)
+            slopes = np.zeros_like(priors["roll"].slopes)
             for i, pose in enumerate(poses):
                 slopes[i, PARAMETERS * i : PARAMETERS * i + 3] = yaw_slope(pose)
             now = np.array([angles_from_rotation(pose.rotation)[0] for pose in poses])
             off = (now - wanted + np.pi) % (2 * np.pi) - np.pi
         else:
-            slopes, off = ties[name].slopes, ties[name].values - wanted
+            slopes, off = priors[name].slopes, priors[name].values - wanted
         held = np.isfinite(wanted)
         off = np.where(held, off, 0.0)
-        kept.append((Tie(off, slopes, np.eye(views), held.astype(float)), LOCK_SIGMA))
+        kept.append((SharedPrior(off, slopes, np.eye(views), held.astype(float)), LOCK_SIGMA))
     return kept
 
 
@@ -186,9 +193,9 @@ def _off_places(poses: Sequence[Pose], turn: Turn) -> tuple[Float[np.ndarray, " 
 
 def _yaw_tie(
     poses: Sequence[Pose], turn: Turn, slopes: Float[np.ndarray, "views unknowns"], spread: float
-) -> Tie:
+) -> SharedPrior:
     placed = np.isfinite(turn.places)
     off, mean = _off_places(poses, turn)
     centre = np.diag(placed.astype(float)) - np.outer(placed, placed) / placed.sum()
     weights = (TAIL + 1) / (TAIL + ((off - mean) / spread) ** 2)
-    return Tie(off, slopes, centre, np.where(placed, np.minimum(weights, 1.0), 0.0))
+    return SharedPrior(off, slopes, centre, np.where(placed, np.minimum(weights, 1.0), 0.0))

@@ -1,4 +1,4 @@
-"""Bodies that turn from drawing to drawing: what a sheet's own scatter says of its cameras.
+"""Widen sigmas where bodies differ between drawings, by the scatter of elevation and roll.
 
 An artist draws a slightly different body every time: a head turned, arms swung, the whole figure
 leaning a little. To a fit of one body that looks like another camera,
@@ -42,8 +42,8 @@ FEWEST = 4  # views whose scatter tells
 TIED = 0.3  # least share of a variance that the drawings decide
 
 
-def with_turned_bodies(joint: JointFit, turn: Turn, kept: Sequence[bool] = ()) -> JointFit:
-    """Return the fit with its rotations and their covariance as bodies that turn ask for.
+def account_for_turned_bodies(joint: JointFit, turn: Turn, kept: Sequence[bool] = ()) -> JointFit:
+    """Shrink the fit's rotations and widen their covariance for bodies that turn.
 
     Unchanged where elevation or roll scatter no more than they are uncertain.
 

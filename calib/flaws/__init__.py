@@ -1,1 +1,1 @@
-"""Drawings that are cropped, stretched, or have holes that are paint."""
+"""Detect drawings that are cropped, stretched, or have false holes."""

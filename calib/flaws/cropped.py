@@ -1,4 +1,4 @@
-"""Figures that a frame cuts off: a foot that ends in a ruled line is no outline.
+"""Detect figures that are cropped: sides that end in a straight, opaque row or column.
 
 At the picture's own edge everybody sees it. But a picture that was cut out of a larger one keeps
 the cut when it is laid on a sheet, with paper beyond. There the drawing is opaque to the last

@@ -1,4 +1,4 @@
-"""Which ruled sides of a sheet's figures are cuts: what the mannequin says with and without them.
+"""Decide which straight sides are crops by fitting the mannequin with and without them.
 
 A side that may be a cut is left out of the outlines, and the sheet fitted again. At the picture's
 edge the cut must then explain the rest far better: a whole figure may touch the edge. Within the
@@ -46,7 +46,7 @@ def possible_cuts(
     return known, possible
 
 
-def proven_cuts(
+def prove_cuts(
     views: Sequence[View],
     possible: Cuts,
     tried: JointFit,
@@ -79,7 +79,7 @@ def proven_cuts(
 def _stands_out(
     index: int, cut: CutOff, views: Sequence[View], possible: Cuts, tried: JointFit
 ) -> bool:
-    """Return whether the views that nothing cuts on that side agree with a cut.
+    """Return whether the views that are whole on that side agree with a cut.
 
     Longer legs than the character's reach below all feet, or make the views that end in a ruled
     line larger than the others; where all end so, on a ground line, nothing tells.

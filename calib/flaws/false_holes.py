@@ -1,4 +1,4 @@
-"""Holes that the drawing from the other side contradicts: they are paint in the paper's colour.
+"""Fill holes that the drawing from the other side contradicts: paint in the paper's colour.
 
 One drawing cannot always tell a gap between arm and body from a white buckle on white paper; the
 splitter assumes (`toonset.dataset.split.holes`). Once cameras are known, a second drawing can tell:
@@ -34,12 +34,12 @@ MOST_PLACES = 400  # pixels of a hole that are looked along
 DEPTHS = 9  # places along each of their rays
 
 
-def without_false_holes(
+def fill_false_holes(
     views: Sequence[View],
     found: Sequence[ViewCalibration],
     vertices: Float[np.ndarray, "vertices 3"],
 ) -> tuple[tuple[View, ...], tuple[FilledHole, ...]]:
-    """Return the drawings with the holes filled that another one contradicts, and which those are.
+    """Fill the holes that another drawing contradicts; return the drawings and those holes.
 
     Args:
         views: the drawings, as cut out; where the paper behind one is not known, nothing is filled
@@ -103,7 +103,7 @@ def _behind(
 
 @dataclass(frozen=True, eq=False)
 class _Painted:
-    """What a drawing shows: paint at all, and paint in the paper's colour; a pixel each."""
+    """Masks of a drawing's paint, and of its paint in the paper's colour."""
 
     solid: Bool[np.ndarray, "height width"]
     paper: Bool[np.ndarray, "height width"]

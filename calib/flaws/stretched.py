@@ -1,4 +1,4 @@
-"""Drawings that are taller or lower than their width asks for, by as much as the sheet proves.
+"""Estimate drawings' aspect ratios, and the mannequin's, as far as the sheet proves them.
 
 An artist squashes a drawing, a layout program stretches another; and a mannequin has another build
 than the character. One number per drawing, the log of its height over its width, is fitted with the
@@ -44,7 +44,7 @@ WIDTHS = np.geomspace(0.05, 0.012, 10)
 
 @dataclass(frozen=True)
 class Stretches:
-    """How drawings and mannequin are stretched; logarithms of height over width.
+    """Stretch of drawings and mannequin; logarithms of height over width.
 
     Attributes:
         views: of every drawing beside the typical one; 0 where that is not proven or clear.
@@ -68,14 +68,14 @@ class Stretches:
 
 
 def nothing_stretched(views: int) -> Stretches:
-    """Return what holds of so many views before anybody has looked."""
+    """Return the identity: no view is stretched."""
     return Stretches((0.0,) * views, 0.0, ())
 
 
 def find_stretches(
     problem: JointProblem, fit: JointFit, model: str, *, doubtful: bool
 ) -> Stretches:
-    """Return what the drawings of a sheet prove.
+    """Return the stretches that the drawings of a sheet prove.
 
     Args:
         problem: the drawings at the working scale.
@@ -137,7 +137,7 @@ def _model_tests(rich: JointFit, price: float, margin: float) -> tuple[ModelTest
     return apart, model_test(TALLER, typical, BIC_MARGIN)
 
 
-def stretched_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:
+def stretch_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:
     """Return the mannequin as tall as the drawings have it; its feet stay where they are."""
     ground = mesh.vertices[:, 1].min()
     vertices = mesh.vertices.copy()
@@ -145,7 +145,7 @@ def stretched_mannequin(mesh: Mesh, stretches: Stretches) -> Mesh:
     return replace(mesh, vertices=vertices)
 
 
-def unstretched(view: View, stretch: float) -> View:
+def unstretch(view: View, stretch: float) -> View:
     """Return a drawing without its stretch: the shorter way of its picture is made longer."""
     if not stretch:
         return view

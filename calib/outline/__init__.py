@@ -1,1 +1,1 @@
-"""The mannequin's occluding contour, and its correspondences with a drawn outline."""
+"""Find the mannequin's occluding contour, and match it with a drawn outline."""

@@ -1,4 +1,4 @@
-"""Corresponding points of a drawing and the mannequin's outline at a pose.
+"""Match a drawing's outline with the mannequin's occluding contour at a pose.
 
 Every point of the occluding contour is matched with the nearest drawn one, and every drawn point
 with the nearest occluding one. "Nearest" is measured over position and outline direction together,
@@ -86,7 +86,7 @@ class Drawing:
     def inset(self, offset: float) -> Drawing:
         """Return the drawing with its outline moved inwards by `offset` heights.
 
-        A drawn line lies outside of the body: what a sheet's views share of that is no misfit.
+        A drawn line lies outside of the body: what a sheet's views share of that is not misfit.
         """
         other = copy.copy(self)
         other.points = self.points - offset * self.height * self.normals

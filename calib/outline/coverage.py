@@ -1,4 +1,4 @@
-"""Which pixels a projected surface covers, from its fold lines alone.
+"""Rasterise a projected surface's coverage from its fold edges alone.
 
 Give every triangle the same turning sense in the image. Over a pixel the number of triangles then
 is the winding number of the sum of their borders. In that sum an edge between two triangles that

@@ -1,4 +1,4 @@
-"""A mesh prepared for outlines: its edges, the faces at them and the faces' planes."""
+"""Prepare a mesh for outlines: its edges, the faces at them and the faces' planes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The mannequin's outline from any direction: contour generators and silhouette masks, no OpenGL.
+"""Find the mannequin's occluding contour and silhouette mask from any direction, without OpenGL.
 
 A contour generator is an edge whose two faces lie on one side of it in the image (or an edge of an
 open surface). Its points on the outer silhouette are kept by a low-resolution mask. In the image an

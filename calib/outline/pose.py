@@ -1,4 +1,4 @@
-"""Poses inside the solver: projection of surface points with its analytic Jacobian.
+"""Project surface points inside the solver, with the analytic Jacobian.
 
 The model is that of `toonset.camera` with the surface's middle as target:
 

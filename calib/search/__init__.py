@@ -1,1 +1,1 @@
-"""Find where to start: templates, turns of the whole sheet, selections, alternatives."""
+"""Search initial cameras: templates, turns of the whole sheet, selections, alternatives."""

@@ -1,4 +1,4 @@
-"""Refine alternatives to a chosen camera, with the drawing's own error integrated out.
+"""Refine alternatives to a chosen camera, with the drawing's own error marginalised.
 
 Aligned to the outline alone, a camera bends to what the artist drew wrongly: a front view whose hem
 is a little too round fits better from 30 degrees above. The sheet knows how far its drawings are

@@ -1,4 +1,4 @@
-"""A view's candidate cameras: what contour alignment reaches from several starts, and the twins.
+"""Refine a view's candidate cameras by contour alignment, and add their mirror twins.
 
 A candidate's negative log-likelihood is n / 2 * log(cost), noise profiled out, with the number n of
 independent outline errors.
@@ -59,7 +59,7 @@ def refine(
     return Candidates.of(align_all(drawing, surface, starts, widths))
 
 
-def with_twins(poses: Sequence[Pose]) -> list[Pose]:
+def add_twins(poses: Sequence[Pose]) -> list[Pose]:
     """Return the poses and their mirror twins."""
     return [*poses, *(pose.twin() for pose in poses)]
 
@@ -69,14 +69,14 @@ def is_twin(pose: Pose, other: Pose) -> bool:
     return rotation_distance(pose.twin().rotation, other.rotation) < MIRROR
 
 
-def half_turned(pose: Pose) -> Pose:
+def turn_half(pose: Pose) -> Pose:
     """Return the pose that sees the other side: turned by 180 degrees about the vertical."""
     return replace(pose, rotation=pose.rotation @ np.diag([-1.0, 1.0, -1.0]))
 
 
 def looks_alike_from_behind(surface: Surface, poses: Sequence[Pose]) -> bool:
     """Return whether no view tells the body from itself turned by 180 degrees: a stack of boxes."""
-    return all(_look_alike(surface, pose, half_turned(pose)) for pose in poses)
+    return all(_look_alike(surface, pose, turn_half(pose)) for pose in poses)
 
 
 def level_twins(
@@ -85,12 +85,12 @@ def level_twins(
     """Return the candidates with equal energies for `pose` and those that look the same.
 
     Both outlines of a symmetric body are one curve, but sampled at other points; what their costs
-    differ by is no evidence, and would add up over the views of a sheet.
+    differ by is not evidence, and would add up over the views of a sheet.
 
     Args:
         view: the candidates.
         surface: the mannequin.
-        pose: the chosen one; with k = 0 where perspective is no evidence.
+        pose: the chosen one; with k = 0 where perspective is not evidence.
         always: the mannequin is not the character: its asymmetries are no evidence either.
         from_behind: the body looks alike from behind.
     """
@@ -98,7 +98,7 @@ def level_twins(
     if always or _look_alike(surface, pose, pose.twin()):
         alike.append(pose.twin())
     if from_behind:
-        alike += [half_turned(p) for p in alike]
+        alike += [turn_half(p) for p in alike]
     if len(alike) == 1:
         return view
     pair = [

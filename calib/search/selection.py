@@ -1,4 +1,4 @@
-"""Which candidates of the views make a sheet: selections compared by a joint fit.
+"""Select one candidate per view by fitting selections jointly.
 
 Every view brings its candidates. A selection takes one of each, is fitted as a sheet at low
 resolution with a common camera distance, and scored by likelihood and by what is shared (elevation,
@@ -20,7 +20,7 @@ from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetMode
 from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
-from toonset.calib.search.hypotheses import SAME_POSE, Candidates, refine, with_twins
+from toonset.calib.search.hypotheses import SAME_POSE, Candidates, add_twins, refine
 from toonset.calib.search.sheet_posterior import SheetPosterior
 from toonset.calib.search.turntable_starts import TurnStart
 from toonset.camera import rotation_distance
@@ -97,13 +97,13 @@ class TogetherSearch:
         surface = self.body.surface
         again = []
         for i, (drawing, found) in enumerate(zip(self.drawings, candidates, strict=True)):
-            starts = with_k(with_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
+            starts = set_distance(add_twins([fit.pose for fit in found.fits[:RECHECKED]]), k)
             again.append(self.informed(refine(drawing, surface, starts, RECHECK_WIDTHS), i))
         return again
 
 
 def _nearest(candidates: Sequence[Candidates], starts: Sequence[Pose]) -> list[Pose]:
-    """Return what each view's start became, or the start where its view ran away from it."""
+    """Return each view's refined start, or the start where refinement diverged."""
     poses = []
     for view, start in zip(candidates, starts, strict=True):
         turns = [rotation_distance(fit.pose.rotation, start.rotation) for fit in view.fits]
@@ -125,6 +125,6 @@ def _same(poses: Sequence[Pose], others: Sequence[Pose]) -> bool:
     return max(turns) < SAME_POSE
 
 
-def with_k(poses: Sequence[Pose], k: float) -> list[Pose]:
+def set_distance(poses: Sequence[Pose], k: float) -> list[Pose]:
     """Return the poses at another camera distance."""
     return [replace(pose, k=k) for pose in poses]

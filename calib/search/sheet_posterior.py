@@ -1,4 +1,4 @@
-"""Which candidates of a sheet's views belong together, and how probable each is.
+"""Compute the posterior of a sheet's candidate cameras, over turns and elevations.
 
 Two things tie the views together, both unknown and summed out on a grid:
 
@@ -6,7 +6,7 @@ Two things tie the views together, both unknown and summed out on a grid:
   -elevation) unless all views flip together;
 - where the views are meant to be seen from: what a person says (labels), else an evenly spaced
   turn, yaw_i = start +- i * 360 / views, in either direction. Most sheets are one (and most start
-  at the front), but a sheet that is none stays possible: "no turn" is one of the alternatives, and
+  at the front), but an uneven sheet stays possible: "no turn" is one of the alternatives, and
   evidence decides.
 
 What is drawn inside the outlines adds to that: the face, and paint that moves as the body turns.
@@ -43,7 +43,7 @@ UNLIKELY = 20.0  # nats: hypotheses this far behind are not asked about paint
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Where the views might be meant to be seen from: alternatives.
+    """Alternative turns of a sheet.
 
     Attributes:
         places: (t, views) yaw in radians; nan where an alternative says nothing about a view.
@@ -165,7 +165,7 @@ class SheetPosterior:
         return [posterior @ (w / w.sum(axis=1, keepdims=True)) for w in weights]
 
     def faces_contradict(self, views: Sequence[Candidates]) -> float:
-        """Return the probability that what looks like faces is none, since outlines deny it.
+        """Return the probability that the faces found are false, since outlines contradict them.
 
         High where the outlines can only be explained with the faces at the back: a drawing or a
         mannequin that is mirrored fits in its mirror twins' cameras, and all outlines agree.
@@ -213,7 +213,7 @@ class SheetPosterior:
         return all_of_them
 
     def _unasked(self, poses: Sequence[Pose], index: int) -> Float[np.ndarray, " n"]:
-        """Return what poses cost that are not where a person put the view."""
+        """Return the cost of poses that contradict a person's camera."""
         if self.asked is None:
             return np.zeros(len(poses))
         off = np.array([_yaw(pose) for pose in poses]) - self.asked[index]

@@ -1,4 +1,4 @@
-"""The templates of a mesh, kept in the user's cache folder between runs.
+"""Cache a mesh's templates in the user's cache folder.
 
 A file is named by the hash of the mesh and of the templates' settings, so it never is out of date.
 Whatever goes wrong with the folder (no home, no permission, a full disk, a damaged file), templates
@@ -26,7 +26,7 @@ from toonset.calib.search.templates import Templates, build_templates
 from toonset.errors import OutputError
 from toonset.write import write_bytes
 
-VERSION = 1  # of the file, and of anything in `build_templates` that is no setting
+VERSION = 1  # of the file, and of anything in `build_templates` that is not a setting
 MOST_FILES = 100
 MOST_BYTES = 10_000_000  # a whole file has a fraction of this
 
@@ -44,7 +44,7 @@ def load_bank(surface: Surface) -> Templates:
 
 
 def bank_path(surface: Surface) -> Path | None:
-    """Return the file of the surface's templates, or None where there is no place for caches."""
+    """Return the file of the surface's templates, or None without a cache folder."""
     folder = _cache_folder()
     if folder is None:
         return None

@@ -1,4 +1,4 @@
-"""Coarse hypotheses: low-resolution silhouettes over yaw and elevation, compared with a drawing.
+"""Match a drawing with low-resolution silhouettes of the mesh over yaw and elevation.
 
 Silhouettes are normalised to unit height and centred on their bounding box, so scale and shift drop
 out; the score is intersection over union of soft masks, all templates at once as one product.

@@ -1,4 +1,4 @@
-"""Coarse hypotheses of a whole sheet: which turn explains all drawings at once.
+"""Search the turn that explains all drawings of a sheet at once.
 
 One drawing of a character whose mannequin has another body fits the mannequin best from a wrong
 side; eight drawings together do not. Every view's silhouette is compared with every template,

@@ -1,1 +1,1 @@
-"""How sure the cameras are: sigmas, verdicts, report, overlay."""
+"""Judge cameras: sigmas, verdicts, report, overlay."""

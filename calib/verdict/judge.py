@@ -1,4 +1,4 @@
-"""How sure: probabilities of the alternatives, uncertainties in angles, verdicts in words."""
+"""Judge cameras: probabilities of alternatives, angular uncertainties, verdicts."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from toonset.view import View
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side
 
 
-def measured(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
-    """Return how well the outlines of a sheet meet under its fit, view by view."""
+def measure_outlines(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
+    """Measure how well the outlines of a sheet meet under its fit, view by view."""
     return [
         measure(drawing, joint.body.surface, drawing.pose_in(pose))
         for drawing, pose in zip(drawings, joint.poses, strict=True)
@@ -31,7 +31,7 @@ def measured(drawings: Sequence[Drawing], joint: JointFit) -> list[Fit]:
 
 def typical_coverage(drawings: Sequence[Drawing], joint: JointFit) -> float:
     """Return the share of the outlines that meet, in the sheet's typical view."""
-    return float(np.median([fit.coverage for fit in measured(drawings, joint)]))
+    return float(np.median([fit.coverage for fit in measure_outlines(drawings, joint)]))
 
 
 def judge_view(

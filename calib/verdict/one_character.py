@@ -1,8 +1,8 @@
-"""Do all drawings show one character? Their colours say.
+"""Check by their colours that all drawings show one character.
 
 A view of a turn shares much of what it shows with the next one, and with its mirror image. So the
 views hang together: link those whose colours overlap most until all are linked (single linkage);
-where even the last link, the weakest, is none, there are two characters. Nothing needs cameras.
+where even the last link, the weakest, is too weak, there are two characters. Nothing needs cameras.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The overlay: every drawing with an outline on it and what was found, for people.
+"""Draw the overlay: every drawing with an outline over it and its camera in words.
 
 The outline is the mannequin's, or without one that of the hull of all other drawings: where they
 let a body be.

@@ -1,4 +1,4 @@
-"""One drawing twice: equal pictures cannot be two directions.
+"""Detect drawings that occur twice: equal pictures cannot be two directions.
 
 Pictures are laid over each other by the moments of their coverage, so that place, size and half a
 pixel do not matter, and blurred, so that a file's noise does not; then the largest difference

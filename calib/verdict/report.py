@@ -1,4 +1,4 @@
-"""A calibration as plain data: the content of calibration.json, and one line per view."""
+"""Report a calibration: the content of calibration.json, and one line per view."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
 
 
 def _landmarks_dict(calibration: Calibration) -> dict[str, Any]:
-    """Return what landmarks say, under its key; nothing where there are none."""
+    """Return the landmarks' entry; empty without landmarks."""
     fits = [
         {
             "view": fit.view,

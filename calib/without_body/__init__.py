@@ -1,1 +1,1 @@
-"""Cameras from the drawings alone: for characters that no mannequin resembles."""
+"""Find cameras from the drawings alone, for characters that no mannequin resembles."""

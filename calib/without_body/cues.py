@@ -1,4 +1,4 @@
-"""What drawings show, whatever a person says of them: found once, when it is first asked for.
+"""Compute the drawings' own cues lazily, each once.
 
 A sheet that is corrected is fitted again and again; these are its drawings' own and stay.
 """
@@ -21,7 +21,7 @@ class Cues:
     """The drawings of a sheet, and what has been found of them."""
 
     def __init__(self, views: Sequence[View]) -> None:
-        """Keep the views; nothing is looked at yet."""
+        """Keep the views; cues are computed when asked for."""
         self.views = views
         self._placed: dict[tuple[bytes, bytes], SheetCameras] = {}
 
@@ -44,7 +44,7 @@ class Cues:
 
     @cached_property
     def free_yaws(self) -> tuple[Float[np.ndarray, " views"], float]:
-        """Return yaws that may be no even ring, the first 0, and what speaks for them, nats."""
+        """Return yaws that may be unevenly spaced, the first 0, and their evidence in nats."""
         return uneven_yaws(self.figures, self.evidence.paint)
 
     def placed(

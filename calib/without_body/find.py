@@ -1,4 +1,4 @@
-"""Views to cameras without a mannequin: which turn it is, then cameras that cohere.
+"""Calibrate views without a mannequin: choose the turn, then make the silhouettes coherent.
 
 1. all turns that artists lay out, weighed by paint, faces, detail and outlines (`posterior`);
    five, six or seven views may stand anywhere (`uneven`)

@@ -19,7 +19,7 @@ from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, View
 from toonset.calib.verdict.checks import OF_DRAWINGS, JudgedSheet, apply_checks
 from toonset.calib.verdict.judge import judge_sheet
 from toonset.calib.without_body.placing import Figures, SheetCameras
-from toonset.calib.without_body.posterior import Doubts, doubts, view_doubt
+from toonset.calib.without_body.posterior import ErrorProbabilities, doubts, view_doubt
 from toonset.calib.without_body.turns import NEAR, STARTS, TurnHypotheses, wrapped
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.coherence import ViewCoherence, coherence
@@ -134,7 +134,7 @@ def _doubted(
     found: Found,
     labels: Sequence[Label],
     apart: float,
-    doubt: Doubts,
+    doubt: ErrorProbabilities,
     state: SheetState,
 ) -> tuple[ViewCalibration, ...]:
     """Return the views with their own verdicts."""
@@ -176,7 +176,11 @@ def _apart_verdict(
 
 
 def _turn_verdict(
-    found: Found, labels: Sequence[Label], wrong: float, doubt: Doubts, limits: VerdictThresholds
+    found: Found,
+    labels: Sequence[Label],
+    wrong: float,
+    doubt: ErrorProbabilities,
+    limits: VerdictThresholds,
 ) -> tuple[Verdict, str]:
     """Return the verdict of a view by the probability that it is seen from elsewhere."""
     views = len(found.placed.cameras)
@@ -211,7 +215,7 @@ def scale_apart(cameras: Sequence[Camera]) -> float:
     return float(np.exp(np.abs(logs - np.median(logs)).max()))
 
 
-def _doubts_text(doubt: Doubts) -> str:
+def _doubts_text(doubt: ErrorProbabilities) -> str:
     return (
         f"without a body; in doubt: front or back {doubt.front:.2f}, which way round "
         f"{doubt.way:.2f}, spacing {doubt.spacing:.2f}"

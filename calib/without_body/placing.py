@@ -1,4 +1,4 @@
-"""Cameras of a turn without a body: placed by the drawings' boxes, then made to cohere.
+"""Place a turn's cameras by the drawings' boxes, then make the silhouettes coherent.
 
 World frame: +Y up, the axis of the turn; +Z the front; the origin in the middle of the figure,
 which is about 1 high. All cameras of a sheet have one elevation, one perspective and one scale;
@@ -24,7 +24,7 @@ from jaxtyping import Float
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.hull_rays import Silhouette
 from toonset.dataset.silhouettes.outlines import Square, outlines_of
-from toonset.dataset.silhouettes.turn_fit import camera_moved, fit_turns
+from toonset.dataset.silhouettes.turn_fit import fit_turns, move_camera
 from toonset.dataset.silhouettes.turned_rays import TurnedRays
 from toonset.view import View
 
@@ -194,7 +194,7 @@ def _fitted(
     ratio = outlines.ratio(cameras[0])
     fit = fit_turns(outlines, yaw_sigma, TAU, rounds)
     moved = [
-        camera_moved(camera, Square(view.square.low / ratio, view.square.size / ratio), own)
+        move_camera(camera, Square(view.square.low / ratio, view.square.size / ratio), own)
         for camera, view, own in zip(cameras, outlines.views, fit.numbers, strict=True)
     ]
     apart = fit.apart_px[1] / ratio / figures.height_px

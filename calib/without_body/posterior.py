@@ -1,4 +1,4 @@
-"""How probable the turns of a sheet are, from all that drawings show without a body.
+"""Compute the posterior of a sheet's turns from paint, faces, shins and outlines.
 
 - **Paint** moves as the body turns: which way round, and where the axis of symmetry lies.
 - **Faces and detail** look to the front: heads have eyes, fronts have buttons.
@@ -33,7 +33,7 @@ from toonset.view import View
 HEIGHT_PX = 160  # working height of a figure
 RIM_PX = 3.0
 DETAIL = 1.0  # nats per relative difference of detail
-FAINTEST = 0.005  # OKLab per pixel: detail below is none
+FAINTEST = 0.005  # OKLab per pixel: less is not detail
 ROUGH = 0.006  # of the height: outlines whose places are not fitted are this far apart
 SHINS_FROM, SHINS_TO = 0.05, 0.2  # of the height, from the ground
 BEHIND = 30.0  # nats per height by which they stand behind the figure's middle
@@ -43,7 +43,7 @@ PAINT_BROKEN, FACES_BROKEN, SHINS_BROKEN, OUTLINES_BROKEN = 0.02, 0.02, 0.05, 0.
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What a sheet shows without a body.
+    """Evidence of a sheet without a body.
 
     Attributes:
         paint: the colours, band by band.
@@ -101,8 +101,8 @@ def outlines_log_likelihood(figures: Figures, turns: TurnHypotheses) -> Float[np
 
 
 @dataclass(frozen=True)
-class Doubts:
-    """How probable it is that the chosen turn is wrong, by what is wrong about it.
+class ErrorProbabilities:
+    """Probabilities that the chosen turn is wrong, by kind of error.
 
     Attributes:
         front: front and back are confused, the axis is right.
@@ -115,7 +115,9 @@ class Doubts:
     spacing: float
 
 
-def doubts(turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen: int) -> Doubts:
+def doubts(
+    turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen: int
+) -> ErrorProbabilities:
     """Return the doubts about a turn."""
     yaws = turns.yaws[chosen]
 
@@ -127,7 +129,7 @@ def doubts(turns: TurnHypotheses, posterior: Float[np.ndarray, " turns"], chosen
     way = mass(2 * yaws[0] - yaws) + mass(2 * yaws[0] + np.pi - yaws)
     if np.abs(wrapped(2 * (yaws - yaws[0]))).max() < NEAR:  # front and back only
         way = 0.0
-    return Doubts(front, way, max(0.0, 1 - right - front - way))
+    return ErrorProbabilities(front, way, max(0.0, 1 - right - front - way))
 
 
 def view_doubt(
@@ -141,7 +143,7 @@ def view_doubt(
 def _doubted(
     log_likelihood: Float[np.ndarray, " turns"], broken: float
 ) -> Float[np.ndarray, " turns"]:
-    """Return log-likelihoods of a cue that means nothing on some sheets."""
+    """Return log-likelihoods of a cue that is uninformative on some sheets."""
     relative = np.exp(log_likelihood - log_likelihood.max())
     return np.log((1 - broken) * relative + broken)
 

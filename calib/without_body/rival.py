@@ -1,4 +1,4 @@
-"""A mannequin against no body at all: whose cameras explain the drawings better?"""
+"""Compare a mannequin with no body at all by how well their cameras explain the drawings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from toonset.calib.without_body.turns import NEAR, STARTS, turn_hypotheses, wrap
 from toonset.view import View
 
 FEWEST = 3  # views: fewer say nothing by themselves
-P_ELSEWHERE = 0.05  # that a sheet is no turn that artists lay out
+P_ELSEWHERE = 0.05  # that a sheet is not a turn that artists lay out
 WITHOUT = "no body explains the drawings better than the mannequin: cameras are theirs alone"
 
 

@@ -1,4 +1,4 @@
-"""Which way the views of a sheet may be seen from: the turns that artists lay out.
+"""List the turns that a sheet's views may show, with their prior.
 
 A turn is a pattern of steps, where it starts and which way round it goes. Before anything is
 looked at, a sheet of four or more is probably an even ring, starts at the front and runs to the
@@ -34,7 +34,7 @@ FEW: dict[int, tuple[tuple[float, ...], ...]] = {  # degrees
 
 @dataclass(frozen=True, eq=False)
 class TurnHypotheses:
-    """Where the views may be seen from: alternatives.
+    """Alternative turns of a sheet, with their prior.
 
     Attributes:
         yaws: (turns, views) radians.

@@ -1,4 +1,4 @@
-"""Turns that are no even ring: every view's yaw from outlines and paint.
+"""Estimate every view's yaw where a turn is not evenly spaced, from outlines and paint.
 
 Coordinate ascent from several starts: outlines alone know uneven yaws to 13 degrees (five views,
 six characters), with the paint that moves as the body turns to 7 (docs/decisions.md).
@@ -22,7 +22,7 @@ from toonset.dataset.silhouettes.turned_rays import TurnedRays
 STARTS = 4  # even, and three that are not
 STEPS = np.radians([24.0, 12.0, 6.0, 3.0])
 SWEEPS = 4  # at most, of every step
-PAINT = 0.3  # of its nats: the body is no stack of cylinders, and yaws follow its every error
+PAINT = 0.3  # of its nats: the body is not a stack of cylinders, and yaws follow its every error
 LEAST_GAP, GAP_SIGMA = np.radians(25.0), np.radians(5.0)  # nobody draws one direction twice
 TILT = np.radians(4.0)  # step of the elevation
 FIRST_TILT, MOST_TILT = np.radians(10.0), np.radians(45.0)
@@ -51,7 +51,7 @@ def uneven_yaws(figures: Figures, paint: Paint) -> tuple[Float[np.ndarray, " vie
 
 @dataclass(frozen=True, eq=False)
 class _Stand:
-    """Where the views are seen from, and what speaks for it.
+    """Yaws of the views, and their evidence.
 
     Attributes:
         yaws: radians.

@@ -1,1 +1,1 @@
-"""What several verbs share: options, inputs, what is printed."""
+"""Share options, inputs and printing among verbs."""

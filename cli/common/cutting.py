@@ -1,4 +1,4 @@
-"""Options that say how a sheet is cut: of `split` and `calibrate`."""
+"""Declare the options of `split` and `calibrate` that say how a sheet is cut."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of `toonset export`: what each format writes, wants and says."""
+"""List the formats of `toonset export`: writer, inputs and hint of each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BESIDE = ("images", "toonset.json", "mannequin.obj")
 
 
 class Format(StrEnum):
-    """What is written."""
+    """Formats of `toonset export`."""
 
     colmap = "colmap"
     nerfstudio = "nerfstudio"
@@ -31,7 +31,7 @@ class Format(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What is to be written, and how."""
+    """One export: what to write, and how."""
 
     out: Path
     views: Sequence[ExportView]

@@ -1,4 +1,4 @@
-"""Help in plain text: under panels as the verbs name them, without the 0.3 s that rich costs.
+"""Print help in plain text, with panels, without the 0.3 s of importing rich.
 
 Also what a mistyped choice was meant to be.
 """
@@ -29,7 +29,7 @@ class Verb(TyperCommand):
             raise typer.BadParameter(str(error), ctx=ctx) from error
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; a value that is no choice is told the choice most like it."""
+        """Parse the arguments; a value that is not a choice is told the choice most like it."""
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as error:

@@ -1,4 +1,4 @@
-"""What training asks of its process: that freed memory is kept."""
+"""Set the process up for training: keep freed memory."""
 
 from __future__ import annotations
 

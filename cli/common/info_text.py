@@ -1,4 +1,4 @@
-"""Facts of bundles, runs and split folders as text: a table of views, a line for all else."""
+"""Format facts of bundles, runs and split folders as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawings to their palette and label maps, as a person corrected them: `palette` and `edit`."""
+"""Find and label the drawings' palette with a person's corrections, for `palette` and `edit`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.pictures import Pictures
 from toonset.errors import PaletteError, ToonsetError
-from toonset.palette.corrected import corrected
+from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import Map, PaintMap, choose_palette
 from toonset.palette.paints.select import PaletteOptions
@@ -50,7 +50,7 @@ def label_drawings(
     notes: tuple[str, ...] = ()
     if given is not None and wanted != PaletteCorrections():
         strokes, notes = given.strokes_on(drawn.pictures, drawn.places)
-        found, maps = corrected(
+        found, maps = correct_palette(
             drawn.pictures, contours, found, wanted, strokes, where=str(given.path), space=space
         )
     return replace(found, title=found.title or drawn.title), maps, notes

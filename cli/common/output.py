@@ -1,4 +1,4 @@
-"""What a command prints: results on stdout, progress and reasons on stderr."""
+"""Print results to stdout, progress and reasons to stderr."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SECONDS_BETWEEN_LOG_LINES = 5.0
 
 @dataclass
 class Printer:
-    """What one command prints: `say` for people, `doubt` why exit 3, `result` once at the end."""
+    """Printer of a command: `say` for people, `doubt` why exit 3, `result` once at the end."""
 
     as_json: bool = False
     quiet: bool = False

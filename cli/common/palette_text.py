@@ -1,4 +1,4 @@
-"""What `palette` prints of a palette: its colours, what is left out, and the evidence."""
+"""Format a palette for `toonset palette`: colours, left-out colours, evidence."""
 
 from __future__ import annotations
 

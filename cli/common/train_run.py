@@ -1,4 +1,4 @@
-"""One training as the command line asks for it, from reading the bundle to the files of the run."""
+"""Run `toonset train` from reading the bundle to writing the run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from toonset.cli.common.host import keep_freed_memory
 from toonset.cli.common.output import Printer
 from toonset.cli.common.train_summary import summary
-from toonset.cli.common.train_watch import Stopper, Voice
+from toonset.cli.common.train_watch import Stopper, TrainPrinter
 from toonset.write import check_output
 
 DOUBTFUL = 3  # exit code: written, but weak (--strict), or training was cut short
@@ -21,7 +21,7 @@ PREVIEWS = ("preview.png", ".*.tmp")  # in RUN.unfinished
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked for.
+    """One training as asked for.
 
     Attributes:
         bundle: what to train on.
@@ -68,7 +68,7 @@ def run(request: Request, printer: Printer) -> int:
     keep_freed_memory()
     stopper = Stopper(printer)
     looking = MonitorOptions(
-        Voice(printer).tell, stopper, test, request.previews, request.preview_every
+        TrainPrinter(printer).tell, stopper, test, request.previews, request.preview_every
     )
     with stopper.listening():
         found = train(

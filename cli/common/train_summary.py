@@ -1,4 +1,4 @@
-"""What `toonset train` says at its end."""
+"""Format the summary that `toonset train` prints at its end."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _hull(metrics: dict[str, Any]) -> list[str]:
 
 
 def _verdict(found: dict[str, Any], *, verbose: bool) -> str:
-    """Return what the run is worth, and by what."""
+    """Return the run's verdict and its reasons."""
     if not verbose:
         return f"verdict: {found['verdict']}"
     off = found["off_height"]

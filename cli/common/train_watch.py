@@ -1,4 +1,4 @@
-"""While a field is fitted: what is said, and Ctrl-C, which finishes the step and writes the run.
+"""Print a training's progress; on Ctrl-C finish the step and write the run.
 
 Before the first step there is nothing to write, so the signal ends the program as everywhere else;
 a second one ends it at any time.
@@ -74,7 +74,7 @@ class Stopper:
 
 
 @dataclass
-class Pace:
+class RateLimit:
     """When a line is due.
 
     Attributes:
@@ -98,12 +98,12 @@ class Pace:
         return True
 
 
-class Voice:
+class TrainPrinter:
     """Says where a training stands."""
 
     def __init__(self, printer: Printer) -> None:
         """Speak through the command's printer."""
-        self._printer, self._pace = printer, Pace(sys.stderr.isatty())
+        self._printer, self._pace = printer, RateLimit(sys.stderr.isatty())
 
     def tell(self, status: Status) -> None:
         """Say where a training stands, if that is due."""

@@ -1,1 +1,1 @@
-"""The page that corrects a bundle: what it shows, its server, and how a change is fitted."""
+"""Serve the page that corrects a bundle: its content, its server, refitting."""

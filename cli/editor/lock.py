@@ -1,4 +1,4 @@
-"""One server per bundle: a file beside it names the process and its port."""
+"""Lock a bundle for one server, by a file beside it that names process and port."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def locked(folder: Path, port: int) -> Iterator[None]:
 
 
 def _pid(file: Path) -> int | None:
-    """Return whose lock it is; None where there is none, or none that can be read."""
+    """Return the process id in the lock; None if the lock is missing or unreadable."""
     try:
         return int(json.loads(file.read_bytes())["pid"])
     except (OSError, ValueError, TypeError, KeyError):
@@ -53,7 +53,7 @@ def _pid(file: Path) -> int | None:
 
 
 def _owner(file: Path) -> int | None:
-    """Return the process that edits; None if there is none any more."""
+    """Return the process that edits; None if it has ended."""
     pid = _pid(file)
     if pid is None:
         return None

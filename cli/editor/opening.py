@@ -1,4 +1,4 @@
-"""From what a person names, a sheet or a bundle, to a session that corrects it."""
+"""Open a session on the sheet or bundle that a person names."""
 
 from __future__ import annotations
 

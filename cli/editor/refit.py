@@ -1,4 +1,4 @@
-"""A bundle made again from its sheet and corrections, as the command line would make it."""
+"""Rebuild a bundle from its sheet and corrections, as the command line would."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Body = Mesh | Literal["none"] | None
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is corrected.
+    """A bundle to be corrected.
 
     Attributes:
         sheet: the picture.
@@ -62,7 +62,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Changed:
-    """What has to be found again.
+    """Parts of a bundle to be computed again.
 
     Attributes:
         cut: the drawings, and all that follows.
@@ -113,7 +113,7 @@ def file_of(corrections: dict[str, Any]) -> bytes:
 def cut_sheet(
     sheet: Path, corrections: dict[str, Any], workshop: Path
 ) -> tuple[Sheet, Path | None]:
-    """Return the drawings as corrected, and the file that says how; None where nothing is."""
+    """Return the corrected drawings and their corrections file; None without corrections."""
     if corrections == NOTHING:
         return split_sheet(sheet), None
     file = workshop / CORRECTIONS
@@ -199,7 +199,7 @@ def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
 
 
 def note_corrections(folder: Path, corrections: dict[str, Any]) -> None:
-    """Let a bundle say that it follows these corrections: they change nothing of its cameras.
+    """Record corrections in a bundle whose cameras they leave as they are.
 
     Its calibration.json is then what `calibrate --corrections` writes.
     """

@@ -1,4 +1,4 @@
-"""What the page shows of a sheet and its bundle, as numbers and pictures: see `page/types.js`."""
+"""Collect what the page shows of a sheet and its bundle: see `page/types.js`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from toonset.dataset.split_folder.load import Sheet
 from toonset.errors import PictureError
 from toonset.html_page import base64_text, data_url, html_page, json_text
 from toonset.mesh import Mesh
-from toonset.nerf.surface.decimate import decimated
+from toonset.nerf.surface.decimate import decimate
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.names import hex_of
 from toonset.palette.palette import DroppedColor, PaletteColor
@@ -86,7 +86,7 @@ def for_page(reason: str) -> str:
 
 
 def left_out_of(sheet: Sheet) -> list[dict[str, Any]]:
-    """Return what the splitter saw on a sheet that is no figure."""
+    """Return what the splitter left out of a sheet."""
     left = sheet.split.sources[0].left_out
     return [{"box": list(one.box), "kind": one.kind} for one in left]
 
@@ -162,7 +162,7 @@ def _few_faces(vertices: bytes, faces: bytes) -> tuple[bytes, bytes]:
     corners = np.frombuffer(faces, np.int64).reshape(-1, 3)
     if len(corners) > MOST_FACES:
         one_label = np.zeros(len(corners), np.int64)
-        places, corners, _ = decimated(places, corners, one_label, MOST_FACES)
+        places, corners, _ = decimate(places, corners, one_label, MOST_FACES)
     return places.astype("<f4").tobytes(), corners.astype("<u4").tobytes()
 
 

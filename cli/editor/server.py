@@ -1,4 +1,4 @@
-"""The page's server: one page and four questions, for one person at this machine.
+"""Serve the page and its four requests to one person at this machine.
 
 The standard library's server is enough, and nothing has to be installed or kept up to date: one
 person asks a few times a minute. It listens on 127.0.0.1 alone, on a port that the system chooses,
@@ -61,7 +61,7 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, title: str) -> None:
-        """Listen; nothing is answered before `serve`."""
+        """Listen; requests are answered once `serve` runs."""
         super().__init__((HOST, 0), _Handler)
         self.page = page_of(None, None, title).encode("utf-8")
         self.token = secrets.token_urlsafe(32)
@@ -97,7 +97,7 @@ class Server(ThreadingHTTPServer):
         return thread
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: a browser that went away is no error."""
+        """Ignore the error: a browser that went away is harmless."""
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -1,4 +1,4 @@
-"""One bundle that a person corrects: what they did, kept at once, and what it makes of the bundle.
+"""Keep a person's corrections of a bundle on disk, and refit the bundle in a thread.
 
 Whatever comes in is on disk, in corrections.json, before it is answered. Fitting follows in a
 thread of its own: always with the newest corrections, so what comes in meanwhile replaces what
@@ -104,7 +104,7 @@ class Session:
 
         Raises:
             StaleError: they follow on other than the newest ones.
-            ToonsetError: they are none, the disk is full, or somebody else has written the file.
+            ToonsetError: they are invalid, the disk is full, or somebody else has written the file.
         """
         data = file_of(corrections)
         parse_corrections(data, CORRECTIONS)

@@ -1,1 +1,1 @@
-"""A bundle on disk: cameras, pictures, calibration, palette, labels."""
+"""Read and write bundles: cameras, pictures, calibration, palette, labels."""

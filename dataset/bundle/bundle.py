@@ -1,4 +1,4 @@
-"""The bundle on disk: what calibration hands to palette, training and other programs.
+"""Read a bundle: what calibration hands to palette, training and other programs.
 
     transforms.json    cameras (see `toonset.dataset.bundle.transforms`)
     images/000.png     RGBA crops, straight alpha
@@ -63,7 +63,7 @@ def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:
     """Return the mesh of a file that was given, else the folder's own, else None.
 
     Raises:
-        MeshError: the file is no mesh.
+        MeshError: the file is not a mesh.
     """
     own = folder / MANNEQUIN
     file = given or (own if own.is_file() else None)
@@ -106,7 +106,7 @@ class Bundle:
 
 
 def _calibration_of(folder: Path) -> CalibrationFile | None:
-    """Return how cameras were found; None where nothing says it."""
+    """Return the calibration; None if the bundle has none."""
     try:
         return read_calibration(transforms_file(folder).parent / CALIBRATION)
     except ToonsetError:

@@ -1,4 +1,4 @@
-"""calibration.json, both ways."""
+"""Read and write calibration.json."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION, CalibrationFile
 from toonset.errors import BundleError, CameraError
-from toonset.json_file import read_json, validated
+from toonset.json_file import read_json, validate
 from toonset.read import schema_version
 from toonset.view import View
 
@@ -50,7 +50,7 @@ def read_calibration(file: Path) -> CalibrationFile:
     if version != VERSION:
         said = "no schema" if version is None else f"'{SCHEMA}/{version}'"
         raise BundleError(f"{file}: states {said}, '{SCHEMA}/{VERSION}' is needed; calibrate again")
-    found = validated(CalibrationFile, content, file)
+    found = validate(CalibrationFile, content, file)
     for number, view in enumerate(found.views):
         try:
             view.check()

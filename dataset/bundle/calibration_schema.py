@@ -1,4 +1,4 @@
-"""calibration.json as a schema: what calibration found, how sure it is, and where it comes from.
+"""Define the schema of calibration.json: cameras, uncertainties, inputs.
 
 Angles are degrees, lengths world units or pixels of the view, as each name says. Unknown keys are
 ignored on reading (within a major version keys may be added), except in a camera.
@@ -51,7 +51,7 @@ class CalibratedCamera(_Record):
         """Return the camera.
 
         Raises:
-            CameraError, BundleError: it is none, none that can be computed with, or not as it is
+            CameraError, BundleError: not a valid camera, out of range, or not as it is
                 described.
         """
         camera = NativeCamera(
@@ -121,7 +121,7 @@ class ViewRecord(_Record):
         """Refuse what no calibration writes.
 
         Raises:
-            CameraError, BundleError: a camera is none, or the covariance is none.
+            CameraError, BundleError: a camera or a covariance is invalid.
         """
         for camera in (self.camera, self.twin, *(other.camera for other in self.alternatives)):
             camera.camera()
@@ -152,7 +152,7 @@ class CameraModel(_Record):
 
 
 class DrawingError(_Record):
-    """How far drawn outlines are off: a smooth field, and noise from point to point."""
+    """Error of drawn outlines: a smooth field, and noise from point to point."""
 
     smooth: Spread
     white: Spread
@@ -167,7 +167,7 @@ class InputFile(_Record):
 
 
 class LandmarkFit(_Record):
-    """How well a view's landmarks fit one camera."""
+    """Fit of a view's landmarks to one camera."""
 
     view: Annotated[str, Field(min_length=1, max_length=255)]
     rms_px: Spread

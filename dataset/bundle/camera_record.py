@@ -1,4 +1,4 @@
-"""The exact camera as a record: what stands under a frame's `toonset` key."""
+"""Define the exact camera's record, which stands under a frame's `toonset` key."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class NativeCamera(BaseModel):
         """Return the camera of the record.
 
         Raises:
-            CameraError: the record is no camera.
+            CameraError: the record is not a camera.
             BundleError: its numbers are beyond what is computed with, or `model` contradicts k.
         """
         numbers = [*np.ravel(self.rotation), *self.target, *self.center]

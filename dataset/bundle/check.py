@@ -1,4 +1,4 @@
-"""Everything that is wrong with a bundle, or with any transforms.json folder, in one go.
+"""List every problem of a bundle, or of any transforms.json folder.
 
 Readers stop at the first problem; this goes on, so that a person sees all of them at once. A
 folder without a problem here is read without an error by every stage.
@@ -62,7 +62,7 @@ Colors = UInt8[np.ndarray, "colors 3"]
 
 @dataclass(frozen=True)
 class _Frames:
-    """What transforms.json says.
+    """Frames of a transforms.json.
 
     Attributes:
         names: file name of every frame's picture; None where the file cannot be read.

@@ -1,4 +1,4 @@
-"""A bundle's drawings with what `toonset palette` has found of them."""
+"""Read a bundle's drawings with their palette and labels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A palette, its label maps and contours on disk, in a bundle or in a folder of their own.
+"""Write a palette, its label maps and contours, in a bundle or in a folder of their own.
 
 palette.json         the colours
 palette.gpl, .ase, .hex, .png   the same for other programs, and as a picture for people

@@ -1,4 +1,4 @@
-"""Collecting everything that is wrong with a folder, where a reader stops at the first thing."""
+"""Collect all problems of a folder, where a reader stops at the first."""
 
 from __future__ import annotations
 

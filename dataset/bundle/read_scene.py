@@ -1,4 +1,4 @@
-"""A scene from disk: pictures, their cameras, and labels where a palette stands beside them."""
+"""Read a scene from disk: pictures, cameras, and labels where there is a palette."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def read_scene(path: Path) -> Scene:
 
 
 def read_palette_of(root: Path) -> Palette | None:
-    """Return the palette of a folder's palette.json, None where there is none.
+    """Return the palette of a folder's palette.json; None if missing.
 
     Raises:
         BundleError, PaletteError: it lies elsewhere, or is broken.
@@ -82,10 +82,10 @@ def read_picture(frame: PosedPicture, file: Path) -> UInt8[np.ndarray, "height w
 
 
 def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
-    """Return a frame's label map, None where there is none.
+    """Return a frame's label map; None if missing.
 
     Raises:
-        PictureError: it is no indexed PNG.
+        PictureError: it is not an indexed PNG.
         BundleError: it has another size than its camera, or a label without a colour.
     """
     file = member(root, f"labels/{label_name(frame)}")
@@ -98,7 +98,7 @@ def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
 
 
 def read_tones(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:
-    """Return whether each pixel's paint lies in light (0), in shadow (1) or is none (255).
+    """Return whether each pixel's paint lies in light (0) or in shadow (1); 255: no paint.
 
     None where the frame has no tones: those of a flat sheet, or of an older palette.
 

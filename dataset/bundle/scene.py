@@ -1,4 +1,4 @@
-"""A scene to train on: posed RGBA pictures, with or without palette labels and mannequin."""
+"""Define a scene to train on: posed RGBA pictures, optionally labels and mannequin."""
 
 from __future__ import annotations
 

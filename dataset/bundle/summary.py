@@ -1,4 +1,4 @@
-"""What a bundle or any transforms.json folder holds, as plain data, without decoding its pictures.
+"""Summarise a bundle or any transforms.json folder as plain data, without decoding pictures.
 
 A broken part is named under `damaged` and left out; `toonset.dataset.bundle.check` looks at all.
 """
@@ -75,7 +75,7 @@ def _optional(log: ProblemLog, name: str, read: Any) -> Any:
 
 
 def _calibration(found: CalibrationFile | None) -> dict[str, Any]:
-    """Return what is known of the sheet as a whole; nothing for other programs' cameras."""
+    """Return the sheet's calibration summary; empty for other programs' cameras."""
     if found is None:
         return {}
     content = found.model_dump(mode="json")

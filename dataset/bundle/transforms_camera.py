@@ -1,4 +1,4 @@
-"""The camera of a transforms.json's frame: honoured exactly, or refused by name."""
+"""Read the camera of a transforms.json's frame exactly, or refuse it by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""transforms.json to cameras and pictures: every frame checked, every path inside the folder."""
+"""Read transforms.json: check every frame, and that every path stays inside the folder."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def frame_of(
     """Return one frame.
 
     Raises:
-        BundleError: its camera is none, or its picture lies outside, or is needed and missing.
+        BundleError: its camera is invalid, its picture lies outside, or is needed and missing.
     """
     frame = content.frames[number]
     where = f"{file}: frame {number} ({frame.file_path[:80]!r})"
@@ -116,7 +116,7 @@ def is_inside(root: Path, path: Path) -> bool:
     """Return whether a path, links followed, stays in a folder.
 
     Raises:
-        OSError, ValueError: the path is no file name (too long, a loop of links, a NUL).
+        OSError, ValueError: the path is not a file name (too long, a loop of links, a NUL).
     """
     return path.resolve().is_relative_to(root.resolve())
 

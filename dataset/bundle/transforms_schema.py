@@ -1,4 +1,4 @@
-"""What a transforms.json may hold: nerfstudio's, instant-ngp's, Blender's, and toonset's own.
+"""Define the schema of transforms.json: keys of nerfstudio, instant-ngp, Blender and toonset.
 
 Unknown keys are other programs' business and are ignored, except lens distortion, which would bend
 what is seen (`toonset.dataset.bundle.transforms_camera` refuses it).
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.errors import BundleError
-from toonset.json_file import read_json, validated
+from toonset.json_file import read_json, validate
 from toonset.read import schema_version
 
 SCHEMA, VERSION = "toonset-transforms", 1
@@ -25,7 +25,7 @@ Row = tuple[float, float, float, float]
 
 
 class Intrinsics(BaseModel):
-    """What a frame may say of its lens, or the file for all frames; pixels."""
+    """Intrinsics of a frame, or of the file for all frames; pixels."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     w: int | None = None
@@ -61,4 +61,4 @@ def read_records(file: Path) -> TransformsFile:
     content = read_json(file)
     if isinstance(content, dict) and str(content.get("schema", "")).startswith("toonset-"):
         schema_version(content, SCHEMA, VERSION, str(file), BundleError)
-    return validated(TransformsFile, content, file)
+    return validate(TransformsFile, content, file)

@@ -1,1 +1,1 @@
-"""Bundles for other programs."""
+"""Export bundles to other programs."""

@@ -1,4 +1,4 @@
-"""Writing a Python script that rebuilds cameras, mannequin and drawings inside Blender.
+"""Write a Python script that rebuilds cameras, mannequin and drawings inside Blender.
 
     import_cameras.py    run it in Blender: blender --python import_cameras.py, or Scripting > Open
     scene.glb            the mannequin, and every drawing on a plane behind it

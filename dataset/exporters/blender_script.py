@@ -1,4 +1,4 @@
-"""The Blender script that `toonset.dataset.exporters.blender` fills in."""
+"""Hold the Blender script that `toonset.dataset.exporters.blender` fills in."""
 
 SCRIPT = r'''"""Cameras, mannequin and drawings of a character, for Blender 3.6 or later.
 

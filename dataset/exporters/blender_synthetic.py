@@ -1,4 +1,4 @@
-"""Writing datasets as NeRF's synthetic scenes: transforms_train, _val and _test.json.
+"""Write a dataset as NeRF's synthetic scenes: transforms_train, _val and _test.json.
 
     transforms_train.json    camera_angle_x for all, and a pose per picture
     train/000.png            RGBA, straight alpha

@@ -1,4 +1,4 @@
-"""Writing COLMAP datasets with pycolmap: what 3D Gaussian splatting and many others read.
+"""Write a COLMAP dataset with pycolmap, for 3D Gaussian splatting and many others.
 
     images/000.png          RGB over white: COLMAP, GLOMAP and splatting trainers ignore alpha or
                             each treat it in another way
@@ -26,7 +26,7 @@ from toonset.camera import Camera
 from toonset.dataset.exporters.common import ExportView, write_beside
 from toonset.dataset.exporters.points import TrackedPoints
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.split.background import flattened
+from toonset.dataset.split.background import flatten
 from toonset.mesh import Mesh
 from toonset.write import new_folder, write_bytes
 
@@ -60,7 +60,7 @@ def write_colmap(
     model = _reconstruction(views, points)
     with new_folder(folder, force=force) as temporary:
         for view in views:
-            picture, mask = flattened(view.rgba)[..., :3], figure_mask(view.rgba)
+            picture, mask = flatten(view.rgba)[..., :3], figure_mask(view.rgba)
             write_bytes(temporary / "images" / view.name, encode_png(picture))
             write_bytes(temporary / "masks" / f"{view.name}.png", encode_png(mask))
         _write_model(model, temporary / "sparse" / "0", text=text, old_layout=old_layout)

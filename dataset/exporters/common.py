@@ -1,4 +1,4 @@
-"""What every export is made of: drawings with their exact cameras and the pinholes that stand in.
+"""Write what every export shares: drawings, exact cameras, and the pinholes that replace them.
 
 Programs without orthographic cameras get a far pinhole, as the bundle's transforms.json has it. The
 exact cameras always stand beside an export in toonset.json:

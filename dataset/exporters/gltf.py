@@ -1,4 +1,4 @@
-"""Writing cameras, mannequin and drawings as one GLB file that Blender and viewers open.
+"""Write cameras, mannequin and drawings as one GLB file that Blender and viewers open.
 
     scene.glb          a node per view with its camera; the drawing on a plane behind the mannequin
     images/000.png     the drawings, RGBA

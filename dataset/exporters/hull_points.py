@@ -1,4 +1,4 @@
-"""Points of the drawings' visual hull, with their colours, where there is no mannequin.
+"""Sample coloured points of the drawings' visual hull, where there is no mannequin.
 
 The ray of a pixel enters the hull where it first lies inside all other silhouettes: there is a
 point of its surface. A view sees a point if the view's own ray enters the hull no earlier.

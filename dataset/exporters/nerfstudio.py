@@ -1,4 +1,4 @@
-"""Writing transforms.json folders for nerfstudio and instant-ngp.
+"""Write transforms.json folders for nerfstudio and instant-ngp.
 
     transforms.json    a lens per frame; orthographic views are far pinholes
     images/000.png     RGBA, straight alpha: both programs blend it over a background of their own

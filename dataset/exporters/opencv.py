@@ -1,4 +1,4 @@
-"""Writing cameras as OpenCV's YAML (`cv2.FileStorage`).
+"""Write cameras as OpenCV's YAML (`cv2.FileStorage`).
 
     cameras.yml        views: a list of maps with name, image (path), image_width, image_height,
                        camera_matrix, distortion_coefficients (0), rvec, R, tvec

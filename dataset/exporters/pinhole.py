@@ -1,4 +1,4 @@
-"""Lenses that other programs can hold: the principal point in the middle, one lens for all views.
+"""Fit cameras to other programs' lenses: a centred principal point, one lens for all views.
 
 An orthographic view is free to choose: any point of its target's plane may be the principal one,
 and its far pinhole may stand at any distance. So its picture is only ever padded, never resampled.
@@ -20,11 +20,11 @@ from toonset.dataset.images.picture import MAX_PIXELS
 from toonset.errors import BundleError
 
 LARGEST_FACTOR = 4.0  # a picture that must be enlarged by more has no business with the others
-SAME_PX = 1e-3  # a shift or a growth of a picture below this is none
+SAME_PX = 1e-3  # a smaller shift or growth of a picture is left out
 Pair = tuple[float, float]
 
 
-def centred(view: ExportView) -> ExportView:
+def centre_view(view: ExportView) -> ExportView:
     """Return the view with its principal point in the middle of its picture.
 
     An orthographic view keeps its picture. A pinhole's is padded with nothing to the smallest

@@ -1,4 +1,4 @@
-"""Points of the mannequin that drawings show, with their colours: a start for 3D reconstruction.
+"""Sample coloured points of the mannequin that drawings show, as a start for 3D reconstruction.
 
 A point is kept if no drawing has background where the point projects. A view sees it if nothing of
 the mannequin lies before it. Its colour comes from the view in which it lies deepest inside the

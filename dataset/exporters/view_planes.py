@@ -1,4 +1,4 @@
-"""Where drawings hang in a 3D scene: in register with the mannequin, as their cameras see them.
+"""Place drawings in a 3D scene: in register with the mannequin, as their cameras see them.
 
 The drawings form a wide ring around mannequin and cameras, each behind the mannequin as its camera
 sees it. So no drawing stands between another camera and the mannequin, and neighbours stay out of

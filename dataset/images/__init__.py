@@ -1,1 +1,1 @@
-"""Pictures: decode and encode them safely."""
+"""Decode and encode pictures safely."""

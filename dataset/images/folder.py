@@ -1,4 +1,4 @@
-"""The pictures of a folder, in the order in which people count."""
+"""List a folder's pictures in natural order: view2 before view10."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".gif")
 
 
 def picture_files(folder: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """Return a folder's pictures in natural order, and the names of what is none.
+    """Return a folder's pictures in natural order, and the names of its other files.
 
     Pictures are told by their endings; names that start with a dot are the system's and are
     counted neither way.

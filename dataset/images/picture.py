@@ -1,4 +1,4 @@
-"""Pictures in and out: one safe way to decode, one to encode.
+"""Decode and encode pictures in one safe way.
 
 Pillow decodes behind an allow-list of formats; the size is capped from the header before anything
 is decoded. The format is recognised by content, so a PNG named `.jpg` reads fine and a text file
@@ -144,7 +144,7 @@ def _opened(data: bytes, path: Path, max_pixels: int) -> Iterator[Image.Image]:
     """Yield the lazily opened picture; whatever Pillow raises inside becomes a PictureError."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # odd metadata is no reason to refuse or to print
+            warnings.simplefilter("ignore")  # odd metadata is not a reason to refuse or to print
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(data), formats=FORMATS) as image:
                 _check(image, data, path, max_pixels)

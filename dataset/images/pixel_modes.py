@@ -1,4 +1,4 @@
-"""From any decoded picture to 8-bit sRGB with straight alpha, or a refusal by name."""
+"""Convert any decoded picture to 8-bit sRGB with straight alpha, or refuse it by name."""
 
 from __future__ import annotations
 

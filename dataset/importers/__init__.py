@@ -1,1 +1,1 @@
-"""Other programs' cameras and pictures as bundles."""
+"""Import other programs' cameras and pictures as bundles."""

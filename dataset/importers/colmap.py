@@ -32,7 +32,7 @@ def read_colmap(folder: Path) -> tuple[tuple[str, Camera], ...]:
         folder: a dataset with `sparse/0`, or a model's own folder; .bin or .txt.
 
     Raises:
-        BundleError: there is no model, it is damaged, or a camera is no pinhole.
+        BundleError: there is no model, it is damaged, or a camera is not a pinhole.
     """
     model = _load(_model_folder(folder))
     posed = [image for _, image in sorted(model.images.items()) if image.has_pose]

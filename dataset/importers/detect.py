@@ -1,4 +1,4 @@
-"""Cameras and pictures of other programs: recognised, read, and named for a bundle.
+"""Detect the format of other programs' cameras, and read them.
 
 transforms.json, transforms_train.json ...    nerfstudio, instant-ngp, NeRF's synthetic scenes
 sparse/0, sparse, or a model's own folder     COLMAP (.bin or .txt, old or new layout)
@@ -31,7 +31,7 @@ Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # ours from a world with 
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """What was read.
+    """Views read from another program's files.
 
     Attributes:
         views: pictures with cameras; names are unique.

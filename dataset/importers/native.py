@@ -1,4 +1,4 @@
-"""Reading toonset.json beside an export: the exact cameras, preferred to the format's pinholes."""
+"""Read toonset.json beside an export: exact cameras, preferred to the format's pinholes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from toonset.dataset.bundle.transforms_schema import MAX_FRAMES
 from toonset.dataset.exporters.common import NATIVE
 from toonset.dataset.importers.paths import ImportView, find_picture
 from toonset.errors import BundleError, CameraError
-from toonset.json_file import read_json, validated
+from toonset.json_file import read_json, validate
 from toonset.read import schema_version
 
 NAME, VERSION = "toonset-export", 1
@@ -77,7 +77,7 @@ def read_native(root: Path) -> NativeExport:
     file = root / NATIVE
     content = read_json(file)
     schema_version(content, NAME, VERSION, str(file), BundleError)
-    records = validated(_ExportRecord, content, file).views
+    records = validate(_ExportRecord, content, file).views
     views = tuple(_view(root, record, file) for record in records)
     return NativeExport(
         views,

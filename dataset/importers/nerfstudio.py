@@ -1,4 +1,4 @@
-"""Reading nerfstudio, instant-ngp and NeRF-synthetic folders for an import."""
+"""Read nerfstudio, instant-ngp and NeRF-synthetic folders for an import."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading cameras from OpenCV's YAML; `toonset.dataset.exporters.opencv` says what is in it.
+"""Read cameras from OpenCV's YAML; `toonset.dataset.exporters.opencv` says what is in it.
 
 Of a view's `R` and `rvec` one is enough; what a view lacks (camera_matrix, image_width, ...) may
 stand once at the top of the file.

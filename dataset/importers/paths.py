@@ -1,4 +1,4 @@
-"""Where an imported view's picture and mask lie: inside the folders that were named."""
+"""Find an imported view's picture and mask inside the folders that were named."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def find_picture(folders: Sequence[Path], name: str, where: str) -> Path:
 
 
 def find_mask(folders: Sequence[Path], name: str) -> Path | None:
-    """Return the mask of a picture: NAME.png (COLMAP's) or STEM.png, None where there is none."""
+    """Return the mask of a picture: NAME.png (COLMAP's) or STEM.png; None if missing."""
     return _first(folders, [f"{name}.png", str(Path(name).with_suffix(".png"))], f"mask of {name}")
 
 

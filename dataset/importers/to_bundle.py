@@ -1,4 +1,4 @@
-"""Writing imported views as a bundle: RGBA pictures, cameras, and the mannequin if there is one."""
+"""Write imported views as a bundle: RGBA pictures, cameras, and the mannequin if there is one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from toonset.write import new_folder, write_bytes, write_json
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What was written.
+    """Report of an import.
 
     Attributes:
         views: names of the pictures.

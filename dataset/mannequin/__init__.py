@@ -1,1 +1,1 @@
-"""A plain body made by code; landmarks, named points of a mannequin and pixels that show them."""
+"""Make a plain body; read landmarks, pairs of its named points and pixels."""

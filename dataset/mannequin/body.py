@@ -1,4 +1,4 @@
-"""The default mannequin's flesh: parts round its joints, in units of its height, the left side."""
+"""Build the default mannequin's solids round its joints, left side, in units of its height."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mannequin on disk: NAME.obj with its parts, and NAME.landmarks.json beside it."""
+"""Write a mannequin: NAME.obj with its parts, and NAME.landmarks.json beside it."""
 
 from __future__ import annotations
 

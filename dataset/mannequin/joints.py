@@ -1,4 +1,4 @@
-"""The default mannequin's proportions and joints, in units of its height.
+"""Compute the default mannequin's proportions and joints, in units of its height.
 
 Everything is written for the left side, x >= 0; the right one is its mirror image. Proportions run
 smoothly from a grown-up of 8 heads to a cartoon child of 2: with a larger head legs get shorter

@@ -1,4 +1,4 @@
-"""Landmark files: which pixel of a drawing shows which point of the mannequin.
+"""Read landmark files: which pixel of a drawing shows which point of the mannequin.
 
 JSON:
 
@@ -87,7 +87,7 @@ def read_landmarks(
 
 
 def read_known_points(mesh_path: Path) -> dict[str, Numbers]:
-    """Return the named points beside a mannequin's file; none where there is no such file.
+    """Return the named points beside a mannequin's file; empty if that is missing.
 
     Raises:
         LandmarkError: `NAME.landmarks.json` is there, but broken.

@@ -1,4 +1,4 @@
-"""The two formats of landmark files, JSON and CSV, as plain records; nothing is looked up here."""
+"""Parse landmark files, JSON or CSV, into plain records."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Pair:
-    """What a file says of one point: `world` is None where only its name is given."""
+    """One point of a file: `world` is None if only its name is given."""
 
     name: str
     pixel: Numbers
@@ -54,7 +54,7 @@ def read_landmark_file(path: Path) -> LandmarkFile:
     """Return the content of a .csv file, or of JSON with any other ending.
 
     Raises:
-        LandmarkError: the file is missing or broken, or a number is none.
+        LandmarkError: the file is missing or broken, or a number is invalid.
     """
     data = read_whole(path, "landmark", LandmarkError, MAX_BYTES)
     try:

@@ -1,4 +1,4 @@
-"""The default mannequin: a plain body made by code, with named parts and landmarks.
+"""Make the default mannequin: a plain body with named parts and landmarks.
 
 One closed surface, mirror symmetric to the last bit, 1.7 world units tall, feet on y = 0, facing
 +Z, its left at +X. The same options give the same body.

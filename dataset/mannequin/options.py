@@ -1,4 +1,4 @@
-"""What the default mannequin looks like: proportions and pose. Nothing heavy is imported."""
+"""Define the default mannequin's options, proportions and pose. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCALES = (0.7, 1.4)  # thinner, a limb falls between two grid layers; thicker, a
 
 @dataclass(frozen=True)
 class MannequinOptions:
-    """What the mannequin looks like.
+    """Proportions and pose of the default mannequin.
 
     Attributes:
         heads_tall: height over the height of the head, 2 to 8. Of fourteen characters' outlines
@@ -34,7 +34,7 @@ class MannequinOptions:
     limb_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse bodies that would be no clean surface.
+        """Refuse options that would not give a clean surface.
 
         Raises:
             MeshError: a number out of range, or an unknown pose.

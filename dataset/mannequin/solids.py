@@ -1,4 +1,4 @@
-"""Solids as signed distance functions (negative inside), blended into one another.
+"""Blend solids given as signed distance functions (negative inside).
 
 A solid is a function from points to distances: exact for a limb, of the right sign and to first
 order at the surface for the others, which is what meshing needs.

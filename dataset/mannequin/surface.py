@@ -1,4 +1,4 @@
-"""A closed, exactly mirror-symmetric surface of even triangles from a solid.
+"""Mesh a solid as a closed, exactly mirror-symmetric surface of even triangles.
 
 Only the half at x >= 0 is meshed, by marching cubes on a grid with a layer at x = 0, so that the
 border of the half lies in that plane exactly; the other half is its mirror image. Marching cubes

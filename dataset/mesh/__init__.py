@@ -1,1 +1,1 @@
-"""Mesh files: read, check, write."""
+"""Read, check and write mesh files."""

@@ -1,4 +1,4 @@
-"""glTF 2.0 and GLB, self-contained: triangles of the default scene in world coordinates.
+"""Read glTF 2.0 and GLB: triangles of the default scene in world coordinates.
 
 Read: node transforms, skins in their rest pose (as every viewer shows them), vertex colours, base
 colour and base colour texture. Refused by name: other files, sparse or compressed data, strips.

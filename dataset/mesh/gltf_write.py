@@ -1,4 +1,4 @@
-"""Building a GLB file: a description, and one buffer that holds arrays and pictures.
+"""Build a GLB file: JSON, and one buffer that holds arrays and pictures.
 
 Source: Khronos glTF 2.0 specification, sections 3.6 (binary data) and 4.4 (GLB), and its extensions
 KHR_materials_unlit and KHR_materials_variants.

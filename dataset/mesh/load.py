@@ -1,4 +1,4 @@
-"""Mesh files in and out: one safe way to read a mannequin, one to write it.
+"""Read and write mesh files in one safe way.
 
 Read: OBJ, glTF/GLB (self-contained), PLY, STL, OFF; never an archive, never a file outside the
 mesh's own folder. Sizes are capped before anything is built from a header's promise. Coordinates

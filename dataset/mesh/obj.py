@@ -1,4 +1,4 @@
-"""Wavefront OBJ: vertices with colours, polygons, objects and groups, material colours.
+"""Read Wavefront OBJ: vertices with colours, polygons, objects and groups, material colours.
 
 Our own reader: trimesh takes index 0 for the first vertex, counts negative indices from the file's
 end, and names parts by their materials.
@@ -26,7 +26,7 @@ LINES_BETWEEN = 100_000  # of two looks at how much it has become
 
 @dataclass
 class _Lists:
-    """What the lines add up to. Faces are vertices, then texture corners, from 0; -1 = none."""
+    """Parsed lines. Faces are vertices, then texture corners, from 0; -1 = none."""
 
     vertices: list[list[float]] = field(default_factory=list)
     colors: list[list[float]] = field(default_factory=list)

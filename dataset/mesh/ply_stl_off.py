@@ -1,4 +1,4 @@
-"""PLY, STL and OFF, parsed by trimesh from bytes, with what their headers promise checked."""
+"""Read PLY, STL and OFF with trimesh, after checking what their headers promise."""
 
 from __future__ import annotations
 

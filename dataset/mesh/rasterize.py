@@ -1,4 +1,4 @@
-"""A mesh as a camera sees it, by OpenCV's rasteriser: depth and face normal at every pixel centre.
+"""Rasterise a mesh with OpenCV: depth and face normal at every pixel centre.
 
 The rasteriser is a pinhole that looks into the middle of the picture. Points are handed to it as
 

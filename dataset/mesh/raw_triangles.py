@@ -1,4 +1,4 @@
-"""What every mesh reader delivers, and the one way from there to a checked mesh."""
+"""Weld and check the raw triangles that every mesh reader returns."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Outlines and masks: distances, coherence under cameras, displacement."""
+"""Compare silhouettes: distances, coherence under cameras, registration, displacement."""

@@ -1,4 +1,4 @@
-"""What outlines say of one kind of error in a sheet's drawings: how large, and whether at all."""
+"""Report how large one kind of error in a sheet's drawings is, and whether it is proven."""
 
 from __future__ import annotations
 

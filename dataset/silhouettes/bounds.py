@@ -1,4 +1,4 @@
-"""Where in the world the character is, from cameras and masks alone."""
+"""Find the character's bounding box in the world from cameras and masks alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do the drawings agree with each other under their cameras? Needs no mesh.
+"""Measure how far silhouettes cohere under their cameras, without a mesh.
 
 Under the right cameras every outline point of a view is the picture of some point of the body, and
 that point lies inside (or on the outline of) every other silhouette. With the signed distance D_j
@@ -43,7 +43,7 @@ ODD_CONTRADICTION = 0.012  # of the height
 
 @dataclass(frozen=True, eq=False)
 class ViewCoherence:
-    """How one drawing agrees with the hull of the others.
+    """Coherence of one drawing with the hull of the others.
 
     Attributes:
         share: share of the outline that the hull reaches within the tolerance, 0 to 1.
@@ -62,7 +62,7 @@ class ViewCoherence:
 
 @dataclass(frozen=True, eq=False)
 class SheetCoherence:
-    """How the drawings of a sheet agree.
+    """Coherence of a sheet's drawings.
 
     Attributes:
         views: in the sheet's order.
@@ -74,7 +74,7 @@ class SheetCoherence:
 
     @property
     def odd_view(self) -> int | None:
-        """Return the one view without which the others agree, or None where there is no such.
+        """Return the one view without which the others agree; None if there is none.
 
         Its camera is wrong or the drawing shows something else, such as a mirrored figure.
         """

@@ -1,4 +1,4 @@
-"""The drawn outline: sub-pixel contour points with outward normals.
+"""Extract the drawn outline: sub-pixel contour points with outward normals.
 
 The contour is the 0.5 level of the view's alpha (marching squares), holes included, resampled at
 even spacing. Coordinates are pixels of the view, first pixel's centre at (0.5, 0.5).
@@ -91,7 +91,7 @@ def drawn_contour(view: View, spacing_of_height: float = 1 / 256) -> Contour:
 def _is_cut(
     loop: Float[np.ndarray, "n 2"], shape: tuple[int, ...], height: float
 ) -> Bool[np.ndarray, " n"]:
-    """Return which points of an evenly sampled loop are no outline, but the picture's edge.
+    """Return which points of an evenly sampled loop are the picture's edge, not outline.
 
     Short contacts with the edge are those of a closely cropped figure.
     """

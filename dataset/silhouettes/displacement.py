@@ -1,4 +1,4 @@
-"""How a drawing may be moved: families of displacements, linear in few numbers.
+"""Define families of displacements of a drawing, linear in few parameters.
 
 A displacement says where a pixel's content comes from: corrected(x) = drawn(x + d(x)), all in
 units of the figure's square (`Square`), so that it means the same at every size.

@@ -1,4 +1,4 @@
-"""Rays through outline points, cut by the other silhouettes: the visual hull where it matters.
+"""Intersect rays through outline points with the visual hull of the other silhouettes.
 
 A point of a ray lies in the visual hull if it is inside every silhouette. Instead of cutting rays
 with polygons, the signed distance to each silhouette's outline is sampled along them: its minimum

@@ -1,4 +1,4 @@
-"""How wide the drawn contour line of a figure is."""
+"""Measure the width of a figure's drawn contour line."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-DARKEST_CONTOUR = 100.0  # luma of 255: a lighter border is no ink
+DARKEST_CONTOUR = 100.0  # luma of 255: a lighter border is not ink
 LEAST_INKED = 0.7  # of the border that must be dark to speak of a contour
 MOST_DEEP = 0.5  # of the border's darkness: if so much goes on inside, the figure itself is dark
 NOT_INK = 24  # levels above the ink: another colour

@@ -1,4 +1,4 @@
-"""What of a picture is the figure."""
+"""Compute a picture's figure mask from its alpha."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def alpha_of(frame: Frame) -> Float[np.ndarray, "height width"]:
     return frame.rgba[..., 3] / np.float32(255)
 
 
-def widened(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+def widen_thin_parts(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
     """Return the coverage with thin parts as wide as they cover pixels.
 
     Interpolated between pixel centres, a line that covers the share a of its pixels is in the mask
@@ -37,7 +37,7 @@ def widened(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "heig
 
 
 def thin(alpha: Float[np.ndarray, "height width"]) -> Bool[np.ndarray, "height width"]:
-    """Return faint pixels that hang on the figure and are no border of it.
+    """Return faint pixels that hang on the figure and are not its border.
 
     A cape's corner seen from its edge covers too little of any pixel to be in the mask. On a
     border, what is on one side of a pixel covers more than the pixel does; on a ridge, both sides
@@ -77,7 +77,7 @@ def has_figure(frame: Frame) -> bool:
 
 
 def figure_px(frame: Frame) -> int:
-    """Return the longer side of a figure's box, 0 where there is none."""
+    """Return the longer side of a figure's box, 0 without a figure."""
     mask = mask_of(frame.rgba)
     sides = [np.flatnonzero(mask.any(axis=axis)) for axis in (0, 1)]
     return max((int(side[-1] - side[0] + 1) if len(side) else 0) for side in sides)

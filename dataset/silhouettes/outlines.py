@@ -1,4 +1,4 @@
-"""The outlines of a sheet's drawings, ready to be compared: distances, gradients, outline points.
+"""Prepare a sheet's outlines for comparison: signed distances, gradients, outline points.
 
 All of it is kept at one small size, whatever the pictures' size, so that comparing costs the same
 for every sheet; the antialiased outline keeps its place to a tenth of a pixel.

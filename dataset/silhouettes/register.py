@@ -1,4 +1,4 @@
-"""Moving a sheet's drawings until their outlines are those of one body, as little as it takes.
+"""Register a sheet's drawings: the least displacements that make their outlines one body's.
 
 Minimised over the numbers c_v of all drawings at once, by Gauss-Newton:
 
@@ -36,7 +36,7 @@ AFRESH = 4  # rounds after which whole rays are searched again, not only near th
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Moved drawings and what speaks for moving them.
+    """Registered drawings and the evidence for moving them.
 
     Attributes:
         numbers: (views, k) of the family, in units of the squares.
@@ -87,7 +87,7 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
         numbers = flat.reshape(views, count)
         normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
         if round_ >= SETTLED:
-            tau = learned(energy(normal.matrix, precision, flat, tau), len(flat))
+            tau = learn_error_size(energy(normal.matrix, precision, flat, tau), len(flat))
     spent = normal.cost + flat @ precision @ flat / tau**2
     volume = log_volume(normal.matrix, moves.covariance * tau**2, views)
     gain = (first.cost - spent - volume) / 2
@@ -97,7 +97,7 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
 def common(
     outlines: Outlines, moves: Moves
 ) -> tuple[Float[np.ndarray, "m 4"], Float[np.ndarray, "4 m"]]:
-    """Return what all numbers are where the body stands aside along an axis, or is larger.
+    """Return the gauge directions, 3 translations and 1 scale, that outlines cannot see.
 
     That is no error of the drawings: of all numbers that differ by it, those are meant which move
     the figures least. (The equations leave it open but for perspective, through which errors
@@ -203,7 +203,7 @@ def energy(
     numbers: Float[np.ndarray, " k"],
     tau: float,
 ) -> float:
-    """Return what numbers and their uncertainty amount to, in variances of the prior."""
+    """Return the expected energy of the numbers, in variances of the prior."""
     potrf, potri = get_lapack_funcs(("potrf", "potri"), (matrix,))
     factor, _ = potrf(matrix + precision / tau**2, lower=True)
     spread, _ = potri(factor, lower=True)  # its lower half: half the work of an inverse
@@ -212,8 +212,8 @@ def energy(
     return float(numbers @ precision @ numbers) + trace
 
 
-def learned(whole: float, count: int) -> float:
-    """Return the size of errors that the energy of `count` numbers speaks for."""
+def learn_error_size(whole: float, count: int) -> float:
+    """Return the size of errors, by the energy of `count` numbers."""
     return float(np.clip(np.sqrt(whole / count), LEAST, MOST))
 
 

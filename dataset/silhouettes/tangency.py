@@ -1,4 +1,4 @@
-"""How far a sheet's outlines are from being those of one body.
+"""Measure how far a sheet's outlines are from being those of one body.
 
 Every ray through a drawing's outline touches the body, so somewhere on it there is a point that all
 other drawings show as figure. Where there is none, the drawings disagree, and the ray's point

@@ -1,4 +1,4 @@
-"""Turning, placing and sizing a sheet's cameras until its outlines are those of one body.
+"""Fit yaws, shifts and sizes of a sheet's cameras until its outlines are those of one body.
 
 Minimised over each camera's shift, growth and yaw, by Gauss-Newton:
 
@@ -98,14 +98,14 @@ def fit_turns(
     return Fit(flat.reshape(views, OWN), tau, gain, apart)
 
 
-def camera_moved(camera: Camera, square: Square, own: Float[np.ndarray, " 4"]) -> Camera:
+def move_camera(camera: Camera, square: Square, own: Float[np.ndarray, " 4"]) -> Camera:
     """Return the camera of a drawing after its numbers; `square` in the camera's pixels."""
     yaw, elevation, roll = camera.angles
     rotation = rotation_from_angles(yaw + float(own[YAW]), elevation, roll)
-    return moved(replace(camera, rotation=rotation), square, own[PLACE])
+    return displace_camera(replace(camera, rotation=rotation), square, own[PLACE])
 
 
-def moved(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
+def displace_camera(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]) -> Camera:
     """Return the camera whose pixel of a point is the moved one: u + d(u), exactly."""
     growth = 1 + 2 * own[2]
     middle = square.low + square.size / 2
@@ -130,7 +130,7 @@ def _improved(normal: _Normal, deviation: np.ndarray, flat: np.ndarray) -> np.nd
 
 
 def _learned(matrix: np.ndarray, deviation: np.ndarray, flat: np.ndarray, tau: float) -> float:
-    """Return the size of wrong places that the numbers and their uncertainty speak for."""
+    """Return the size of placing errors, by the numbers and their uncertainty."""
     spread = np.linalg.inv(deviation[:, None] * matrix * deviation + np.eye(len(flat)))
     place = np.arange(len(flat)).reshape(-1, OWN)[:, PLACE].reshape(-1)
     unit = flat[place] / deviation[place]
@@ -148,7 +148,7 @@ def _linearised(outlines: Outlines, flat: np.ndarray, free: Bool[np.ndarray, " m
     """Return the normal equations at `flat`; numbers that are not free have no slope."""
     own = flat.reshape(-1, OWN)
     views = tuple(
-        replace(view, camera=camera_moved(view.camera, view.square, numbers))
+        replace(view, camera=move_camera(view.camera, view.square, numbers))
         for view, numbers in zip(outlines.views, own, strict=True)
     )
     aside = [
@@ -185,8 +185,8 @@ def _aside(outline: Outline, own: np.ndarray, movable: Bool[np.ndarray, " 4"]) -
     """Return a camera a STEP ahead and behind in each number that may move."""
     return [
         (
-            camera_moved(outline.camera, outline.square, own + step),
-            camera_moved(outline.camera, outline.square, own - step),
+            move_camera(outline.camera, outline.square, own + step),
+            move_camera(outline.camera, outline.square, own - step),
         )
         if free
         else None

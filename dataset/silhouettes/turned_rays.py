@@ -1,4 +1,4 @@
-"""How far turning silhouettes are from being one body's, one of them turned at a time.
+"""Update the contradiction of silhouettes when one of them turns.
 
 What one silhouette excludes on another's rays depends on these two alone: of V(V - 1) pairs only
 2(V - 1) are sampled again where one view turns. Equal to `hull_rays.contradiction` of `cut_rays`,

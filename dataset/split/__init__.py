@@ -1,1 +1,1 @@
-"""Segment one sheet: background, figures, what is none of them, cut-outs with alpha."""
+"""Segment one sheet: background, figures, what is left out, cut-outs with alpha."""

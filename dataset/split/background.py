@@ -1,4 +1,4 @@
-"""What of a sheet is background: its colour or its gradient, its noise, and how far pixels are off.
+"""Estimate a sheet's background and its noise, and each pixel's difference from it.
 
 No more is modelled than the border asks for: one colour; else a quadratic gradient; else a smooth
 field (`toonset.dataset.split.background_field`).
@@ -26,14 +26,14 @@ STEADY = 1.5  # times the 99th percentile of noise: the 99.99th of a normal dist
 RIPPLED = 2.0  # the same in JPEG, whose ripples are stronger near figures than in the border
 GRAIN = 2.0  # levels: paper with more has grain all over, beside which no ripples are seen
 RARE = 3.0  # times the 80th percentile of noise: where its 99th may lie
-LEAST_SURE = 0.3  # of the border: less in one colour is no background
+LEAST_SURE = 0.3  # of the border: less in one colour is not background
 WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
 WORTH_LEVELS = 2.0  # and less by so many levels
 WORTH_SHARE = 0.05  # of the border: or explain so much more of it
 CLEARLY = 0.98  # of the border in one colour with less noise than that: nothing to gain
 RING = 0.02  # of the shorter side: the border that is looked at
 INSETS = (0.0, 0.02, 0.04, 0.06, 0.08)  # of the shorter side: where it is looked for
-COMMON = 0.3  # of the sheet: a colour that covers less is no background but a frame
+COMMON = 0.3  # of the sheet: a colour that covers less is not background but a frame
 MOST_SAMPLES = 200_000  # border pixels that are looked at
 
 
@@ -116,7 +116,7 @@ def is_transparent(rgba: UInt8[np.ndarray, "height width 4"]) -> bool:
     return float(np.count_nonzero(rgba[..., 3] < 128)) / rgba[..., 3].size > TRANSPARENT
 
 
-def flattened(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
+def flatten(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
     """Return an opaque picture: what is see-through shows white paper."""
     if (rgba[..., 3] == 255).all():
         return rgba

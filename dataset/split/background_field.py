@@ -1,4 +1,4 @@
-"""Backgrounds whose colour changes over the sheet: gradients, vignettes, uneven paper.
+"""Fit backgrounds whose colour changes over the sheet: gradients, vignettes, uneven paper.
 
 Both fields are fitted on a small copy of the sheet, by robust least squares on the border first and
 then on everything inside that agrees: figures are outliers.

@@ -1,4 +1,4 @@
-"""Corrections of a sheet's first look, one after the other: each proposes a better one, or nothing.
+"""Correct a sheet's first segmentation step by step: each proposes a better one, or nothing.
 
 `./run bench split` runs the sheets with each of them left out.
 """
@@ -14,10 +14,10 @@ from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import (
     Blobs,
+    add_blocks,
     find_blobs,
-    find_mains,
-    with_blocks,
-    without_strangers,
+    find_main_blobs,
+    remove_strangers,
 )
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
@@ -25,7 +25,7 @@ from toonset.dataset.split.touching.cut import Cut, part_touching
 
 @dataclass(frozen=True, eq=False)
 class SheetState:
-    """What is known of a sheet so far, in cells.
+    """Segmentation of a sheet so far, in cells.
 
     Attributes:
         rgba: the sheet.
@@ -37,7 +37,7 @@ class SheetState:
         shadow: cells of cast shadows.
         paper: cells that the border reaches through background.
         blobs: patches of figures and other things.
-        bodies: numbers of the patches that are bodies of views; None: as `find_mains` says.
+        bodies: numbers of the patches that are bodies of views; None: as `find_main_blobs` says.
         cuts: where touching figures were cut apart.
     """
 
@@ -70,9 +70,9 @@ class SheetState:
         return cls(*known, paper, find_blobs(~paper))
 
     @property
-    def mains(self) -> Int[np.ndarray, " bodies"]:
+    def main_blobs(self) -> Int[np.ndarray, " bodies"]:
         """Return the numbers of the patches that are bodies of views."""
-        return find_mains(self.blobs) if self.bodies is None else self.bodies
+        return find_main_blobs(self.blobs) if self.bodies is None else self.bodies
 
 
 def remove_shadows(state: SheetState) -> SheetState | None:
@@ -80,7 +80,7 @@ def remove_shadows(state: SheetState) -> SheetState | None:
     if not len(state.blobs.areas):
         return None
     seen = state.rgba, state.ground, state.tolerance
-    shadow = find_shadows(state.blobs, state.mains, *seen)
+    shadow = find_shadows(state.blobs, state.main_blobs, *seen)
     if not shadow.any():
         return None
     paper = joined(~state.painted | state.ruled | shadow, state.ring)
@@ -96,14 +96,14 @@ def cut_touching_figures(state: SheetState) -> SheetState | None:
 
 def add_blocky_figures(state: SheetState) -> SheetState | None:
     """Propose rectangles as views that stand with the others in the same colours."""
-    mains = with_blocks(state.blobs, state.mains, state.painted, state.rgba[..., :3])
-    return replace(state, bodies=mains) if len(mains) > len(state.mains) else None
+    main_blobs = add_blocks(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
+    return replace(state, bodies=main_blobs) if len(main_blobs) > len(state.main_blobs) else None
 
 
 def drop_strangers(state: SheetState) -> SheetState | None:
     """Propose smaller figures in other colours, such as weapons, as no views."""
-    mains = without_strangers(state.blobs, state.mains, state.painted, state.rgba[..., :3])
-    return replace(state, bodies=mains) if len(mains) < len(state.mains) else None
+    main_blobs = remove_strangers(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
+    return replace(state, bodies=main_blobs) if len(main_blobs) < len(state.main_blobs) else None
 
 
 CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {

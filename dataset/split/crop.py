@@ -1,4 +1,4 @@
-"""Where each figure of a sheet stands and which pixels are its own, before its edge is softened."""
+"""Crop each figure of a sheet: its box and its own pixels, before the edge is matted."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LEAST_CELL_PX = 16  # pixels of paint in a cell of a grid: less is an empty cell
 
 @dataclass(frozen=True, eq=False)
 class Crop:
-    """Where a figure stands, and its pixels there.
+    """Box of a figure, and its pixels there.
 
     Attributes:
         box: (x, y, width, height) in the sheet, with a margin.
@@ -120,7 +120,7 @@ def _crop(
 
 
 def _tight(crop: Crop, shape: tuple[int, ...], margin: int) -> Crop | None:
-    """Return the crop around what it covers, with a margin; None if that is nothing."""
+    """Return the crop around its pixels, with a margin; None if it is empty."""
     rows, columns = (np.flatnonzero(crop.solid.any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return None

@@ -1,4 +1,4 @@
-"""Enclosed patches in the background's colour: holes, or white eyes, shirts and paper?
+"""Tell holes from white eyes, shirts and paper among patches in the background's colour.
 
 A picture alone cannot always tell; these rules say what is assumed. A patch is a hole (the gap
 between arm and body) if all of this holds:
@@ -104,7 +104,7 @@ def open_holes(
         enclosed: its patches in the background's colour.
         background: that colour behind the crop.
         outline: what the outlines of all figures of the sheet look like.
-        least_share: of the figure's area; a smaller patch is no hole.
+        least_share: of the figure's area; a smaller patch is not a hole.
     """
     area = int(mask.sum())
     if not enclosed.any() or int(enclosed.sum()) > LINE_ART * area:

@@ -1,4 +1,4 @@
-"""JPEG ripples: whether a sheet has them, and how far they reach.
+"""Detect JPEG compression of a sheet, and how far its ripples reach.
 
 They end at the borders of 8 x 8 blocks, in columns and rows that repeat; nothing drawn does that.
 Source: Z. Fan, R. L. de Queiroz, "Identification of bitmap compression history: JPEG detection and

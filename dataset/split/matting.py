@@ -1,4 +1,4 @@
-"""Cutting a figure out of a plain background: soft edge and pure colours.
+"""Matte a figure from a plain background: soft alpha and unmixed colours.
 
 A pixel of the edge is a mixture C = a F + (1 - a) B of the figure's colour F and the background B.
 F is found by walking inwards while the contrast to B still grows and C stays on the line from B to
@@ -17,7 +17,7 @@ SOFTEST_EDGE_PX = 3
 PURE = 0.95  # of the contrast: a layer of pixels that has it is no longer mixed
 GROWTH = 1.04  # of the contrast per step inwards: slower growth is shading, not an edge
 HARD_CONTRAST = 16  # levels: below it the figure is too like the background to divide
-OFF_LINE = 5.0  # levels, beyond the background's noise: farther off the line is no mixture
+OFF_LINE = 5.0  # levels, beyond the background's noise: farther off the line is not a mixture
 SHADED = 0.2  # of the contrast: so far the next pixel's colour may differ from that in the mixture
 STEPS = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
 
@@ -69,7 +69,7 @@ def cut_out(
     Returns:
         RGBA such that alpha * RGB + (1 - alpha) * background is the crop within a level, inside
         `mask`; alpha 0 outside of it. Where figure and background are too alike to divide, or the
-        pixel is no mixture of the two, alpha is 1.
+        pixel is not a mixture of the two, alpha is 1.
     """
     solid = mask.astype(np.uint8)
     rgba = np.dstack([rgb * solid[..., None], 255 * solid])

@@ -1,8 +1,8 @@
-"""Ruled lines of a sheet: frames round it or round each figure, tables, ground and height lines.
+"""Detect ruled lines: frames round the sheet or a figure, tables, ground and height lines.
 
 A line is a thin straight run with paper along most of it, or a row of dashes. It counts if it
 crosses most of the sheet, or if it closes a rectangle with other lines; so a spear, a belt or a
-letter is none.
+letter is not a ruled line.
 """
 
 from __future__ import annotations

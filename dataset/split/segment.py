@@ -1,4 +1,4 @@
-"""A look at the whole sheet: what is paint, what is paper, which figures stand where.
+"""Segment the whole sheet: foreground, background, and which figures stand where.
 
 Very large sheets are segmented on cells of a few pixels; cutting out
 (`toonset.dataset.split.sheet`) uses every pixel again.
@@ -29,7 +29,7 @@ PAINTED = 0.12  # of a cell: less is noise
 
 @dataclass(frozen=True, eq=False)
 class SheetLayout:
-    """What a look at the sheet found, in cells of `cell_px` pixels.
+    """Segmentation of a sheet, in cells of `cell_px` pixels.
 
     Attributes:
         cell_px: width and height of a cell.
@@ -74,7 +74,7 @@ def find_layout(
     ground: Background,
     without: Sequence[str] = (),
 ) -> SheetLayout:
-    """Return what stands where on a sheet; `without` names corrections that are left out.
+    """Segment a sheet; `without` names corrections that are left out.
 
     Raises:
         SheetError: there is no such correction.
@@ -98,7 +98,7 @@ def find_layout(
     for name, propose in CORRECTIONS.items():
         if name not in without:
             state = propose(state) or state
-    grouping = group_blobs(state.blobs, state.mains, state.rgba[..., :3])
+    grouping = group_blobs(state.blobs, state.main_blobs, state.rgba[..., :3])
     return SheetLayout(
         *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
         *(state.blobs, grouping, state.cuts),

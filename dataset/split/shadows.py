@@ -1,4 +1,4 @@
-"""Soft shadows that the figures cast on the ground: no part of the character.
+"""Detect soft shadows that the figures cast on the ground.
 
 A shadow is the paper, darker: every channel dimmed by one factor, without inner structure. Grey
 shoes are that, too, so a shadow must also lie as a shadow lies: in the lower half of its figure,
@@ -41,7 +41,7 @@ OPAQUE = 230  # alpha: and less opaque
 
 def find_shadows(
     blobs: Blobs,
-    mains: Int[np.ndarray, " mains"],
+    main_blobs: Int[np.ndarray, " main_blobs"],
     rgba: UInt8[np.ndarray, "height width 4"],
     ground: UInt8[np.ndarray, "height width 3"] | None,
     tolerance: int,
@@ -50,13 +50,13 @@ def find_shadows(
 
     Args:
         blobs: patches of paint, shadows included.
-        mains: numbers of those that are bodies of views.
+        main_blobs: numbers of those that are bodies of views.
         rgba: the sheet.
         ground: its background's colours; None where it is transparent: there a shadow is
             see-through black.
         tolerance: noise of the sheet in levels.
     """
-    looks = [(blobs.window(int(n)), blobs.mask(int(n))) for n in mains]
+    looks = [(blobs.window(int(n)), blobs.mask(int(n))) for n in main_blobs]
     lights = [
         see_through(rgba[window])
         if ground is None
@@ -71,7 +71,7 @@ def find_shadows(
         shadow = _shadow_of(body, dim, tone)
         found[window] |= shadow
         shaded += bool(shadow.any())
-    return found if shaded >= max(1.0, OFTEN * len(mains)) else np.zeros_like(found)
+    return found if shaded >= max(1.0, OFTEN * len(main_blobs)) else np.zeros_like(found)
 
 
 def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
@@ -223,7 +223,7 @@ def _stands_in(rest: Bool[np.ndarray, "height width"], shadow: np.ndarray, depth
 
 @dataclass(frozen=True, eq=False)
 class Dim:
-    """Where a picture is the paper with less light.
+    """Pixels that are the paper with less light.
 
     Attributes:
         mask: there.

@@ -1,4 +1,4 @@
-"""From a sheet to its views: find the background, the figures, their order; cut each one out.
+"""Split a sheet into its views: find background and figures, and cut each figure out.
 
 The cost grows with the number of pixels, plus a little per figure.
 """
@@ -13,14 +13,14 @@ from jaxtyping import Bool, UInt8
 from pydantic import Field
 
 from toonset.dataset.silhouettes.line_width import contour_width_px
-from toonset.dataset.split.background import Background, find_background, flattened, is_transparent
+from toonset.dataset.split.background import Background, find_background, flatten, is_transparent
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
 from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
-from toonset.dataset.split.warnings import border_doubts, figure_doubts
+from toonset.dataset.split.warnings import border_warnings, figure_warnings
 from toonset.errors import SheetError
 from toonset.view import Box, View
 
@@ -40,13 +40,13 @@ NAMES = {
 
 @dataclass(frozen=True)
 class SheetOptions:
-    """How a sheet is split.
+    """Options of splitting a sheet.
 
     Attributes:
         margin_px: empty pixels around every figure.
         least_hole: share of the figure's area from which an enclosed patch in the background's
             colour is a hole.
-        most_figures: more are refused; a sheet of letters or a pattern is no character sheet.
+        most_figures: more are refused; a sheet of letters or a pattern is not a character sheet.
         background_rgb: the background's colour, where a person knows it.
         boxes: (x, y, width, height) of the figures where a person gives them; one view each, in
             this order.
@@ -66,7 +66,7 @@ class SheetOptions:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something on the sheet that is no view.
+    """A patch of the sheet that is not a view.
 
     Attributes:
         box: (x, y, width, height) in the sheet.
@@ -87,7 +87,7 @@ class Segmentation:
         background: the sheet's colour; None where it is transparent.
         sure: share of the sheet's border that is background, 0 to 1.
         warnings: what a person should look at, for a view may be wrong.
-        left_out: what was seen but is no view.
+        left_out: what was seen but is not a view.
         remarks: what was done besides, for people.
     """
 
@@ -114,7 +114,7 @@ def split_picture(
     """
     options = options or SheetOptions()
     if options.background_rgb is not None or not is_transparent(rgba):
-        rgba = flattened(rgba)
+        rgba = flatten(rgba)
     ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
     found = find_layout(rgba, paint, ground, options.without)
@@ -126,7 +126,7 @@ def split_picture(
         tuple(views),
         ground.rgb,
         ground.sure,
-        border_doubts(ground, found) + (() if by_hand else figure_doubts(found, views, rgba)),
+        border_warnings(ground, found) + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
     )
@@ -212,7 +212,7 @@ def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View
 
 
 def _left_out(found: SheetLayout) -> tuple[LeftOut, ...]:
-    """Return what was seen but is no view, words as one each."""
+    """Return the patches that are not views, words as one each."""
     boxes = [(line.box, "frame") for line in found.lines]
     kinds = np.array(found.grouping.kinds, dtype=object)
     for kind in NAMES:

@@ -1,4 +1,4 @@
-"""What a person should look at after a sheet was split, for a view may be wrong."""
+"""Warn of views that may be cut wrongly."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ NEARER = 1.2  # times the gap between parts and their bodies: so near a part may
 WIDE = 1.8  # times the median width: two figures that touch
 
 
-def border_doubts(ground: Background, found: SheetLayout) -> tuple[str, ...]:
+def border_warnings(ground: Background, found: SheetLayout) -> tuple[str, ...]:
     """Return a line if the background is hardly one."""
     if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:  # a frame explains it
         return ()
     return (f"only {100 * ground.sure:.0f} % of the sheet's border is background",)
 
 
-def figure_doubts(
+def figure_warnings(
     found: SheetLayout, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
 ) -> tuple[str, ...]:
     """Return a line for every cut in doubt, every wide view, all left out that may be views."""

@@ -1,1 +1,1 @@
-"""Sheets as files: load and cut them, the folder of `toonset split`, corrections by hand."""
+"""Read sheets, read and write split folders, apply corrections by hand."""

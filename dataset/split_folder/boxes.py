@@ -1,4 +1,4 @@
-"""Boxes by hand: where the figures of a sheet stand, from a JSON or a CSV file.
+"""Read figures' boxes from a JSON or CSV file.
 
 JSON, any of:
 
@@ -36,7 +36,7 @@ def read_boxes(path: Path) -> tuple[tuple[Box, ...], ...]:
     Only the split.json of several sheets speaks of more than one.
 
     Raises:
-        SheetError: the file is missing, broken or without boxes, or a box is none.
+        SheetError: the file is missing, broken or without boxes, or a box is invalid.
     """
     data = read_whole(path, "boxes", SheetError, MAX_BYTES)
     if data.removeprefix(BOM).lstrip()[:1] in (b"[", b"{"):
@@ -164,7 +164,7 @@ def _box(where: str, entry: object) -> Box:
 
 
 def _numbers(entry: object) -> list[float]:
-    """Return what an entry's numbers are; none where it is no box."""
+    """Return an entry's numbers; empty if it is not a box."""
     if isinstance(entry, dict):
         named = {SHORT.get(key, key): value for key, value in entry.items()}
         entry = named.get("box", [named.get(name) for name in COLUMNS])

@@ -1,4 +1,4 @@
-"""What is odd about files that are read together, and what is wrong with a split folder."""
+"""Check files that are read together, and split folders."""
 
 from __future__ import annotations
 

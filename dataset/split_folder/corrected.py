@@ -1,7 +1,7 @@
-"""Corrections and the sheet that they belong to: which sheet, which view, what they change.
+"""Match corrections to a sheet's views by their boxes.
 
 A view is found again by its box, whatever its number has become: of all pairs the one that overlaps
-most comes first, each box and each view once, and less than half is no match.
+most comes first, each box and each view once, and less than half is not a match.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class Given:
         return without(replace(split, views=tuple(views)), dropped), tuple(notes)
 
     def of_views(self, views: Sequence[View]) -> tuple[ViewCorrection | None, ...]:
-        """Return what is said of each view; None where nothing is.
+        """Return each view's correction; None without one.
 
         Args:
             views: of one or more sheets, without those that are excluded.

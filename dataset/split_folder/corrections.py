@@ -1,4 +1,4 @@
-"""corrections.json: everything a person corrected of one sheet, in one file.
+"""Read and write corrections.json: everything a person corrected of one sheet.
 
     {"version": 1,
      "sheet": {"name": "sheet.png", "sha256": "...", "size": [1600, 400]},
@@ -55,7 +55,7 @@ Size = Annotated[float, Field(gt=0, le=1e6)]
 
 @dataclass(frozen=True)
 class SheetName:
-    """Which sheet a file of corrections belongs to.
+    """Name and hash of the sheet that corrections belong to.
 
     Attributes:
         name: its file name.
@@ -103,7 +103,7 @@ class PointPair:
 
 @dataclass(frozen=True)
 class ViewCorrection:
-    """What a person said of one view.
+    """Corrections of one view.
 
     Attributes:
         box: (x, y, width, height) of its figure in the sheet.
@@ -157,7 +157,7 @@ _SCHEMA: TypeAdapter[Corrections] = TypeAdapter(Corrections)
 
 
 def read_corrections(path: str | Path) -> Corrections:
-    """Return what a corrections.json says.
+    """Read a corrections.json.
 
     Raises:
         SheetError: the file cannot be read, is larger than 8 MB, or says what cannot be meant.
@@ -167,7 +167,7 @@ def read_corrections(path: str | Path) -> Corrections:
 
 
 def parse_corrections(data: bytes, where: str) -> Corrections:
-    """Return what the bytes of a corrections.json say.
+    """Parse the bytes of a corrections.json.
 
     Args:
         data: of the file.
@@ -194,7 +194,7 @@ def parse_corrections(data: bytes, where: str) -> Corrections:
 
 
 def corrections_json(corrections: Corrections) -> dict[str, Any]:
-    """Return the content of a corrections.json; what says nothing is left out."""
+    """Return the content of a corrections.json; empty entries are left out."""
     said = _SCHEMA.dump_python(corrections, mode="json", exclude_defaults=True)
     return {"version": VERSION, **said}
 

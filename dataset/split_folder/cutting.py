@@ -1,4 +1,4 @@
-"""What a person says about how sheets are cut, as typed."""
+"""Define the options of how sheets are cut, as a person types them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 from toonset.errors import PaletteError, SheetError, UsageError
 from toonset.palette.formats.hex import rgb_of_typed
 
-MOST_CELLS = 1000  # a sheet of letters or a tile map is no character sheet
+MOST_CELLS = 1000  # a sheet of letters or a tile map is not a character sheet
 
 
 @dataclass(frozen=True)
 class Cutting:
-    """How sheets are cut.
+    """Options of how sheets are cut.
 
     Attributes:
         boxes: file of boxes.
@@ -34,7 +34,7 @@ class Cutting:
 
         Raises:
             UsageError: both boxes and a grid.
-            SheetError: a word that is no number, colour or grid.
+            SheetError: a word that is not a number, colour or grid.
         """
         if self.boxes is not None and self.grid:
             raise UsageError("--boxes and --grid both say where the figures are; drop one")

@@ -24,7 +24,7 @@ from toonset.dataset.split_folder.cutting import Cutting
 from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
-from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
+from toonset.dataset.split_folder.views import Split, join_splits, split_of_sheet, without
 from toonset.errors import PictureError, SheetError, UsageError
 from toonset.palette.names import rgb_of_hex
 from toonset.read import read_whole
@@ -67,7 +67,7 @@ class Sheet:
 
         All warnings count: of the splitter (figures that touch or are cut, a background that is
         not plain) and of the files (copies, cells that do not divide the sheet, a changed folder).
-        What was left out of a sheet (text, frames, specks, dropped views) is no warning: it is
+        What was left out of a sheet (text, frames, specks, dropped views) is not a warning: it is
         ordinary, and the overlay shows it. Nor is what a split folder says of its sheets: a person
         has had the chance to look.
         """
@@ -100,7 +100,7 @@ def split_sheet(
         corrections: file of what a person corrected of one of the sheets (docs/formats.md).
 
     Raises:
-        ToonsetError: a file is no picture or shows no figure, is given twice, a split folder is
+        ToonsetError: a file is not a picture or shows no figure, is given twice, a split folder is
             broken, or an argument cannot be understood or does not fit the sheets.
     """
     paths = [sheet] if isinstance(sheet, str | Path) else sheet
@@ -252,7 +252,7 @@ def _uneven_cells(
 
 
 def _joined(parts: Sequence[Sheet]) -> Sheet:
-    split = joined([part.split for part in parts])
+    split = join_splits([part.split for part in parts])
     return Sheet(
         split,
         len(split.views),

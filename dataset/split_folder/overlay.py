@@ -1,4 +1,4 @@
-"""The picture that shows what was found on sheets, for people to see every wrong cut."""
+"""Draw the overlay of a split: sheets with what was found on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One sheet with what was found on it: figures in their colours, outlines, numbered boxes.
+"""Draw one sheet with its figures coloured, outlined and numbered.
 
 All but the figures is faded towards the background. Neighbouring figures have different colours,
 so that a part that went to the wrong one shows. What was left out has an orange box with its kind.
@@ -23,7 +23,7 @@ ENLARGED = 1600  # pixels: a small sheet is enlarged to at most this height
 LARGEST_ZOOM = 8  # of a sprite
 MARGIN, HEAD = 20, 104  # pixels round a sheet; above it, where the tags of its first row fit
 OUTLINE = 2  # pixels, of the line along a mask
-FADE = 0.6  # of what is no figure, towards the background
+FADE = 0.6  # of what is not a figure, towards the background
 CHECK_PX = 12  # of the chequers that stand for see-through
 # tell apart with colour-blind eyes: blue, green, purple; orange is for what was left out
 FIGURES: tuple[Rgb, ...] = ((0, 90, 200), (0, 135, 90), (150, 40, 160))
@@ -42,7 +42,7 @@ class Panel:
         background: its colour; None where it is transparent.
         views: what was cut from it.
         labels: one per view; "" for none.
-        left_out: what was seen in it but is no view.
+        left_out: what was seen in it but is not a view.
     """
 
     title: str

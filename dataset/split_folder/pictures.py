@@ -1,4 +1,4 @@
-"""The pictures of one character: of a bundle, a split folder, other folders, or loose files."""
+"""Load one character's pictures: of a bundle, a split folder, other folders, or loose files."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a picture lies.
+    """Place of a picture in its sheet.
 
     Attributes:
         sheet: the picture that it was cut from.

@@ -1,4 +1,4 @@
-"""Which files and folders a command's arguments mean.
+"""Resolve which files and folders a command's arguments mean.
 
 - a file is a sheet; one figure is fine, so "one file per view" needs nothing special;
 - a folder with a split.json is what `toonset split` wrote, perhaps corrected by hand;

@@ -1,4 +1,4 @@
-"""Reading a split folder back, after a person may have corrected it.
+"""Read a split folder back, after a person may have corrected it.
 
 images/ says which views there are, in the natural order of their names, and what they show;
 split.json only knows where a picture came from. When both disagree:

@@ -1,4 +1,4 @@
-"""Where to write on a picture of figures so that no figure is covered.
+"""Place labels on a picture of figures so that no figure is covered.
 
 A tag is tried in several layouts, the fullest first, at places round and within its box. The first
 layout that covers no figure is taken. Where none is free, the smallest goes where it covers least;
@@ -35,7 +35,7 @@ Layout = tuple[Line, ...]
 
 
 class Costs:
-    """What must not be covered, as a cost per pixel of the picture."""
+    """Cost per pixel of covering the picture."""
 
     def __init__(self, height: int, width: int) -> None:
         """Start with a picture where everything may be covered."""

@@ -1,4 +1,4 @@
-"""What a person says about the views: `front,3q,side,back`, yaws in degrees, or "?" for unknown."""
+"""Parse view labels: `front,3q,side,back`, yaws in degrees, or "?" for unknown."""
 
 from __future__ import annotations
 

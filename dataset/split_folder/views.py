@@ -1,4 +1,4 @@
-"""The views of one or more sheets together, and where each was cut from."""
+"""Join the views of one or more sheets, with where each was cut from."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Source:
         size_wh: pixels.
         background: its colour; None where it is transparent.
         warnings: what was doubtful in it, for people.
-        left_out: what was seen in it but is no view.
+        left_out: what was seen in it but is not a view.
         remarks: what was done besides, for people.
     """
 
@@ -75,7 +75,7 @@ def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segm
     return Split((source,), sheet.views, (0,) * len(sheet.views))
 
 
-def joined(parts: Sequence[Split]) -> Split:
+def join_splits(parts: Sequence[Split]) -> Split:
     """Return several splits as one, views numbered through."""
     sources: list[Source] = []
     views: list[View] = []

@@ -1,4 +1,4 @@
-"""A split sheet on disk: what `toonset split` found, for people to look at and to correct.
+"""Write a split folder, for people to look at and to correct.
 
     images/000.png     RGBA crops, straight alpha
     split.json         which sheet each was cut from, where it stood, its line width and label
@@ -118,7 +118,7 @@ def write_split(
 
 
 def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ...]]:
-    """Return what split.json says of the sheets and of the views.
+    """Read split.json's records of sheets and views.
 
     Raises:
         SheetError: the file is missing, of another version, broken, or speaks of a sheet that it

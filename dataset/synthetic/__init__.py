@@ -1,1 +1,1 @@
-"""Draw synthetic turnarounds with their exact truth."""
+"""Draw synthetic turnarounds with their ground truth."""

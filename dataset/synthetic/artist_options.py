@@ -1,4 +1,4 @@
-"""What artists do besides drawing smoothly wrong, each with its size; 0 is none of it.
+"""Define the sizes of what artists do besides smooth drawing errors; 0 leaves one out.
 
 No heavy imports: the command line reads the defaults.
 """
@@ -25,7 +25,7 @@ def check_ranges(options: object, limits: Mapping[str, tuple[float, float]]) -> 
 
 @dataclass(frozen=True)
 class BodyErrors:
-    """How far the body of one drawing is another than the mesh; see `body_error`.
+    """Sizes of the errors of one drawing's body; see `body_error`.
 
     Attributes:
         head_turn_deg: the head is turned about the neck by up to this, and tilted by half of it.
@@ -63,7 +63,7 @@ class BodyErrors:
 
 @dataclass(frozen=True)
 class ArtistOptions:
-    """What artists do besides; `SynthOptions` has the rest of a drawing.
+    """Sizes of what artists do besides; `SynthOptions` has the rest of a drawing.
 
     Attributes:
         body: every drawing shows another body.

@@ -1,4 +1,4 @@
-"""The error of a hand that draws another body in every view: in space, before the camera looks.
+"""Deform the body as an artist who draws another one in every view.
 
 Head and arms turn about their joints, the face is pulled round the head towards the viewer, and
 all points move by a smooth field of plane waves,

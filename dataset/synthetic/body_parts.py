@@ -1,4 +1,4 @@
-"""Where a mesh has its head and arms: by its landmarks, or by the names of its parts.
+"""Find a mesh's head and arms by its landmarks, or by the names of its parts.
 
 With landmarks every vertex belongs to the nearest bone (the segment between two of them) and the
 bones of head and arms are what moves. Without, parts are taken by the words of their names
@@ -32,7 +32,7 @@ Bone = tuple[Point, Point]
 
 @dataclass(frozen=True, eq=False)
 class Limb:
-    """What turns about a joint.
+    """Part of a body that turns about a joint.
 
     Attributes:
         joint: world coordinates.
@@ -45,7 +45,7 @@ class Limb:
 
 @dataclass(frozen=True, eq=False)
 class BodyParts:
-    """What is known of a body; None and () where it is not."""
+    """Head and arms of a body; None and () where unknown."""
 
     head: Limb | None = None
     arms: tuple[Limb, ...] = ()

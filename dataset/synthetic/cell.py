@@ -1,4 +1,4 @@
-"""One cell of a synthetic turnaround: a body that a camera sees, as one hand draws it."""
+"""Draw one cell of a synthetic turnaround: one body, one camera, one hand."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Cell:
 def draw_cell(
     mesh: Mesh, paints: Paints, camera: Camera, jump: float, options: SynthOptions, hand: Hand
 ) -> Cell:
-    """Return what one hand draws of a body.
+    """Draw a body as one hand does.
 
     While it is drawn, colours in shadow are labels of their own, after those in light.
 

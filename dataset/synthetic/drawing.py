@@ -1,4 +1,4 @@
-"""From labels and depth to a drawing: contour lines, flat colours, anti-aliasing.
+"""Draw contour lines and flat, antialiased colours from labels and depth.
 
 Lines are centred on the edge they draw. All work happens on a picture `supersample` times larger;
 colours are averaged there with premultiplied alpha.

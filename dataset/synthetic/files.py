@@ -1,4 +1,4 @@
-"""A synthetic turnaround on disk.
+"""Write a synthetic turnaround to disk.
 
 sheet.png           the drawn sheet; sheet.jpg where it is a JPEG
 views/000.png ..    its cells on transparent ground, with transforms.json (exact cameras)
@@ -82,7 +82,7 @@ def _write_views(turnaround: Turnaround, folder: Path) -> None:
 
 
 def truth_dict(turnaround: Turnaround) -> dict[str, Any]:
-    """Return what is true of a turnaround, as truth.json holds it.
+    """Return a turnaround's ground truth, as truth.json holds it.
 
     Per view: `name`, `cell_box` and `figure_box` (x, y, width, height in the sheet, px),
     `yaw_deg`, and `camera` (exact, OpenCV axes, in pixels of the cell). Where artists do what

@@ -1,4 +1,4 @@
-"""Parts of a mesh that keep facing the viewer, as cartoonists cheat ears and noses."""
+"""Turn parts of a mesh to the viewer, as cartoonists cheat ears and noses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exact label and depth pictures of a mesh, drawn off-screen; the only module that uses pyrender.
+"""Render exact label and depth pictures of a mesh off-screen; the only user of pyrender.
 
 `toonset.camera.Camera` as an OpenGL projection, for both kinds of camera at once: with the camera's
 frame in the target (x right, y down, z forward), image size (w, h) and centre (cu, cv),
@@ -37,7 +37,7 @@ INSTALL = (
 
 @dataclass(frozen=True, eq=False)
 class LabelPicture:
-    """What a camera sees, one sample per pixel centre, hard edges.
+    """Rendered labels and depth, one sample per pixel centre, hard edges.
 
     Attributes:
         labels: (height, width) label of the nearest face, 255 = nothing.

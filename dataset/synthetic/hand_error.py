@@ -1,11 +1,11 @@
-"""The errors of a hand in the picture: a smooth random displacement, and pens that swell.
+"""Add errors of a hand to a picture: a smooth random displacement, pens that swell.
 
 The displacement is a sum of cosines that fit 1 to 3 half waves into the cell, per axis,
 
     d(x, y) = sum over i, j in 0..3, not both 0, of a_ij cos(pi i x) cos(pi j y),   x, y in [0, 1],
 
 a_ij normal with deviation 1 / (i + j): proportions drift over a body part, lines stay smooth. Its
-mean over the figure is removed (a shift is no error of a drawing) and its size set exactly.
+mean over the figure is removed (a shift is not an error of a drawing) and its size set exactly.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where the cells of a synthetic sheet lie, and the sheet made of them."""
+"""Lay out the cells of a synthetic sheet, and paste them."""
 
 from __future__ import annotations
 

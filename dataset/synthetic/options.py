@@ -1,4 +1,4 @@
-"""What a synthetic turnaround looks like. No heavy imports: the command line reads the defaults."""
+"""Define the options of a synthetic turnaround. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class SynthOptions:
         """Refuse what cannot be drawn.
 
         Raises:
-            SheetError: a number is out of its range, the background is no colour, or there is no
+            SheetError: a number is out of its range, the background is not a colour, or there is no
                 paper for what would be on it.
         """
         limits = {

@@ -1,4 +1,4 @@
-"""What is on a sheet besides the figures: captions below them, and the grain of the paper."""
+"""Add captions and paper grain to a sheet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A two-tone shadow whose light stands still beside the camera, and colours that are a view's own.
+"""Shade a view in two tones with a light beside the camera, and vary its colours.
 
 A pixel is in shadow where its surface's normal n and the direction l to the light, both in camera
 axes, have n . l < LEAST_LIT; normals are smoothed a little, as a brush is wider than a facet.
@@ -24,7 +24,7 @@ Rgb = UInt8[np.ndarray, "colors 3"]
 
 
 def shadow_mask(mesh: Mesh, camera: Camera) -> Bool[np.ndarray, "height width"]:
-    """Return which of a camera's pixels are in shadow; unspecified where there is no body."""
+    """Return which of a camera's pixels are in shadow; unspecified outside of the body."""
     depth, normals = depth_and_normals(mesh.vertices, mesh.faces, camera)
     there = np.isfinite(depth).astype(np.float32)
     lit = (normals @ np.array(TO_LIGHT)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Synthetic turnarounds: sheets of any mesh, drawn like a cartoon, with their exact truth.
+"""Draw a synthetic turnaround of any mesh, with its ground truth.
 
 One generator feeds tests, benchmarks and examples. Every view is drawn from labels and depth of
 `toonset.dataset.synthetic.gl_render`: flat colours, black contours, then the errors of a hand:

@@ -1,1 +1,1 @@
-"""Radiance fields: triplane, and what it is compared with."""
+"""Define radiance fields: the triplane field, its base class and the palette classifier."""

@@ -1,4 +1,4 @@
-"""What every field has in common, so that one trainer and one renderer serve them all.
+"""Define the interface that all fields share, so that one trainer and one renderer serve them.
 
 A field maps points to density and colour. In training the same points come again and again, so a
 field splits the work: `constants` is what depends on the points alone and is computed once,
@@ -24,7 +24,7 @@ DENSITY_SHIFT = math.log(math.expm1(OPAQUE_AT_START))  # softplus of it is the a
 
 
 class Constants(Protocol):
-    """What a field precomputes about points."""
+    """Precomputed values of a field at points."""
 
     def to(self, device: torch.device) -> Self:
         """Return them on a device."""
@@ -48,11 +48,11 @@ class Field(nn.Module, ABC):
     Colour does not depend on the viewing direction: a drawing has no highlights that move.
     """
 
-    decoder_rate = 0.05  # Adam's, for everything that is no table
+    decoder_rate = 0.05  # Adam's, for everything that is not a table
 
     @abstractmethod
     def constants(self, points_world: Float[Tensor, "n 3"]) -> Constants:
-        """Return what depends on the points alone."""
+        """Precompute what depends on the points alone."""
 
     @abstractmethod
     def shade(self, constants: Constants) -> tuple[Float[Tensor, " n"], Float[Tensor, "n 3"]]:

@@ -1,4 +1,4 @@
-"""The palette classifier: from a rendered colour to a palette label."""
+"""Classify rendered colours into palette labels."""
 
 from __future__ import annotations
 

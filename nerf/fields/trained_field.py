@@ -1,4 +1,4 @@
-"""A field that can be rendered, with all that its renderings need."""
+"""Hold a trained field with all that rendering it needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The triplane field: three feature planes, summed, and a small decoder.
+"""Define the triplane field: three feature planes, summed, and a small decoder.
 
     f(x) = P_xy(x, y) + P_xz(x, z) + P_yz(y, z)       bilinear on each plane
     (density, rgb) = decoder(f)                        two layers

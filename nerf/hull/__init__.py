@@ -1,1 +1,1 @@
-"""The body that drawings show: their visual hull, or the mannequin where that is it."""
+"""Estimate the drawn body: its visual hull, or the mannequin where that is the body."""

@@ -1,4 +1,4 @@
-"""The fairest surface inside a visual hull that still touches every outline ray.
+"""Fair a visual hull: the smoothest surface inside it that touches every outline ray.
 
 Between the drawn views a visual hull is too large: eight views of a cylinder carve an octagon, 8 %
 wider at its corners. A body is rounder than that. Among all surfaces inside the hull that touch
@@ -33,7 +33,7 @@ from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.nerf.hull.fairing_fit import Contacts, fit
-from toonset.nerf.hull.hull import LEVEL, Hull, grown
+from toonset.nerf.hull.hull import LEVEL, Hull, grow
 from toonset.nerf.hull.march import Rays, march, rays_of
 from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.kernels.volume import Volume, trilinear
@@ -73,7 +73,7 @@ def fair_hull(
     fair = fit(outside, _contacts(hull, factor, outside, cameras, alphas), len(cameras))
     x, y, z = hull.support.shape
     fine = F.interpolate(fair[None, None], scale_factor=factor, mode="trilinear")[0, 0, :x, :y, :z]
-    smooth = (LEVEL - SLOPE * factor * fine).clamp_(0, 1).minimum(grown(hull.support, reach))
+    smooth = (LEVEL - SLOPE * factor * fine).clamp_(0, 1).minimum(grow(hull.support, reach))
     sure = [
         _shrunk(alpha, math.ceil(slack * hull.voxel * camera.scale))
         for camera, alpha in zip(cameras, alphas, strict=True)
@@ -81,7 +81,7 @@ def fair_hull(
     kept = _lost(replace(hull, support=smooth), fine, hull, cameras, sure)
     if slack < 1:  # the hull of drawings that disagree has shards which no drawing shows
         kept |= sheets(hull, factor)
-    return replace(hull, support=torch.where(grown(kept, 1), smooth.maximum(hull.support), smooth))
+    return replace(hull, support=torch.where(grow(kept, 1), smooth.maximum(hull.support), smooth))
 
 
 def _padded(hull: Hull, voxels: int) -> Hull:
@@ -182,7 +182,7 @@ def signed_distance(hull: Hull, factor: int) -> Volume:
     sides = [partial(squared_distance, part, reach) for part in (inside, ~inside)]
     outer, inner = (squared.float().sqrt_() for squared in side_by_side(sides))
     distance = torch.where(inside, 0.5 - inner, outer - 0.5)
-    beside = grown(inside, 1) & grown(~inside, 1)  # all with a distance below BESIDE, and no other
+    beside = grow(inside, 1) & grow(~inside, 1)  # all with a distance below BESIDE, and no other
     distance[beside] = _between(support, beside, distance[beside])
     return F.avg_pool3d(distance[None] / factor, factor)[0].clamp_(-REACH, REACH)
 

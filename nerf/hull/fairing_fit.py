@@ -1,4 +1,4 @@
-"""The surface that bends least among those that touch every outline ray: the minimiser.
+"""Minimise the fairing energy with Adam and an analytic gradient.
 
 The energy is that of `fairing`, with its gradient written down: the volume is linear in what Adam
 moves, so the gradient is a few more linear operations.
@@ -27,7 +27,7 @@ BAND = 5.0  # coarse voxels from the hull's surface within which bending counts
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Where outline rays may touch the surface.
+    """Places where outline rays may touch the surface.
 
     Attributes:
         rows: (n, 8) the voxels round a point, as numbers in the flat volume; packed ray after ray.

@@ -1,4 +1,4 @@
-"""The visual hull: the part of space that the drawings agree may be filled.
+"""Carve the visual hull: the part of space that the drawings' masks leave.
 
 support(x) = the (missing + 1)-th smallest over the views of alpha_v(project_v(x))
 
@@ -75,13 +75,13 @@ class Hull:
     @cached_property
     def near(self) -> Bool[Tensor, "x y z"]:
         """Return the voxels in which the trilinear support can reach EDGE."""
-        return grown(self.support >= EDGE, 1)
+        return grow(self.support >= EDGE, 1)
 
     @cached_property
     def blocks(self) -> Bool[Tensor, "bx by bz"]:
         """Return the blocks of BLOCK voxels that are, or touch, one with a near voxel."""
         pooled = F.max_pool3d(self.near[None, None].float(), BLOCK, ceil_mode=True)
-        return grown(pooled[0, 0] > 0, 1)
+        return grow(pooled[0, 0] > 0, 1)
 
     def cell_index(
         self, points_world: Float[Tensor, "n 3"], shape: torch.Size, edge: int
@@ -110,7 +110,7 @@ def occupancy(support: Float[Tensor, " n"]) -> Float[Tensor, " n"]:
     return (support / FULL).clamp(0, 1)
 
 
-def grown(volume: Shaped[Tensor, "x y z"], by: int) -> Shaped[Tensor, "x y z"]:
+def grow(volume: Shaped[Tensor, "x y z"], by: int) -> Shaped[Tensor, "x y z"]:
     """Return the largest value (of cells: whether any is set) within `by` cells along every axis.
 
     By shifted copies: thirty times faster than `max_pool3d`.

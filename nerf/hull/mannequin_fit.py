@@ -1,4 +1,4 @@
-"""Whether the mannequin is the body that was drawn: which predicts a left-out drawing better?
+"""Test whether the mannequin is the drawn body, by predicting left-out drawings.
 
 Every drawing's outline is compared with the mannequin's, and with that of the visual hull of the
 other drawings. Where the mannequin's lies nearer, it knows more of the body than the drawings tell
@@ -42,7 +42,7 @@ Alpha = Float[np.ndarray, "height width"]
 
 @dataclass(frozen=True)
 class MannequinFit:
-    """How far predicted outlines lie from drawn ones, in shares of the figure's `Square`.
+    """Distances of predicted outlines from drawn ones, in shares of the figure's `Square`.
 
     Attributes:
         mannequin: root mean square distance of the mannequin's; mean of the drawings.

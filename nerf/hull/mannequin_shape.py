@@ -1,4 +1,4 @@
-"""A mannequin's surface, small enough for a run folder, and what a camera sees of it."""
+"""Store a mannequin's surface in a run, and rasterise it for a camera."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ BESIDE_PX = 2  # pixels of room round what is seen
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
-    """What a camera sees of a shape.
+class ShapeView:
+    """A camera's picture of a shape.
 
     Attributes:
         camera: that looks.
@@ -84,8 +84,8 @@ class Shape:
             sides.append(slice(first, last))
         return sides[0], sides[1]
 
-    def seen(self, camera: Camera, *, normals: bool = False) -> Sight:
-        """Return what a camera sees of the shape; with `normals`, which way its faces look."""
+    def seen(self, camera: Camera, *, normals: bool = False) -> ShapeView:
+        """Rasterise the shape for a camera; with `normals`, its faces' normals, too."""
         width, height = camera.size_wh
         depth = depth_map(self.vertices, self.faces, camera.resized(FINER))
         fine = _grown(
@@ -103,7 +103,7 @@ class Shape:
                     ~there, return_distances=False, return_indices=True
                 )
                 normal = np.where((cover > 0)[..., None], normal[tuple(np.asarray(at))], 0)
-        return Sight(camera, cover, fine[middle, middle], fine, normal)
+        return ShapeView(camera, cover, fine[middle, middle], fine, normal)
 
 
 def shape_of(mesh: Mesh, cameras: Sequence[Camera]) -> Shape:

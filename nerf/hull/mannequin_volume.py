@@ -1,4 +1,4 @@
-"""A mannequin as a hull: the space that its surface encloses."""
+"""Convert a mannequin to a hull: the space that its surface encloses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples along rays, kept only inside the hull.
+"""March along rays, and keep the samples inside the hull.
 
 Rays are cut into steps of one fixed length; a step's middle is a sample if the hull's support
 reaches a level there. Marching runs on two grids: blocks of voxels first, voxels then.
@@ -188,7 +188,7 @@ def _march_chunk(rays: Rays, hull: Hull, step: float, most: int, level: float) -
 
 @dataclass(frozen=True, eq=False)
 class _Lattice:
-    """Where samples of some rays may lie; see `march` for the arguments.
+    """Candidate samples of some rays; see `march` for the arguments.
 
     Attributes:
         rays: the rays.

@@ -1,4 +1,4 @@
-"""The shape that the drawings' silhouettes ask for, from a scene to its hull."""
+"""Compute a scene's shape: carve, fair and store its hull."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from toonset.dataset.bundle.scene import Scene
-from toonset.dataset.silhouettes.mask import alpha_of, figure_px, widened
+from toonset.dataset.silhouettes.mask import alpha_of, figure_px, widen_thin_parts
 from toonset.errors import BundleError
 from toonset.nerf.hull.fairing import fair_hull
 from toonset.nerf.hull.hull import Hull, carve
@@ -45,7 +45,7 @@ def hull_of(
     missing = options.missing_views
     evidence = HullEvidence(missing, ()) if missing is not None else choose_missing(cameras, alphas)
     voxels = per_px(scene, VOXELS_PER_PX, VOXELS)
-    wide = [torch.as_tensor(widened(alpha.numpy())) for alpha in alphas]
+    wide = [torch.as_tensor(widen_thin_parts(alpha.numpy())) for alpha in alphas]
     hull = carve(cameras, wide if len(frames) >= WIDE_FROM else alphas, voxels, evidence.missing)
     slack = SLACK * apart_px / (hull.voxel * max(camera.scale for camera in cameras))
     hull = fair_hull(hull, cameras, alphas, slack) if options.fairing else hull

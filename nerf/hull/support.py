@@ -1,4 +1,4 @@
-"""What views say about points of the world: where they appear, and how covered it is there."""
+"""Sample the views' alpha at points of the world, and how far the views agree."""
 
 from __future__ import annotations
 

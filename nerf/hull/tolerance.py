@@ -1,4 +1,4 @@
-"""Which hull the drawings themselves ask for: leave one view out and predict its mask."""
+"""Choose how many views may contradict the hull, by predicting left-out masks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FEWEST_VIEWS = 4  # with fewer there is no majority to trust
 
 @dataclass(frozen=True)
 class HullEvidence:
-    """How well hulls of the other views predict a view's mask.
+    """Evidence of how well hulls of the other views predict a view's mask.
 
     Attributes:
         missing: the choice: views that may say "background" at a point inside.

@@ -1,1 +1,1 @@
-"""Fast numerics: interpolation, compositing, decoder, losses, threads."""
+"""Compute fast numerics: interpolation, compositing, decoder, losses, threads."""

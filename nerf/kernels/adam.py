@@ -1,4 +1,4 @@
-"""Adam in public tensor operations.
+"""Run Adam in public tensor operations.
 
 `torch.optim` has the same, but imports torch's compiler, `torch._dynamo`, as soon as an optimiser
 is made (docs/decisions.md).

@@ -1,4 +1,4 @@
-"""Differentiable volume rendering: samples packed ray after ray, or as many on every ray."""
+"""Composite samples by differentiable volume rendering: packed, or as many on every ray."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def compositing_weights(
     return torch.exp(-before) * -torch.expm1(-optical_depth)
 
 
-def padded(
+def pad(
     packed: Float[Tensor, "n channels"],
     ray: Int[Tensor, " n"],
     order: Int[Tensor, " n"],

@@ -1,4 +1,4 @@
-"""The decoder's two layers, with the gradient written down.
+"""Evaluate the decoder's two layers, with the gradient written down.
 
 Samples go through both layers in parts, so that the hidden values of a part are still in cache
 when the second layer, or the other product of the gradient, reads them.

@@ -1,4 +1,4 @@
-"""Bilinear interpolation as a sparse matrix.
+"""Interpolate bilinearly by a sparse matrix.
 
 The features of all planes lie in one table; a sample reads 12 of its rows (4 corners of 3 planes):
 

@@ -1,4 +1,4 @@
-"""The terms of the training loss."""
+"""Compute the terms of the training loss."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def straight(
 def cross_entropy(
     logits: Float[Tensor, "rays colors"], labels: Int[Tensor, " rays"]
 ) -> Float[Tensor, ""]:
-    """Return the mean cross-entropy over labelled rays, 0 if there is none."""
+    """Return the mean cross-entropy over labelled rays, 0 without labels."""
     known = labels != UNLABELLED
     return F.cross_entropy(logits[known], labels[known]) if bool(known.any()) else logits.sum() * 0
 

@@ -1,4 +1,4 @@
-"""How many CPU threads training may use, and what they do at the same time.
+"""Run training's work on two threads side by side.
 
 Torch shares single operations among threads, and a step's are too short for that: two threads are
 slower than one. So two threads work side by side instead, each on its own half of a step, of the
@@ -22,7 +22,7 @@ SIDES = 2  # threads that work side by side, the calling one included
 
 
 class _Team(threading.local):
-    """What works beside the calling thread, if anything; the others of a team have none."""
+    """Worker beside the calling thread, if any; the others of a team have none."""
 
     pool: ThreadPoolExecutor | None = None
 

@@ -1,4 +1,4 @@
-"""Linear operations on volumes, and their transposes."""
+"""Apply linear operations to volumes, and their transposes."""
 
 from __future__ import annotations
 

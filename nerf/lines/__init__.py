@@ -1,1 +1,1 @@
-"""Take contour lines off the drawings."""
+"""Find the drawings' contour lines, and the depth steps that have one."""

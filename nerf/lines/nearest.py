@@ -1,4 +1,4 @@
-"""Marked pixels: how far the nearest is, which one it is, and which of them hang together."""
+"""Find the nearest marked pixel, its distance, and connected components."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lines where one part of a figure hides another: which steps in depth an artist draws, and how.
+"""Learn which depth steps an artist draws as lines, and draw them in new views.
 
 The rule is learned from the drawings: steps deeper than `least` have a line, smaller ones have
 none, and lines reach so far onto the nearer and the farther side.
@@ -24,7 +24,7 @@ APART = (
     2.0  # times the line's width and a pixel, from outlines and deeper steps: lines of their own
 )
 WIDEST_PX, WIDEST = 12, 2.0  # from a step, in which its line is measured; times the outline's width
-THINNEST_PX = 0.3  # thinner lines are none
+THINNEST_PX = 0.3  # thinner ones do not count
 GAP_PX = 0.5  # between places at which a line is looked for
 FAINT = 0.3  # coverage from which there is a line
 
@@ -35,7 +35,7 @@ Mask = Bool[np.ndarray, "rows columns"]
 
 @dataclass(frozen=True)
 class StepLines:
-    """How steps in depth are drawn.
+    """Learned rule of which depth steps have a line, and how wide.
 
     Attributes:
         least: the smallest step that has a line, of the figure's height.
@@ -134,10 +134,10 @@ def lines_across(
     return np.where(found.max(axis=1) > FAINT, offs[best], np.nan)
 
 
-def learned_steps(
+def learn_steps(
     covers: Sequence[Cover], depths: Sequence[Depth], height: float, width_px: float
 ) -> StepLines | None:
-    """Return how steps are drawn, None where they are not.
+    """Learn which depth steps are drawn as lines; None if there are no such lines.
 
     Args:
         covers: how far lines cover every pixel of each drawing, 0 to 1.
@@ -166,8 +166,8 @@ def learned_steps(
     return StepLines(STEPS[level], near_px, far_px) if near_px + far_px > THINNEST_PX else None
 
 
-def drawn_steps(depth: Depth, style: StepLines, height: float, finer: int, scale: float) -> Cover:
-    """Return how far lines at steps cover every pixel of a view.
+def draw_steps(depth: Depth, style: StepLines, height: float, finer: int, scale: float) -> Cover:
+    """Draw lines at depth steps: how far they cover every pixel of a view.
 
     Args:
         depth: `finer` samples per pixel and axis, nan where nothing is.
@@ -216,7 +216,7 @@ def _reaches(
         lined += int((_spread(cover, widest / 2)[there] >= LINE).sum())
         count += int(there.sum())
     share = inked / np.maximum(seen, 1)
-    beside = float(share[:, -widest // 4 :].mean(axis=1).min())  # ink that is no step's
+    beside = float(share[:, -widest // 4 :].mean(axis=1).min())  # ink that is not a step's
     near_px, far_px = np.maximum(share - beside, 0).sum(axis=1) * (count / max(lined, 1))
     return float(near_px), float(far_px)
 

@@ -1,4 +1,4 @@
-"""The dark lines of one drawing: its outline, and the strokes within the figure one by one."""
+"""Segment the dark lines of a drawing: its outline, and the strokes within the figure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jaxtyping import Bool, Int, UInt8
 from skimage.morphology import skeletonize
 
 from toonset.nerf.lines.nearest import depth_inside, nearest, parts
-from toonset.palette.pixels.ink_lines import find_contour, rim_line_px
+from toonset.palette.pixels.ink_lines import find_contour, outline_line_px
 
 FEWEST_OUTLINED = 0.5  # of a sheet's views must have an outline, for the sheet to have one
 INK_QUANTILE = 0.2  # darkest part of the rim: the rest is mixed with what it surrounds
@@ -42,11 +42,11 @@ class Lines:
 
 
 def outline_width(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
-    """Return the width in pixels of the dark line round the figure, 0 = there is none."""
+    """Return the width in pixels of the dark line round the figure, 0 without one."""
     alpha = rgba[..., 3:].astype(np.float32) / 255
     over_white = (rgba[..., :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
     light = cv2.cvtColor(over_white, cv2.COLOR_RGB2GRAY)
-    return rim_line_px(light, rgba[..., 3] >= FIGURE)
+    return outline_line_px(light, rgba[..., 3] >= FIGURE)
 
 
 def ink_color(rims: Iterable[UInt8[np.ndarray, "n 3"]]) -> tuple[int, int, int]:

@@ -1,1 +1,1 @@
-"""The drawn look: new views put together from the drawings, over the field's geometry."""
+"""Render the drawn look: new views blended from the drawings over the field's geometry."""

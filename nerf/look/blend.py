@@ -1,4 +1,4 @@
-"""A new view out of the drawings that flank it: colours by labels that they vote on.
+"""Blend a new view from the flanking drawings, by labels that they vote on.
 
 Every place of the surface is looked up in the two drawings beside the view, each shifted towards
 the other by its share of how far they lie apart (`paint_flow`). Their labels and the field's vote;
@@ -18,9 +18,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
-from toonset.nerf.hull.mannequin_shape import FINER, Sight
+from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.lines.nearest import nearest
-from toonset.nerf.lines.step_lines import drawn_steps
+from toonset.nerf.lines.step_lines import draw_steps
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
@@ -30,7 +30,7 @@ from toonset.nerf.look.drawings import (
     crisp_depth,
     filled,
     look_up,
-    taken,
+    sample_picture,
 )
 from toonset.nerf.look.outline import CRUMB_PX, crisp_outline
 from toonset.nerf.look.paint_flow import NEIGHBOURS
@@ -57,7 +57,7 @@ OWN = 0.12  # radians off a drawing's own camera, in which the view becomes the 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """What a view shows of the field.
+    """Geometry of the field as a view sees it.
 
     Attributes:
         camera: of the view.
@@ -114,7 +114,7 @@ class DrawnView:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """What one source says of every pixel."""
+    """Colour and label of every pixel by one source."""
 
     color: Float[np.ndarray, "h w 3"]
     label: UInt8[np.ndarray, "h w"]
@@ -144,8 +144,8 @@ def flanking(cameras: list[Camera], camera: Camera) -> tuple[int, int, float]:
     return first, second, 1 - min(1.0, float(along[second] / whole[second]))
 
 
-def drawn_view(drawings: Drawings, view: Geometry) -> DrawnView:
-    """Return a view of the field in the look of its drawings, in the colours that they show."""
+def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
+    """Blend a view of the field from its drawings, in the colours that they show."""
     height, width = view.alpha.shape
     result = DrawnView(
         np.zeros((height, width, 3), np.float32),
@@ -216,7 +216,7 @@ def _inked(
     paint: Float[np.ndarray, "h w 3"],
     border: float,
     scale: float,
-    sight: Sight | None,
+    sight: ShapeView | None,
     whole: Float[np.ndarray, "h w 4"],
     part: np.float32,
 ) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
@@ -249,13 +249,13 @@ def _inked(
     return rgb, alpha, ink
 
 
-def _inner_lines(drawings: Drawings, sight: Sight, scale: float) -> Float[np.ndarray, "h w"]:
+def _inner_lines(drawings: Drawings, sight: ShapeView, scale: float) -> Float[np.ndarray, "h w"]:
     """Return how far lines cover every pixel where one part of the figure hides another."""
     pen, outline, style = drawings.pen, drawings.outline, drawings.steps
     if pen is None or outline is None or style is None:
         return np.zeros(sight.alpha.shape, np.float32)
     wider = pen.width_px / max(outline.width_px, 1e-6)
-    return drawn_steps(sight.fine, style, drawings.height, FINER, scale * wider)
+    return draw_steps(sight.fine, style, drawings.height, FINER, scale * wider)
 
 
 def _border(drawings: Drawings, view: Geometry) -> float:
@@ -277,7 +277,7 @@ def _candidates(
     own_color: Float[np.ndarray, "h w 3"],
     between: tuple[int, int, float],
 ) -> tuple[list[_Candidate], Bool[np.ndarray, "h w"], Seen]:
-    """Return what drawings and field say, the pixels that drawings show, and the first's places."""
+    """Return candidates of drawings and field, the pixels shown, and the first's places."""
     first, second, share = between
     there = np.isfinite(view.depth)
     textures = drawings.textures
@@ -296,7 +296,7 @@ def _candidates(
         own = own or seen
         mask = seen.mask & there
         places = seen.moved(flow, part)
-        trust = _trust(taken(texture.to_edge, places, cv2.INTER_LINEAR)) * _feathered(mask)
+        trust = _trust(sample_picture(texture.to_edge, places, cv2.INTER_LINEAR)) * _feathered(mask)
         candidates.append(_candidate(texture, places, np.float32(weight) * trust))
         covered |= mask
     assert own is not None
@@ -323,8 +323,8 @@ def _others(drawings: Drawings, camera: Camera, used: tuple[int, int]) -> list[i
 def _candidate(
     texture: Texture, places: tuple[np.ndarray, np.ndarray], weight: Float[np.ndarray, "h w"]
 ) -> _Candidate:
-    color = taken(texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
-    return _Candidate(color, taken(texture.labels, places, cv2.INTER_NEAREST), weight)
+    color = sample_picture(texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
+    return _Candidate(color, sample_picture(texture.labels, places, cv2.INTER_NEAREST), weight)
 
 
 def _straight(view: Geometry) -> Float[np.ndarray, "h w 3"]:

@@ -1,4 +1,4 @@
-"""Drawings for the drawn look, from those that a field was trained on."""
+"""Build the drawn look's textures from the drawings that a field was trained on."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def drawings_of(
     *,
     bent: bool,
 ) -> Drawings | None:
-    """Return what the drawn look needs; None where no drawing, or no field, shows a figure.
+    """Build the drawn look's drawings; None if no drawing, or no field, shows a figure.
 
     Args:
         ready: the drawings as they were trained on.

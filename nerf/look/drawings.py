@@ -1,4 +1,4 @@
-"""A sheet's drawings as projective textures, and what another view sees of each."""
+"""Project a sheet's drawings as textures into another view, with visibility."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Drawing:
 
 @dataclass(frozen=True, eq=False)
 class PairFlow:
-    """How far what two neighbours paint lies apart, seen from half way between them.
+    """Flow between two neighbouring drawings, seen from half way between them.
 
     Attributes:
         pair: the drawings' numbers.
@@ -69,12 +69,12 @@ class PairFlow:
         """Return F at world points; beyond the picture that of its edge."""
         pixels, _, _ = self.camera.project(points)
         x, y = (np.nan_to_num(pixels[..., k] - 0.5).astype(np.float32) for k in (0, 1))
-        return taken(self.flow.astype(np.float32), (x, y), cv2.INTER_LINEAR)
+        return sample_picture(self.flow.astype(np.float32), (x, y), cv2.INTER_LINEAR)
 
 
 @dataclass(frozen=True, eq=False)
 class Drawings:
-    """What the drawn look is made of.
+    """Drawings and surface of the drawn look.
 
     Attributes:
         views: the drawings that show a figure.
@@ -117,7 +117,7 @@ class Drawings:
 
     @property
     def painted_shadow(self) -> Shadow | None:
-        """Return the shadow that the paint still has; None: it was taken off, or there is none."""
+        """Return the shadow that the paint still has; None if removed or missing."""
         return self.shadow if self.shade is None else None
 
     @property
@@ -149,7 +149,7 @@ class Drawings:
         )
 
     def depth(self, view: Drawing) -> Float[np.ndarray, "height width"]:
-        """Return the depth of the surface that a drawing shows, nan where there is none."""
+        """Return the depth of the surface that a drawing shows, nan beside it."""
         if view.levels is not None:
             return depth_of(view.levels, self.depths)
         assert self.shape is not None
@@ -213,7 +213,7 @@ class Texture:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Where places of the surface lie in one drawing.
+    """Projection of surface points into one drawing.
 
     Attributes:
         x, y: (h, w) column and row, the first pixel's centre at 0.
@@ -265,7 +265,7 @@ def levels_of(
 def depth_of(
     levels: UInt8[np.ndarray, "height width"], depths: tuple[float, float]
 ) -> Float[np.ndarray, "height width"]:
-    """Return what `levels_of` has rounded."""
+    """Return the depths of levels: the inverse of `levels_of`."""
     low, high = depths
     return np.where(levels > 0, low + (levels - 1.0) / 254 * (high - low), np.nan)
 
@@ -317,7 +317,7 @@ def look_up(
     return Seen(x, y, without_crumbs(mask, least_px))
 
 
-def taken(
+def sample_picture(
     picture: Shaped[np.ndarray, "height width *channels"], places: Places, mode: int
 ) -> Shaped[np.ndarray, "h w *channels"]:
     """Return a picture's values at places; beyond its edges those of the edge."""

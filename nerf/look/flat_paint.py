@@ -1,4 +1,4 @@
-"""Drawings as paint alone: without outlines, lines at steps in depth, grain and shadows.
+"""Remove outlines, step lines, grain and shadows from drawings.
 
 Outlines belong to one view only, and new views have their own drawn; so have lines where one part
 hides another, and shadows, where the surface is known well enough to draw them anew. What is left
@@ -15,11 +15,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.hull.mannequin_shape import FINER, Sight
+from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
 from toonset.nerf.lines.step_lines import (
     StepLines,
-    learned_steps,
+    learn_steps,
     lines_across,
     step_places,
     step_sides,
@@ -36,7 +36,7 @@ WIDER = 1.2  # times a line's width, from its middle or its step: ink that is th
 GAP_PX = 0.5  # between places at which lines are looked for
 ROUNDS = 24  # pixels that paint goes under a line
 EDGE_PX = 1.0  # beside an edge, colours are mixed
-GRAINY = 0.3  # levels: less is no grain
+GRAINY = 0.3  # levels: less is not grain
 STRENGTH, WINDOW = 10.0, 5  # times the grain: what is smoothed; pixels about each
 LAPLACE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 AROUND = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -64,7 +64,7 @@ class FlatPaint:
 def flat_paint(
     drawings: Sequence[Picture],
     outline: Outline | None,
-    sights: Sequence[Sight] | None,
+    sights: Sequence[ShapeView] | None,
     height: float,
 ) -> FlatPaint:
     """Return the paint of drawings.
@@ -80,7 +80,7 @@ def flat_paint(
     steps = shade = None
     covers = [find_contour(rgba, width) / np.float32(255) for rgba in drawings] if width else []
     if sights and covers:
-        steps = learned_steps(covers, [sight.depth for sight in sights], height, width)
+        steps = learn_steps(covers, [sight.depth for sight in sights], height, width)
     found = []
     for number, rgba in enumerate(drawings):
         kept = _inner(rgba, width)
@@ -102,7 +102,7 @@ def flat_paint(
     return FlatPaint(paints, steps, shade)
 
 
-def pixels_on_steps(sight: Sight, least: float) -> Mask:
+def pixels_on_steps(sight: ShapeView, least: float) -> Mask:
     """Return the pixels on steps in depth of at least `least` world units."""
     near, far = step_sides(sight.fine, least)
     edge = (near | far).astype(np.float32)
@@ -117,7 +117,7 @@ def _inner(rgba: Picture, width: float) -> Mask:
 
 
 def _at_steps(
-    cover: Float[np.ndarray, "height width"], sight: Sight, steps: StepLines, height: float
+    cover: Float[np.ndarray, "height width"], sight: ShapeView, steps: StepLines, height: float
 ) -> Mask:
     """Return the pixels with ink of lines at steps, which may be drawn a little beside them."""
     least = steps.least * height
@@ -179,7 +179,7 @@ def _without_grain(paint: Paint, inside: Mask) -> Float[np.ndarray, "height widt
     return (clean / 255).clip(0, 1)
 
 
-def _clear(rgba: Picture, sight: Sight, width: float, height: float) -> Mask:
+def _clear(rgba: Picture, sight: ShapeView, width: float, height: float) -> Mask:
     """Return pixels that show paint of the shape, away from all edges."""
     edge = np.minimum(depth_inside(mask_of(rgba)) - width, depth_inside(sight.alpha >= 0.5))
     to_step = distance_to(pixels_on_steps(sight, SAME * height))

@@ -1,4 +1,4 @@
-"""A figure's silhouette as a pen draws it: a crisp border, and the line along it."""
+"""Draw a figure's silhouette as a pen does: a crisp border, and the line along it."""
 
 from __future__ import annotations
 

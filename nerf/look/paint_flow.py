@@ -1,4 +1,4 @@
-"""How far what is painted lies apart in two drawings, over a common surface.
+"""Compute the optical flow between two drawings over a common surface.
 
 The displacement F under which two drawings show the same at every pixel t of a view,
 

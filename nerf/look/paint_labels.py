@@ -1,4 +1,4 @@
-"""Which paints drawings show, and drawings in other paints; shadows are no paints."""
+"""Label drawings by paint, and repaint them; shadows count to their paint."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from toonset.palette.extract import in_light
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import label_pixels, nearest_labels
-from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
+from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -48,7 +48,7 @@ def repainted(
     found = []
     for picture, light, shade, contour in zip(pictures, lit, dark, contours, strict=True):
         own = tone_map(label_pixels(light, old), shade, contour, len(old))
-        found.append(recolored(picture, own, contour, *tones))
+        found.append(recolor(picture, own, contour, *tones))
     return found
 
 

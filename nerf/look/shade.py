@@ -1,4 +1,4 @@
-"""Two-tone shading: a shadow whose light stays with the viewer, taken off drawings and cast anew.
+"""Learn a two-tone shadow whose light stays with the viewer; remove it and cast it anew.
 
     shadow where  slope . n + level > 0,     colour in shadow = factor * colour in light
 
@@ -25,7 +25,7 @@ from scipy.ndimage import uniform_filter
 from toonset.nerf.lines.nearest import nearest
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
-FLAT = 0.03  # logarithms per pixel: steeper is no flat paint
+FLAT = 0.03  # logarithms per pixel: steeper is not a flat paint
 BETWEEN = 0.1  # logarithms: a line between the sides is darker than both by more
 LEAST_DROP = 0.1  # logarithms, mean of the channels: weaker shadows are noise
 CELL, MOST_DROP = 0.05, 1.4  # logarithms: of the ratios' histogram
@@ -69,7 +69,7 @@ class Shade:
         return np.asarray(normal @ np.array(self.slope, np.float32) + np.float32(self.level))
 
     def tone(self, normal: Normals, finer: int) -> Picture:
-        """Return what a view's colours in light are multiplied by; borders lie between pixels.
+        """Return the factor of a view's colours in light; borders lie between pixels.
 
         Args:
             normal: `smoothed`.
@@ -94,7 +94,7 @@ def smoothed(normal: Normals, height_px: float) -> Normals:
 def learned_shade(
     paints: Sequence[Picture], normals: Sequence[Normals], clear: Sequence[Clear], height_px: float
 ) -> Shade | None:
-    """Return the shadow of a sheet, None where there is none.
+    """Return the shadow of a sheet; None without one.
 
     Args:
         paints: the drawings' colours in [0, 1].

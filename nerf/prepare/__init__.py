@@ -1,1 +1,1 @@
-"""Make drawings agree before training: cameras, bends, symmetry, what no drawing shows."""
+"""Prepare drawings for training: registration, unwarping, symmetry, view coverage."""

@@ -1,4 +1,4 @@
-"""How well a sheet's drawings agree: the report that tells an artist which view is off, and where.
+"""Report how well a sheet's drawings agree: which view is off, and where.
 
 Per drawing: the shift and size that its outline asks for, its bend, and how well the shape that
 all drawings share explains its mask; and a map of what no shared shape explains: how far a ray
@@ -24,7 +24,7 @@ from toonset.dataset.silhouettes.tangency import Placed, touch
 from toonset.errors import BundleError
 from toonset.nerf.prepare.prepare import aligned
 from toonset.nerf.prepare.registration import Registration
-from toonset.nerf.prepare.unwarp import Unbending, Warp
+from toonset.nerf.prepare.unwarp import Unwarping, Warp
 
 UNEXPLAINED = 0.01  # of the figure's size: a ray that misses the shared shape by more is a fault
 ODD = 0.03  # share of a figure that may still be so after shift, size and bend
@@ -38,7 +38,7 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 @dataclass(frozen=True, eq=False)
 class ViewReport:
-    """How one drawing fits the others.
+    """Report of how one drawing fits the others.
 
     Attributes:
         name: of the picture.
@@ -74,7 +74,7 @@ class ViewReport:
 
 @dataclass(frozen=True, eq=False)
 class Consistency:
-    """How well a sheet's drawings agree.
+    """Report of how well a sheet's drawings agree.
 
     Attributes:
         views: of the drawings that show a figure.
@@ -82,7 +82,7 @@ class Consistency:
         heat_px: per drawing (height, width) by how many pixels its ray misses the shared shape, 0
             outside of the figure; as drawn.
         registration: of all drawings of the scene.
-        unbending: of all drawings of the scene.
+        unwarping: of all drawings of the scene.
         odd: names of the drawings that no shift, size and bend reconciles with the others.
     """
 
@@ -90,7 +90,7 @@ class Consistency:
     frames: tuple[Frame, ...]
     heat_px: tuple[Float[np.ndarray, "height width"], ...]
     registration: Registration
-    unbending: Unbending
+    unwarping: Unwarping
     odd: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -101,7 +101,7 @@ class Consistency:
             "views": [view.to_json() for view in self.views],
             "odd": list(self.odd),
             "registration": self.registration.to_json(),
-            "bends": self.unbending.to_json(),
+            "bends": self.unwarping.to_json(),
         }
 
 
@@ -118,17 +118,17 @@ def consistency_of(scene: Scene) -> Consistency:
             f"{scene.name}: {len(drawn)} picture(s) with an opaque figure; at least "
             f"{FEWEST_VIEWS} are needed to say whether they agree"
         )
-    fitted, registration, unbending = aligned(scene)
+    fitted, registration, unwarping = aligned(scene)
     assert registration is not None
-    assert unbending is not None
+    assert unwarping is not None
     before, after = (_missed([s.frames[i] for i in drawn]) for s in (scene, fitted))
     reports = [
-        _report(scene.frames[i], fitted.frames[i], unbending.warps[i], before[n], after[n])
+        _report(scene.frames[i], fitted.frames[i], unwarping.warps[i], before[n], after[n])
         for n, i in enumerate(drawn)
     ]
     odd = tuple(report.name for report in reports if report.unexplained[1] > ODD)
     frames = tuple(scene.frames[i] for i in drawn)
-    return Consistency(tuple(reports), frames, tuple(before), registration, unbending, odd)
+    return Consistency(tuple(reports), frames, tuple(before), registration, unwarping, odd)
 
 
 def _report(

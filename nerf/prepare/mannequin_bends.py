@@ -1,4 +1,4 @@
-"""Displacements of drawings under which they show the mannequin.
+"""Fit displacements of drawings under which they show the mannequin.
 
 Outlines first, then lines where one part hides another. Minimised over the numbers c of every
 drawing's displacement d, by Gauss-Newton:
@@ -28,7 +28,7 @@ from toonset.dataset.silhouettes.register import (
     SETTLED,
     Fit,
     energy,
-    learned,
+    learn_error_size,
     log_volume,
 )
 from toonset.nerf.lines.step_lines import lines_across
@@ -42,7 +42,7 @@ _BENDS = Bends.expected()
 
 @dataclass(frozen=True, eq=False)
 class InnerLines:
-    """Where a drawing should have lines within its figure, and where it has.
+    """Expected and drawn lines within a figure.
 
     Attributes:
         unit: (n, 2) places of the mannequin's steps in depth, in the drawing's square.
@@ -126,7 +126,7 @@ def fit_bends(
                 energy(n.matrix, precision, own, tau)
                 for own, n in zip(numbers, normal, strict=True)
             )
-            tau = learned(spent, numbers.size)
+            tau = learn_error_size(spent, numbers.size)
     gain = 0.0
     for own, before, after in zip(numbers, first, normal, strict=True):
         paid = after.cost + own @ precision @ own / tau**2

@@ -1,4 +1,4 @@
-"""Drawings that paint one body alike: what outlines cannot say of a drawing's bend, paint does.
+"""Refine the drawings' bends until neighbours show the same paint at the same place.
 
 Outlines fix a bend along the outline only; a face or a buckle within still lies elsewhere in every
 drawing. Neighbouring drawings show the same places X of the body, so the bends d are those under
@@ -60,7 +60,7 @@ _HALF = CONTROLS**2
 
 @dataclass(frozen=True, eq=False)
 class PaintAgreement:
-    """How drawings were changed for their paint to agree.
+    """Changes of drawings that make their paint agree.
 
     Attributes:
         applied: whether they were.

@@ -1,4 +1,4 @@
-"""What happens to drawings before a field is fitted to them.
+"""Prepare drawings before a field is fitted to them.
 
 Where the mannequin is the body that was drawn, drawings are bent to show it (`to_mannequin`). Else
 each only where the drawings ask for it: cameras follow drawings that were placed or
@@ -17,7 +17,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.registration import Registration, register_drawings
 from toonset.nerf.prepare.to_mannequin import Posed, posed
-from toonset.nerf.prepare.unwarp import Unbending, unwarp_drawings
+from toonset.nerf.prepare.unwarp import Unwarping, unwarp_drawings
 
 AGREE_PX = 0.1  # outlines this near agree (docs/decisions.md)
 
@@ -30,7 +30,7 @@ class Prepared:
         scene: the drawings that a field is fitted to.
         drawn: what they were made of: as drawn, perhaps with room round the figures.
         registration: how cameras moved; None: switched off.
-        unbending: how drawings were bent; None: switched off.
+        unwarping: how drawings were bent; None: switched off.
         paint: what their paint said of bends and colours; None: drawings were not bent.
         mannequin: what speaks for the mannequin's shape; None: there is none, or switched off.
         shape: the mannequin's, where it is the character's; None: it is not.
@@ -39,7 +39,7 @@ class Prepared:
     scene: Scene
     drawn: Scene
     registration: Registration | None
-    unbending: Unbending | None
+    unwarping: Unwarping | None
     paint: PaintAgreement | None = None
     mannequin: MannequinFit | None = None
     shape: Shape | None = None
@@ -47,14 +47,14 @@ class Prepared:
     @property
     def apart_px(self) -> float:
         """Return by how much outlines still disagree, root mean square; 0: as exact as pixels."""
-        steps = (self.registration, self.unbending)
+        steps = (self.registration, self.unwarping)
         applied = [step for step in steps if step and step.applied]
         return applied[-1].apart_px[1] if applied else 0.0
 
     @property
     def bent(self) -> bool:
         """Return whether drawings were bent."""
-        return self.unbending is not None and self.unbending.applied
+        return self.unwarping is not None and self.unwarping.applied
 
     @property
     def agree(self) -> bool:
@@ -66,11 +66,11 @@ class Prepared:
 
     def to_json(self) -> dict[str, Any]:
         """Return what was found and done, for a report."""
-        registration, unbending = self.registration, self.unbending
+        registration, unwarping = self.registration, self.unwarping
         return {
             "mannequin": None if self.mannequin is None else self.mannequin.to_json(),
             "registration": None if registration is None else registration.to_json(),
-            "unbending": None if unbending is None else unbending.to_json(),
+            "unbending": None if unwarping is None else unwarping.to_json(),
             "paint": None if self.paint is None else self.paint.to_json(),
         }
 
@@ -86,33 +86,33 @@ def prepare(scene: Scene, options: TrainOptions) -> Prepared:
         MeshError: the mannequin lies in none of the pictures.
     """
     given = posed(scene, unwarp=options.unwarp) if options.mannequin else Posed.left_alone(scene)
-    straight, unbending = given.scene, given.unbending
+    straight, unwarping = given.scene, given.unwarping
     registration = None
     if given.shape is None:
-        straight, registration, unbending = aligned(scene, options.register, options.unwarp)
-    return Prepared(straight, given.drawn, registration, unbending, None, given.fit, given.shape)
+        straight, registration, unwarping = aligned(scene, options.register, options.unwarp)
+    return Prepared(straight, given.drawn, registration, unwarping, None, given.fit, given.shape)
 
 
-def with_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
-    """Return bent drawings bent and tinted further, so that their paint agrees over a hull.
+def agree_on_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:
+    """Bend and tint bent drawings further until their paint agrees over a hull.
 
     Args:
         ready: where its drawings did not bend, it is returned as it is.
         depth_of: the body's surface as a camera sees it, nan where there is none.
         height: of the figure, world units.
     """
-    unbending = ready.unbending
-    if unbending is None or not unbending.applied:
+    unwarping = ready.unwarping
+    if unwarping is None or not unwarping.applied:
         return ready
-    agreed = with_paint_agreed(ready.drawn, ready.scene, unbending.warps, depth_of, height)
+    agreed = with_paint_agreed(ready.drawn, ready.scene, unwarping.warps, depth_of, height)
     scene, warps, found = agreed
-    unbending = replace(unbending, warps=warps)
-    return replace(ready, scene=scene, unbending=unbending, paint=found)
+    unwarping = replace(unwarping, warps=warps)
+    return replace(ready, scene=scene, unwarping=unwarping, paint=found)
 
 
 def aligned(
     scene: Scene, register: bool = True, unwarp: bool = True
-) -> tuple[Scene, Registration | None, Unbending | None]:
+) -> tuple[Scene, Registration | None, Unwarping | None]:
     """Return the scene with drawings set right that disagree, and what was found of each kind.
 
     Bends hold shifts and sizes, too: cameras are moved only where the drawings are more likely
@@ -121,7 +121,7 @@ def aligned(
     Args:
         scene: posed drawings.
         register: whether cameras may move; else there is no registration.
-        unwarp: whether drawings may be bent; else there is no unbending.
+        unwarp: whether drawings may be bent; else there is no unwarping.
 
     Raises:
         BundleError: the cameras do not belong together (see `box_of_masks`).
@@ -129,10 +129,10 @@ def aligned(
     placed, registration = register_drawings(scene) if register else (scene, None)
     if not unwarp:
         return placed, registration, None
-    straight, unbending = unwarp_drawings(scene)
+    straight, unwarping = unwarp_drawings(scene)
     if registration is None or not registration.applied:
-        return straight, registration, unbending
+        return straight, registration, unwarping
     rest, left = unwarp_drawings(placed)
-    if registration.gain_nats + max(0.0, left.gain_nats) >= unbending.gain_nats:
+    if registration.gain_nats + max(0.0, left.gain_nats) >= unwarping.gain_nats:
         return rest, registration, left
-    return straight, replace(registration, applied=False), unbending
+    return straight, replace(registration, applied=False), unwarping

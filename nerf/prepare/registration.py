@@ -1,4 +1,4 @@
-"""Registering drawings: a shift and a size per drawing, so that their outlines agree.
+"""Register drawings by a shift and a size each, so that their outlines agree.
 
 Artists place and size the views of a sheet by eye. What is moved is each view's camera (its
 principal point and its scale), never a pixel: nothing is resampled, and the correction is exact.
@@ -17,14 +17,14 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.alignment import Alignment, alignment_of
 from toonset.dataset.silhouettes.displacement import ShiftAndScale
 from toonset.dataset.silhouettes.outlines import Square
-from toonset.dataset.silhouettes.turn_fit import moved
+from toonset.dataset.silhouettes.turn_fit import displace_camera
 
 ROUNDS = 6  # of Gauss-Newton
 
 
 @dataclass(frozen=True)
 class ViewMove:
-    """How one drawing was off.
+    """Shift and size of one drawing.
 
     Attributes:
         shift_px: (x, y) by which the drawing sits too far right and down, pixels of the picture.
@@ -43,7 +43,7 @@ class ViewMove:
 
 @dataclass(frozen=True, eq=False)
 class Registration(Alignment):
-    """What was found about the drawings' places and sizes.
+    """Registration of a sheet's drawings.
 
     Attributes:
         views: per frame of the scene, as found (also where not applied).
@@ -73,7 +73,7 @@ def register_drawings(scene: Scene) -> tuple[Scene, Registration]:
     frames = list(scene.frames)
     views = [ViewMove((0.0, 0.0), 1.0)] * len(frames)
     for i, (square, own) in numbers.items():
-        frames[i] = replace(frames[i], camera=moved(frames[i].camera, square, own))
+        frames[i] = replace(frames[i], camera=displace_camera(frames[i].camera, square, own))
         views[i] = ViewMove.of(square, own)
     registration = Registration(**vars(found), views=tuple(views))
     return (replace(scene, frames=tuple(frames)) if found.applied else scene), registration

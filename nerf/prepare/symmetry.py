@@ -1,4 +1,4 @@
-"""The other side of a body that is its own mirror image.
+"""Add mirrored drawings of a body that is its own mirror image.
 
 Sheets of half a turn (front, side, back) leave one side undrawn. Where drawings along the mirror
 plane show that left and right are alike, every drawing is one of the other side, too: flipped, from
@@ -30,7 +30,7 @@ MOST_SHIFT = 0.1  # of the picture's width, between its figure's middle and the 
 
 @dataclass(frozen=True)
 class Symmetry:
-    """What the drawings say of left and right.
+    """Evidence of mirror symmetry.
 
     Attributes:
         alike: per facing drawing, the share of the figure's pixels that have their like on the
@@ -50,7 +50,7 @@ class Symmetry:
 
 
 def add_mirrored_views(scene: Scene) -> tuple[Scene, Symmetry | None]:
-    """Return the scene with mirror images of drawings where nothing was drawn, and the evidence.
+    """Add mirror images of drawings where no drawing shows the body; return the evidence, too.
 
     None: no drawing shows both sides, or no mirror image would be new.
     """
@@ -66,11 +66,11 @@ def add_mirrored_views(scene: Scene) -> tuple[Scene, Symmetry | None]:
     if min(alike) < ALIKE:
         return scene, Symmetry(alike, plane_x, ())
     found = Symmetry(alike, plane_x, tuple(frame.name for frame in new))
-    return with_mirrored(scene, found), found
+    return mirror_found(scene, found), found
 
 
-def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
-    """Return the scene with the mirror images that were found to be drawings of it."""
+def mirror_found(scene: Scene, found: Symmetry | None) -> Scene:
+    """Add the mirror images that were found to be drawings of the scene."""
     if found is None or not found.mirrored:
         return scene
     sources = (frame for frame in scene.frames if frame.name in found.mirrored)
@@ -79,10 +79,10 @@ def with_mirrored(scene: Scene, found: Symmetry | None) -> Scene:
     return replace(scene, frames=(*scene.frames, *more))
 
 
-def with_all_mirrored(scene: Scene) -> Scene:
-    """Return the scene with every drawing's mirror image: all that symmetry could ever show."""
+def mirror_all(scene: Scene) -> Scene:
+    """Add every drawing's mirror image: all that symmetry could ever show."""
     names = tuple(frame.name for frame in scene.frames)
-    return with_mirrored(scene, Symmetry((), 0.0, names))
+    return mirror_found(scene, Symmetry((), 0.0, names))
 
 
 def mirrored(frame: Frame, plane_x: float) -> Frame:

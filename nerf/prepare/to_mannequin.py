@@ -1,4 +1,4 @@
-"""Drawings of the mannequin's own body: bent until they show it.
+"""Bend drawings of the mannequin's own body until they show it.
 
 Only where the mannequin predicts drawings better than they predict each other (`mannequin_fit`).
 What every drawing gets wrong is then known from one common shape, and the shape between the drawn
@@ -20,16 +20,16 @@ from toonset.dataset.silhouettes.outlines import OUTLINE_POINTS, ROOM, Outlines,
 from toonset.dataset.silhouettes.register import Fit
 from toonset.nerf.hull.hull import LEVEL
 from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired, parts_left
-from toonset.nerf.hull.mannequin_shape import FINER, Shape, Sight, shape_of
-from toonset.nerf.lines.step_lines import learned_steps, step_places
+from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView, shape_of
+from toonset.nerf.lines.step_lines import learn_steps, step_places
 from toonset.nerf.lines.strokes import outline_width
 from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
-from toonset.nerf.prepare.unwarp import MOST, Unbending, Warp, warped
+from toonset.nerf.prepare.unwarp import MOST, Unwarping, Warp, warped
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED
 
 OUTSIDE = 0.25  # of an outline's width: lines that reach farther beyond the silhouette lie about it
-MOST_OUTSIDE = 1.5  # of its width: what is farther out is no line
+MOST_OUTSIDE = 1.5  # of its width: what is farther out is not a line
 SURE = 2.5  # standard errors, from drawing to drawing
 
 
@@ -42,14 +42,14 @@ class Posed:
         drawn: what was bent: as drawn, with room round the figures.
         shape: the mannequin, where it is taken for the character's shape; None: it is not.
         fit: what speaks for it; None: it could not be asked.
-        unbending: how drawings were bent; None: they were not asked.
+        unwarping: how drawings were bent; None: they were not asked.
     """
 
     scene: Scene
     drawn: Scene
     shape: Shape | None
     fit: MannequinFit | None
-    unbending: Unbending | None = None
+    unwarping: Unwarping | None = None
 
     @classmethod
     def left_alone(cls, scene: Scene, fit: MannequinFit | None = None) -> Posed:
@@ -76,13 +76,13 @@ def posed(scene: Scene, *, unwarp: bool = True) -> Posed:
     if fit is None or not fit.chosen:
         return Posed.left_alone(scene, fit)
     drawn = _with_room(scene)
-    bent, unbending = bent_to(drawn, shape)  # even if not kept: what no bend explains is a part
+    bent, unwarping = bent_to(drawn, shape)  # even if not kept: what no bend explains is a part
     fit = replace(fit, left=parts_left(_beside(_in_pictures(bent, scene), shape)))
     if not fit.chosen:
         return Posed.left_alone(scene, fit)
-    if not unwarp or not unbending.applied:
-        return Posed(scene, scene, shape, fit, unbending if unwarp else None)
-    return Posed(bent, drawn, shape, fit, unbending)
+    if not unwarp or not unwarping.applied:
+        return Posed(scene, scene, shape, fit, unwarping if unwarp else None)
+    return Posed(bent, drawn, shape, fit, unwarping)
 
 
 def _in_pictures(bent: Scene, scene: Scene) -> list[Frame]:
@@ -139,7 +139,7 @@ def _outside(scene: Scene, shape: Shape) -> float:
     return found if max(sure, OUTSIDE * width) < found < MOST_OUTSIDE * width else 0.0
 
 
-def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
+def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unwarping]:
     """Return the scene with its drawings bent to show the mannequin, and how.
 
     Drawings that show it within an outline's own error are returned as they are, to the bit.
@@ -166,7 +166,7 @@ def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
         )
         for i, square, own in zip(shown, squares, fit.numbers, strict=True):
             warps[i] = Warp(square, own)
-    found = Unbending(
+    found = Unwarping(
         fit.gain_nats > 0,
         fit.gain_nats,
         fit.tau * squares[0].size,
@@ -180,7 +180,7 @@ def bent_to(scene: Scene, shape: Shape) -> tuple[Scene, Unbending]:
 
 
 def _inner_lines(
-    frames: list[Frame], sights: list[Sight], squares: list[Square], fit: Fit
+    frames: list[Frame], sights: list[ShapeView], squares: list[Square], fit: Fit
 ) -> list[InnerLines] | None:
     """Return where drawings should have lines at steps in depth; None: their artist draws none.
 
@@ -199,7 +199,7 @@ def _inner_lines(
         for cover, frame, square, own in zip(covers, frames, squares, fit.numbers, strict=True)
     ]
     height = _height(sights)
-    style = learned_steps(moved, [sight.depth for sight in sights], height, width)
+    style = learn_steps(moved, [sight.depth for sight in sights], height, width)
     if style is None:
         return None
     found = []
@@ -229,7 +229,7 @@ def _moved(
     return cv2.remap(cover, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
 
 
-def _height(sights: list[Sight]) -> float:
+def _height(sights: list[ShapeView]) -> float:
     """Return the figure's height, world units."""
     tall = [np.flatnonzero((sight.alpha > 0).any(axis=1)) for sight in sights]
     heights = [
@@ -239,6 +239,6 @@ def _height(sights: list[Sight]) -> float:
     return float(np.median(heights))
 
 
-def _depth_inside(sight: Sight) -> Float[np.ndarray, "height width"]:
+def _depth_inside(sight: ShapeView) -> Float[np.ndarray, "height width"]:
     inside = np.pad(sight.alpha >= 0.5, 1).astype(np.uint8)
     return cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]

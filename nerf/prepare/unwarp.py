@@ -1,4 +1,4 @@
-"""Bent drawings: a smooth displacement per drawing under which the outlines are one body's.
+"""Unwarp drawings by smooth displacements under which the outlines are one body's.
 
 corrected(x) = drawn(x + d(x)). The rays of the cameras stay; the drawing is resampled once, with
 its alpha and its labels.
@@ -37,7 +37,7 @@ class Warp:
 
     @classmethod
     def none(cls) -> Warp:
-        """Return the warp that moves nothing."""
+        """Return the identity."""
         return cls(Square(np.zeros(2), 1.0), np.zeros(2 * CONTROLS**2))
 
     def at(self, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
@@ -51,13 +51,13 @@ class Warp:
 
     @property
     def is_none(self) -> bool:
-        """Return whether nothing is moved."""
+        """Return whether the warp is the identity."""
         return not np.any(self.numbers)
 
 
 @dataclass(frozen=True, eq=False)
-class Unbending(Alignment):
-    """What was found about the drawings' bends.
+class Unwarping(Alignment):
+    """Bends that were taken out of the drawings.
 
     Attributes:
         warps: per frame of the scene, what was applied.
@@ -66,8 +66,8 @@ class Unbending(Alignment):
     warps: tuple[Warp, ...]
 
 
-def unwarp_drawings(scene: Scene) -> tuple[Scene, Unbending]:
-    """Take the bends out of a scene's drawings; return it, and what was found.
+def unwarp_drawings(scene: Scene) -> tuple[Scene, Unwarping]:
+    """Unwarp a scene's drawings; return the scene and the fit.
 
     Drawings that agree within an outline's own error are returned as they are, to the bit; so are
     pictures without a figure, and scenes with fewer than FEWEST_VIEWS.
@@ -82,8 +82,8 @@ def unwarp_drawings(scene: Scene) -> tuple[Scene, Unbending]:
         for i, (square, own) in numbers.items():
             warps[i] = Warp(square, own)
             changed[i] = warped(changed[i], warps[i])
-    unbending = Unbending(**vars(found), warps=tuple(warps))
-    return (replace(scene, frames=tuple(changed)) if found.applied else scene), unbending
+    unwarping = Unwarping(**vars(found), warps=tuple(warps))
+    return (replace(scene, frames=tuple(changed)) if found.applied else scene), unwarping
 
 
 def warped(frame: Frame, warp: Warp) -> Frame:
@@ -96,7 +96,7 @@ def warped(frame: Frame, warp: Warp) -> Frame:
 def resampled(
     rgba: UInt8[np.ndarray, "height width 4"], places: Float[np.ndarray, "height width 2"]
 ) -> UInt8[np.ndarray, "height width 4"]:
-    """Return straight-alpha colours taken from `places` (pixels), nothing beyond the edges."""
+    """Return straight-alpha colours at `places` (pixels), transparent beyond the edges."""
     straight = rgba.astype(np.float32) / 255
     straight[..., :3] *= straight[..., 3:]  # what is transparent has no colour to mix in
     # cubic: linear interpolation would blur a line of one pixel to half its depth

@@ -1,4 +1,4 @@
-"""Which sides of a character no drawing shows: shape and colours there are a guess.
+"""Find the sides of a character that no drawing shows: shape and colours there are a guess.
 
 Drawings from opposite sides share an outline, so that for the shape half a turn is all there is:
 four even views have but two outlines, five have five.
@@ -20,7 +20,7 @@ DEPTHLESS = math.radians(150)  # then a body may come out four times as deep as 
 
 @dataclass(frozen=True)
 class Gap:
-    """A turn between neighbouring drawings in which there is no other.
+    """Gap in yaw between neighbouring drawings.
 
     Attributes:
         after: the drawing at which it begins, seen from above counterclockwise.
@@ -34,7 +34,7 @@ class Gap:
 
 
 def guesses(scene: Scene) -> list[str]:
-    """Return what must be guessed of a character, a line each, for people."""
+    """Describe the sides of a character that no drawing shows, a line each, for people."""
     scene = replace(scene, frames=tuple(frame for frame in scene.frames if figure_px(frame)))
     if len(scene.frames) < 2:
         return []
@@ -69,7 +69,7 @@ def wide_gaps(scene: Scene) -> list[Gap]:
 
 
 def outline_gap(scene: Scene) -> float:
-    """Return the largest turn, of half a turn, in which there is no outline; radians."""
+    """Return the largest gap in yaw between outlines, of half a turn; radians."""
     turns = sorted(_yaw(frame.camera) % math.pi for frame in scene.frames)
     following = [*turns[1:], turns[0] + math.pi]
     return max(end - begin for begin, end in zip(turns, following, strict=True))

@@ -1,4 +1,4 @@
-"""Pictures as a loop: GIF, animated WebP, MP4."""
+"""Encode pictures as a loop: GIF, animated WebP, MP4."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A trained field read once, at the hull's voxels: what views are rendered from.
+"""Bake a trained field into volumes at the hull's voxels, from which views are rendered.
 
 Values between voxels are trilinear. OpenCV's `remap` interpolates bilinearly at any list of places,
 ten times faster than a field or `grid_sample` answers; so a volume's slices lie side by side in one
@@ -26,7 +26,7 @@ from torch import Tensor
 
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.hull.hull import EDGE, Hull, grown, occupancy
+from toonset.nerf.hull.hull import EDGE, Hull, grow, occupancy
 from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.render.labels import label_table
 
@@ -68,7 +68,7 @@ class Baked:
     def of(cls, trained: TrainedField) -> Baked:
         """Return the field, read at the voxels where the hull leaves anything."""
         hull = trained.hull
-        read = grown(hull.near, 1)
+        read = grow(hull.near, 1)
         cells = read.reshape(-1).nonzero()[:, 0]
 
         def look(chunk: Int[Tensor, " n"]) -> tuple[Tensor, Tensor]:
@@ -77,7 +77,7 @@ class Baked:
 
         found = side_by_side([partial(look, chunk) for chunk in cells.split(POINTS_PER_CHUNK)])
         depth, color = (torch.cat(parts) for parts in zip(*found, strict=True))
-        surface = (hull.inside & grown(~hull.inside, 1)).reshape(-1)
+        surface = (hull.inside & grow(~hull.inside, 1)).reshape(-1)
         paints = _paints(trained.classifier, color[surface[cells]])
 
         def matter() -> Slices:
@@ -186,19 +186,19 @@ def _leaps(hull: Hull, step: float) -> UInt8[Tensor, "x y z"]:
     away, cells = torch.zeros(hull.near.shape, dtype=torch.uint8), hull.near.byte()
     for _ in range(MOST_CLEAR):
         away += 1 - cells
-        cells = grown(cells, 1)
+        cells = grow(cells, 1)
     return ((away.float() - 1) * (hull.voxel / step)).floor_().add_(1).clamp_(0, 255).byte()
 
 
 def _shell(near: Bool[Tensor, "x y z"]) -> Float[Tensor, "3 n"]:
-    beyond = grown(F.pad(~near, (1,) * 6, value=True), 1)[1:-1, 1:-1, 1:-1]
+    beyond = grow(F.pad(~near, (1,) * 6, value=True), 1)[1:-1, 1:-1, 1:-1]
     return (near & beyond).nonzero().T + 1.0
 
 
 def _paints(
     classifier: PaletteClassifier | None, shown: Float[Tensor, "n 3"]
 ) -> Float[Tensor, "colors 3"]:
-    """Return the median of all colours with each label, nan where there is none."""
+    """Return the median of all colours with each label, nan for unused labels."""
     if classifier is None:
         return torch.zeros(0, 3)
     labels = classifier(shown).argmax(dim=1)

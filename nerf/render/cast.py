@@ -1,4 +1,4 @@
-"""Rays through a baked field, for a picture: no work in empty space or behind what is opaque.
+"""Cast a picture's rays through a baked field, skipping empty and hidden space.
 
 The samples are those of `toonset.nerf.hull.march`, so a view shows what was trained. But a picture
 needs only the front of what a ray meets: a ray begins where the hull may begin, goes on a few steps
@@ -18,7 +18,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.rays import Paths, Sight
+from toonset.nerf.render.rays import Paths, ViewRays
 
 RAYS_PER_CHUNK = 1 << 14  # a chunk's arrays stay in a core's cache
 FEWEST_STEPS, MOST_STEPS = 12, 32  # of a ray that are looked up together: more as rays get fewer
@@ -28,7 +28,7 @@ OPAQUE_FROM = 0.98  # opacity at which a ray ends; the colour seen until then st
 FAINTEST = 1e-12  # weight of steps whose mean place is asked for
 
 
-def cast(sight: Sight, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays"]:
+def cast(sight: ViewRays, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays"]:
     """Return premultiplied colour, opacity, and depth times opacity of rays through pixels.
 
     A ray that reaches OPAQUE_FROM ends and counts as opaque.
@@ -43,7 +43,7 @@ def cast(sight: Sight, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays
 
 @dataclass(frozen=True, eq=False)
 class _Rays:
-    """How far some rays have come.
+    """State of some rays while they are cast.
 
     Attributes:
         ray: (n,) which they are.

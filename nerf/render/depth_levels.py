@@ -1,4 +1,4 @@
-"""Depth as a 16-bit picture, and the scale that turns its levels back into world units.
+"""Encode depth as a 16-bit picture, with the scale back to world units.
 
     depth = nearest + unit (level - 1),   level 0: nothing is seen
 

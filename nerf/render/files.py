@@ -1,4 +1,4 @@
-"""The files of a rendering: a picture per camera and layer, and all of a turn in one file."""
+"""Encode a rendering's files: a picture per camera and layer, and whole turns."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UNSEEN = 0.05  # of a view in the drawn look: worth a word
 DEPTH_FILE = "depth.json"  # the scale of depth pictures
 
 
-def rendered_files(
+def render_files(
     trained: TrainedField,
     named: Sequence[tuple[str, Camera]],
     layers: Sequence[str] = ("rgb",),

@@ -1,4 +1,4 @@
-"""Which palette colours every pixel shows, and how much of it each covers.
+"""Compute which palette colours cover every pixel, and how far.
 
 A ray that falls between two colours sees a blend of both, and a blend may look like a third:
 between green cloth and light skin lies brown. So what a ray on a border sees, c, is explained in
@@ -46,7 +46,7 @@ def labels_of(
     color: Float[Tensor, "3 ..."],
     opacity: Float[Tensor, " *rays"],
 ) -> Int[Tensor, " *rays"]:
-    """Return the label of every ray's premultiplied colour, NONE where it meets nothing."""
+    """Return the label of every ray's premultiplied colour, NONE for empty rays."""
     red, green, blue = _straight(color, opacity).mul_(LEVELS).clamp_(0, LEVELS - 1).int()
     index = (red * LEVELS + green) * LEVELS + blue
     labels = table.view(-1).index_select(0, index.view(-1)).view(index.shape).long()
@@ -84,7 +84,7 @@ def palette_shares(
 
 @dataclass(frozen=True, eq=False)
 class _Blends:
-    """What rays show: `part` of one palette colour and the rest of another.
+    """Blends that rays show: `part` of one palette colour and the rest of another.
 
     Attributes:
         first, second: (pixels, rays) labels.

@@ -1,4 +1,4 @@
-"""A rendered view, and its layers as 8-bit pictures."""
+"""Convert a rendered view to 8-bit layers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.errors import BundleError, OutputError, PaletteError, ToonsetError
 from toonset.nerf.fields.trained_field import NO_DRAWINGS, NO_LINES, NO_PALETTE, TrainedField
-from toonset.nerf.look.blend import DrawnView, Geometry, drawn_view
+from toonset.nerf.look.blend import DrawnView, Geometry, blend_view
 from toonset.nerf.options import LAYERS
 from toonset.nerf.render.depth_levels import DepthLevels
 from toonset.nerf.render.normals import normal_picture
@@ -61,7 +61,7 @@ class Rendering:
         if self.field.drawings is None:
             raise BundleError(NO_DRAWINGS)
         view = Geometry(self.camera, self.alpha, self.depth, self.rgb, self.shares)
-        return drawn_view(self.field.drawings, view)
+        return blend_view(self.field.drawings, view)
 
     def picture(self, layer: str = "rgb") -> Layer:
         """Return one layer as RGBA with straight alpha, or as a label map.

@@ -1,4 +1,4 @@
-"""Which way the seen surface faces, from a rendering's depth."""
+"""Compute surface normals from a rendering's depth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Views as layers of one OpenRaster file, for paint programs: drawn lines, then a layer per paint.
+"""Write a view as an OpenRaster file for paint programs: lines, then a layer per paint.
 
 A layer takes its share s of colour k off what a pixel shows, c with alpha A (c premultiplied):
 
@@ -33,7 +33,7 @@ from toonset.nerf.lines.nearest import nearest
 from toonset.nerf.render.animation import check_one_size
 from toonset.nerf.render.layers import Rendering
 from toonset.palette.names import hex_of, name_of
-from toonset.view import premultiplied, straight
+from toonset.view import premultiply, straight
 
 PAINTED = ("drawn", "rgb", "palette")  # what can be seen in layers
 LINES, INK = "lines", "ink"  # layers' names; ink: painted lines of no palette colour
@@ -73,7 +73,7 @@ class PaintLayer:
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
-    """What the layers above have left.
+    """Colour and alpha that the layers above leave.
 
     Attributes:
         color: premultiplied.
@@ -101,7 +101,7 @@ class _Rest:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What a view shows.
+    """Colour, labels and lines of a view.
 
     Attributes:
         shown: its picture.
@@ -162,7 +162,7 @@ def layered(view: Rendering, layer: str, picture: Picture) -> list[PaintLayer]:
 
 
 def _look(view: Rendering, layer: str, picture: Picture) -> _Look:
-    """Return what is to be divided."""
+    """Return the view that is divided into layers."""
     alpha = picture[..., 3] / 255.0
     shown = _Rest(picture[..., :3] / 255.0 * alpha[..., None], alpha, np.ones_like(alpha))
     palette, shares = view.field.palette, view.shares
@@ -282,7 +282,7 @@ def _names(look: _Look) -> list[str]:
 
 
 def _cut(name: str, color: Color, share: Share) -> PaintLayer | None:
-    """Return a layer cut to what it shows, None if that is nothing."""
+    """Return a layer cropped to its visible pixels; None if it is empty."""
     rgba = np.rint(255 * np.dstack([color, share]).clip(0, 1)).astype(np.uint8)
     rgba[rgba[..., 3] == 0] = 0
     if not rgba.any():
@@ -331,4 +331,4 @@ def _thumbnail(picture: Picture) -> Picture:
     height, width = picture.shape[:2]
     by = min(1.0, THUMBNAIL_PX / max(height, width))
     size = (max(1, round(by * width)), max(1, round(by * height)))
-    return straight(cv2.resize(premultiplied(picture), size, interpolation=cv2.INTER_AREA))
+    return straight(cv2.resize(premultiply(picture), size, interpolation=cv2.INTER_AREA))

@@ -1,4 +1,4 @@
-"""A camera's rays through a baked field, and between which depths they may meet anything.
+"""Compute a camera's rays through a baked field, and their depth range.
 
 Depths are past the plane through the hull's middle that is parallel to the picture, world units.
 The voxels round what may be seen are drawn into a coarse picture of the nearest and farthest depth,
@@ -46,7 +46,7 @@ class Paths:
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class ViewRays:
     """A baked field as a camera sees it.
 
     Attributes:
@@ -64,8 +64,8 @@ class Sight:
     reach: Float[Tensor, "2 rows columns"]
 
     @classmethod
-    def of(cls, baked: Baked, camera: Camera) -> Sight:
-        """Return what `camera` sees."""
+    def of(cls, baked: Baked, camera: Camera) -> ViewRays:
+        """Compute the rays of a camera."""
         hull, (width, height) = baked.trained.hull, camera.size_wh
         middle = float(camera.rotation[2] @ ((hull.box.low + hull.box.high) / 2 - camera.target))
         corner = camera.rotation @ (hull.low - hull.voxel / 2 - camera.target) - [0, 0, middle]

@@ -1,4 +1,4 @@
-"""Replacing palette colours of a trained run."""
+"""Replace palette colours of a trained run."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from toonset.nerf.options import ORIGINAL
 from toonset.palette.formats.hex import rgb_of_typed
 from toonset.palette.formats.registry import palette_names, parse_colors
 from toonset.palette.pixels.labels import nearest_colors
-from toonset.palette.recolor import changed_colors
+from toonset.palette.recolor import change_colors
 
 
-def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
+def recolor_run(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
     """Return the run with palette colours replaced; all changes happen at once.
 
     Args:
@@ -33,10 +33,10 @@ def recolored(trained: TrainedField, changes: Sequence[str]) -> TrainedField:
         return trained
     if trained.palette is None:
         raise PaletteError(NO_PALETTE)
-    return _in_colors(trained, changed_colors(trained.palette, changes))
+    return _in_colors(trained, change_colors(trained.palette, changes))
 
 
-def with_pen(trained: TrainedField, width_px: float | None, color: str | None) -> TrainedField:
+def change_pen(trained: TrainedField, width_px: float | None, color: str | None) -> TrainedField:
     """Return the run with the outline of its drawn look drawn by another pen.
 
     Args:
@@ -46,7 +46,7 @@ def with_pen(trained: TrainedField, width_px: float | None, color: str | None) -
 
     Raises:
         BundleError: its drawings have no outline, or lines are switched off.
-        PaletteError: `color` is none.
+        PaletteError: `color` is not a colour.
     """
     if width_px is None and color is None:
         return trained
@@ -58,7 +58,7 @@ def with_pen(trained: TrainedField, width_px: float | None, color: str | None) -
     return replace(trained, drawings=replace(trained.drawings, pen=pen))
 
 
-def repainted(
+def repaint_run(
     trained: TrainedField, palette: str, *, nearest: bool = False, flag: str = "--palette"
 ) -> TrainedField:
     """Return the run in the colours of another palette, without training again.
@@ -95,12 +95,12 @@ def variants_of(
     Args:
         trained: the run.
         palettes: palette files, or typed colours.
-        nearest: see `repainted`.
+        nearest: see `repaint_run`.
 
     Raises:
-        PaletteError: see `repainted`.
+        PaletteError: see `repaint_run`.
     """
-    fields = [repainted(trained, one, nearest=nearest, flag="--variants") for one in palettes]
+    fields = [repaint_run(trained, one, nearest=nearest, flag="--variants") for one in palettes]
     return list(zip(palette_names(palettes, ORIGINAL), fields, strict=True))
 
 

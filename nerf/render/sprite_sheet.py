@@ -1,4 +1,4 @@
-"""A turn as a sprite sheet: one picture of equal cells, and a JSON that game engines read.
+"""Pack a turn into a sprite sheet: one picture of equal cells, and a JSON for game engines.
 
 The JSON is the "hash" layout of TexturePacker and Aseprite: `frames` by name with frame, size,
 duration and pivot, and in `meta` the picture and a frame tag; `animations` names the frames of the

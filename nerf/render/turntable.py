@@ -1,4 +1,4 @@
-"""Cameras that turn round a trained figure."""
+"""Place cameras that turn round a trained figure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rendering new views of a trained field.
+"""Render new views of a trained field.
 
 One ray goes through every pixel that may show the figure, more through pixels on borders: outlines,
 folds, where one colour meets the next. Outlines are soft through the hull's occupancy.
@@ -21,7 +21,7 @@ from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import cast
 from toonset.nerf.render.labels import NONE, labels_of, palette_shares
 from toonset.nerf.render.layers import Rendering
-from toonset.nerf.render.rays import Sight
+from toonset.nerf.render.rays import ViewRays
 from toonset.palette.pixels.labels import UNLABELLED
 
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
@@ -44,7 +44,7 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
 @one_thread()
 def _render(baked: Baked, camera: Camera) -> Rendering:
     width, height = camera.size_wh
-    sight = Sight.of(baked, camera)
+    sight = ViewRays.of(baked, camera)
     seen = cast(sight, _grid(height, width)).view(5, height, width)
     labels, shares = torch.full((height, width), NONE), None
     if baked.labels is not None:

@@ -1,1 +1,1 @@
-"""A run on disk: write, read, watch."""
+"""Write, read and monitor runs."""

@@ -1,4 +1,4 @@
-"""What the drawn look is made of, on disk.
+"""Write and read the drawn look's files.
 
     drawings.png            the drawings as they were trained on, side by side, tops aligned
     paint.png               the same without outlines and what else new views have drawn anew
@@ -93,7 +93,7 @@ class ShadowRecord(BaseModel):
 
 
 class ShapeRecord(BaseModel):
-    """Where the grid of a `Shape` lies."""
+    """Grid of a `Shape`: its origin and step."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     low: tuple[Number, Number, Number]
@@ -102,7 +102,7 @@ class ShapeRecord(BaseModel):
 
 
 class DrawingsRecord(BaseModel):
-    """What config.json holds of `Drawings`."""
+    """Record of `Drawings` in config.json."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     cameras: list[NativeCamera] = Field(min_length=1, max_length=MOST_VIEWS)
@@ -163,8 +163,8 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
 
     Raises:
         BundleError: a file is missing or damaged, or does not belong to the record.
-        CameraError: a camera's record is none.
-        PictureError: a picture is none.
+        CameraError: a camera's record is invalid.
+        PictureError: a picture is invalid.
     """
     cameras = [camera.camera() for camera in record.cameras]
     rgba, paint = (_apart(_picture(folder / name, cameras), cameras) for name in (PICTURES, PAINT))

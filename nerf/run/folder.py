@@ -1,4 +1,4 @@
-"""A trained run on disk, and back.
+"""Write a trained run to disk, and read it back.
 
     model.safetensors   parameters of field and classifier, and the hull
     config.json         what is needed to build them, and the resolved options
@@ -52,7 +52,7 @@ MOST_CELLS = 512  # along one side, of planes and hull alike
 
 
 class FieldRecord(BaseModel):
-    """What builds a `TrainedField` around the tensors of model.safetensors."""
+    """Record that rebuilds a `TrainedField` around the tensors of model.safetensors."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     resolution: int = Field(ge=1, le=MOST_CELLS)

@@ -1,4 +1,4 @@
-"""What looks on while a field is fitted: held-out views, previews, a wish to stop.
+"""Monitor a training: held-out views, previews, a request to stop.
 
 Looking at held-out views may take a tenth of the time, so a cheap look comes often and an expensive
 one seldom. None of it changes the training by a bit.
@@ -36,7 +36,7 @@ INTERRUPTED = "interrupted"
 
 @dataclass(frozen=True)
 class MonitorOptions:
-    """What to look at.
+    """Options of the monitor.
 
     Attributes:
         tell: called with the status after every step.
@@ -72,7 +72,7 @@ class Monitor:
         self._test_at, self._preview_at = FIRST_LOOK_S, 0.0
 
     def look(self, moment: Moment) -> str:
-        """Look at a training after a step; return why it should end, or nothing."""
+        """Look at a training after a step; return why it should end, or None."""
         spent = moment.history[-1].seconds
         unfinished = len(moment.history) < moment.of
         if self.looking.stop() and unfinished:

@@ -1,4 +1,4 @@
-"""The files of a run: the field, and beside it metrics.json, history.csv and preview.png."""
+"""Write a run's report: metrics.json, history.csv and preview.png beside the field."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tensors of model.safetensors: a field as small as it can be without changing a rendering.
+"""Pack a field into model.safetensors, as small as renderings allow without change.
 
     field.*, classifier.*     parameters; tables in half precision, as training leaves them
     field.planes              only the rows that a point near the hull can read,
@@ -30,7 +30,7 @@ SLACK = 1e-3  # cells: where single precision may round a point to
 
 
 def packed(trained: TrainedField) -> dict[str, Tensor]:
-    """Return what model.safetensors holds of a field."""
+    """Pack a field into the tensors of model.safetensors."""
     result = {}
     for name, values in parameters_of(trained).items():
         result[name] = values.half() if values.numel() >= HALF_FROM else values.clone()

@@ -1,1 +1,1 @@
-"""Score renderings beside pictures: metrics, tables, verdict."""
+"""Score renderings against pictures: metrics, tables, verdict."""

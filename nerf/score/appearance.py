@@ -1,4 +1,4 @@
-"""Figures that follow the eye where PSNR does not: blocks that may shift, dirt, sharpness.
+"""Score appearance where PSNR misleads: shift-tolerant block PSNR, dirt, sharpness.
 
 PSNR likes blur: a crisp edge a pixel beside the true one costs more than a soft one.
 """

@@ -1,4 +1,4 @@
-"""Renderings against pictures: of views that were held out, and of the drawings trained on."""
+"""Evaluate renderings against held-out views and the drawings trained on."""
 
 from __future__ import annotations
 

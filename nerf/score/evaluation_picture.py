@@ -1,4 +1,4 @@
-"""Evaluated views in one picture, the worst first: drawing, renderings, heat map of the error."""
+"""Draw evaluated views in one picture, the worst first, with an error heat map."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LDR-FLIP: the difference that a person sees who flips between two pictures, 0 to 1 per pixel.
+"""Compute LDR-FLIP: the difference seen when flipping between two pictures, 0 to 1 per pixel.
 
 Computed by the authors' package, flip-evaluator. It has no wheel for some machines (Linux on ARM);
 there the figure is missing, with the reason.

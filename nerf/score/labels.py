@@ -1,4 +1,4 @@
-"""How many pixels a rendering gives the right palette label."""
+"""Score a rendering's palette labels: mIoU and the share of right pixels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class LabelScore:
 
 
 def score_labels(rendered: Labels, true: Labels) -> LabelScore | None:
-    """Return the score over pixels that are labelled in both; None where there is none.
+    """Return the score over pixels that are labelled in both; None without any.
 
     In the truth these are the pixels that are no blends, in the rendering those of the figure.
     """

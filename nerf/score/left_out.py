@@ -1,4 +1,4 @@
-"""How well drawings predict each other: each is left out, and drawn from the others.
+"""Measure how well drawings predict each other: each is left out, and drawn from the others.
 
 A drawing's own camera is a new view to the others. What they make of it is compared with the
 drawing as it was drawn, D, both at one size and a little blurred, in CIELAB:
@@ -28,7 +28,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import has_figure
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.blend import SOLID, Geometry, drawn_view, flanking
+from toonset.nerf.look.blend import SOLID, Geometry, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import default_layer
@@ -68,7 +68,7 @@ class LeftOut:
 
 
 def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
-    """Return every drawing as the others predict it; nothing of fewer than FEWEST drawings.
+    """Return every drawing as the others predict it; empty for fewer than FEWEST drawings.
 
     Where people are shown the field's own colours, the drawing counts as far off as those, if that
     is farther.
@@ -120,7 +120,7 @@ def predicted(
     frame, others = frames[number], drawings.without(number)
     names = [own.name for i, own in enumerate(frames) if i != number]
     first, second, _ = flanking([one.camera for one in others.views], view.camera)
-    found = drawn_view(others, view)
+    found = blend_view(others, view)
     size = view.camera.size_wh
     drawn = cv2.resize(over_white(frame.rgba), size, interpolation=cv2.INTER_AREA)
     apart = difference(_over_white(found.rgb, found.alpha), drawn)

@@ -1,4 +1,4 @@
-"""How well a rendering's ink lies on the drawing's: F1 of dark pixels, some pixels off tolerated.
+"""Score a rendering's lines: F1 of dark pixels, with a tolerance of some pixels.
 
 Hair and boots as dark as ink count, too: where they end is a line to the eye. But only drawings
 with dark lines round their figures are asked.

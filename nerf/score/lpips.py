@@ -1,4 +1,4 @@
-"""LPIPS through its own package, where the user has the weights on disk; nothing is downloaded.
+"""Compute LPIPS with its own package, from weights on the user's disk; nothing is downloaded.
 
 The package ships its small linear layers only. The AlexNet below them is read from torch's cache of
 weights if its hash is the one that its name says, and only tensors are read: no code in it is run.
@@ -26,7 +26,7 @@ Lpips = Callable[[np.ndarray, np.ndarray], float | None]
 
 
 def load_lpips() -> Lpips | str:
-    """Return the distance of two sRGB pictures over white, or why there is none.
+    """Return the distance function of two sRGB pictures over white, or why it is missing.
 
     The pictures are (height, width, 3) in [0, 1]; for those smaller than 32 px it is None.
     """

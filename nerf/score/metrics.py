@@ -1,4 +1,4 @@
-"""PSNR and SSIM of a rendering against a drawing, over white and inside the mask."""
+"""Compute PSNR and SSIM of a rendering against a drawing, over white and inside the mask."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def shifted_psnr(
 def silhouette_iou(
     rendered: UInt8[np.ndarray, "height width 4"], drawn: UInt8[np.ndarray, "height width 4"]
 ) -> float | None:
-    """Return intersection over union of what is at least half opaque; None where nothing is."""
+    """Return intersection over union of what is at least half opaque; None if both are empty."""
     a, b = mask_of(rendered), mask_of(drawn)
     return float((a & b).sum() / (a | b).sum()) if (a | b).any() else None
 

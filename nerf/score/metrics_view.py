@@ -1,4 +1,4 @@
-"""Every figure of one rendering against its drawing."""
+"""Compute every metric of one rendering against its drawing."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Judges:
 
 
 def load_judges() -> Judges:
-    """Return what this machine has; nothing is downloaded."""
+    """Load the metrics that this machine has; nothing is downloaded."""
     return Judges(load_flip(), load_lpips())
 
 

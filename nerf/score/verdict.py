@@ -1,4 +1,4 @@
-"""What a run says of itself: ok, or weak and why.
+"""Judge a run: ok, or weak and why.
 
 A run is weak where a drawing and what the others make of its side are plainly apart (`left_out`),
 or where no drawing shows a side (`view_coverage`). The bound is where people would be unhappy with
@@ -15,7 +15,7 @@ import numpy as np
 
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS
-from toonset.nerf.prepare.symmetry import with_mirrored
+from toonset.nerf.prepare.symmetry import mirror_found
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.score.left_out import LeftOut, left_out
@@ -31,7 +31,7 @@ NOTHING = "the field shows no figure: look at preview.png, and train longer or c
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run is worth.
+    """Verdict of a run.
 
     Attributes:
         verdict: OK or WEAK.
@@ -59,7 +59,7 @@ class Verdict:
 
 
 def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> Verdict:
-    """Return what a run is worth.
+    """Judge a run.
 
     Args:
         training: the run, its field with the drawings laid over it.
@@ -67,7 +67,7 @@ def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> 
         baked: its field; None: made here.
     """
     ready = training.prepared.scene
-    reasons = guesses(with_mirrored(ready, training.symmetry))
+    reasons = guesses(mirror_found(ready, training.symmetry))
     if training.result.drawings is None:
         return Verdict(WEAK, (*reasons, NOTHING), ())
     views = left_out(baked or Baked.of(training.result), ready, drawn)
@@ -96,7 +96,7 @@ def _measured(worst: LeftOut) -> str:
 
 
 def _remedy(training: Training, worst: LeftOut, *, stands_out: bool) -> str:
-    """Return what helps, by what is most likely the cause."""
+    """Return advice, by the most likely cause."""
     done = len(training.history)
     usual = STEPS_ON_SHAPE if training.prepared.shape else USUAL_STEPS
     ended = training.stopped in ("steps", "budget")
@@ -117,7 +117,7 @@ def _remedy(training: Training, worst: LeftOut, *, stands_out: bool) -> str:
 
 
 def blended(scene: Scene) -> float:
-    """Return the share of the figures' pixels that are no palette colour; 0 without labels."""
+    """Return the share of the figures' pixels without a palette colour; 0 without labels."""
     figure, blends = 0, 0
     for frame in scene.frames:
         if frame.labels is not None:

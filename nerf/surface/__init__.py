@@ -1,1 +1,1 @@
-"""A closed mesh of a field, in palette colours."""
+"""Extract a closed mesh of a field, in palette colours."""

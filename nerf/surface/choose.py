@@ -1,4 +1,4 @@
-"""Which drawing paints which face of a surface: one for each patch, and for each feature.
+"""Choose the drawing that paints each face of a surface, by graph cuts.
 
     cost = sum over faces of   area (1 - how frontal and how far from an edge it is drawn)
          + sum over seams of   length (colours apart + SEAM + FEATURE where an eye or a button is)
@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from toonset.camera import Camera
 from toonset.dataset.mesh.rasterize import depth_map
-from toonset.nerf.look.drawings import SQUARE, Places, taken
+from toonset.nerf.look.drawings import SQUARE, Places, sample_picture
 from toonset.nerf.surface.paint import Paint
 from toonset.nerf.surface.unwrap import areas, neighbours
 
@@ -71,7 +71,7 @@ def merits(
         seen = (depth <= limit + BEHIND * height) & (cover > 0.5)
         ways = camera.rotation[2] + camera.k * (points[:, 0] - camera.target)
         frontal = -(normal * ways).sum(axis=1) / np.linalg.norm(ways, axis=1)
-        good = frontal * taken(paint.trust, (x, y), cv2.INTER_LINEAR).mean(axis=1)
+        good = frontal * sample_picture(paint.trust, (x, y), cv2.INTER_LINEAR).mean(axis=1)
         shown = (seen.mean(axis=1) >= SHOWN) & (frontal > GRAZING)
         result[:, number] = np.where(shown, good, 0)
     return result
@@ -129,7 +129,7 @@ class _Seams:
     def cost(
         self, first: Int[np.ndarray, " e"], second: Int[np.ndarray, " e"]
     ) -> Int[np.ndarray, " e"]:
-        """Return what each edge costs; a metric over the drawings."""
+        """Return the cost of each edge; a metric over the drawings."""
         edge = np.arange(len(self.one))
         apart = np.abs(self.color[first, edge] - self.color[second, edge]).mean(axis=(1, 2))
         feature = self.feature[first, edge] + self.feature[second, edge]
@@ -150,8 +150,8 @@ def _seams(
     colors, features = [], []
     for paint in paints:
         places, _ = _places(paint.texture.camera, points)
-        colors.append(taken(paint.texture.paint, places, cv2.INTER_LINEAR))
-        on = taken(paint.feature.astype(np.float32), places, cv2.INTER_NEAREST)
+        colors.append(sample_picture(paint.texture.paint, places, cv2.INTER_LINEAR))
+        on = sample_picture(paint.feature.astype(np.float32), places, cv2.INTER_NEAREST)
         features.append(on.mean(axis=1))
     color = np.stack([*colors, np.mean(colors, axis=0)])
     return _Seams(one, other, length, color, np.stack([*features, np.zeros(len(ends))]))

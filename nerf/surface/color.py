@@ -1,4 +1,4 @@
-"""Palette probabilities at points of a trained field's surface, as a viewer in front sees them."""
+"""Compute palette probabilities at points of a field's surface, as seen from in front."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from toonset.errors import PaletteError
 from toonset.nerf.fields.trained_field import NO_PALETTE, TrainedField
 from toonset.nerf.hull.hull import occupancy
 from toonset.nerf.hull.march import Rays, march
-from toonset.nerf.kernels.compositing import compositing_weights, padded
+from toonset.nerf.kernels.compositing import compositing_weights, pad
 from toonset.nerf.kernels.losses import straight
 
 STEEPEST = math.radians(30)  # drawings are seen from about level; from above they say nothing
@@ -91,7 +91,7 @@ def _seen(
     density, rgb = trained.field(samples.points)
     depth = density * occupancy(samples.support) * trained.step
     packed = torch.cat([depth[:, None], rgb], dim=1)
-    table = padded(packed, samples.ray, samples.order, samples.rays, trained.samples)
+    table = pad(packed, samples.ray, samples.order, samples.rays, trained.samples)
     weights = compositing_weights(table[..., 0])
     return straight((weights[..., None] * table[..., 1:]).sum(dim=1), weights.sum(dim=1))
 

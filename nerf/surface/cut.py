@@ -1,4 +1,4 @@
-"""Cutting triangles where two labels are equally likely.
+"""Cut triangles where two labels are equally likely.
 
 two labels:    the cut runs from edge to edge, 3 triangles
 three labels:  cuts meet in the middle, 6 triangles

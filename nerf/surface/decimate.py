@@ -1,4 +1,4 @@
-"""Fewer triangles: edges collapse, cheapest first, and colours keep their borders.
+"""Decimate a mesh by quadric error, keeping the borders of colours.
 
 A vertex' cost is its squared distance from the planes of the faces that were merged into it. On an
 edge between two labels stands one more plane, upright on each face, so borders cost what outlines
@@ -28,7 +28,7 @@ Triangles = tuple[
 ]
 
 
-def decimated(
+def decimate(
     vertices: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "f 3"],
     labels: Int[np.ndarray, " f"],

@@ -1,4 +1,4 @@
-"""A coloured surface as GLB, OBJ or PLY.
+"""Write a coloured surface as GLB, OBJ or PLY.
 
     GLB   one mesh, one unlit material whose texture holds the palette: flat colours as drawn, one
           draw call; another palette is another texture of 8 x 8 px per colour, which variants

@@ -1,8 +1,8 @@
-"""A drawing as paint for a surface: without its outlines, and where it is to be trusted.
+"""Prepare a drawing as paint for a surface: without outlines, with a trust per pixel.
 
 Outlines are no paint. Under the silhouette's `Texture` holds the nearest paint already. Those along
 the drawing's own steps in depth are strokes of the outline's colour near such a step; what is round
-(an eye) is none. Strokes elsewhere are painted and stay.
+(an eye) is not a line. Strokes elsewhere are painted and stay.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STEP = 0.015  # of the figure's height: an outline may be drawn where depth step
 SLIP = 0.02  # of the figure's height: so far from a step its line may lie
 EXPLAINED = 0.5  # of a stroke's pixels must lie there, for the stroke to be an outline
 INK_LIKE = 40.0  # levels from the outline's colour, Euclidean
-ROUND = 3.0  # times the largest circle in it: a dark spot of so little area is no line
+ROUND = 3.0  # times the largest circle in it: a dark spot of so little area is not a line
 BESIDE_PX = 1.5  # a pixel and those that touch it
 FEATHER_PX, LEAST_TRUST = 4.0, 0.1  # beside an edge a drawing shows what the next one may not
 SMALL = 0.012  # of the figure's squared height: smaller patches are features, eyes and buttons

@@ -1,4 +1,4 @@
-"""What of a trained field is solid: its hull, less what rays pass before they are opaque.
+"""Compute which part of a trained field is solid, by transmittance from all round.
 
 Inside of its hull a field is a mist that is dense enough to look solid from where it was drawn, so
 no density is "the surface". Rays tell: from all round, level, a ray stops where it has gathered
@@ -58,7 +58,7 @@ class Solid:
 
 @torch.no_grad()
 def solid_of(trained: TrainedField, progress: Callable[[float], None] = lambda done: None) -> Solid:
-    """Return what is solid of a trained field: no cavities, no specks.
+    """Compute the solid part of a trained field, without cavities and specks.
 
     Args:
         trained: the field.
@@ -97,7 +97,7 @@ def _stopped(
 def _grown(
     stopped: Bool[np.ndarray, "x y z"], inside: Bool[np.ndarray, "x y z"]
 ) -> Float[np.ndarray, "x y z"]:
-    """Return what rays stop at, grown by the usual depth of it below the hull's surface."""
+    """Grow the cells that rays stop at by their usual depth below the hull's surface."""
     if not (stopped & inside).any():
         return np.zeros(stopped.shape)
     outward = _distance(~stopped)

@@ -1,4 +1,4 @@
-"""The surface of a trained field as triangles in palette colours, with crisp borders.
+"""Extract the surface of a trained field as triangles in palette colours.
 
 Marching cubes on what is solid; palette probabilities at the vertices; triangles cut where two
 colours are equally likely. Neighbours share the cuts, so the surface stays closed.
@@ -19,7 +19,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.options import FACES
 from toonset.nerf.surface.color import label_probabilities
 from toonset.nerf.surface.cut import cut
-from toonset.nerf.surface.decimate import decimated
+from toonset.nerf.surface.decimate import decimate
 from toonset.nerf.surface.files import Surface, Variant
 from toonset.nerf.surface.solid import SOLID_FROM, Solid, solid_of
 
@@ -60,7 +60,7 @@ def surface_of(
     vertices, corners, labels = cut(vertices, corners, chances)
     if faces is not None and len(corners) > faces:
         fewer = partial(progress, "merging triangles")
-        vertices, corners, labels = decimated(vertices, corners, labels, faces, fewer)
+        vertices, corners, labels = decimate(vertices, corners, labels, faces, fewer)
     assert trained.palette is not None  # label_probabilities has refused a run without palette
     others = [(name, field.palette) for name, field in variants]
     known = tuple(Variant(name, palette) for name, palette in others if palette is not None)

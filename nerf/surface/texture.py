@@ -1,4 +1,4 @@
-"""The drawn look on a surface: a picture for its atlas, put together from the drawings.
+"""Texture a surface with the drawn look: an atlas put together from the drawings.
 
 Every texel lies on a face, every face is painted by one drawing (`choose`), by the field where no
 drawing shows it. Beside a seam the next drawing's colour is mixed in where it has the same label.
@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.mesh.rasterize import depth_map
 from toonset.errors import BundleError
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.look.drawings import Drawings, Places, taken
+from toonset.nerf.look.drawings import Drawings, Places, sample_picture
 from toonset.nerf.options import FACES
 from toonset.nerf.surface.choose import chosen, merits
 from toonset.nerf.surface.files import Surface
@@ -40,7 +40,7 @@ NO_DRAWINGS = "run: holds no drawings to paint the mesh with; train again, or le
 NO_OUTLINE = "run: its drawings have no outline; leave --outline out"
 
 
-def textured_surface_of(
+def texture_surface(
     trained: TrainedField,
     faces: int | None = FACES,
     progress: Callable[[str, float], None] = lambda step, done: None,
@@ -181,6 +181,6 @@ def _looked_up(
     padded = np.zeros((max(1, -(-count // ROW)), ROW, 2), dtype=np.float32)
     padded.reshape(-1, 2)[:count] = np.nan_to_num(pixels - 0.5, nan=-1e4)
     places: Places = (padded[..., 0].copy(), padded[..., 1].copy())
-    color = taken(paint.texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
-    label = taken(paint.texture.labels, places, cv2.INTER_NEAREST)
+    color = sample_picture(paint.texture.paint, places, cv2.INTER_CUBIC).clip(0, 1)
+    label = sample_picture(paint.texture.labels, places, cv2.INTER_NEAREST)
     return color.reshape(-1, 3)[:count], label.ravel()[:count]

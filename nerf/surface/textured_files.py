@@ -1,4 +1,4 @@
-"""A surface with a picture as GLB or OBJ, and the inverted hull that draws its outline.
+"""Write a textured surface as GLB or OBJ, with an inverted hull as its outline.
 
 GLB   one unlit material with the picture, and one per variant. With an outline the surface is
       moved in by half the line's width, and a second mesh, without its small bumps, lies as far
@@ -84,7 +84,7 @@ class TexturedSurface:
         path = Path(path)
         shown = {"outline": self.pen is not None, "variants": bool(self.others)}
         check_textured_files(path, **shown, force=force)
-        files = textured_files(self, path)
+        files = encode_textured_files(self, path)
         write_mesh_files(files, path)
         return {name: len(data) for name, data in files.items()}
 
@@ -103,7 +103,7 @@ def check_textured_files(path: Path, *, outline: bool, force: bool, variants: bo
         raise OutputError(f"{path}: cannot leave out back faces; end -o in .glb for --outline")
 
 
-def textured_files(textured: TexturedSurface, path: Path) -> dict[str, bytes]:
+def encode_textured_files(textured: TexturedSurface, path: Path) -> dict[str, bytes]:
     """Return the files of a textured mesh, by name: that of `path` first."""
     if path.suffix.lower() == ".glb":
         return {path.name: encode_textured_glb(textured)}

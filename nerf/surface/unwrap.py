@@ -1,4 +1,4 @@
-"""A surface cut into charts that lie flat on one picture, and what lies under its texels.
+"""Unwrap a surface into charts of one atlas, and find the place under every texel.
 
 Charts end at the borders of `groups`. Between charts is a gutter wide enough for four mip levels;
 texels there belong to the nearest face, whose plane goes on beyond its edges.

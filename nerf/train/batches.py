@@ -1,4 +1,4 @@
-"""The rays of all drawings, cut once into batches."""
+"""Cut the rays of all drawings into batches."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def make_batches(
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """What drawings show in some pixels, and how many rays go through each."""
+    """Drawn colours of some pixels, and how many rays go through each."""
 
     rgb: Float[Tensor, "n 3"]
     alpha: Float[Tensor, " n"]

@@ -1,4 +1,4 @@
-"""Classic volume rendering without a hull: stratified samples along the rays through a box.
+"""Sample rays through a box without a hull: classic stratified volume rendering.
 
 Every step draws its samples anew, one per bin of equal length, so nothing can be computed before.
 Source: Mildenhall et al., "NeRF", 2020, equations 2 and 3.
@@ -106,7 +106,7 @@ class BoxRays:
         ).to(self._device)
 
     def after(self, step: int, model: Model) -> None:
-        """Take note of nothing: samples are drawn anew for every step."""
+        """Do nothing: samples are drawn anew for every step."""
 
 
 def open_box(scene: Scene) -> Hull:
@@ -123,7 +123,7 @@ def full_hull(box: Box) -> Hull:
 
 @torch.no_grad()
 def without_empty_space(hull: Hull, field: Field) -> Hull:
-    """Return the hull with the voxels emptied in and round which the field shows nothing."""
+    """Empty the hull's voxels in and round which the field is empty."""
     counts = hull.support.shape
     centres = [(torch.arange(n) + 0.5) * hull.voxel for n in counts]
     points = torch.cartesian_prod(*centres) + torch.as_tensor(hull.low, dtype=torch.float32)

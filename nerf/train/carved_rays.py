@@ -1,4 +1,4 @@
-"""The rays a training draws its steps from.
+"""Sample training rays inside the hull, and hand out a step's batches.
 
 A training asks for a step's batches by their number and by the step, and tells when a step is done.
 """
@@ -23,7 +23,7 @@ HIDDEN_BELOW = 0.01  # light that reaches a sample which nobody sees any more
 
 
 class TrainingRays(Protocol):
-    """Where a training's batches come from."""
+    """Source of a training's batches."""
 
     def __len__(self) -> int:
         """Return how many steps go through all rays once."""

@@ -1,4 +1,4 @@
-"""The last state of a training that is known to be good, and when a training has gone wrong."""
+"""Keep the last good state of a training, and detect divergence."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STILL_GOOD = 2.0  # times the best window's loss: worth keeping
 class LastGood:
     """Looks at the loss before every update; a model that has gone wrong goes back.
 
-    A field can go wrong without a loss that is no number: colours and opacities have limits, so
+    A field can go wrong without a loss that is not a number: colours and opacities have limits, so
     parameters that run away show as a loss that stays high.
     """
 
@@ -28,7 +28,7 @@ class LastGood:
         self._kept, self._kept_step = _copied(model), 0
 
     def wrong(self, loss: Tensor, value: float, step: int) -> str:
-        """Return why the training must end before this step's update, or nothing.
+        """Return why the training must end before this step's update, or None.
 
         Args:
             loss: of the step.
@@ -45,7 +45,7 @@ class LastGood:
         return ""
 
     def wrong_at_end(self, step: int) -> str:
-        """Return what is wrong after the last update, or nothing."""
+        """Return what is wrong after the last update, or None."""
         if not all(bool(torch.isfinite(p).all()) for p in self._model.parameters()):
             return self._back("parameters not finite at the end")
         return self._judge(step)

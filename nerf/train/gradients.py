@@ -1,4 +1,4 @@
-"""A step's gradient, its parts side by side: of some batches, and of what smooths the field."""
+"""Compute a step's gradient, its parts side by side: batches and smoothness."""
 
 from __future__ import annotations
 

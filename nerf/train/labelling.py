@@ -1,4 +1,4 @@
-"""Palette labels for a scene that comes without."""
+"""Label a scene that comes without a palette."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from jaxtyping import UInt8
 from toonset.dataset.bundle.scene import Scene
 from toonset.palette.paints.extract import find_palette
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.grain import without_grain
+from toonset.palette.pixels.grain import remove_grain
 from toonset.palette.pixels.labels import label_pixels
 
 
-def labelled(scene: Scene) -> tuple[Scene, Palette]:
+def label_scene(scene: Scene) -> tuple[Scene, Palette]:
     """Return the scene with palette and labels extracted from its own pictures."""
     palette = find_palette([frame.rgba for frame in scene.frames])
-    return relabelled(scene, palette.rgb), palette
+    return relabel_scene(scene, palette.rgb), palette
 
 
-def relabelled(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
+def relabel_scene(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
     """Return the scene with a palette and every pixel's label by it."""
-    pictures = without_grain([frame.rgba for frame in scene.frames])
+    pictures = remove_grain([frame.rgba for frame in scene.frames])
     frames = tuple(
         replace(frame, labels=label_pixels(picture, palette))
         for frame, picture in zip(scene.frames, pictures, strict=True)
@@ -30,7 +30,7 @@ def relabelled(scene: Scene, palette: UInt8[np.ndarray, "colors 3"]) -> Scene:
     return replace(scene, palette=palette, frames=frames)
 
 
-def without_palette(scene: Scene) -> Scene:
+def drop_palette(scene: Scene) -> Scene:
     """Return the scene without palette and labels."""
     return replace(
         scene, palette=None, frames=tuple(replace(frame, labels=None) for frame in scene.frames)

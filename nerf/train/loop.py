@@ -1,4 +1,4 @@
-"""The training loop: Adam over batches of rays."""
+"""Run the training loop: Adam over batches of rays."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class Moment:
 
 
 class Watch(Protocol):
-    """What looks on while a field is fitted; the seconds it takes are not the training's."""
+    """Callback while a field is fitted; its seconds do not count as training."""
 
     def begin(self, trained: TrainedField) -> None:
         """Take the field that will be fitted."""
 
     def look(self, moment: Moment) -> str:
-        """Look at a training after each step; return why it should end, or nothing."""
+        """Look at a training after each step; return why it should end, or None."""
         ...
 
 

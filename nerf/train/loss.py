@@ -1,4 +1,4 @@
-"""What one optimiser step minimises: a batch of rays, rendered and compared with the drawings."""
+"""Compute the loss of one step: a batch of rays, rendered and compared with the drawings."""
 
 from __future__ import annotations
 

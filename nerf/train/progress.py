@@ -1,4 +1,4 @@
-"""Where a training stands, in numbers and in one line."""
+"""Report a training's progress, in numbers and in one line."""
 
 from __future__ import annotations
 

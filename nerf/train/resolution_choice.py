@@ -1,4 +1,4 @@
-"""How fine the planes are: from one cell per pixel down to a third, by what drawings predict.
+"""Choose the planes' resolution by how well it predicts left-out drawings.
 
 Finer planes fit each drawing's own pixels, and thin limbs; coarser ones hold what drawings share.
 Short trainings on some drawings predict the others with finer and with coarser planes; the coarser
@@ -36,7 +36,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class FieldChoice:
-    """Which planes were chosen, and on what evidence.
+    """Chosen resolution of the planes, and its evidence.
 
     Attributes:
         cells: along the longest side.

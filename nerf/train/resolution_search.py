@@ -1,4 +1,4 @@
-"""Short trainings that say how fine the planes need to be.
+"""Search the planes' resolution by short trainings.
 
 For every candidate a field is fitted for a few steps to all drawings but one or two, inside the
 hull of all of them, and compared with what was left out (see
@@ -43,7 +43,7 @@ Batches = Sequence[tuple[Batch, ...]]
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What all candidates are fitted to, and how.
+    """Scene and settings that all candidates share.
 
     Attributes:
         scene: drawings as they are fitted, without mirror images.

@@ -1,4 +1,4 @@
-"""What training returns: the field, and how it came about."""
+"""Define the result of training: the field, and its history."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fitting a triplane field and a palette classifier to posed drawings.
+"""Fit a triplane field and a palette classifier to posed drawings.
 
     loss = photometric + palette_weight * cross-entropy + smoothness * total variation
 
@@ -32,8 +32,8 @@ from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint import Depths
-from toonset.nerf.prepare.prepare import Prepared, prepare, with_paint
-from toonset.nerf.prepare.symmetry import add_mirrored_views, with_mirrored
+from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
+from toonset.nerf.prepare.symmetry import add_mirrored_views, mirror_found
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
@@ -102,8 +102,8 @@ def fit_field(
     tell("carving the hull" if options.carve else "placing the box")
     hull, evidence = _hull(whole, options, ready)
     if options.carve and agree:
-        ready = with_paint(ready, _depths(ready, hull), _height(hull))
-    scene = with_mirrored(ready.scene, symmetry)
+        ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
+    scene = mirror_found(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
@@ -130,7 +130,7 @@ def fit_field(
 
 
 def _hull(scene: Scene, options: TrainOptions, ready: Prepared) -> tuple[Hull, HullEvidence]:
-    """Return where the field is, and what speaks for how drawings carve it."""
+    """Return the field's hull, and the evidence for how drawings carve it."""
     if not options.carve:
         return open_box(scene), NO_EVIDENCE
     if ready.shape is None:

@@ -1,1 +1,1 @@
-"""A run as one HTML page that anyone can open: its data packed, its pictures, the page itself."""
+"""Write a run as one HTML page that anyone can open."""

@@ -1,4 +1,4 @@
-"""A run, or a bundle that is not trained yet, to a page."""
+"""Build the page of a run, or of a bundle that is not trained yet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a run or a bundle: its template and modules, its data and pictures, in one file."""
+"""Assemble a page: template and modules, data and pictures, in one file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page needs of a run: numbers as JSON, and all arrays in one deflated blob.
+"""Pack a run for the page: numbers as JSON, and all arrays in one deflated blob.
 
 The field itself goes along, planes and decoder: it is the smallest form that it has, and a page
 reads it once, at the hull's voxels, as `toonset.nerf.render.baked` does.
@@ -39,7 +39,7 @@ from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.views import baked_of
 from toonset.nerf.run.tensors import rows_near
 from toonset.nerf.viewer.volume import BLOCK, packed_hull
-from toonset.view import premultiplied
+from toonset.view import premultiply
 
 CHANNELS = 4  # of a texel
 EDGE_STEPS = 5.0  # per pixel: how finely distances to an edge are kept
@@ -163,7 +163,7 @@ def _weights(layer: torch.nn.Linear) -> dict[str, Any]:
 
 
 def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
-    """Return what the drawn look is made of."""
+    """Return the page's record of the drawn look."""
     textures = drawings.textures
     paint, whole, about = _atlases(drawings, textures)
     shape = drawings.shape
@@ -214,7 +214,7 @@ def plain_drawings_record(
 ) -> dict[str, Any]:
     """Return drawings and a body beside them, before anything is trained."""
     sizes = [picture.shape[:2] for picture in pictures]
-    whole = [_bytes(premultiplied(picture) / 255) for picture in pictures]
+    whole = [_bytes(premultiply(picture) / 255) for picture in pictures]
     return {
         "cameras": [camera_record(camera) for camera in cameras],
         "whole": blob.add(np.stack([_padded(one, _largest(sizes), "constant") for one in whole])),

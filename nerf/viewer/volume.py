@@ -1,4 +1,4 @@
-"""What a page's rays read of a field's hull: where samples may be, and how far is clear.
+"""Pack a field's hull for the page's rays: support and safe steps.
 
 support  (z, y, x)  the hull's support, 0 to 255
 safe_steps (z, y, x)  per block of BLOCK voxels: 0 = the field is read there; n = steps, in any
@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.hull.hull import EDGE, grown
+from toonset.nerf.hull.hull import EDGE, grow
 
 BLOCK = 4  # voxels a side
 MOST_CLEAR = 40  # blocks
@@ -44,12 +44,12 @@ class PackedHull:
 def packed_hull(trained: TrainedField) -> PackedHull:
     """Return a field's hull, cut to the voxels that may hold a sample."""
     hull = trained.hull
-    near = grown(hull.near, 1)
+    near = grow(hull.near, 1)
     places = near.nonzero()
     first, last = places.amin(dim=0), places.amax(dim=0) + 1
     cut = tuple(slice(a, b) for a, b in zip(first.tolist(), last.tolist(), strict=True))
     support = hull.support[cut]
-    codes = _leaps(grown(support >= EDGE, 1), hull.voxel / trained.step)
+    codes = _leaps(grow(support >= EDGE, 1), hull.voxel / trained.step)
     start = first.numpy()
     box = np.stack([-start - 0.5, np.array(hull.support.shape) - start - 0.5])
     levels = (support * 255).round().byte().numpy()
@@ -68,6 +68,6 @@ def _leaps(solid: Bool[Tensor, "x y z"], per_voxel: float) -> UInt8[np.ndarray, 
     away, around = torch.zeros(filled.shape), filled
     for _ in range(MOST_CLEAR):
         away += ~around
-        around = grown(around, 1)
+        around = grow(around, 1)
     clear = ((away - 1) * (BLOCK * per_voxel)).floor().clamp(0, MOST_STEPS - 1) + 1
     return torch.where(filled, 0, clear).byte().numpy()

@@ -1,1 +1,1 @@
-"""Palette files of this and other programs."""
+"""Read and write palette files of this and other programs."""

@@ -1,4 +1,4 @@
-"""Adobe's swatches: .ase (Illustrator, InDesign, Affinity, Procreate) and Photoshop's older .aco.
+"""Read and write Adobe's .ase swatches; read Photoshop's older .aco.
 
 Both are big-endian. ASE: "ASEF", version 1.0, number of blocks; a block is kind, length, content. A
 colour's content is a UTF-16 name (its length counts the closing zero), four letters for the model,

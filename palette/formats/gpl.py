@@ -1,4 +1,4 @@
-"""GIMP's .gpl, which Krita, Inkscape and Aseprite read and write too.
+"""Read and write GIMP's .gpl, which Krita, Inkscape and Aseprite have, too.
 
 Lines of "red green blue name". Aseprite's variant says `Channels: RGBA` and has a fourth number.
 Sources: GIMP's app/core/gimppalette-load.c; Aseprite's docs/gpl-palette-extension.md.
@@ -24,7 +24,7 @@ def read_gpl(data: bytes, where: str) -> list[NamedColor]:
     """Return the colours of a .gpl, without Aseprite's fully transparent ones.
 
     Raises:
-        PaletteError: not a .gpl, or a line that is no colour.
+        PaletteError: not a .gpl, or a line that is not a colour.
     """
     lines = lines_of(data, where)
     if not lines[0].startswith(MAGIC):

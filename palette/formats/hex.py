@@ -1,4 +1,4 @@
-"""Hex lists: one colour per line, as Lospec writes .hex, and paint.net's .txt (AARRGGBB).
+"""Read and write hex lists: Lospec's .hex, and paint.net's .txt (AARRGGBB).
 
 Source: paint.net documentation, "Working with palettes": comments begin with ";", eight digits are
 alpha, red, green, blue.
@@ -42,7 +42,7 @@ def to_hex(palette: Palette) -> str:
 
 
 def _color(word: str, paint_net: bool, where: str) -> NamedColor | None:
-    """Return the colour; None for paint.net's fully transparent one, which is none."""
+    """Return the colour; None for paint.net's fully transparent one."""
     match = WITH_ALPHA.fullmatch(word) if paint_net else None
     if match is None:
         return NamedColor(rgb_of_hex(word, where))

@@ -1,4 +1,4 @@
-"""JSON: toonset's own palette.json, and lists of hex colours such as Lospec gives."""
+"""Read and write palette.json; read lists of hex colours such as Lospec's."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_json(data: bytes, where: str) -> list[NamedColor]:
     An entry is "#rrggbb", or an object with "hex" and perhaps "name" and "tones".
 
     Raises:
-        PaletteError: no JSON, no such list, or an entry that is no colour.
+        PaletteError: no JSON, no such list, or an entry that is not a colour.
     """
     content = parse_json(data, where, PaletteError)
     entries = content.get("colors") if isinstance(content, dict) else content
@@ -40,7 +40,7 @@ def read_json(data: bytes, where: str) -> list[NamedColor]:
 
 
 def json_title(data: bytes) -> str:
-    """Return what an object calls itself, as toonset and Lospec write it; "" if it does not."""
+    """Return an object's title, as toonset and Lospec write it; "" if missing."""
     content = parse_json(data, "palette", PaletteError)
     said = [content.get(key) for key in ("title", "name")] if isinstance(content, dict) else []
     return next((clean_name(text) for text in said if isinstance(text, str)), "")

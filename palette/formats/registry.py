@@ -1,4 +1,4 @@
-"""Palettes that people type and that programs exchange: which format is which, read and written."""
+"""Parse typed palettes and choose the format of palette files."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ WRITTEN = tuple(kind.extensions[0] for kind in FORMATS if kind.write is not None
 def parse_colors(text_or_path: str) -> UInt8[np.ndarray, "colors 3"]:
     """Return the sRGB colours of a typed list or of a palette file; repeated ones count once.
 
-    Swatches that a file names as another one's tone in shadow are none of them.
+    Swatches that a file names as another one's tone in shadow are left out.
 
     Args:
         text_or_path: "#aabbcc,#123,white" (commas or spaces, # may be left out), or the path of a
@@ -116,7 +116,7 @@ def names_tones(text_or_path: str) -> bool:
 
 
 def palette_title(text_or_path: str) -> str:
-    """Return what a palette file calls itself; "" where it does not, and of typed colours."""
+    """Return a palette file's title; "" if missing, and of typed colours."""
     path = Path(text_or_path)
     if path.suffix.lower() not in EXTENSIONS:
         return ""

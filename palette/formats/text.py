@@ -1,4 +1,4 @@
-"""Text of foreign palette files: encodings and line ends."""
+"""Decode the text of foreign palette files: encodings and line ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shadow tones in palette files: swatches of their own, named after their paint.
+"""Write shadow tones as swatches of their own in palette files, and read them back.
 
     brown
     brown, shadow

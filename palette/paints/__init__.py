@@ -1,1 +1,1 @@
-"""Find a palette: count colours, cluster them, choose those that are paints."""
+"""Find a palette: count colours, cluster them, select those that are paints."""

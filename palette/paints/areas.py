@@ -1,4 +1,4 @@
-"""How much of the character every paint covers, soft pixels and drawn lines included.
+"""Measure the area of every paint, antialiased pixels and drawn lines included.
 
 A pixel of a colour that flat paint has, too, is that paint's. Any other is a blend of what lies
 beside it, so it counts for the nearest of its four neighbours' paints and the ink, not for a third

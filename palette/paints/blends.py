@@ -1,4 +1,4 @@
-"""Which paints are none: what only blends of others look like, in long edges and thin strokes."""
+"""Reject colours that are only blends of two others, along edges and in thin strokes."""
 
 from __future__ import annotations
 

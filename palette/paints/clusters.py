@@ -1,4 +1,4 @@
-"""From all colours that occur to paints: one paint per colour that a painter would name.
+"""Cluster flat colours into paints by quick shift: one per colour that a painter would name.
 
 Flat pixels are counted in small cells of RGB. Every cell points to the nearest cell that is denser
 than itself, if that lies within a just-noticeable distance; cells that point nowhere are peaks,
@@ -25,7 +25,7 @@ CELL = 4  # levels per side of a counting cell
 EXACT = 0.2  # of a paint: so frequent an exact colour is the paint itself
 MOST_CELLS = 4096  # the fullest; the others, of noisy pictures, join the nearest paint
 TOUCHING = 1.5 * JUST_NOTICEABLE  # shades with a wider gap between them are not of one paint
-LEAST_PEAK = 0.002  # of the flat pixels; less is no paint, but joins the nearest
+LEAST_PEAK = 0.002  # of the flat pixels; less is not a paint, but joins the nearest
 UNLIKE = 4 * JUST_NOTICEABLE  # from all paints' shades: nobody takes it for one of them
 FEW = 4  # flat pixels: a block of 2 x 2
 
@@ -64,7 +64,7 @@ class Found:
 
 
 def find_paints(histogram: Histogram) -> Found:
-    """Return the paints, and what is none but unlike all of them."""
+    """Return the paints, and rare colours that are unlike all of them."""
     ink = find_ink(histogram)
     cells, cell_of = _cells(histogram, ink)
     peaks = _peaks(cells)

@@ -1,4 +1,4 @@
-"""The paper's own tool, for comparison: the library `extcolors` and a 5 % rule.
+"""Extract a palette with the paper's own tool, for comparison: `extcolors` and a 5 % rule.
 
 What it does, read from its source (version 1.0.0): every colour that is not wholly transparent is
 counted, then, from the most frequent on, each takes over all later colours within a tolerance (32)

@@ -1,4 +1,4 @@
-"""The paper's palette: the colours that make up at least 5 % of the character's pixels.
+"""Extract the paper's palette: colours that make up at least 5 % of the character's pixels.
 
 Which colours there are is read from flat paint (`histogram`, `clusters`); how much of each, from
 all of the figure's (`areas`). Where the drawn lines are given, they count to their ink, and the

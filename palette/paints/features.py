@@ -1,4 +1,4 @@
-"""Features: eyes, mouths, buttons, which cover too little for the rule but make the character.
+"""Find features: eyes, mouths, buttons, too small for the 5 % rule but part of the character.
 
 A colour under the rule is a feature if people tell it from every colour of the palette, and if it
 is where the character has it: at the same height in two drawings or more, for turning leaves
@@ -18,7 +18,7 @@ from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.paints.clusters import UNLIKE
 from toonset.palette.palette import MAX_COLORS, Palette, Shadow
 from toonset.palette.pixels.labels import nearest_labels
-from toonset.palette.pixels.shadow import shaded
+from toonset.palette.pixels.shadow import apply_shadow
 
 RGB = tuple[int, int, int]
 
@@ -41,7 +41,7 @@ def find_features(
     """
     unlike = [color.rgb for color in palette.dropped if color.cost >= UNLIKE]
     if shadow is not None:
-        shades = oklab_from_rgb(shaded(palette.rgb, shadow.factor))
+        shades = oklab_from_rgb(apply_shadow(palette.rgb, shadow.factor))
         unlike = [rgb for rgb in unlike if _away(rgb, shades) > LEFT]
     listed = [*(color.rgb for color in palette.colors), *(color.rgb for color in palette.dropped)]
     listed = listed[:MAX_COLORS]

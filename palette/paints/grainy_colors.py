@@ -1,4 +1,4 @@
-"""A palette's colours as grainy drawings have them.
+"""Read a palette's colours off grainy drawings, as medians.
 
 Which paints there are shows once grain is smoothed off; but smoothing mixes into a paint what lies
 beside it, so that colours darken near lines. Within a paint grain is as often lighter as darker:
@@ -29,7 +29,7 @@ RGB = tuple[int, int, int]
 Named = TypeVar("Named", PaletteColor, ContourColor)
 
 
-def with_drawn_colors(
+def read_drawn_colors(
     palette: Palette, drawings: Pictures, smooth: Pictures, apart: Sequence[Bool[np.ndarray, "_ _"]]
 ) -> Palette:
     """Return a palette of smoothed drawings with the colours of the drawings themselves.

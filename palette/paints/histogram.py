@@ -1,4 +1,4 @@
-"""A character's pixels, counted by colour: all of them, and those that lie within flat paint.
+"""Count a character's pixels by colour: all of them, and those within flat paint.
 
 Flat pixels tell which colours there are. A pixel is flat if it equals a neighbour at one side and
 one above or below, but for the picture's noise; the soft pixels along edges do not, and count only
@@ -54,7 +54,7 @@ class Picture:
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """How often every colour occurs in the opaque pixels.
+    """Histogram of the opaque pixels' colours.
 
     Attributes:
         colors: (n, 3) sRGB, each once, sorted by blue, then green, then red.

@@ -1,4 +1,4 @@
-"""The colour of thin dark strokes, which soft edges leave next to no flat pixel of."""
+"""Estimate the colour of thin dark strokes, which have next to no flat pixel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many paints there are: as many as make the shortest description of the pixels.
+"""Choose the number of paints by minimum description length.
 
 Two touching clouds of shades are one paint if a single hump describes them about as well as two. A
 cloud is described by the best one-humped density (isotonic regression) along the line that parts

@@ -1,4 +1,4 @@
-"""Where colours are: patches of them, the largest of each so that a person can look at it."""
+"""Locate colours: their patches, the largest of each for a person to look at."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Members = Int[np.ndarray, " members"]
 Box = tuple[int, int, int, int]
 
 
-def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Palette:
+def add_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) -> Palette:
     """Return the palette with the place of every left-out colour's largest patch, if it lacks one.
 
     It is looked for in the picture with most of the colour's pixels, each pixel taken for the
@@ -47,7 +47,7 @@ def with_places(palette: Palette, images: Sequence[UInt8[np.ndarray, "_ _ 4"]]) 
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
-    """Where some colours are in a picture.
+    """Pixels of some colours in a picture.
 
     Attributes:
         view: number of the picture.
@@ -90,7 +90,7 @@ def patches_of(places: Sequence[Pixels], thickness_px: int = THIN) -> list[Place
 
     Args:
         places: the pixels, per picture.
-        thickness_px: what is thinner is no patch.
+        thickness_px: what is thinner is not a patch.
     """
     found = []
     for own in places:

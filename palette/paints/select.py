@@ -1,4 +1,4 @@
-"""Which paints become the palette: the paper's rule, and what a person wants kept."""
+"""Select the palette from the paints: the paper's rule, and what a person keeps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RGB = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class PaletteOptions:
-    """How colours are chosen.
+    """Options of choosing colours.
 
     Attributes:
         min_share: least share of the character's pixels, 0 to 1; the paper's rule is 5 %.
@@ -67,7 +67,7 @@ class PaletteOptions:
 
 @dataclass(frozen=True, eq=False)
 class Amount:
-    """How much of a paint there is.
+    """Amount of a paint.
 
     Attributes:
         paint: the paint.

@@ -1,4 +1,4 @@
-"""Colours of tiny features: eyes, teeth, buttons, which cover too little to be a paint.
+"""Find the colours of tiny features: eyes, teeth, buttons, too small to be a paint.
 
 What little there is of a colour is mostly a blend along an edge, or noise. A feature differs from
 both: its colour is unlike every paint, no two paints mix to it, and it is there at two places at

@@ -1,4 +1,4 @@
-"""Which pixels are blends: the soft pixels between two colours, which are nobody's colour.
+"""Detect antialiased pixels, which are blends of two colours and have no label.
 
 They lie along the borders between labels. Every pixel there is compared with the colours that begin
 beside it, in units of the picture's own noise: a clean picture tells a blend of one part in a
@@ -90,7 +90,7 @@ def _inner(padded: UInt8[np.ndarray, "height width"]) -> np.ndarray:
 
 
 def _paints(padded: np.ndarray, inner: np.ndarray, rgba: np.ndarray, palette: np.ndarray) -> Paints:
-    """Return what the palette's colours look like in the picture, and its noise beside edges."""
+    """Return the palette's colours as drawn in the picture, and its noise beside edges."""
     edge = ((padded != NONE) & ~inner).astype(np.uint8)
     ring = np.flatnonzero(inner & (cv2.dilate(edge, np.ones((5, 5), dtype=np.uint8)) > 0))
     ring = ring[:: max(1, len(ring) // SAMPLE)]

@@ -1,4 +1,4 @@
-"""Grain of paper and pencil, taken off before pixels are labelled: paints are regions.
+"""Smooth the grain of paper and pencil away before pixels are labelled.
 
 A label map without specks is a Markov field: every pixel's paint is likely by its own colour, and
 by its neighbours' unless the drawing has an edge between. With squared distances to the paints'
@@ -29,7 +29,7 @@ GUIDE_PX = 9  # window in which the guide's own grain is averaged
 Picture = UInt8[np.ndarray, "height width 4"]
 
 
-def without_grain(pictures: Sequence[Picture]) -> list[Picture]:
+def remove_grain(pictures: Sequence[Picture]) -> list[Picture]:
     """Return drawings whose grain is smoothed within borders; as they are where it is faint.
 
     Only opaque pixels are changed, and only they are averaged.

@@ -1,4 +1,4 @@
-"""The drawn lines: how much of every pixel is ink of a contour, told from black cloth and hair.
+"""Detect contour lines: how far ink covers every pixel, black cloth and hair excepted.
 
 A line is dark and thin. Closing the picture's lightness with a disc a little wider than the line
 fills the line and nothing that is thicker; what the closing fills, as a share of the way from the
@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from toonset.palette.pixels.grain import without_grain
+from toonset.palette.pixels.grain import remove_grain
 
 Morphology = Callable[..., np.ndarray]  # cv2.dilate or cv2.erode
 
@@ -33,7 +33,7 @@ OUTLINED = 0.7  # of the rim that must be dark for an outline all round
 SURE = 0.9  # of a layer of the rim that must be dark for its line to be measured there first
 SEEN = 0.3  # of the rim that must be a line by itself, for the rest to go on
 ROUND = 0.5  # of the rim that must be a line for its width to be told
-DARKEST = 100  # lightness of 255: a lighter rim is no ink
+DARKEST = 100  # lightness of 255: a lighter rim is not ink
 WIDEST = 0.04  # of the figure's height: wider is a limb
 SOFT = 0.004  # of the figure's height: so far inside a blurred rim its line may be dark only
 MEASURED_PX = 800  # height of a figure on which its line's width is measured
@@ -56,7 +56,7 @@ def find_contour(
     light = _lightness(rgba)
     mask = rgba[..., 3] >= 128
     none = np.zeros(mask.shape, dtype=np.uint8)
-    width = rim_line_px(light, mask) if line_width_px is None else line_width_px
+    width = outline_line_px(light, mask) if line_width_px is None else line_width_px
     if width <= 0 or not mask.any():
         return none
     closed = _closed(light, _reach(width))
@@ -77,10 +77,10 @@ def find_contours(
     pictures: Sequence[UInt8[np.ndarray, "height width 4"]],
 ) -> list[UInt8[np.ndarray, "height width"]]:
     """Return how far the drawn lines cover every pixel of a sheet's drawings, grain taken off."""
-    return [find_contour(picture) for picture in without_grain(pictures)]
+    return [find_contour(picture) for picture in remove_grain(pictures)]
 
 
-def rim_line_px(
+def outline_line_px(
     light: UInt8[np.ndarray, "height width"], mask: Bool[np.ndarray, "height width"]
 ) -> float:
     """Return the width of the dark line round the figure: 0 where less than half of it has one.
@@ -99,7 +99,7 @@ def rim_line_px(
         size = max(1, round(light.shape[1] / shrink)), max(1, round(light.shape[0] / shrink))
         small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
         covered = cv2.resize(mask.view(np.uint8), size, interpolation=cv2.INTER_AREA) > 0
-        return shrink * rim_line_px(small, covered)
+        return shrink * outline_line_px(small, covered)
     rims = _dark_rims(light, mask, int(SOFT * tall))
     widths = (_width_at(light, rim, int(WIDEST * tall / 2) + 1) for rim in rims)
     return next((width for width in widths if width > 0), 0.0)
@@ -171,7 +171,7 @@ def _ink(light: np.ndarray, filled: np.ndarray) -> float:
 
 
 def _coverage(light: np.ndarray, closed: np.ndarray, ink: float) -> np.ndarray:
-    """Return what was filled as a share of the way from the surroundings to the ink."""
+    """Return the filled part as a share of the way from the surroundings to the ink."""
     cover = np.zeros_like(light)
     for rows in _bands(light):
         filled = closed[rows] - light[rows]

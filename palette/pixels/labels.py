@@ -1,4 +1,4 @@
-"""Label maps: which palette colour every pixel has, and which pixels have none.
+"""Label every pixel with its palette colour, or none.
 
 Colours repeat, so each is looked up once: a table over all 2^24 colours holds the nearest palette
 colour of those that occur. What lies inside an area of one label is done; only the pixels along

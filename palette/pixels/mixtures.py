@@ -1,4 +1,4 @@
-"""What covers the pixels between areas: mixtures of two tones, so that borders are sub-pixel.
+"""Unmix the pixels between areas into two tones each, for sub-pixel borders.
 
 A pixel of colour c between areas is a mixture of two tones a and b that are drawn nearby:
 
@@ -39,7 +39,7 @@ Tones = Int16[np.ndarray, "height width"]
 
 @dataclass(frozen=True, eq=False)
 class Mixtures:
-    """What covers some pixels.
+    """Two tones that cover each of some pixels.
 
     Attributes:
         first, second: (n,) tones; the number of tones stands for a drawn line.
@@ -87,7 +87,7 @@ def find_mixtures(
     drawn: Float[np.ndarray, "tones 3"],
     at: Bool[np.ndarray, "height width"],
 ) -> Mixtures:
-    """Return what covers the chosen pixels.
+    """Unmix the chosen pixels.
 
     Args:
         picture: sRGB with straight alpha.

@@ -1,4 +1,4 @@
-"""Pictures in other colours: a paint's tones and its soft edges move with it, drawn lines stay.
+"""Recolour pictures: tones and soft edges move with their paint, drawn lines stay.
 
     c' = c + k s (m' - m)
 
@@ -20,7 +20,7 @@ from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.mixtures import LINE, NONE, alone, colors_as_drawn, find_mixtures
-from toonset.palette.pixels.shadow import DRAWN, FLOOR, shaded
+from toonset.palette.pixels.shadow import DRAWN, FLOOR, apply_shadow
 
 WINDOW = 7  # pixels: a soft edge is three wide, with a tone on either side
 SHADE = 0.06  # in OKLab
@@ -34,7 +34,7 @@ Colors = UInt8[np.ndarray, "n 3"]
 
 def tones_of(colors: UInt8[np.ndarray, "colors 3"], shadow: Shadow | None) -> Colors:
     """Return colours in light, then in shadow; within 8 bits."""
-    dark = colors if shadow is None else shaded(colors, shadow.factor)
+    dark = colors if shadow is None else apply_shadow(colors, shadow.factor)
     return np.concatenate([colors, dark])
 
 
@@ -57,7 +57,7 @@ def tone_map(
     return own
 
 
-def recolored(picture: Picture, tones: Tones, contour: Map, old: Colors, new: Colors) -> Picture:
+def recolor(picture: Picture, tones: Tones, contour: Map, old: Colors, new: Colors) -> Picture:
     """Return a picture with its tones' colours changed; the same picture if none changes.
 
     Args:

@@ -1,4 +1,4 @@
-"""Two-tone shading: the shadow of a sheet, where it lies in the drawings, and the colours in light.
+"""Detect two-tone shading: its factor, its place in the drawings, the colours in light.
 
     colour in shadow = factor * colour in light           levels of sRGB, one factor per sheet
 
@@ -26,7 +26,7 @@ from toonset.palette.pixels.antialias import OPAQUE
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
 NARROWEST_PX = 2 * SIDE_PX  # a picture; there is no border in it to look across
-FLAT = 0.03  # logarithms per pixel: steeper is no flat paint
+FLAT = 0.03  # logarithms per pixel: steeper is not a flat paint
 BETWEEN = 0.1  # logarithms: a line between the sides is darker than both by more
 LEAST_DROP, MOST_DROP = 0.1, 1.4  # logarithms: weaker is noise, deeper is another paint
 ALIKE = 0.12  # logarithms that a channel's ratio may be off the factor
@@ -69,7 +69,7 @@ class _Borders:
 
 
 def find_shadow(pictures: Sequence[Picture], contours: Sequence[Map]) -> Shadow | None:
-    """Return the shadow that the pictures of a character share; None where there is none.
+    """Return the shadow that the pictures of a character share; None without one.
 
     Args:
         pictures: the drawings.
@@ -290,7 +290,7 @@ def lit_pictures(
 
 def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
     rgb = smoothed(picture)
-    light = np.where(dark[..., None], shaded(rgb, 1 / np.array(shadow.factor)), rgb)
+    light = np.where(dark[..., None], apply_shadow(rgb, 1 / np.array(shadow.factor)), rgb)
     edge = _beside(dark)
     pure = _clear(picture, contour) & ~edge
     if pure.any():
@@ -301,7 +301,7 @@ def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
     return lit
 
 
-def shaded(
+def apply_shadow(
     rgb: np.ndarray, factor: Sequence[float] | Float[np.ndarray, " 3"]
 ) -> UInt8[np.ndarray, "*n 3"]:
     """Return colours multiplied by a shadow's factor, or by its inverse: in light again."""

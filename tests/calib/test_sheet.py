@@ -1,4 +1,4 @@
-"""What a sheet's views share: ties, labels, turns, proportions, the ladder's parts."""
+"""What a sheet's views share: priors, labels, turns, proportions, model selection."""
 
 import math
 from dataclasses import replace
@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from toonset.calib.fit.proportions import as_it_is
-from toonset.calib.fit.sheet_prior import Turn, sheet_ties, yaw_slope
+from toonset.calib.fit.sheet_prior import Turn, sheet_priors, yaw_slope
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose, pixel_slopes, project
 from toonset.calib.search.sheet_posterior import possible_turns
@@ -51,7 +51,7 @@ def test_pixel_slopes_equal_central_differences(k):
 def test_ties_measure_deviations_across_the_seam_of_yaw():
     poses = [pose_at(yaw) for yaw in (math.pi - 0.1, -math.pi + 0.1, math.pi - 0.1)]
     turn = Turn(np.array([math.pi, math.pi, np.nan]))
-    tie = sheet_ties(poses, turn, 0.1, 18)["yaw"]
+    tie = sheet_priors(poses, turn, 0.1, 18)["yaw"]
     deviations = tie.centre @ tie.values
     np.testing.assert_allclose(deviations, [-0.1, 0.1, 0.0], atol=1e-9)
 
@@ -60,7 +60,7 @@ def test_a_spread_is_what_the_deviations_show_between_its_expectation_and_them()
     wild = [replace(pose_at(roll=r)) for r in (-0.4, 0.4, -0.4, 0.4)]
     still = [pose_at(roll=0.0)] * 4
     nothing = np.zeros((24, 24))
-    spreads = [sheet_ties(p, None, 0.1, 24)["roll"].spread(nothing, 0.05) for p in (wild, still)]
+    spreads = [sheet_priors(p, None, 0.1, 24)["roll"].spread(nothing, 0.05) for p in (wild, still)]
     assert 0.2 < spreads[0] < 0.4
     assert 0.02 < spreads[1] < 0.05
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from toonset.cli.common.train_watch import LOG_S, Pace, Stopper
+from toonset.cli.common.train_watch import LOG_S, RateLimit, Stopper
 from toonset.cli.main import RENAMED
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
@@ -146,7 +146,7 @@ def test_a_log_gets_a_line_now_and_then_and_a_terminal_a_live_one():
     now = [0.0]
 
     def lines(live: bool, seconds: float, steps: int) -> int:
-        pace = Pace(live, lambda: now[0])
+        pace = RateLimit(live, lambda: now[0])
         said = 0
         for step in range(steps):
             said += pace.due((step + 1) / steps)

@@ -12,7 +12,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map
 from toonset.mesh import Mesh
-from toonset.nerf.lines.step_lines import StepLines, drawn_steps
+from toonset.nerf.lines.step_lines import StepLines, draw_steps
 
 SIDE, FINE, LINE_PX = 150, 3, 2.0
 SKIN, BELT, ARM = (240, 200, 160), (60, 60, 160), (90, 150, 60)
@@ -88,9 +88,7 @@ def drawing(mesh: Mesh, camera: Camera, hand: Hand = Hand(), seed: int = 0) -> n
     if hand.lines:
         inside = cv2.distanceTransform(there.astype(np.uint8), cv2.DIST_L2, 5)
         ink = _smaller((inside <= LINE_PX * FINE).astype(np.float32))
-        at_steps = drawn_steps(
-            np.where(np.isfinite(depth), depth, np.nan), STEPS, HEIGHT, FINE, 1.0
-        )
+        at_steps = draw_steps(np.where(np.isfinite(depth), depth, np.nan), STEPS, HEIGHT, FINE, 1.0)
         ink = np.maximum(ink, at_steps)[..., None]
         rgb = rgb * (1 - ink) + INK * ink
     rng = np.random.default_rng(seed)

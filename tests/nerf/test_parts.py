@@ -14,7 +14,7 @@ from torch import nn
 from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
 from toonset.nerf.kernels import decoder, losses
-from toonset.nerf.kernels.compositing import composite, compositing_weights, padded
+from toonset.nerf.kernels.compositing import composite, compositing_weights, pad
 from toonset.nerf.kernels.interpolation import Operator
 from toonset.nerf.score.metrics import BEST_PSNR, compare, ssim
 
@@ -101,7 +101,7 @@ def test_gradients_of_compositing_match_central_differences() -> None:
 
 def test_padding_changes_no_rendering() -> None:
     depth = torch.tensor([0.5, 2.0, 0.1])
-    table = padded(depth[:, None], torch.tensor([0, 0, 2]), torch.tensor([0, 1, 0]), 3, 4)[..., 0]
+    table = pad(depth[:, None], torch.tensor([0, 0, 2]), torch.tensor([0, 1, 0]), 3, 4)[..., 0]
     weights = compositing_weights(table)
     torch.testing.assert_close(weights[0, :2], compositing_weights(depth[:2]))
     assert weights[1].abs().sum() == 0

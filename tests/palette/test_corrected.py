@@ -9,7 +9,7 @@ import pytest
 
 from tests.palette.shaded import BOOTS, FACTOR, SKIN, TROUSERS, TUNIC, drawings
 from toonset.errors import PaletteError
-from toonset.palette.corrected import BY_HAND, corrected
+from toonset.palette.corrected import BY_HAND, correct_palette
 from toonset.palette.corrections import Divided, PaletteCorrections, Stroke
 from toonset.palette.extract import choose_palette, paint_maps
 from toonset.palette.names import hex_of
@@ -37,7 +37,9 @@ def colors_of(maps, palette):
 
 def done(sheet, strokes=(), **wanted):
     pictures, contours, found, maps = sheet
-    palette, after = corrected(pictures, contours, found, PaletteCorrections(**wanted), strokes)
+    palette, after = correct_palette(
+        pictures, contours, found, PaletteCorrections(**wanted), strokes
+    )
     shares = [color.share for color in palette.colors]
     assert shares == sorted(shares, reverse=True)
     assert palette.rule.endswith(BY_HAND)
@@ -155,7 +157,7 @@ def test_what_cannot_be_done_names_file_and_key(wanted, words, sheet):
     if "leaves no colour" in words:
         filled = {"drop": tuple(hexes.values())}
     with pytest.raises(PaletteError) as refused:
-        corrected(pictures, contours, found, PaletteCorrections(**filled), where="file.json")
+        correct_palette(pictures, contours, found, PaletteCorrections(**filled), where="file.json")
     assert str(refused.value).startswith("file.json: ")
     assert words in str(refused.value)
 

@@ -12,8 +12,8 @@ from toonset.palette.extract import PaintMap, extract_palette, paint_maps
 from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
-from toonset.palette.pixels.recolor import recolored, tone_map, tones_of
-from toonset.palette.recolor import changed_colors, recolored_drawing
+from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
+from toonset.palette.recolor import change_colors, recolor_drawing
 
 GREEN = (40, 140, 70)
 
@@ -34,7 +34,7 @@ def test_the_same_colours_are_the_same_bytes(shadow: bool) -> None:
     drawn = drawings(shadow=shadow, noisy=True, views=2)
     palette, maps, contours = found(drawn)
     for one, paint, contour in zip(drawn, maps, contours, strict=True):
-        same = recolored_drawing(one.rgba, paint, contour, palette, palette.rgb)
+        same = recolor_drawing(one.rgba, paint, contour, palette, palette.rgb)
         assert same.tobytes() == one.rgba.tobytes()
 
 
@@ -46,7 +46,7 @@ def test_a_paint_has_its_new_colour_with_the_sheets_shadow_and_others_stay() -> 
     colors = palette.rgb
     colors[tunic] = GREEN
     for one, paint, contour in zip(drawn, maps, contours, strict=True):
-        new = recolored_drawing(one.rgba, paint, contour, palette, colors)
+        new = recolor_drawing(one.rgba, paint, contour, palette, colors)
         assert np.array_equal(new[..., 3], one.rgba[..., 3])
         sure = cv2.erode((one.paint == 1).astype(np.uint8), np.ones((7, 7))) > 0
         for part, factor in ((sure & ~one.dark, (1, 1, 1)), (sure & one.dark, FACTOR)):
@@ -71,8 +71,8 @@ def test_recolouring_back_restores() -> None:
         ),
     )
     for one, paint, contour in zip(drawn, maps, contours, strict=True):
-        new = recolored_drawing(one.rgba, paint, contour, palette, colors)
-        back = recolored_drawing(new, paint, contour, changed, palette.rgb)
+        new = recolor_drawing(one.rgba, paint, contour, palette, colors)
+        back = recolor_drawing(new, paint, contour, changed, palette.rgb)
         off = np.abs(back.astype(int) - one.rgba).max(axis=2)
         assert (off > 2).mean() < 1e-4
 
@@ -93,7 +93,7 @@ def test_soft_edges_are_mixed_as_before_and_lines_and_eyes_stay() -> None:
     old = np.array([red, blue], dtype=np.uint8)
     new = np.array([green, blue], dtype=np.uint8)
     tones = tone_map(labels, None, contour, 2)
-    after = recolored(picture, tones, contour, tones_of(old, None), tones_of(new, None))
+    after = recolor(picture, tones, contour, tones_of(old, None), tones_of(new, None))
     assert np.abs(after[9, 8:13, :3] - ((1 - share) * green + share * blue)).max() <= 1.5
     assert np.array_equal(after[15:17], picture[15:17])
     assert np.array_equal(after[4, 3], picture[4, 3])
@@ -120,11 +120,11 @@ def test_a_shadow_of_a_new_colour_stays_within_8_bits() -> None:
 )
 def test_a_change_that_means_nothing_is_refused(change: str, words: str) -> None:
     with pytest.raises(PaletteError, match=words):
-        changed_colors(np.array(PAINTS, dtype=np.uint8), [change])
+        change_colors(np.array(PAINTS, dtype=np.uint8), [change])
 
 
 def test_a_colour_is_replaced_once() -> None:
     colors = np.array(PAINTS, dtype=np.uint8)
     first = hex_of(tuple(colors[0].tolist()))
     with pytest.raises(PaletteError, match=f"{first} is replaced twice; drop one"):
-        changed_colors(colors, [f"{first}=#111111", f"{first}=#222222"])
+        change_colors(colors, [f"{first}=#111111", f"{first}=#222222"])

@@ -7,7 +7,7 @@ from tests.palette.pictures import as_set, block, soft_stripes
 from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.paints.extract import find_palette, pick_palette
-from toonset.palette.paints.places import with_places
+from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette, PaletteColor, Place
 from toonset.palette.pixels.labels import nearest_colors
@@ -180,5 +180,5 @@ def test_left_out_colours_are_shown_where_they_are() -> None:
     pictures = [block(((200, 30, 40), 90)), block(((200, 30, 40), 90))]
     pictures[1][5:9, 20:26, :3] = (20, 60, 180)
     pictures[0][30:32, 3:5, :3] = (20, 60, 180)
-    palette = with_places(find_palette(pictures), pictures)
+    palette = add_places(find_palette(pictures), pictures)
     assert [color.place for color in palette.dropped] == [Place(1, (20, 5, 6, 4))]

@@ -1,1 +1,1 @@
-"""Figures from marks: connected blobs, groups of them, letters and swatches among them."""
+"""Group connected components into figures, with letters and swatches among them."""

@@ -1,4 +1,4 @@
-"""Which patches of a sheet are the bodies of the drawn views, and in which order one reads them.
+"""Find the connected components that are the drawn views' bodies, in reading order.
 
 The views of a turnaround show one character, so they are about equally high: of all heights the one
 counts that explains most of what is drawn, tall things first.
@@ -66,7 +66,7 @@ def as_box(numbers: Int[np.ndarray, " 4"]) -> Box:
     return x, y, width, height
 
 
-def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
+def find_main_blobs(blobs: Blobs) -> Int[np.ndarray, " main_blobs"]:
     """Return the numbers of the patches that are the bodies of the views, in no order."""
     large = np.flatnonzero(blobs.areas >= LEAST_SPECK)
     letters = np.zeros(len(blobs.areas), dtype=bool)
@@ -80,52 +80,52 @@ def find_mains(blobs: Blobs) -> Int[np.ndarray, " mains"]:
     return large
 
 
-def with_blocks(
+def add_blocks(
     blobs: Blobs,
-    mains: Int[np.ndarray, " mains"],
+    main_blobs: Int[np.ndarray, " main_blobs"],
     painted: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
-) -> Int[np.ndarray, " mains"]:
+) -> Int[np.ndarray, " main_blobs"]:
     """Return the bodies and the rectangles that are views, too: a blocky character's profile.
 
     It stands level with another view and has its colours, several of them; a swatch has one.
     """
-    if len(mains) < 2:
-        return mains
+    if len(main_blobs) < 2:
+        return main_blobs
     fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
-    blocks = np.setdiff1d(np.flatnonzero(fill >= RECTANGLE), mains)
-    height, area = np.median(blobs.boxes[mains, 3]), np.median(blobs.areas[mains])
+    blocks = np.setdiff1d(np.flatnonzero(fill >= RECTANGLE), main_blobs)
+    height, area = np.median(blobs.boxes[main_blobs, 3]), np.median(blobs.areas[main_blobs])
     blocks = blocks[(blobs.areas[blocks] >= LEAST_AREA * area)]
     if not len(blocks):
-        return mains
+        return main_blobs
     ends = np.stack([blobs.boxes[:, 1], blobs.boxes[:, 1] + blobs.boxes[:, 3]], axis=1)
-    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in mains])
+    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in main_blobs])
     typical = np.median([np.minimum(look, looks.mean(axis=0)).sum() for look in looks])
     views = []
     for block in blocks.tolist():
-        level = np.abs(ends[mains] - ends[block]).max(axis=1) <= LEVEL * height
+        level = np.abs(ends[main_blobs] - ends[block]).max(axis=1) <= LEVEL * height
         look = _look_of(blobs, block, painted, rgb)
         alike = np.minimum(look, looks.mean(axis=0)).sum() >= STRANGE * typical
         if level.any() and alike and look.max() <= PLAIN:
             views.append(block)
-    return np.concatenate([mains, np.array(views, dtype=mains.dtype)])
+    return np.concatenate([main_blobs, np.array(views, dtype=main_blobs.dtype)])
 
 
-def without_strangers(
+def remove_strangers(
     blobs: Blobs,
-    mains: Int[np.ndarray, " mains"],
+    main_blobs: Int[np.ndarray, " main_blobs"],
     painted: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
-) -> Int[np.ndarray, " mains"]:
+) -> Int[np.ndarray, " main_blobs"]:
     """Return the bodies without smaller ones in other colours: a sword as high as its bearer."""
-    if len(mains) < 3:
-        return mains
-    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in mains])
-    others = (looks.sum(axis=0) - looks) / (len(mains) - 1)
+    if len(main_blobs) < 3:
+        return main_blobs
+    looks = np.array([_look_of(blobs, int(n), painted, rgb) for n in main_blobs])
+    others = (looks.sum(axis=0) - looks) / (len(main_blobs) - 1)
     shared = np.minimum(looks, others).sum(axis=1)
-    heights, areas = blobs.boxes[mains, 3], blobs.areas[mains]
+    heights, areas = blobs.boxes[main_blobs, 3], blobs.areas[main_blobs]
     smaller = (heights <= SMALLER * np.median(heights)) | (areas <= SMALLER * np.median(areas))
-    return mains[~smaller | (shared >= STRANGE * np.median(shared))]
+    return main_blobs[~smaller | (shared >= STRANGE * np.median(shared))]
 
 
 def shared_colors(a: UInt8[np.ndarray, "_ 3"], b: UInt8[np.ndarray, "_ 3"]) -> float:

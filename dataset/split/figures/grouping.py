@@ -1,4 +1,4 @@
-"""Which patches of a sheet are parts of a view, and what the others are.
+"""Group connected components into views, and classify the rest.
 
 A patch that is no body of a view is a part of one (a floating hat, a hand apart) if it lies within
 or close to it, or if most views have the like at the same level; else it is left out under a name.
@@ -40,7 +40,7 @@ DISC = (0.74, 0.83)  # of its box that a disc fills
 
 @dataclass(frozen=True, eq=False)
 class Grouping:
-    """Which figure every patch belongs to.
+    """Figure of every patch.
 
     Attributes:
         figure_of_blob: (blobs,) number of the figure in reading order; -1 = none.
@@ -55,32 +55,34 @@ class Grouping:
 
 
 def group_blobs(
-    blobs: Blobs, mains: Int[np.ndarray, " mains"], rgb: UInt8[np.ndarray, "height width 3"]
+    blobs: Blobs,
+    main_blobs: Int[np.ndarray, " main_blobs"],
+    rgb: UInt8[np.ndarray, "height width 3"],
 ) -> Grouping:
     """Return which figure every patch belongs to, and what the others are.
 
     Args:
         blobs: the patches.
-        mains: those that are the bodies of the views.
+        main_blobs: those that are the bodies of the views.
         rgb: the sheet.
     """
-    mains = mains[reading_order(blobs.boxes[mains], blobs.centers[mains])]
+    main_blobs = main_blobs[reading_order(blobs.boxes[main_blobs], blobs.centers[main_blobs])]
     figure = np.full(len(blobs.areas), -1)
-    figure[mains] = np.arange(len(mains))
+    figure[main_blobs] = np.arange(len(main_blobs))
     kinds = np.full(len(blobs.areas), "", dtype=object)
     small = np.flatnonzero((figure < 0) & (blobs.areas >= LEAST_SPECK))
     if len(small):
-        nearest, gap = _nearest_main(blobs, mains, small)
-        letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[mains, 3])))
+        nearest, gap = _nearest_main(blobs, main_blobs, small)
+        letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[main_blobs, 3])))
         swatches = find_swatches(blobs.boxes[small], blobs.areas[small])
-        typical = float(np.median(blobs.areas[mains]))
-        bodies = mains[nearest]
+        typical = float(np.median(blobs.areas[main_blobs]))
+        bodies = main_blobs[nearest]
         for i, number in enumerate(small):
             within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
             in_row = bool(letters[i] | swatches[i]) and not within
             if not in_row and _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
                 figure[number] = nearest[i]
-        again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(mains), rgb)
+        again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(main_blobs), rgb)
         figure[small[again]] = nearest[again]
         for i, number in enumerate(small):
             if figure[number] >= 0:
@@ -91,17 +93,17 @@ def group_blobs(
                 kinds[number] = "text"
             elif blobs.areas[number] >= LISTED_SPECK * typical:
                 kinds[number] = _kind(blobs, int(number), typical)
-    return Grouping(figure, len(mains), tuple(kinds))
+    return Grouping(figure, len(main_blobs), tuple(kinds))
 
 
 def _nearest_main(
-    blobs: Blobs, mains: np.ndarray, small: np.ndarray
+    blobs: Blobs, main_blobs: np.ndarray, small: np.ndarray
 ) -> tuple[Int[np.ndarray, " small"], Float[np.ndarray, " small"]]:
-    """Return for every small patch the position in `mains` of the nearest figure, and the gap."""
+    """Return the position in `main_blobs` of every small patch's nearest figure, and the gap."""
     is_main = np.zeros(len(blobs.areas) + 1, dtype=bool)
-    is_main[mains + 1] = True
+    is_main[main_blobs + 1] = True
     position = np.zeros(len(blobs.areas) + 1, dtype=np.int64)
-    position[mains + 1] = np.arange(len(mains))
+    position[main_blobs + 1] = np.arange(len(main_blobs))
     zero_at_main = (~is_main[blobs.labels]).view(np.uint8)
     away, found = cv2.distanceTransformWithLabels(
         zero_at_main, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL

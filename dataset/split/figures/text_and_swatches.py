@@ -1,4 +1,4 @@
-"""Text and colour swatches on a sheet: small things alike, side by side on a line."""
+"""Detect text and colour swatches: small things alike, side by side on a line."""
 
 from __future__ import annotations
 

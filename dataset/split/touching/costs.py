@@ -1,4 +1,4 @@
-"""What a cut through a patch would cross: paint, drawn lines, edges, and where it would begin.
+"""Compute what a cut through a patch crosses: paint, lines, edges, and where it would begin.
 
 Two figures that touch meet in a cleft: a right cut begins and ends where the background is a sharp
 corner (the minima rule), a cut through a limb on a straight side.
@@ -26,7 +26,7 @@ TOLL = 0.015  # of the height: cost of a cut that begins at a straight side
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class CutCosts:
     """A patch on a small picture.
 
     Attributes:
@@ -44,17 +44,17 @@ class Sight:
     open: Float[np.ndarray, "height width"]
 
     def prices(self) -> Float[np.ndarray, "3 height width"]:
-        """Return what a cut costs per cell: from cleft to cleft along lines, or edges; plainly."""
+        """Return a cut's costs per cell: from cleft to cleft along lines, or edges; plainly."""
         gaps, tolls = GAP * np.maximum(self.solid - self.drawn, 0), self._tolls()
         costs = self.by_lines() + tolls, self.by_edges() + tolls, self.drawn
         return np.stack(costs) + gaps
 
     def by_lines(self) -> Float[np.ndarray, "height width"]:
-        """Return what paint costs per cell if lines are cheap."""
+        """Return the cost of paint per cell if lines are cheap."""
         return self.drawn * (1 - LINE * self.lines)
 
     def by_edges(self) -> Float[np.ndarray, "height width"]:
-        """Return what paint costs per cell if lines and edges are cheap."""
+        """Return the cost of paint per cell if lines and edges are cheap."""
         return self.drawn * (1 - np.maximum(LINE * self.lines, EDGE * self.edges))
 
     def _tolls(self) -> Float[np.ndarray, "height width"]:
@@ -72,7 +72,7 @@ def look_at(
     mask: Bool[np.ndarray, "height width"],
     paint: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
-) -> Sight:
+) -> CutCosts:
     """Return a patch as cuts see it, at most `MOST_ROWS` high."""
     shrink = min(1.0, MOST_ROWS / len(mask))
     size = max(8, round(mask.shape[1] * shrink)), max(8, round(mask.shape[0] * shrink))
@@ -80,7 +80,7 @@ def look_at(
         cv2.resize(picture.astype(np.float32), size, interpolation=cv2.INTER_AREA)
         for picture in (mask, paint, _lines(rgb), _edges(rgb))
     )
-    return Sight(solid, drawn, lines, edges, _openness(drawn > 0.5))
+    return CutCosts(solid, drawn, lines, edges, _openness(drawn > 0.5))
 
 
 def _openness(inside: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:

@@ -1,4 +1,4 @@
-"""Figures that touch or overlap a little: cut apart where the evidence says that two meet.
+"""Cut apart figures that touch or overlap a little, where the evidence says that two meet.
 
 Cuts are cheap ways from the top to the bottom (`seams`) through what is seen of a patch (`costs`);
 which one is right, and whether a person should look at it, is decided in `selection`.
@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import Blobs, find_mains
+from toonset.dataset.split.figures.blobs import Blobs, find_main_blobs
 from toonset.dataset.split.touching.costs import look_at
 from toonset.dataset.split.touching.profiles import flanks, largest_piece
 from toonset.dataset.split.touching.selection import WIDE_ALONE, Option, best_option, find_options
@@ -27,7 +27,7 @@ SURE = 0.9  # chance of being right: a cut that has less is worth a look
 
 @dataclass(frozen=True)
 class Cut:
-    """Where two figures were cut apart.
+    """Cut between two figures.
 
     Attributes:
         box: (x, y, width, height) of the two together, in the cells of the labels.
@@ -90,9 +90,9 @@ def part_touching(
         painted: pixels that are not of the background's colour.
         rgb: the sheet.
     """
-    mains, cuts = find_mains(blobs), list[Cut]()
+    main_blobs, cuts = find_main_blobs(blobs), list[Cut]()
     patches = _Patches(blobs.labels.copy(), painted, rgb, {}, {})
-    for number in mains:
+    for number in main_blobs:
         patches.measure(int(number) + 1, blobs.window(int(number)))
     queue, top = list(patches.boxes), len(blobs.areas)
     while queue:
@@ -116,12 +116,14 @@ def _part(patches: _Patches, label: int, new: int) -> Cut | None:
     if paint.sum() < mask.sum() * (1 - MOST_ENCLOSED):
         paint = mask  # a line drawing: its inside is paper, too
     rgb = patches.rgb[window]
-    sight = look_at(mask, paint, rgb)
-    small = cv2.resize(rgb, sight.drawn.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    options = find_options(sight, small, [side for two in patches.sides.values() for side in two])
+    cut_costs = look_at(mask, paint, rgb)
+    small = cv2.resize(rgb, cut_costs.drawn.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    options = find_options(
+        cut_costs, small, [side for two in patches.sides.values() for side in two]
+    )
     if not options:
         return None
-    best, sure = best_option(options, sight.drawn > 0.5)
+    best, sure = best_option(options, cut_costs.drawn > 0.5)
     if best.badness > WORST:
         return None
     box = patches.boxes[label]
@@ -138,7 +140,7 @@ def _enlarged(option: Option, shape: tuple[int, ...]) -> Int[np.ndarray, " heigh
     """Return the column right of a cut for every row of the sheet."""
     rows, columns = option.is_right.shape
     each = np.minimum(np.arange(shape[0]) * rows // shape[0], rows - 1)
-    return np.rint(option.way.columns[each] * shape[1] / columns).astype(int)
+    return np.rint(option.seam.columns[each] * shape[1] / columns).astype(int)
 
 
 def _crossed(

@@ -1,4 +1,4 @@
-"""The outlines of a sheet's figures from the side, and how alike two of them are.
+"""Compare the side profiles of a sheet's figures.
 
 The views of a turnaround show one character: what a cut leaves should look from the cut's side as
 some figure of the sheet does from its left or its right. Opposite views are mirror images of each

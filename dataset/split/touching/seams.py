@@ -1,4 +1,4 @@
-"""Ways from the top to the bottom of a picture that cost as little as they can, and distinct ones.
+"""Find distinct seams of least cost from the top to the bottom of a picture.
 
 A way may run along a row as far as it likes but never turns back up: least costs follow row by row,
 as in seam carving with steps of any length.
@@ -23,7 +23,7 @@ AT_THE_SIDES = 0.08  # of the paint that at least lies to each side in the middl
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class Seam:
     """A way from the top to the bottom.
 
     Attributes:
@@ -51,7 +51,7 @@ def distinct_ways(
     prices: Float[np.ndarray, "kinds height width"],
     drawn: Float[np.ndarray, "height width"],
     dearest: float,
-) -> Iterator[list[Way]]:
+) -> Iterator[list[Seam]]:
     """Yield ways that part the paint, round by round; the same may come twice.
 
     After every round the paint that was crossed is dearer, so that the next goes elsewhere.
@@ -73,9 +73,9 @@ def distinct_ways(
             for column in _valleys(np.where(inner, through, np.inf))[:MOST_WAYS]:
                 if through[column] > dearest:
                     break
-                way = _way(down[kind], up[kind], column)
-                _make_dearer(price, drawn, way)
-                ways.append(way)
+                seam = _way(down[kind], up[kind], column)
+                _make_dearer(price, drawn, seam)
+                ways.append(seam)
         yield ways
 
 
@@ -111,7 +111,7 @@ def _valleys(cost: Float[np.ndarray, " width"]) -> list[int]:
     return [int(c) for c in middles[np.argsort(cost[middles], kind="stable")]]
 
 
-def _way(down: np.ndarray, up: np.ndarray, column: int) -> Way:
+def _way(down: np.ndarray, up: np.ndarray, column: int) -> Seam:
     """Return the cheapest way through a column of the middle row."""
     middle = len(down) // 2
     above = _climbed(down[: middle + 1], column)
@@ -120,7 +120,7 @@ def _way(down: np.ndarray, up: np.ndarray, column: int) -> Way:
     for row, c in reversed(above + below):  # the cell nearest to the middle row counts
         columns[row] = c
     met = np.array(above[::-1] + below[1:])
-    return Way(columns, met[:, 0], met[:, 1])
+    return Seam(columns, met[:, 0], met[:, 1])
 
 
 def _climbed(costs: np.ndarray, column: int) -> list[tuple[int, int]]:
@@ -138,9 +138,9 @@ def _climbed(costs: np.ndarray, column: int) -> list[tuple[int, int]]:
     return cells
 
 
-def _make_dearer(price: np.ndarray, drawn: np.ndarray, way: Way) -> None:
+def _make_dearer(price: np.ndarray, drawn: np.ndarray, seam: Seam) -> None:
     crossed = np.zeros(drawn.shape, dtype=np.uint8)
-    crossed[way.rows_met, way.columns_met] = way.along(drawn) > 0.3
+    crossed[seam.rows_met, seam.columns_met] = seam.along(drawn) > 0.3
     size = 2 * max(1, round(AROUND * len(drawn))) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     price += DEARER * cv2.dilate(crossed, disc) * drawn

@@ -1,4 +1,4 @@
-"""Which of several cuts through a patch is the right one, and how sure that is.
+"""Select the right cut through a patch, with its probability, by logistic regression.
 
 Evidence is added up as logarithms: what the cut crosses, whether it runs from cleft to cleft, and
 how alike both sides of it are to sides of the sheet's other figures. The weights are those of a
@@ -16,9 +16,9 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.split.figures.blobs import shared_colors
-from toonset.dataset.split.touching.costs import Sight
+from toonset.dataset.split.touching.costs import CutCosts
 from toonset.dataset.split.touching.profiles import largest_piece, right_flank, unlikeness
-from toonset.dataset.split.touching.seams import Way, distinct_ways
+from toonset.dataset.split.touching.seams import Seam, distinct_ways
 
 DEAREST = 0.3  # of the height in paint: a way that costs more is not looked at
 MOST_CROSSED = 0.4  # of the height in paint, lines or not: figures touch, they do not merge
@@ -40,7 +40,7 @@ class Option:
     """A cut that leaves something like a figure on each side.
 
     Attributes:
-        way: where it runs.
+        seam: where it runs.
         is_right: which cells lie right of it.
         evidence: paint crossed beside lines and beside edges in heights, places where it begins or
             ends on a straight side, unlikeness of its left and its right side: all 0 at best.
@@ -48,7 +48,7 @@ class Option:
         ends: in heights, where the left figure ends and where the right one begins.
     """
 
-    way: Way
+    seam: Seam
     is_right: Bool[np.ndarray, "height width"]
     evidence: tuple[float, float, float, float, float]
     crossed: float
@@ -61,23 +61,23 @@ class Option:
 
 
 def find_options(
-    sight: Sight,
+    cut_costs: CutCosts,
     colors: UInt8[np.ndarray, "height width 3"],
     others: Sequence[Float[np.ndarray, " rows"]],
 ) -> list[Option]:
     """Return the cuts that come into question.
 
     Args:
-        sight: the patch.
+        cut_costs: the patch.
         colors: of its cells.
         others: sides of the sheet's figures that are known, those of this patch included.
     """
     found: list[Option] = []
-    height, width = sight.drawn.shape
-    for ways in distinct_ways(sight.prices(), sight.drawn, DEAREST * height):
-        for way in ways:
-            option = _option(sight, colors, others, way)
-            if option is not None and not any(_are_same(option, o, sight) for o in found):
+    height, width = cut_costs.drawn.shape
+    for ways in distinct_ways(cut_costs.prices(), cut_costs.drawn, DEAREST * height):
+        for seam in ways:
+            option = _option(cut_costs, colors, others, seam)
+            if option is not None and not any(_are_same(option, o, cut_costs) for o in found):
                 found.append(option)
         if not found and width < TWO_WIDE * height:  # one look is enough at a single figure
             break
@@ -85,14 +85,14 @@ def find_options(
 
 
 def _option(
-    sight: Sight, colors: np.ndarray, others: Sequence[np.ndarray], way: Way
+    cut_costs: CutCosts, colors: np.ndarray, others: Sequence[np.ndarray], seam: Seam
 ) -> Option | None:
     """Return a way as a cut, None if it does not leave two figures."""
-    height, width = sight.drawn.shape
-    crossed = float(way.along(sight.drawn).sum()) / height
+    height, width = cut_costs.drawn.shape
+    crossed = float(seam.along(cut_costs.drawn).sum()) / height
     if crossed > MOST_CROSSED:
         return None
-    inside, right = sight.drawn > 0.5, way.is_right(width)
+    inside, right = cut_costs.drawn > 0.5, seam.is_right(width)
     if not (inside & right).any() or not (inside & ~right).any():
         return None
     one, two = largest_piece(inside & ~right), largest_piece(inside & right)
@@ -101,12 +101,12 @@ def _option(
     sides = right_flank(one), right_flank(two[:, ::-1])
     unlike = unlikeness(sides[0], [*others, sides[1]]), unlikeness(sides[1], [*others, sides[0]])
     ends = np.flatnonzero(one.any(axis=0))[-1], np.flatnonzero(two.any(axis=0))[0]
-    evidence = (*_crossing(sight, way), *unlike)
-    return Option(way, right, evidence, crossed, (ends[0] / height, ends[1] / height))
+    evidence = (*_crossing(cut_costs, seam), *unlike)
+    return Option(seam, right, evidence, crossed, (ends[0] / height, ends[1] / height))
 
 
-def _are_same(a: Option, b: Option, sight: Sight) -> bool:
-    inside = sight.drawn > 0.5
+def _are_same(a: Option, b: Option, cut_costs: CutCosts) -> bool:
+    inside = cut_costs.drawn > 0.5
     return bool((a.is_right != b.is_right)[inside].sum() < SAME * inside.sum())
 
 
@@ -114,24 +114,24 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
     """Return the most probable cut and its chance to be right among those between two figures."""
     best = min(options, key=lambda option: option.badness)
     limit = ELSEWHERE * inside.sum()
-    rivals = [o for o in options if (o.is_right != best.is_right)[inside].sum() <= limit]
-    chances = np.array([np.exp(best.badness - option.badness) for option in rivals])
-    ends = np.array([option.ends for option in rivals])
+    alternatives = [o for o in options if (o.is_right != best.is_right)[inside].sum() <= limit]
+    chances = np.array([np.exp(best.badness - option.badness) for option in alternatives])
+    ends = np.array([option.ends for option in alternatives])
     alike = (np.abs(ends - best.ends) <= AS_GOOD).all(axis=1)
     return best, float(chances[alike].sum() / chances.sum())
 
 
-def _crossing(sight: Sight, way: Way) -> tuple[float, float, float]:
-    height = len(sight.drawn)
-    by_lines, by_edges = sight.by_lines(), sight.by_edges()
-    gap = 0.1 * np.maximum(sight.solid - sight.drawn, 0)
-    met = way.along(sight.drawn) > 0.5
+def _crossing(cut_costs: CutCosts, seam: Seam) -> tuple[float, float, float]:
+    height = len(cut_costs.drawn)
+    by_lines, by_edges = cut_costs.by_lines(), cut_costs.by_edges()
+    gap = 0.1 * np.maximum(cut_costs.solid - cut_costs.drawn, 0)
+    met = seam.along(cut_costs.drawn) > 0.5
     ends = np.diff(np.concatenate([[0], met.astype(np.int8), [0]]))
     first, last = np.flatnonzero(ends == 1), np.flatnonzero(ends == -1) - 1
-    opened = way.along(sight.open)
+    opened = seam.along(cut_costs.open)
     return (
-        float(way.along(by_lines + gap).sum()) / height,
-        float(way.along(by_edges).sum()) / height,
+        float(seam.along(by_lines + gap).sum()) / height,
+        float(seam.along(by_edges).sum()) / height,
         float(opened[first].sum() + opened[last].sum()),
     )
 

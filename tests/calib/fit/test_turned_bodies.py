@@ -8,7 +8,7 @@ from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.fit.sheet_prior import Spreads, Turn, yaw_slope
-from toonset.calib.fit.turned_bodies import ROLL, YAW, with_turned_bodies
+from toonset.calib.fit.turned_bodies import ROLL, YAW, account_for_turned_bodies
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.camera import angles_from_rotation, rotation_from_angles
@@ -17,7 +17,7 @@ VIEWS, SIGMA = 8, np.radians(0.3)
 RING = np.arange(VIEWS) * 2 * np.pi / VIEWS
 TURN = Turn(RING)
 BODY = as_it_is(prepare_surface(random_body(0)))
-LOOSE = Spreads(1.0, 1.0, 1.0, 1.0)  # ties that hold nothing
+LOOSE = Spreads(1.0, 1.0, 1.0, 1.0)  # priors that hold nothing
 
 
 def fit_of(angles) -> JointFit:
@@ -53,7 +53,7 @@ def test_turned_bodies_are_seen_and_their_sigmas_are_true():
     for _ in range(200):
         true, apparent = sheet(rng, 1.5)
         fit = fit_of(apparent)
-        found = with_turned_bodies(fit, TURN)
+        found = account_for_turned_bodies(fit, TURN)
         before.append(errors(fit, true))
         after.append(errors(found, true))
         scores.append(after[-1][:, 0] / yaw_sigmas(found))
@@ -70,7 +70,7 @@ def test_a_view_that_was_meant_elsewhere_stays_there():
     for _ in range(50):
         _, apparent = sheet(rng, 1.5)
         apparent[1, 0] += np.radians(25)
-        found = with_turned_bodies(fit_of(apparent), TURN)
+        found = account_for_turned_bodies(fit_of(apparent), TURN)
         if found.noise.turned > np.radians(1):
             moved.append(np.degrees(abs(errors(found, apparent)[1, 0])))
     assert len(moved) > 30
@@ -83,7 +83,7 @@ def test_cameras_that_differ_in_one_way_only_are_no_turned_bodies(scatter):
     moved = []
     for _ in range(50):
         _, apparent = sheet(rng, 0.0, **scatter)
-        found = with_turned_bodies(fit_of(apparent), TURN)
+        found = account_for_turned_bodies(fit_of(apparent), TURN)
         moved.append(np.degrees(np.abs(errors(found, apparent)).max()))
     assert np.median(moved) < 1.0
 
@@ -91,10 +91,10 @@ def test_cameras_that_differ_in_one_way_only_are_no_turned_bodies(scatter):
 def test_steady_drawings_few_views_and_unknown_turns_are_left_alone():
     rng = np.random.default_rng(2)
     steady = fit_of(np.column_stack([RING, np.full(VIEWS, 0.1), np.zeros(VIEWS)]))
-    assert with_turned_bodies(steady, TURN) is steady
+    assert account_for_turned_bodies(steady, TURN) is steady
     _, apparent = sheet(rng, 2.0)
     few = fit_of(apparent[:3])
-    assert with_turned_bodies(few, Turn(RING[:3])) is few
-    found = with_turned_bodies(fit_of(apparent), Turn(np.full(VIEWS, np.nan)))
+    assert account_for_turned_bodies(few, Turn(RING[:3])) is few
+    found = account_for_turned_bodies(fit_of(apparent), Turn(np.full(VIEWS, np.nan)))
     assert found.noise.turned > 0
     assert errors(found, apparent)[:, 0] == pytest.approx(0, abs=1e-9)

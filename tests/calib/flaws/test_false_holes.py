@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
-from toonset.calib.flaws.false_holes import without_false_holes
+from toonset.calib.flaws.false_holes import fill_false_holes
 from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png, load_rgba
@@ -52,7 +52,7 @@ def filled(views, yaws, papers=None, verdict="ok", elevation: float = 0.0):
     found = cast("list[ViewCalibration]", looks)
     papers = papers or [WHITE] * len(views)
     views = [replace(view, paper=paper) for view, paper in zip(views, papers, strict=True)]
-    return without_false_holes(views, found, slab())
+    return fill_false_holes(views, found, slab())
 
 
 def test_a_hole_that_the_back_does_not_show_is_paint():

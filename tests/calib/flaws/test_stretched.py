@@ -12,7 +12,7 @@ from bench.cases.bodies import random_body
 from bench.stability.damage import stretched
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import BIC_MARGIN, STRETCHED, TALLER
-from toonset.calib.flaws.stretched import Stretches, as_drawn, stretched_mannequin, unstretched
+from toonset.calib.flaws.stretched import Stretches, as_drawn, stretch_mannequin, unstretch
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.result import Calibration, CutOff, FlatSide
 from toonset.camera import rotation_distance
@@ -67,7 +67,7 @@ def test_drawing_error_is_no_stretch(seed: int, looks: str) -> None:
 
 
 def test_a_lower_mannequin_is_made_as_tall_as_the_drawings(made: Turnaround) -> None:
-    low = stretched_mannequin(made.mesh, Stretches((), np.log(0.85), ()))
+    low = stretch_mannequin(made.mesh, Stretches((), np.log(0.85), ()))
     found = find_cameras(made.views, low)
     assert proven(found) == {TALLER}
     assert found.verdict == "ok"
@@ -100,7 +100,7 @@ def test_a_picture_without_its_stretch_loses_nothing() -> None:
     rgba[10:30, 5:25] = (200, 40, 40, 255)
     view = View(rgba, (3, 4, 30, 40), 0.0, "000.png", (-np.inf, -np.inf, np.inf, 30.0))
     for stretch, size_wh in ((np.log(1.5), (45, 40)), (-np.log(1.5), (30, 60))):
-        longer = unstretched(view, stretch)
+        longer = unstretch(view, stretch)
         assert longer.rgba.shape[1::-1] == size_wh
         assert longer.box == (3, 4, *size_wh)
         assert longer.ends[3] == 30 * size_wh[1] / 40
@@ -109,12 +109,12 @@ def test_a_picture_without_its_stretch_loses_nothing() -> None:
         assert (width, height) == pytest.approx(wanted, abs=1)
         seen = longer.rgba[longer.rgba[..., 3] > 0]
         np.testing.assert_allclose(seen[:, :3], np.broadcast_to((200, 40, 40), (len(seen), 3)))
-    assert unstretched(view, 0.0) is view
+    assert unstretch(view, 0.0) is view
 
 
 def test_cuts_are_told_in_the_drawings_own_pixels(made: Turnaround) -> None:
     found = find_cameras(made.views, made.mesh)
-    shown = [unstretched(view, np.log(1.25)) for view in made.views]
+    shown = [unstretch(view, np.log(1.25)) for view in made.views]
     width, height = shown[0].rgba.shape[1::-1]
     side = FlatSide("right", width, ((40, 60),), at_edge=True)
     cut = CutOff(made.views[0].name, side, 10.0)

@@ -28,7 +28,7 @@ from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
 from toonset.dataset.exporters.common import ExportView, read_views
 from toonset.dataset.exporters.nerfstudio import write_transforms
 from toonset.dataset.exporters.opencv import write_opencv
-from toonset.dataset.exporters.pinhole import centred, common_lens, square_pixels
+from toonset.dataset.exporters.pinhole import centre_view, common_lens, square_pixels
 from toonset.dataset.exporters.points import TrackedPoints, encode_ply
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.mesh.load import save_obj
@@ -61,7 +61,7 @@ def through(
 @MODELS
 def test_centring_moves_picture_and_camera_together(k: float) -> None:
     for view in views_all_round(k=k):
-        moved = centred(view)
+        moved = centre_view(view)
         np.testing.assert_allclose(moved.camera.center, np.array(moved.camera.size_wh) / 2)
         assert moved.rgba.shape[1::-1] == moved.camera.size_wh
         shown = moved.camera.project(np.array([[0.2, 1.0, 0.1]]))[0][0]
@@ -76,7 +76,7 @@ def test_centring_moves_picture_and_camera_together(k: float) -> None:
 
 def test_a_moved_target_still_covers_the_body_in_its_bound() -> None:
     for view in views_all_round():
-        moved = centred(view)
+        moved = centre_view(view)
         points = around(view.camera.target)
         off = moved.pinhole.project(points)[0] - moved.camera.project(points)[0]
         assert np.linalg.norm(off, axis=1).max() <= moved.error_px
@@ -113,7 +113,7 @@ def test_a_principal_point_far_outside_is_refused() -> None:
     view = views_all_round(1, k=0.2)[0]
     astray = replace(view, camera=replace(view.camera, center=np.array([60_000.0, 60.0])))
     with pytest.raises(BundleError, match="at most 80 megapixels"):
-        centred(replace(astray, camera=replace(astray.camera, center=np.array([6e5, 6e5]))))
+        centre_view(replace(astray, camera=replace(astray.camera, center=np.array([6e5, 6e5]))))
 
 
 def test_square_pixels_enlarge_the_shorter_direction() -> None:

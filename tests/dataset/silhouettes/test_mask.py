@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from toonset.dataset.silhouettes.mask import thin, widened
+from toonset.dataset.silhouettes.mask import thin, widen_thin_parts
 
 
 def coverage(corners: np.ndarray, side: int = 40, fine: int = 16) -> np.ndarray:
@@ -29,11 +29,11 @@ def test_a_line_is_as_wide_as_it_covers_pixels(covered: float) -> None:
     alpha = np.zeros((30, 30), np.float32)
     alpha[20:] = 1
     alpha[5:20, 12] = covered
-    row = widened(alpha)[10]
+    row = widen_thin_parts(alpha)[10]
     across = np.linspace(10, 14, 40001)
     inside = np.interp(across, np.arange(30), row) >= 0.5
     assert abs(4 * inside.mean() - covered) < 1e-3
-    np.testing.assert_array_equal(widened(alpha)[20:], alpha[20:])
+    np.testing.assert_array_equal(widen_thin_parts(alpha)[20:], alpha[20:])
 
 
 @pytest.mark.parametrize("degrees", [0, 10, 30, 45, 70])

@@ -12,9 +12,9 @@ from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose
 from toonset.calib.search.hypotheses import (
     Candidates,
-    half_turned,
     level_twins,
     looks_alike_from_behind,
+    turn_half,
 )
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.split.sheet import split_picture
@@ -84,14 +84,14 @@ def test_only_bodies_without_front_look_alike_from_behind(stack):
     assert looks_alike_from_behind(prepare_surface(stack), poses)
     for body in (random_body(1, symmetric=True), random_body(2)):
         assert not looks_alike_from_behind(prepare_surface(body), poses)
-    assert rotation_distance(half_turned(seen(30)).rotation, seen(210).rotation) < 1e-9
+    assert rotation_distance(turn_half(seen(30)).rotation, seen(210).rotation) < 1e-9
 
 
 @pytest.mark.parametrize("from_behind", [True, False])
 def test_differences_between_outlines_that_are_one_are_no_evidence(from_behind):
     surface = prepare_surface(random_body(2))  # its twins do not look alike
     pose = Pose(rotation_from_angles(np.radians(40), np.radians(8), 0), np.zeros(2), 1.0)
-    fits = tuple(Fit(p, cost, 0.0, 1.0) for p, cost in [(pose, 1e-6), (half_turned(pose), 2e-6)])
+    fits = tuple(Fit(p, cost, 0.0, 1.0) for p, cost in [(pose, 1e-6), (turn_half(pose), 2e-6)])
     view = Candidates(fits, np.array([0.0, 3.0]))
     found = level_twins(view, surface, pose, always=False, from_behind=from_behind)
     assert found.energies.tolist() == [0.0, 0.0 if from_behind else 3.0]

@@ -20,7 +20,7 @@ from toonset.dataset.split.sheet import LeftOut, Segmentation
 from toonset.dataset.split_folder.boxes import read_boxes
 from toonset.dataset.split_folder.checks import odd_files
 from toonset.dataset.split_folder.read import read_split
-from toonset.dataset.split_folder.views import Split, joined, split_of_sheet, without
+from toonset.dataset.split_folder.views import Split, join_splits, split_of_sheet, without
 from toonset.dataset.split_folder.write import read_records, write_split
 from toonset.errors import PictureError, SheetError
 from toonset.view import View
@@ -261,7 +261,7 @@ def test_dropping_numbers_anew_and_keeps_a_record():
 
 def test_joined_sheets_number_through():
     one, two = cut(), without(cut(), frozenset({0}))
-    both = joined([one, two])
+    both = join_splits([one, two])
     assert [view.name for view in both.views] == [f"{i:03d}.png" for i in range(7)]
     assert both.source_of == (0,) * 4 + (1,) * 3
     assert both.labels == (*one.labels, *two.labels)
@@ -276,14 +276,16 @@ def single(name: str, height: int, digest: str) -> Split:
 
 def test_odd_files_are_named():
     views = [single(f"{n}.png", 100, f"{n}") for n in range(3)]
-    assert odd_files(joined(views)) == ()
-    copy = odd_files(joined([*views, single("copy.png", 100, "1")]))
+    assert odd_files(join_splits(views)) == ()
+    copy = odd_files(join_splits([*views, single("copy.png", 100, "1")]))
     assert copy == ("copy.png is a copy of 1.png: is one of them another view?",)
-    high = odd_files(joined([*views, single("high.png", 160, "h")]))
+    high = odd_files(join_splits([*views, single("high.png", 160, "h")]))
     assert high == ("high.png: 160 px high, most views are 100: is it drawn at another scale?",)
-    sheet = odd_files(joined([*views, cut()]))
+    sheet = odd_files(join_splits([*views, cut()]))
     assert sheet == ("sheet.png shows 4 figures, the others one: is it a sheet of the same views?",)
-    assert odd_files(joined([cut(), replace(cut(), sources=single("b", 9, "b").sources)])) == ()
+    assert (
+        odd_files(join_splits([cut(), replace(cut(), sources=single("b", 9, "b").sources)])) == ()
+    )
 
 
 # ---- folders of pictures

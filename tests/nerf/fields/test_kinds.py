@@ -16,12 +16,7 @@ from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.fields.base import Field, Places
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
-from toonset.nerf.kernels.compositing import (
-    composite,
-    composite_packed,
-    padded,
-    transmittance_packed,
-)
+from toonset.nerf.kernels.compositing import composite, composite_packed, pad, transmittance_packed
 from toonset.nerf.train.batches import Batch
 from toonset.nerf.train.carved_rays import PRUNE_AFTER, FixedRays, seen_samples
 from toonset.nerf.train.gradients import gradients_of
@@ -125,7 +120,7 @@ def test_packed_compositing_equals_the_padded_one() -> None:
     ray = torch.arange(4).repeat_interleave(counts)
     order = torch.cat([torch.arange(int(n)) for n in counts])
     depth, color = torch.rand(12, dtype=torch.float64), torch.rand(12, 3, dtype=torch.float64)
-    table = padded(torch.cat([depth[:, None], color], 1), ray, order, 4, 6)
+    table = pad(torch.cat([depth[:, None], color], 1), ray, order, 4, 6)
     edges = torch.arange(7, dtype=torch.float64)
     for fast, slow in zip(
         composite_packed(depth, color, ray, 4),

@@ -10,7 +10,7 @@ import torch.nn.functional as F
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.errors import BundleError
-from toonset.nerf.hull.hull import EDGE, LEVEL, Hull, carve, grown
+from toonset.nerf.hull.hull import EDGE, LEVEL, Hull, carve, grow
 from toonset.nerf.hull.march import march, pixels_near, rays_of
 from toonset.nerf.hull.support import agreement, project
 from toonset.nerf.hull.tolerance import choose_missing
@@ -68,8 +68,8 @@ def test_carving_survives_a_camera_inside_the_box() -> None:
 def test_growing_is_pooling_the_largest(by: int) -> None:
     volume = torch.rand(7, 2, 9, generator=torch.Generator().manual_seed(by))
     pooled = F.max_pool3d(volume[None, None], 2 * by + 1, stride=1, padding=by)[0, 0]
-    torch.testing.assert_close(grown(volume, by), pooled)
-    torch.testing.assert_close(grown(volume > 0.9, by), grown((volume > 0.9).float(), by) > 0)
+    torch.testing.assert_close(grow(volume, by), pooled)
+    torch.testing.assert_close(grow(volume > 0.9, by), grow((volume > 0.9).float(), by) > 0)
 
 
 @pytest.mark.parametrize("k", [0.0, 0.2])

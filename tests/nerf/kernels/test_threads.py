@@ -11,7 +11,7 @@ import torch
 from bench.cases.cases import train_cases
 from toonset.nerf.kernels.threads import side_by_side, threads_in_use, working_threads
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.train import fit_field
 
 
@@ -72,7 +72,7 @@ def test_no_thread_computes_gradients_where_none_are_asked_for() -> None:
 @pytest.mark.parametrize("carve", [True, False])
 def test_one_and_two_threads_give_the_same_bits(carve: bool) -> None:
     (case,) = train_cases(None, 0, 1, px=48)
-    scene = labelled(case.train)[0]
+    scene = label_scene(case.train)[0]
     steps = 130 if carve else 4  # enough for trials
     options = TrainOptions(steps=steps, carve=carve, device="cpu")
     found = []

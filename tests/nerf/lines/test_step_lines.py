@@ -9,8 +9,8 @@ from tests.nerf.bodies import FINE, HEIGHT, LINE_PX, STEPS, Hand, body, depths, 
 from toonset.nerf.hull.mannequin_shape import FINER, shape_of
 from toonset.nerf.lines.step_lines import (
     StepLines,
-    drawn_steps,
-    learned_steps,
+    draw_steps,
+    learn_steps,
     lines_across,
     step_places,
     step_sides,
@@ -67,18 +67,18 @@ def test_a_line_is_found_where_it_lies() -> None:
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_lines_are_as_wide_as_told_on_either_side(scale: float) -> None:
     fine = np.repeat(np.repeat(stair(0.1), 3, axis=0), 3, axis=1)
-    line = drawn_steps(fine, StepLines(0.05, 2.0, 1.0), 1.0, 3, scale)
+    line = draw_steps(fine, StepLines(0.05, 2.0, 1.0), 1.0, 3, scale)
     middle = line[10:30].mean(axis=0)
     assert middle[:30].sum() == pytest.approx(2.0 * scale, abs=0.2)
     assert middle[30:].sum() == pytest.approx(1.0 * scale, abs=0.2)
-    assert not drawn_steps(fine, StepLines(0.2, 2.0, 1.0), 1.0, 3, scale).any()
+    assert not draw_steps(fine, StepLines(0.2, 2.0, 1.0), 1.0, 3, scale).any()
 
 
 def test_the_rule_of_a_sheet_is_learned() -> None:
     scene = sheet(body(), Hand())
     covers = [find_contour(frame.rgba, LINE_PX) / 255.0 for frame in scene.frames]
     seen = [depths(body(), camera) for camera in ring()]
-    found = learned_steps(covers, seen, HEIGHT, LINE_PX)
+    found = learn_steps(covers, seen, HEIGHT, LINE_PX)
     assert found is not None
     assert found.least <= STEPS.least * 1.2
     assert found.width_px == pytest.approx(STEPS.width_px, abs=0.8)
@@ -89,19 +89,19 @@ def test_an_artist_who_draws_no_steps_has_no_rule() -> None:
     scene = sheet(body(), Hand(lines=False))
     seen = [depths(body(), camera) for camera in ring()]
     covers = [find_contour(frame.rgba, LINE_PX) / 255.0 for frame in scene.frames]
-    assert learned_steps(covers, seen, HEIGHT, LINE_PX) is None
-    assert learned_steps(covers, seen, HEIGHT, 0.0) is None
+    assert learn_steps(covers, seen, HEIGHT, LINE_PX) is None
+    assert learn_steps(covers, seen, HEIGHT, 0.0) is None
     flat = [np.zeros_like(depth) for depth in seen]
-    assert learned_steps(covers, flat, HEIGHT, LINE_PX) is None
+    assert learn_steps(covers, flat, HEIGHT, LINE_PX) is None
 
 
 def test_lines_of_a_shape_are_those_of_the_drawing() -> None:
     """What was drawn with these lines is drawn with them again."""
     camera = ring()[1]
     sight = shape_of(body(), ring()).seen(camera)
-    line = drawn_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
+    line = draw_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
     exact = depths(body(), camera.resized(FINE))
-    truth = drawn_steps(exact, STEPS, HEIGHT, FINE, 1.0)
+    truth = draw_steps(exact, STEPS, HEIGHT, FINE, 1.0)
     assert truth.sum() > 20
     assert np.abs(line - truth).sum() < 0.1 * truth.sum()
 
@@ -113,6 +113,6 @@ def test_lines_of_any_width_are_measured(width: int) -> None:
     depth[:4] = depth[-4:] = np.nan
     cover = np.zeros((400, 400))
     cover[:, 200 - width // 2 : 200 + width // 2] = 1
-    found = learned_steps([cover], [depth], 2.0, float(width))
+    found = learn_steps([cover], [depth], 2.0, float(width))
     assert found is not None
     assert found.width_px == pytest.approx(width, abs=1.5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.nerf.look.painted import INK, PALETTE, camera_at, draw, drawings, geometry, ring, unseen
-from toonset.nerf.look.blend import drawn_view, flanking
+from toonset.nerf.look.blend import blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.layers import color_picture
@@ -26,7 +26,7 @@ def test_a_view_between_drawings_is_what_would_have_been_drawn(
     egg: Drawings, degrees: float
 ) -> None:
     camera = camera_at(np.radians(degrees))
-    view = drawn_view(egg, geometry(camera))
+    view = blend_view(egg, geometry(camera))
     found = compare(color_picture(view.rgb, view.alpha), draw(camera))["psnr"]
     assert found is not None
     assert found > 24  # the grey field alone has 12
@@ -36,7 +36,7 @@ def test_a_view_between_drawings_is_what_would_have_been_drawn(
 @pytest.mark.parametrize("number", [0, 3])
 def test_a_drawn_camera_returns_its_own_drawing(egg: Drawings, number: int) -> None:
     own = egg.views[number]
-    view = drawn_view(egg, geometry(own.camera))
+    view = blend_view(egg, geometry(own.camera))
     apart = over_white(color_picture(view.rgb, view.alpha)) - over_white(own.rgba)
     assert np.abs(apart).max() <= 1.01 / 255
 
@@ -45,7 +45,7 @@ def test_nothing_pops_where_one_pair_of_drawings_follows_another(egg: Drawings) 
     """A hundredth of a degree beside a drawing the view is nearly the same, from either side."""
     yaw = egg.views[1].camera.angles[0]
     at, before, after = (
-        drawn_view(egg, geometry(camera_at(yaw + turn))).rgb for turn in (0, -2e-4, 2e-4)
+        blend_view(egg, geometry(camera_at(yaw + turn))).rgb for turn in (0, -2e-4, 2e-4)
     )
     assert np.abs(before - at).mean() < 2e-4
     assert np.abs(after - at).mean() < 2e-4
@@ -54,7 +54,7 @@ def test_nothing_pops_where_one_pair_of_drawings_follows_another(egg: Drawings) 
 def test_both_eyes_stay_whole(egg: Drawings) -> None:
     import cv2
 
-    view = drawn_view(egg, geometry(camera_at(np.radians(12))))
+    view = blend_view(egg, geometry(camera_at(np.radians(12))))
     count, _, about, _ = cv2.connectedComponentsWithStats((view.labels == 1).astype(np.uint8))
     sizes = sorted(about[1:, cv2.CC_STAT_AREA])
     assert count == 3
@@ -64,7 +64,7 @@ def test_both_eyes_stay_whole(egg: Drawings) -> None:
 def test_what_no_drawing_shows_is_the_fields() -> None:
     """Two drawings of the front say nothing of the back: it is grey, as the field is."""
     few = drawings([camera_at(0.0), camera_at(0.8)])
-    view = drawn_view(few, geometry(camera_at(np.pi)))
+    view = blend_view(few, geometry(camera_at(np.pi)))
     assert view.by_field > 0.9
     assert np.isfinite(view.rgb).all()
     middle = view.rgb[60, 60]
@@ -72,32 +72,32 @@ def test_what_no_drawing_shows_is_the_fields() -> None:
 
 
 def test_a_view_from_above_has_no_hole(egg: Drawings) -> None:
-    view = drawn_view(egg, geometry(camera_at(0.3, np.radians(60))))
+    view = blend_view(egg, geometry(camera_at(0.3, np.radians(60))))
     assert np.isfinite(view.rgb).all()
     assert view.alpha[60, 60] == 1
     assert 0 < view.by_field < 1
 
 
 def test_a_view_of_nothing_is_empty(egg: Drawings) -> None:
-    view = drawn_view(egg, unseen(geometry(camera_at(0.1))))
+    view = blend_view(egg, unseen(geometry(camera_at(0.1))))
     assert not view.alpha.any()
     assert not view.rgb.any()
 
 
 def test_the_outline_is_as_wide_as_it_was_drawn_and_can_be_another(egg: Drawings) -> None:
     shown = geometry(camera_at(0.4))
-    area = drawn_view(egg, shown).ink.sum()
+    area = blend_view(egg, shown).ink.sum()
     wide = replace(egg, pen=Outline((90, 0, 120), 4.0))
-    other = drawn_view(wide, shown)
+    other = blend_view(wide, shown)
     assert 1.8 < other.ink.sum() / area < 2.1
-    assert drawn_view(replace(egg, pen=None), shown).ink.sum() == 0
+    assert blend_view(replace(egg, pen=None), shown).ink.sum() == 0
     line = other.ink > 0.99
     np.testing.assert_allclose(other.rgb[line].mean(axis=0) * 255, (90, 0, 120), atol=1)
 
 
 def test_another_pen_draws_round_a_drawn_view_too(egg: Drawings) -> None:
     shown = geometry(egg.views[2].camera)
-    bare = drawn_view(replace(egg, pen=None), shown)
+    bare = blend_view(replace(egg, pen=None), shown)
     dark = bare.rgb.max(axis=-1) < 0.2
     assert not (dark & (bare.alpha > 0.9)).any()
 
@@ -105,23 +105,23 @@ def test_another_pen_draws_round_a_drawn_view_too(egg: Drawings) -> None:
 def test_drawings_without_lines_stay_without() -> None:
     bare = drawings(line_px=0.0)
     assert bare.outline is None
-    view = drawn_view(bare, geometry(camera_at(0.4)))
+    view = blend_view(bare, geometry(camera_at(0.4)))
     assert view.ink.sum() == 0
     assert (view.rgb.max(axis=-1)[view.alpha > 0.9] > 0.3).all()
 
 
 def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> None:
     shown = geometry(camera_at(0.35))
-    before = drawn_view(egg, shown)
+    before = blend_view(egg, shown)
     palette = PALETTE.copy()
     palette[2] = (40, 200, 220)
-    after = drawn_view(replace(egg, repaint=palette), shown)
+    after = blend_view(replace(egg, repaint=palette), shown)
     belt = (before.labels == 2) & (before.ink == 0)
     inner = belt & np.roll(belt, 2, 0) & np.roll(belt, -2, 0)
     np.testing.assert_allclose(np.median(after.rgb[inner] * 255, axis=0), palette[2], atol=3)
     far = (before.labels == 1) & (before.ink == 0)
     np.testing.assert_array_equal(after.rgb[far], before.rgb[far])
-    same = drawn_view(replace(egg, repaint=PALETTE), shown)
+    same = blend_view(replace(egg, repaint=PALETTE), shown)
     assert same.rgb.tobytes() == before.rgb.tobytes()
 
 
@@ -144,7 +144,7 @@ def test_a_figure_of_one_colour_has_no_hole(color: tuple[int, int, int]) -> None
     views = tuple(
         replace(view, rgba=np.dstack([flat, view.rgba[..., 3]]), paint=flat) for view in whole.views
     )
-    view = drawn_view(replace(whole, views=views), geometry(camera_at(0.4)))
+    view = blend_view(replace(whole, views=views), geometry(camera_at(0.4)))
     solid = view.alpha > 0.99
     assert np.isfinite(view.rgb).all()
     paint = solid & (view.ink == 0)
@@ -156,8 +156,8 @@ def test_a_figure_of_one_colour_has_no_hole(color: tuple[int, int, int]) -> None
 @pytest.mark.parametrize("side", [60, 30])
 def test_a_small_view_is_a_large_one_seen_from_afar(egg: Drawings, side: int) -> None:
     """No line is dotted: drawings are averaged before they are looked up."""
-    small = drawn_view(egg, geometry(camera_at(0.4, side=side)))
-    large = drawn_view(egg, geometry(camera_at(0.4)))
+    small = blend_view(egg, geometry(camera_at(0.4, side=side)))
+    large = blend_view(egg, geometry(camera_at(0.4)))
     block = 120 // side
     mean = large.rgb.reshape(side, block, side, block, 3).mean(axis=(1, 3))
     assert np.abs(small.rgb - mean).mean() < 0.012
@@ -181,6 +181,6 @@ def test_bent_drawings_have_a_narrower_figure_between_them_and_their_own_where_d
     straight = drawings()
     bent = replace(straight, bent=True)
     between, drawn = geometry(camera_at(0.4)), geometry(camera_at(0.0))
-    assert drawn_view(bent, between).alpha.sum() < drawn_view(straight, between).alpha.sum() - 20
-    own = (drawn_view(each, drawn).alpha for each in (bent, straight))
+    assert blend_view(bent, between).alpha.sum() < blend_view(straight, between).alpha.sum() - 20
+    own = (blend_view(each, drawn).alpha for each in (bent, straight))
     np.testing.assert_allclose(next(own), next(own), atol=1e-6)

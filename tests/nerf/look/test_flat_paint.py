@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.nerf.bodies import ARM, HEIGHT, SKIN, Hand, body, drawing, ring, sheet
-from toonset.nerf.hull.mannequin_shape import Sight, shape_of
+from toonset.nerf.hull.mannequin_shape import ShapeView, shape_of
 from toonset.nerf.look.flat_paint import FlatPaint, flat_paint
 from toonset.nerf.look.outline import outline_of
 from toonset.nerf.look.shade import Shade, learned_shade, smoothed, unlit
@@ -14,14 +14,14 @@ from toonset.nerf.look.shade import Shade, learned_shade, smoothed, unlit
 FACTOR = 0.7
 
 
-def painted(hand: Hand, views: int = 8) -> tuple[FlatPaint, list[Sight], list[np.ndarray]]:
+def painted(hand: Hand, views: int = 8) -> tuple[FlatPaint, list[ShapeView], list[np.ndarray]]:
     drawn = [drawing(body(), camera, hand, i) for i, camera in enumerate(ring(views))]
     shape = shape_of(body(), ring(views))
     sights = [shape.seen(camera, normals=True) for camera in ring(views)]
     return flat_paint(drawn, outline_of(drawn), sights, HEIGHT), sights, drawn
 
 
-def off(found: FlatPaint, sights: list[Sight], plain: Hand) -> float:
+def off(found: FlatPaint, sights: list[ShapeView], plain: Hand) -> float:
     """Return the mean difference from the body's own colours, levels, inside the figure."""
     exact = [drawing(body(), camera, plain) for camera in ring(len(sights))]
     apart = [

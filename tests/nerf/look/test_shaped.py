@@ -10,7 +10,7 @@ import pytest
 from tests.nerf.bodies import ARM, PALETTE, Hand, body, camera_at, depths, drawing, ring, sheet
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import shape_of
-from toonset.nerf.look.blend import Geometry, drawn_view
+from toonset.nerf.look.blend import Geometry, blend_view
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.outline import Outline
@@ -55,7 +55,7 @@ def test_views_are_what_would_have_been_drawn(
     lined: Drawings, shaded: Drawings, shadow: float, degrees: float
 ) -> None:
     camera = camera_at(np.radians(degrees))
-    view = drawn_view(lined if shadow == 1 else shaded, misty(camera))
+    view = blend_view(lined if shadow == 1 else shaded, misty(camera))
     true = drawing(body(), camera, Hand(shadow=shadow))
     found = compare(color_picture(view.rgb, view.alpha), true)
     assert found["psnr"] is not None
@@ -66,7 +66,7 @@ def test_views_are_what_would_have_been_drawn(
 def test_lines_at_steps_follow_the_view(lined: Drawings) -> None:
     """The arm lies elsewhere before the belly than in any drawing, and so does its line."""
     camera = camera_at(np.radians(22))
-    ink = drawn_view(lined, misty(camera)).ink
+    ink = blend_view(lined, misty(camera)).ink
     exact = drawing(body(), camera)
     inside = depths(body(), camera)
     arm = np.isfinite(inside) & (np.abs(exact[..., :3].astype(int) - ARM).max(axis=-1) < 20)
@@ -82,7 +82,7 @@ def test_a_wider_pen_widens_lines_at_steps_and_none_draws_none(lined: Drawings) 
     shown = misty(camera_at(0.4))
     assert lined.outline is not None
     plain, wide, bare = (
-        drawn_view(replace(lined, pen=pen), shown)
+        blend_view(replace(lined, pen=pen), shown)
         for pen in (lined.outline, Outline((90, 0, 120), 2 * lined.outline.width_px), None)
     )
     assert 1.6 < wide.ink.sum() / plain.ink.sum() < 2.2
@@ -94,8 +94,8 @@ def test_recolouring_keeps_the_shadow(shaded: Drawings) -> None:
     shown = misty(camera_at(0.35))
     palette = PALETTE.copy()
     palette[1] = (200, 60, 60)
-    before = drawn_view(shaded, shown)
-    after = drawn_view(replace(shaded, repaint=palette), shown)
+    before = blend_view(shaded, shown)
+    after = blend_view(replace(shaded, repaint=palette), shown)
     belt = (before.labels == 1) & (before.ink == 0) & (before.alpha == 1)
     belt &= np.roll(belt, 2, 0) & np.roll(belt, -2, 0)
     red = after.rgb[belt][:, 0]
@@ -105,7 +105,7 @@ def test_recolouring_keeps_the_shadow(shaded: Drawings) -> None:
 
 def test_small_views_take_smaller_drawings(lined: Drawings) -> None:
     camera = camera_at(0.4, 60)
-    view = drawn_view(lined, misty(camera))
+    view = blend_view(lined, misty(camera))
     found = compare(color_picture(view.rgb, view.alpha), drawing(body(), camera))
     assert found["psnr"] is not None
     assert found["psnr"] > 17  # lines are scaled, not as many pixels wide
@@ -114,12 +114,12 @@ def test_small_views_take_smaller_drawings(lined: Drawings) -> None:
 
 def test_a_view_beside_the_shape_is_empty(lined: Drawings) -> None:
     away = camera_at(0.1).moved((1000, 0), (80, 80))
-    view = drawn_view(lined, misty(away))
+    view = blend_view(lined, misty(away))
     assert not view.alpha.any()
 
 
 def test_two_drawings_leave_the_rest_to_the_field() -> None:
     few = drawn(Hand(), views=2)
-    view = drawn_view(few, misty(camera_at(np.pi / 2)))
+    view = blend_view(few, misty(camera_at(np.pi / 2)))
     assert np.isfinite(view.rgb).all()
     assert 0.0 < view.by_field < 1

@@ -14,7 +14,7 @@ from toonset.nerf.prepare.consistency import CELL, TEXT, consistency_of, consist
 def test_report_of_a_perfect_sheet(balls) -> None:
     found = consistency_of(balls.sheet())
     assert not found.registration.applied
-    assert not found.unbending.applied
+    assert not found.unwarping.applied
     assert found.odd == ()
     for view in found.views:
         assert view.shift_px == (0.0, 0.0)

@@ -16,7 +16,7 @@ from toonset.nerf.hull.hull import carve
 from toonset.nerf.hull.march import surface_depth
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint import Depths, with_paint_agreed
-from toonset.nerf.prepare.prepare import Prepared, prepare, with_paint
+from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
 from toonset.nerf.prepare.unwarp import Warp
 
 WRONG = 0  # the drawing that is wrong: from the front
@@ -86,7 +86,7 @@ def test_paint_that_was_mixed_anew_becomes_one_paint() -> None:
 def test_exact_drawings_are_untouched_to_the_bit() -> None:
     scene = scene_of(ring())
     ready = prepare(scene, TrainOptions())
-    after = with_paint(ready, *body_of(scene))
+    after = agree_on_paint(ready, *body_of(scene))
     assert after.paint is None
     for one, other in zip(after.scene.frames, scene.frames, strict=True):
         assert one.rgba.tobytes() == other.rgba.tobytes()
@@ -95,7 +95,7 @@ def test_exact_drawings_are_untouched_to_the_bit() -> None:
 def test_drawings_that_did_not_bend_are_returned_as_they_are() -> None:
     scene = sheet(3.0)
     ready = Prepared(scene, scene, None, None, None, None)
-    assert with_paint(ready, *body_of(scene)) is ready
+    assert agree_on_paint(ready, *body_of(scene)) is ready
 
 
 @pytest.mark.parametrize("shown", [0, 1, 2])

@@ -11,21 +11,21 @@ from toonset.nerf.train.train import fit_field
 
 
 def test_drawings_that_agree_stay(balls) -> None:
-    scene, registration, unbending = aligned(balls.sheet())
+    scene, registration, unwarping = aligned(balls.sheet())
     assert scene is balls.sheet()
     assert registration is not None
-    assert unbending is not None
+    assert unwarping is not None
     assert not registration.applied
-    assert not unbending.applied
+    assert not unwarping.applied
 
 
 def test_bends_alone_where_they_explain_more(balls) -> None:
     drawn, _ = balls.bent_sheet()
-    scene, registration, unbending = aligned(drawn)
+    scene, registration, unwarping = aligned(drawn)
     assert registration is not None
-    assert unbending is not None
-    assert unbending.applied
-    assert unbending.gain_nats > registration.gain_nats > 0
+    assert unwarping is not None
+    assert unwarping.applied
+    assert unwarping.gain_nats > registration.gain_nats > 0
     assert not registration.applied
     for before, after in zip(drawn.frames, scene.frames, strict=True):
         assert after.camera is before.camera
@@ -33,9 +33,9 @@ def test_bends_alone_where_they_explain_more(balls) -> None:
 
 def test_cameras_follow_where_places_explain_enough(balls) -> None:
     drawn, _, _ = balls.misplaced(0)
-    scene, registration, unbending = aligned(drawn)
+    scene, registration, unwarping = aligned(drawn)
     assert registration is not None
-    assert unbending is not None
+    assert unwarping is not None
     assert registration.applied
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
     assert registration.apart_px[1] < 0.5 * registration.apart_px[0]
@@ -43,14 +43,14 @@ def test_cameras_follow_where_places_explain_enough(balls) -> None:
 
 def test_switches_are_heard(balls) -> None:
     drawn, _ = balls.bent_sheet()
-    scene, registration, unbending = aligned(drawn, register=False, unwarp=False)
+    scene, registration, unwarping = aligned(drawn, register=False, unwarp=False)
     assert scene is drawn
     assert registration is None
-    assert unbending is None
-    scene, registration, unbending = aligned(drawn, unwarp=False)
+    assert unwarping is None
+    scene, registration, unwarping = aligned(drawn, unwarp=False)
     assert registration is not None
     assert registration.applied
-    assert unbending is None
+    assert unwarping is None
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.prepare.symmetry import with_all_mirrored
+from toonset.nerf.prepare.symmetry import mirror_all
 from toonset.nerf.prepare.view_coverage import FEW_OUTLINES, guesses, outline_gap, wide_gaps
 
 NOTHING = np.zeros((8, 8, 4), dtype=np.uint8)
@@ -70,5 +70,5 @@ def test_what_mirror_images_may_show_is_no_guess_yet() -> None:
         for some in (scene(0, 45, 90, 135, 180), scene(0, 180))
     )
     assert guesses(half)
-    assert not guesses(with_all_mirrored(half))
-    assert guesses(with_all_mirrored(ends)) == guesses(ends)
+    assert not guesses(mirror_all(half))
+    assert guesses(mirror_all(ends)) == guesses(ends)

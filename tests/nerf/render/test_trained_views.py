@@ -11,7 +11,7 @@ from tests.nerf.ellipsoids import PARTS, draw, train_scene
 from toonset.errors import PaletteError
 from toonset.nerf.render.animation import encode_gif
 from toonset.nerf.render.layers import alpha_picture, color_picture, depth_picture, palette_picture
-from toonset.nerf.render.recolor import recolored
+from toonset.nerf.render.recolor import recolor_run
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.train.result import Training
@@ -50,7 +50,7 @@ def test_recolor_replaces_one_colour_and_nothing_else(training: Training) -> Non
     assert palette is not None
     index = int(np.abs(palette.astype(int) - [40, 80, 200]).sum(1).argmin())
     old = "#{:02x}{:02x}{:02x}".format(*palette[index].tolist())
-    changed = recolored(training.result, [f"{old}=#00ff00"])
+    changed = recolor_run(training.result, [f"{old}=#00ff00"])
     camera = train_scene().frames[4].camera
     before, after = render(training.result, camera), render(changed, camera)
     a = palette_picture(before, training.result.palette)
@@ -62,15 +62,15 @@ def test_recolor_replaces_one_colour_and_nothing_else(training: Training) -> Non
     assert full.sum() > 20
     assert np.abs(b[full][:, :3].astype(int) - [0, 255, 0]).max() <= 3
     with pytest.raises(PaletteError, match="choose one of them"):
-        recolored(training.result, ["#123456=#000000"])
-    by_name = recolored(training.result, [f"{name_of(tuple(palette[index].tolist()))}=#00ff00"])
+        recolor_run(training.result, ["#123456=#000000"])
+    by_name = recolor_run(training.result, [f"{name_of(tuple(palette[index].tolist()))}=#00ff00"])
     assert by_name.palette is not None
     assert changed.palette is not None
     assert (by_name.palette == changed.palette).all()
     with pytest.raises(PaletteError, match="OLD=NEW"):
-        recolored(training.result, ["#123456"])
+        recolor_run(training.result, ["#123456"])
     with pytest.raises(PaletteError, match="without palette"):
-        recolored(replace(training.result, palette=None), [f"{old}=#00ff00"])
+        recolor_run(replace(training.result, palette=None), [f"{old}=#00ff00"])
 
 
 def test_turntable_frames_the_figure(training: Training) -> None:

@@ -18,8 +18,8 @@ from toonset.nerf.hull.march import clip, rays_of
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import OPAQUE_FROM, cast
 from toonset.nerf.render.normals import normal_picture, normals_of
-from toonset.nerf.render.rays import Sight
-from toonset.nerf.render.recolor import repainted
+from toonset.nerf.render.rays import ViewRays
+from toonset.nerf.render.recolor import repaint_run
 from toonset.nerf.render.views import borders, places_within, render
 
 SHAPE, VOXEL = (20, 28, 16), 0.1
@@ -51,7 +51,7 @@ def ball(density: float = 1.0) -> TrainedField:
 def fast(trained: TrainedField, camera: Camera) -> np.ndarray:
     """Return what is cast through every pixel."""
     pixels = torch.as_tensor(camera.pixel_grid().reshape(-1, 2).T, dtype=torch.float32)
-    return cast(Sight.of(Baked.of(trained), camera), pixels).T.numpy()
+    return cast(ViewRays.of(Baked.of(trained), camera), pixels).T.numpy()
 
 
 def slow(
@@ -179,13 +179,13 @@ def test_normals_of_a_ball_point_away_from_its_middle(k: float) -> None:
 def test_a_whole_palette_is_matched_by_order_or_by_nearest() -> None:
     run = replace(ball(), palette=np.array([[250, 0, 0], [0, 0, 250]], dtype=np.uint8))
     assert run.palette is not None
-    by_order = repainted(run, "#0000ff,#ff0000").palette
-    by_nearest = repainted(run, "#0000ff,#ff0000,#00ff00", nearest=True).palette
+    by_order = repaint_run(run, "#0000ff,#ff0000").palette
+    by_nearest = repaint_run(run, "#0000ff,#ff0000,#00ff00", nearest=True).palette
     assert by_order is not None
     assert by_nearest is not None
     assert by_order.tolist() == [[0, 0, 255], [255, 0, 0]]
     assert by_nearest.tolist() == [[255, 0, 0], [0, 0, 255]]
     with pytest.raises(PaletteError, match=r"3 colours, the run has 2; .* or pass --nearest"):
-        repainted(run, "#0000ff,#ff0000,#00ff00")
+        repaint_run(run, "#0000ff,#ff0000,#00ff00")
     with pytest.raises(PaletteError, match="without palette"):
-        repainted(ball(), "#0000ff")
+        repaint_run(ball(), "#0000ff")

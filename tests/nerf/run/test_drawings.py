@@ -20,12 +20,12 @@ from tests.nerf.look.painted import camera_at, drawings, geometry
 from tests.nerf.look.test_shaped import drawn, misty
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.errors import BundleError, ToonsetError
-from toonset.nerf.look.blend import drawn_view
+from toonset.nerf.look.blend import blend_view
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.run.report import write_run
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.result import Training
 
 CONFIG, PICTURES, PAINT = "config.json", "drawings.png", "paint.png"
@@ -40,7 +40,7 @@ def egg() -> Drawings:
 @pytest.fixture
 def folder(tmp_path: Path, training: Training, egg: Drawings) -> Path:
     result = replace(training.result, drawings=egg)
-    write_run(tmp_path, replace(training, result=result), labelled(train_scene())[0])
+    write_run(tmp_path, replace(training, result=result), label_scene(train_scene())[0])
     return tmp_path
 
 
@@ -48,7 +48,7 @@ def test_views_are_the_same_after_loading(folder: Path, egg: Drawings) -> None:
     loaded = read_field(folder).drawings
     assert loaded is not None
     shown = geometry(camera_at(0.4))
-    a, b = drawn_view(egg, shown), drawn_view(loaded, shown)
+    a, b = blend_view(egg, shown), blend_view(loaded, shown)
     np.testing.assert_array_equal(a.rgb, b.rgb)
     np.testing.assert_array_equal(a.ink, b.ink)
     assert loaded.outline == egg.outline
@@ -62,7 +62,7 @@ def shaped() -> Drawings:
 @pytest.fixture
 def shaped_folder(tmp_path: Path, training: Training, shaped: Drawings) -> Path:
     result = replace(training.result, drawings=shaped)
-    write_run(tmp_path, replace(training, result=result), labelled(train_scene())[0])
+    write_run(tmp_path, replace(training, result=result), label_scene(train_scene())[0])
     return tmp_path
 
 
@@ -73,7 +73,7 @@ def test_a_mannequins_shape_lines_and_shadow_are_the_same_after_loading(
     assert loaded is not None
     assert loaded.steps == shaped.steps
     assert loaded.shade == shaped.shade
-    a, b = (drawn_view(one, misty(body_camera(0.4))) for one in (shaped, loaded))
+    a, b = (blend_view(one, misty(body_camera(0.4))) for one in (shaped, loaded))
     np.testing.assert_array_equal(a.rgb, b.rgb)
     assert loaded.shape is not None
 
@@ -90,7 +90,7 @@ def test_a_shape_takes_the_place_of_depth(shaped_folder: Path) -> None:
 
 
 def test_a_run_without_drawings_says_how_to_get_them(training: Training, tmp_path: Path) -> None:
-    write_run(tmp_path, training, labelled(train_scene())[0])
+    write_run(tmp_path, training, label_scene(train_scene())[0])
     old = read_field(tmp_path)
     assert old.drawings is None
     view = render(old, train_scene().frames[0].camera)

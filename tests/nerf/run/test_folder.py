@@ -16,13 +16,13 @@ from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.run.report import write_run
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.result import Training
 
 
 @pytest.fixture
 def run_folder(tmp_path: Path, training: Training) -> Path:
-    write_run(tmp_path, training, labelled(train_scene())[0])
+    write_run(tmp_path, training, label_scene(train_scene())[0])
     return tmp_path
 
 

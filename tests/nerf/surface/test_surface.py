@@ -22,7 +22,7 @@ from toonset.nerf.render.layers import palette_picture
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.surface.cut import cut
-from toonset.nerf.surface.decimate import decimated
+from toonset.nerf.surface.decimate import decimate
 from toonset.nerf.surface.files import (
     Surface,
     check_mesh_files,
@@ -185,7 +185,7 @@ def test_cuts_are_shared_and_keep_every_area() -> None:
     label = chances.argmax(axis=1)
     old = faces < len(plain.vertices)
     assert (label[faces[old]] == np.repeat(labels[:, None], 3, axis=1)[old]).all()
-    assert closed(decimated(vertices, faces, labels, 400)[1])
+    assert closed(decimate(vertices, faces, labels, 400)[1])
 
 
 @pytest.mark.parametrize("name", ["b.glb", "b.obj", "b.ply", "odd name.obj"])

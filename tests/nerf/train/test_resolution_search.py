@@ -18,7 +18,7 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.run.report import write_run
 from toonset.nerf.train import resolution_search
-from toonset.nerf.train.labelling import without_palette
+from toonset.nerf.train.labelling import drop_palette
 from toonset.nerf.train.resolution_choice import Candidate, FieldChoice, chosen, shares_for
 from toonset.nerf.train.resolution_search import left_out
 from toonset.nerf.train.train import finest_cells, fit_field
@@ -30,7 +30,7 @@ SHORT = TrainOptions(steps=2 * FEW, device="cpu", missing_views=0)
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     """Return eight drawings of 60 px."""
-    return without_palette(next(iter(train_cases(None, 0, 1, px=60))).train)
+    return drop_palette(next(iter(train_cases(None, 0, 1, px=60))).train)
 
 
 @pytest.fixture(scope="module")

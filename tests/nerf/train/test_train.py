@@ -28,7 +28,7 @@ from toonset.nerf.train import gradients
 from toonset.nerf.train import loss as loss_module
 from toonset.nerf.train import train as train_module
 from toonset.nerf.train.batches import Batch
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.loop import LEAST_STEPS
 from toonset.nerf.train.result import Training
 from toonset.nerf.train.train import FieldOf, fit_field
@@ -62,7 +62,7 @@ def test_orthographic_views_and_worlds_of_any_size(k: float, unit: float) -> Non
 
 
 def test_same_seed_same_bits_other_seed_other_bits() -> None:
-    scene = labelled(train_scene())[0]
+    scene = label_scene(train_scene())[0]
     few = replace(QUICK, steps=5)
     states = []
     for options in (few, few, replace(few, seed=1)):
@@ -137,12 +137,14 @@ def test_empty_pictures_are_passed_over() -> None:
     ("field_of", "steps", "least"), [(voxels, 60, 22.0), (painted, 0, 17.0), (network, 3, 5.0)]
 )
 def test_other_fields_are_trained_and_rendered(field_of: FieldOf, steps: int, least: float) -> None:
-    training = fit_field(labelled(train_scene())[0], replace(QUICK, steps=steps), field_of=field_of)
+    training = fit_field(
+        label_scene(train_scene())[0], replace(QUICK, steps=steps), field_of=field_of
+    )
     assert held_out_psnr(training.result) > least
 
 
 def test_a_field_in_a_whole_box_is_trained_rendered_and_read_again(tmp_path: Path) -> None:
-    scene = labelled(train_scene())[0]
+    scene = label_scene(train_scene())[0]
     training = fit_field(scene, replace(QUICK, carve=False, smoothness=0.0, steps=40))
     write_run(tmp_path, training, replace(scene, frames=scene.frames[:1]))
     loaded, camera = read_field(tmp_path), held_out().frames[0].camera

@@ -17,10 +17,10 @@ from tests.nerf.bodies import Hand, body, sheet
 from tests.nerf.ellipsoids import QUICK
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.render.recolor import recolored
+from toonset.nerf.render.recolor import recolor_run
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.training import train
 from toonset.nerf.viewer.build import run_scene
 from toonset.nerf.viewer.page import page_html
@@ -36,8 +36,8 @@ SIGHTS = ((0.0, 0.0), (70.0, 20.0), (200.0, -15.0))  # yaw, elevation, degrees
 @pytest.fixture(scope="module")
 def fields() -> dict[str, TrainedField]:
     """Return a field, and one whose surface is that of the character's own body."""
-    scene = labelled(sheet(body(), Hand()))[0]
-    shaded = replace(labelled(sheet(body(), Hand(shadow=0.7)))[0], mannequin=body())
+    scene = label_scene(sheet(body(), Hand()))[0]
+    shaded = replace(label_scene(sheet(body(), Hand(shadow=0.7)))[0], mannequin=body())
     return {"field": train(scene, QUICK).field, "body": train(shaded, QUICK).field}
 
 
@@ -98,7 +98,7 @@ def test_another_colour_changes_only_that_paint(
     assert trained.palette is not None
     colors = trained.palette.tolist()
     new = [40, 220, 60]
-    changed = recolored(trained, [f"{hex_of(tuple(colors[0]))}={hex_of((40, 220, 60))}"])
+    changed = recolor_run(trained, [f"{hex_of(tuple(colors[0]))}={hex_of((40, 220, 60))}"])
     camera = camera_at(trained, 40.0, 5.0)
     before = drawn_by_page(page, trained, camera, layer)
     after = drawn_by_page(page, trained, camera, layer, colors=[new, *colors[1:]])

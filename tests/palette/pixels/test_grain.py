@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from toonset.palette.extract import extract_palette, label_image
-from toonset.palette.pixels.grain import noise_levels, without_grain
+from toonset.palette.pixels.grain import noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED
 
@@ -36,7 +36,7 @@ def test_noise_is_measured_in_levels(grain: float) -> None:
 @pytest.mark.parametrize("grain", [0.0, 1.0])
 def test_clean_drawings_stay_as_they_are(grain: float) -> None:
     picture = drawn(figure(), grain)
-    assert without_grain([picture])[0] is picture
+    assert remove_grain([picture])[0] is picture
 
 
 def test_a_sheet_saved_as_jpeg_stays_as_it_is() -> None:
@@ -45,7 +45,7 @@ def test_a_sheet_saved_as_jpeg_stays_as_it_is() -> None:
     read = cv2.imdecode(written, cv2.IMREAD_COLOR)
     assert read is not None
     read = np.dstack([read[..., ::-1], picture[..., 3]])
-    assert without_grain([read])[0] is read
+    assert remove_grain([read])[0] is read
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -67,7 +67,7 @@ def test_paints_on_rough_paper_are_regions(seed: int) -> None:
 def test_borders_stay_where_they_are() -> None:
     paint = figure()
     picture = drawn(paint, 16.0)
-    smooth = without_grain([picture])[0]
+    smooth = remove_grain([picture])[0]
     truth = drawn(paint, 0.0)
     off = np.abs(smooth[..., :3].astype(float) - truth[..., :3])[paint != UNLABELLED]
     assert off.mean() < 6  # of 16 levels of grain, borders included

@@ -73,7 +73,7 @@ def test_ways_cost_what_was_promised_and_reach_both_ends() -> None:
     assert (first.rows_met[0], first.rows_met[-1]) == (0, 29)
     aside = (np.diff(first.columns_met) != 0).sum()
     assert first.along(drawn).sum() + DETOUR * aside >= cheapest.min() - 1e-9
-    assert len({way.columns.tobytes() for ways in rounds for way in ways}) > len(rounds[0])
+    assert len({seam.columns.tobytes() for ways in rounds for seam in ways}) > len(rounds[0])
 
 
 def test_a_cleft_is_less_open_than_a_side() -> None:
@@ -81,10 +81,10 @@ def test_a_cleft_is_less_open_than_a_side() -> None:
     for x in (45, 115):
         cv2.circle(mask, (x, 100), 36, 1, -1)
     whole = mask.astype(bool)
-    sight = look_at(whole, whole, np.zeros((200, 160, 3), np.uint8))
+    cut_costs = look_at(whole, whole, np.zeros((200, 160, 3), np.uint8))
     column = np.flatnonzero(whole[:, 80])
     side = np.flatnonzero(whole[100])[0]
-    assert sight.open[column[0], 80] < 0.3 < 0.7 < sight.open[100, side]
+    assert cut_costs.open[column[0], 80] < 0.3 < 0.7 < cut_costs.open[100, side]
 
 
 def test_a_figure_is_like_its_mirror_image_at_any_size() -> None:
@@ -128,9 +128,9 @@ def test_nothing_is_cut_on_an_empty_sheet() -> None:
 def test_the_chance_of_a_cut_is_one_if_it_has_no_rival() -> None:
     rgb = row(300, (70, 50, 50), (189, 50, 50))
     mask = (rgb != 255).any(axis=-1)
-    sight = look_at(mask, mask, rgb)
-    options = find_options(sight, rgb, [*flanks(mask)])
-    best, sure = best_option(options, sight.drawn > 0.5)
+    cut_costs = look_at(mask, mask, rgb)
+    options = find_options(cut_costs, rgb, [*flanks(mask)])
+    best, sure = best_option(options, cut_costs.drawn > 0.5)
     assert 0 < sure <= 1
-    assert best_option([best], sight.drawn > 0.5) == (best, 1)
+    assert best_option([best], cut_costs.drawn > 0.5) == (best, 1)
     assert all(best.badness <= option.badness for option in options)
