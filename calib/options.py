@@ -1,4 +1,4 @@
-"""How hard calibration looks, and where it begins to doubt. Imports nothing heavy."""
+"""Define the options and verdict thresholds of calibration. Imports nothing heavy."""
 
 from __future__ import annotations
 

@@ -21,6 +21,7 @@ from toonset.calib.result import FilledHole, ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.split.background import difference
 from toonset.dataset.split.holes import CLEAR, LEAST_HOLE_PX
+from toonset.raster import dilate
 from toonset.view import Box, View
 
 Rgb = tuple[int, int, int]
@@ -144,15 +145,12 @@ def _is_closed(
 
 def _with_paper(view: View, hole: Bool[np.ndarray, "height width"], paper: Rgb) -> View:
     """Return the view with paper's colour in a hole, and laid under its mixed edge."""
-    size = 2 * EDGE_PX + 1
-    grown = cv2.dilate(hole.view(np.uint8), np.ones((size, size), np.uint8)) > 0
     share = view.rgba[..., 3:].astype(np.float64) / 255
     under: UInt8[np.ndarray, "height width 3"] = np.rint(
         share * view.rgba[..., :3] + (1 - share) * np.array(paper)
     ).astype(np.uint8)
-    opaque = np.dstack([under, np.full(grown.shape, 255, np.uint8)])
-    beside = cv2.dilate(_outside(view).view(np.uint8), np.ones((size, size), np.uint8)) > 0
-    inside = hole | (grown & ~beside)
+    opaque = np.dstack([under, np.full(hole.shape, 255, np.uint8)])
+    inside = hole | (dilate(hole, EDGE_PX) & ~dilate(_outside(view), EDGE_PX))
     return replace(view, rgba=np.where(inside[..., None], opaque, view.rgba))
 
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from jaxtyping import Float
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.ndimage import gaussian_filter
 
 from toonset.palette.colors import oklab_from_rgb
+from toonset.raster import depth_inside
 from toonset.view import View
 
 FEWEST = 3  # views: front and back alone need not share a colour
@@ -44,9 +44,7 @@ def other_character(drawings: Sequence[View]) -> list[int]:
 def _colors(view: View) -> Float[np.ndarray, "lightness a b"]:
     """Return how much of a drawing has which colour, its contour's ink aside; 1 in all."""
     opaque = view.rgba[..., 3] > OPAQUE
-    padded = np.pad(opaque, 1).astype(np.uint8)
-    depth = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
-    deep = depth > view.line_width_px + 1
+    deep = depth_inside(opaque) > view.line_width_px + 0.5
     if deep.sum() < FEWEST_PIXELS:
         deep = opaque if opaque.any() else view.mask
     lab = oklab_from_rgb(view.rgba[deep][:, :3])

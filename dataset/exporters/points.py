@@ -9,17 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from scipy.ndimage import distance_transform_edt
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame
 from toonset.dataset.mesh.rasterize import depth_map
 from toonset.mesh import Mesh
+from toonset.raster import distance_to, nearest
 
 OUTSIDE = 0.03  # of the body height: drawn outlines differ from the mannequin's by so much
 BEHIND = 0.01  # of the body height: a point deeper than the surface by more is hidden
@@ -100,9 +99,8 @@ def look_up(
     """Return px to the figure, px inside of it, and the colour of its nearest pixel."""
     height, width = rgba.shape[:2]
     figure = np.pad(rgba[..., 3] >= 128, 1)  # a figure cut off by the frame ends there
-    found: Any = distance_transform_edt(~figure, return_indices=True)
-    away, (rows, columns) = found
-    inside: Any = distance_transform_edt(figure)
+    away, inside = distance_to(figure), distance_to(~figure)
+    rows, columns = nearest(figure)
     column, row, within = _cells(pixels, (width, height))
     at = row + 1, column + 1
     color = rgba[rows[at] - 1, columns[at] - 1, :3]

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from toonset.raster import dilate, distance_to
+
 DARKEST_CONTOUR = 100.0  # luma of 255: a lighter border is not ink
 LEAST_INKED = 0.7  # of the border that must be dark to speak of a contour
 MOST_DEEP = 0.5  # of the border's darkness: if so much goes on inside, the figure itself is dark
@@ -23,7 +25,7 @@ def contour_width_px(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
     """
     mask = np.pad(rgba[..., 3] >= 128, 1)
     luma = np.pad(cv2.cvtColor(rgba, cv2.COLOR_RGBA2GRAY), 1, constant_values=255)
-    depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    depth = distance_to(~mask)
     rows = np.flatnonzero(mask.any(axis=1))
     layers = int(np.clip(WIDEST * (rows[-1] - rows[0] + 1), 6, MOST_LAYERS))
     layers = min(layers, int(depth.max()))
@@ -33,8 +35,7 @@ def contour_width_px(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
     run = (layer_of == 1) & dark
     shares = [float(run.sum() / max(sizes[1], 1))]
     for layer in range(2, layers + 1):
-        reached = cv2.dilate(run.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        inked = reached & dark & (layer_of == layer)
+        inked = dilate(run) & dark & (layer_of == layer)
         shares.append(float(inked.sum() / max(sizes[layer], 1)))
         run |= inked
     return _width(np.array(shares))

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Int
 
 from toonset.dataset.split.corrections import joined
 from toonset.dataset.split.segment import SheetLayout, figure_cells, in_pixels
 from toonset.errors import SheetError
+from toonset.raster import dilate
 from toonset.view import Box
 
 LEAST_CELL_PX = 16  # pixels of paint in a cell of a grid: less is an empty cell
@@ -145,8 +145,7 @@ def _own_pixels(
     rows = slice(max(y // cell_px - 1, 0), (y + height) // cell_px + 2)
     columns = slice(max(x // cell_px - 1, 0), (x + width) // cell_px + 2)
     near = cells[rows, columns]
-    grown = cv2.dilate((near == number + 1).view(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    own = grown & ((near == 0) | (near == number + 1))
+    own = dilate(near == number + 1) & ((near == 0) | (near == number + 1))
     local = (x - columns.start * cell_px, y - rows.start * cell_px, width, height)
     return np.asarray(in_pixels(own, cell_px, local), dtype=bool)
 

@@ -23,6 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.split.background import difference
+from toonset.raster import depth_inside, dilate, erode
 
 LEAST_HOLE_PX = 9
 LEAST_ISLAND_PX = 4
@@ -38,7 +39,6 @@ CLEAR = 40  # levels from the background: a line or another colour
 MOST_FADING = 0.1  # of the border
 AS_INKED = 0.5  # of the outline's share of ink
 SLACK = 0.05  # of the border: the shares of a short border are rough
-SQUARE = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -113,9 +113,7 @@ def open_holes(
         difference(rgb, background),
         cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY),
     )
-    depth = cv2.distanceTransform(
-        np.pad(mask, 1).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-    )[1:-1, 1:-1]
+    depth = depth_inside(mask) + 0.5
     _, labels, stats, _ = cv2.connectedComponentsWithStats(
         enclosed.astype(np.uint8), connectivity=4
     )
@@ -143,7 +141,7 @@ def _is_behind_a_limb(
     patch: Bool[np.ndarray, "height width"], depth: Float[np.ndarray, "height width"], tall: int
 ) -> bool:
     """Return whether a patch is as far from the outside as a limb is thick."""
-    rim = patch & (cv2.erode(np.pad(patch, 1).view(np.uint8), SQUARE)[1:-1, 1:-1] == 0)
+    rim = patch & ~erode(patch)
     walls = depth[rim]
     thin = float((walls <= max(LEAST_WALL_PX, THIN_WALL * tall)).mean())
     return thin <= MOST_THIN and float(walls.min()) <= THICK_WALL * tall
@@ -153,7 +151,7 @@ def _fading(
     patch: Bool[np.ndarray, "height width"], contrast: UInt8[np.ndarray, "height width"]
 ) -> float:
     """Return the share of a patch's border beside which nothing differs from the background."""
-    rim = (cv2.dilate(patch.view(np.uint8), SQUARE) > 0) & ~patch
+    rim = dilate(patch) & ~patch
     around = cv2.dilate(contrast, np.ones((7, 7), np.uint8))
     return float((around[rim] < CLEAR).mean()) if rim.any() else 0.0
 
@@ -161,8 +159,7 @@ def _fading(
 def _look(
     empty: np.ndarray, solid: np.ndarray, contrast: np.ndarray, luma: np.ndarray
 ) -> BorderLook:
-    patch = empty.astype(np.uint8)
-    reach = [cv2.dilate(patch, SQUARE, iterations=steps) > 0 for steps in (2, 3, 4)]
+    reach = [dilate(empty, steps) for steps in (2, 3, 4)]
     near, far = reach[1] & solid, reach[2] & ~reach[0] & solid
     return BorderLook(
         int((luma[near] < INK_LUMA).sum()),

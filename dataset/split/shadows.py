@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs
+from toonset.raster import dilate
 
 OFF_MEAN = 0.2  # of the noise: so far a whole patch may be off
 LEAST_AREA = 0.01  # of the figure's area, with its edge
@@ -95,8 +96,7 @@ def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
 
 def _is_soft(body: np.ndarray, dim: Dim, piece: np.ndarray) -> bool:
     """Return whether most of a patch's border with the paper fades into it, as no cloth does."""
-    paper = np.pad(~body, 1, constant_values=True).view(np.uint8)
-    beside = cv2.dilate(paper, np.ones((3, 3), np.uint8))[1:-1, 1:-1] > 0
+    beside = dilate(np.pad(~body, 1, constant_values=True))[1:-1, 1:-1]
     rim = dim.light[_lit(piece, dim, body) & beside]
     return bool(len(rim) and np.mean(rim >= FADED - dim.noise / 255) >= MOSTLY)
 
@@ -186,16 +186,15 @@ def _grown(
     shadow: Bool[np.ndarray, "height width"], reach: float, room: Bool[np.ndarray, "height width"]
 ) -> Bool[np.ndarray, "height width"]:
     """Return the shadow with the dim pixels that are connected to it within a few steps."""
-    square = np.ones((3, 3), np.uint8)
     for _ in range(max(2, round(reach))):
-        shadow = shadow | ((cv2.dilate(shadow.view(np.uint8), square) > 0) & room)
+        shadow = shadow | (dilate(shadow) & room)
     return shadow
 
 
 def _borders_paper(shadow: np.ndarray, body: np.ndarray) -> bool:
     """Return whether enough of the shadow's border is paper: it lies beside the figure."""
-    padded = np.pad(shadow, 1).view(np.uint8)
-    rim = (cv2.dilate(padded, np.ones((3, 3), np.uint8)) > 0) & (padded == 0)
+    padded = np.pad(shadow, 1)
+    rim = dilate(padded) & ~padded
     return bool((rim & ~np.pad(body, 1)).sum() >= BESIDE * rim.sum())
 
 

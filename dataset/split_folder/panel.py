@@ -15,6 +15,7 @@ from jaxtyping import Bool, UInt8
 
 from toonset.dataset.split.sheet import LeftOut
 from toonset.dataset.split_folder.tags import Corners, Costs, Line, Rgb, draw_tag
+from toonset.raster import dilate
 from toonset.view import View
 
 WIDEST, HIGHEST = 2400, 3200  # pixels of a sheet in the overlay
@@ -163,9 +164,9 @@ def _scaled(
 def _outline(picture: np.ndarray, box: Corners, mask: Bool[np.ndarray, "_ _"], color: Rgb) -> None:
     """Draw a line along the outside of a mask, white beyond it so that it shows on any ground."""
     around = OUTLINE + 1
-    inside = np.pad(mask, around).astype(np.uint8)
-    line = cv2.dilate(inside, np.ones((2 * OUTLINE + 1,) * 2, np.uint8))
-    halo = cv2.dilate(line, np.ones((3, 3), np.uint8))
+    inside = np.pad(mask, around)
+    line = dilate(inside, OUTLINE)
+    halo = dilate(line)
     left, top, right, bottom = box
     window = picture[top - around : bottom + around, left - around : right + around]
     window[(halo > line)] = WHITE

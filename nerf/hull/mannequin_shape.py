@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt16
-from scipy import ndimage
 
 from toonset.camera import Camera
 from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
+from toonset.raster import distance_to, nearest
 
 FINER = 3  # samples per pixel and axis: outlines and steps in depth lie between pixels
 GRID_PX = 0.25  # of the drawings: what is nearer is one vertex
@@ -99,10 +98,7 @@ class Shape:
             _, normal = depth_and_normals(self.vertices, self.faces, camera)
             there = (normal != 0).any(axis=-1)
             if self.beyond and there.any():
-                at = ndimage.distance_transform_edt(
-                    ~there, return_distances=False, return_indices=True
-                )
-                normal = np.where((cover > 0)[..., None], normal[tuple(np.asarray(at))], 0)
+                normal = np.where((cover > 0)[..., None], normal[nearest(there)], 0)
         return ShapeView(camera, cover, fine[middle, middle], fine, normal)
 
 
@@ -161,9 +157,8 @@ def _grown(
     """Return depth continued over so many pixels beside the figure."""
     if by_px <= 0 or not np.isfinite(depth).any():
         return depth
-    found = ndimage.distance_transform_edt(np.isnan(depth), return_indices=True)
-    away, at = cast("tuple[np.ndarray, np.ndarray]", found)
-    return np.where(away <= by_px, depth[tuple(at)], np.nan)
+    there = np.isfinite(depth)
+    return np.where(distance_to(there) <= by_px, depth[nearest(there)], np.nan)
 
 
 def _within(mesh: Mesh, cameras: Sequence[Camera]) -> Bool[np.ndarray, " faces"]:

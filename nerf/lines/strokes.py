@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 from skimage.morphology import skeletonize
 
-from toonset.nerf.lines.nearest import depth_inside, nearest, parts
 from toonset.palette.pixels.ink_lines import find_contour, outline_line_px
+from toonset.raster import depth_inside, nearest, parts
 
 FEWEST_OUTLINED = 0.5  # of a sheet's views must have an outline, for the sheet to have one
 INK_QUANTILE = 0.2  # darkest part of the rim: the rest is mixed with what it surrounds

@@ -19,7 +19,6 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
-from toonset.nerf.lines.nearest import nearest
 from toonset.nerf.lines.step_lines import draw_steps
 from toonset.nerf.look.drawings import (
     CRUMB,
@@ -37,6 +36,7 @@ from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.recolor import tones_of
+from toonset.raster import nearest
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large

@@ -12,12 +12,12 @@ from jaxtyping import Bool, Float, Float16, Shaped, UInt8
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
-from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
 from toonset.nerf.lines.step_lines import StepLines, step_edges
 from toonset.nerf.look.outline import Outline, without_crumbs
 from toonset.nerf.look.paint_labels import paint_labels, repainted
 from toonset.nerf.look.shade import Shade
 from toonset.palette.palette import Shadow
+from toonset.raster import depth_inside, distance_to, nearest
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
 BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much

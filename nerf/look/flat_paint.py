@@ -16,7 +16,6 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
-from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest
 from toonset.nerf.lines.step_lines import (
     StepLines,
     learn_steps,
@@ -27,6 +26,7 @@ from toonset.nerf.lines.step_lines import (
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.look.shade import Shade, learned_shade, smoothed, unlit
 from toonset.palette.pixels.ink_lines import find_contour
+from toonset.raster import depth_inside, distance_to, nearest
 
 SOFT_PX = 1.5  # beyond an outline, in which paint and ink are mixed
 INK = 40  # of 255: how far a line covers a pixel that has some of it

@@ -11,8 +11,8 @@ from jaxtyping import Bool, Float, UInt8
 from skimage.measure import find_contours
 
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.lines.nearest import depth_inside, nearest
 from toonset.nerf.lines.strokes import FEWEST_OUTLINED, ink_color, mean_width, outline_width
+from toonset.raster import depth_inside, nearest
 
 FINER = 3  # samples per pixel and axis
 SMOOTH_PX = 0.7  # sigma: what is finer in a field's opacity is noise
@@ -90,9 +90,8 @@ def crisp_outline(
     inside = without_crumbs(inside, CRUMB_PX * samples, hole_px * samples)
     ink = np.zeros_like(alpha, dtype=np.float32)
     if width_px > 0:
-        padded = np.pad(inside, 1).astype(np.uint8)
-        distance = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
-        line = np.clip(FINER * width_px + 1 - distance, 0, 1) * inside
+        depth = depth_inside(inside).astype(np.float32)
+        line = np.clip(FINER * width_px + 0.5 - depth, 0, 1) * inside
         ink = cv2.resize(line, (width, height), interpolation=cv2.INTER_AREA)
     cover = cv2.resize(inside.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
     return cover, np.minimum(ink, cover)

@@ -22,7 +22,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import uniform_filter
 
-from toonset.nerf.lines.nearest import nearest
+from toonset.raster import nearest
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
 FLAT = 0.03  # logarithms per pixel: steeper is not a flat paint

@@ -34,9 +34,9 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.lines.nearest import depth_inside, nearest
 from toonset.nerf.lines.strokes import outline_width
 from toonset.nerf.prepare.unwarp import Warp, warped
+from toonset.raster import depth_inside, nearest
 
 POINTS = 60.0  # places along a length as long as the figure
 BLURS = (0.024, 0.012, 0.006)  # of the figure's height: sigma

@@ -29,10 +29,10 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.dataset.images.picture import encode_png
 from toonset.errors import PaletteError, UsageError
 from toonset.nerf.fields.trained_field import NO_PALETTE
-from toonset.nerf.lines.nearest import nearest
 from toonset.nerf.render.animation import check_one_size
 from toonset.nerf.render.layers import Rendering
 from toonset.palette.names import hex_of, name_of
+from toonset.raster import dilate, is_uniform, nearest
 from toonset.view import premultiply, straight
 
 PAINTED = ("drawn", "rgb", "palette")  # what can be seen in layers
@@ -48,7 +48,6 @@ PURE = 0.5  # of a pixel, that shows its paint's colour
 BLEND = 0.08  # of colours, that a soft edge may be off a mixture of the paints beside it
 PLAIN = 0.1  # of colours: a thin line, an eye, is its paint's
 AROUND_PX, FEWEST, MOST = 5, 3, 3  # pixels in which paints are looked for, of one, how many of them
-SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Color = Float[np.ndarray, "height width 3"]
@@ -190,23 +189,19 @@ def _lines(look: _Look) -> Share:
     off = look.shown.color - look.shown.alpha[..., None] * look.paint
     share = (off * way).sum(axis=-1) / np.maximum(length, 1e-9)
     share = np.where(length > CLEAR**2, share, look.ink)
-    side = 2 * NEAR_PX + 1
-    near = cv2.dilate((look.ink > 0).astype(np.uint8), np.ones((side, side), np.uint8)) > 0
-    return np.where(near & (share > FAINT), share, 0)
+    return np.where(dilate(look.ink > 0, NEAR_PX) & (share > FAINT), share, 0)
 
 
 def _pure(look: _Look, rest: _Rest, lines: Share) -> list[Bool[np.ndarray, "height width"]]:
     """Return where every paint is seen alone: amid its own, or thin and in its own colour."""
     color = rest.color / np.maximum(rest.alpha, 1e-6)[..., None]
     off = np.linalg.norm(color - look.paints[look.labels] / 255.0, axis=-1)
-    pure = (_amid(look.labels) | (off < PLAIN)) & (rest.alpha > 1 - FAINT) & (lines < PURE)
+    pure = (
+        (is_uniform(look.labels.astype(np.int16)) | (off < PLAIN))
+        & (rest.alpha > 1 - FAINT)
+        & (lines < PURE)
+    )
     return [pure & (look.labels == number) for number in range(len(look.paints))]
-
-
-def _amid(labels: Labels) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels whose neighbours have the same label."""
-    small = labels.astype(np.int16)
-    return np.asarray(cv2.erode(small, SQUARE) == cv2.dilate(small, SQUARE))
 
 
 def _colors(
@@ -233,7 +228,7 @@ def _edges(
     """
     upper, lower = np.full(look.labels.shape, -1), look.labels.copy()
     share = np.zeros(look.labels.shape)
-    at = ~_amid(look.labels) & (rest.alpha > 0)
+    at = ~is_uniform(look.labels.astype(np.int16)) & (rest.alpha > 0)
     side = (AROUND_PX, AROUND_PX)
     counts = [cv2.boxFilter(one.astype(np.float32), -1, side, normalize=False)[at] for one in pure]
     seen = np.stack(counts)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, UInt8
 
 from toonset.dataset.silhouettes.mask import mask_of
+from toonset.raster import distance_to
 from toonset.view import over_white
 
 TOLERANCE_PX, OF_PX = 2.0, 260.0  # that a line may be off; of a figure so tall
@@ -38,8 +39,8 @@ def line_f1(
     if not found.any():
         return 0.0
     near = tolerance_px(drawn)
-    precision = float((_distance(wanted)[found] <= near).mean())
-    recall = float((_distance(found)[wanted] <= near).mean())
+    precision = float((distance_to(wanted)[found] <= near).mean())
+    recall = float((distance_to(found)[wanted] <= near).mean())
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
@@ -69,12 +70,6 @@ def _dark(rgba: UInt8[np.ndarray, "height width 4"]) -> Bool[np.ndarray, "height
 def _height(rgba: UInt8[np.ndarray, "height width 4"]) -> int:
     rows = np.flatnonzero(mask_of(rgba).any(axis=1))
     return int(rows[-1] - rows[0] + 1) if len(rows) else 0
-
-
-def _distance(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    """Return the pixels to the nearest one of a mask that has any."""
-    apart = (~mask).astype(np.uint8)
-    return cv2.distanceTransform(apart, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
 
 
 def _is_outlined(

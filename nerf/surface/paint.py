@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy import ndimage
 
-from toonset.nerf.lines.nearest import depth_inside, distance_to, nearest, parts
 from toonset.nerf.lines.step_lines import step_edges
 from toonset.nerf.lines.strokes import SOFT, lines_of, strokes_of
 from toonset.nerf.look.drawings import SQUARE, Drawings, Texture
+from toonset.raster import depth_inside, distance_to, nearest, parts
 
 STEP = 0.015  # of the figure's height: an outline may be drawn where depth steps by so much
 SLIP = 0.02  # of the figure's height: so far from a step its line may lie

@@ -19,7 +19,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from toonset.errors import SetupError
-from toonset.nerf.lines.nearest import distance_to, nearest
+from toonset.raster import distance_to, nearest
 
 GUTTER = 4  # texels round every chart
 MOST_SIDE = 2048  # texels, about: half a GiB of memory while it is painted

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
@@ -20,9 +19,9 @@ from toonset.palette.paints.histogram import count_pixels
 from toonset.palette.paints.line_color import find_ink, rounded
 from toonset.palette.palette import ContourColor, Palette, PaletteColor
 from toonset.palette.pixels.labels import UNLABELLED, nearest_labels
+from toonset.raster import is_uniform
 
 LEAST_PX = 50  # of a paint's inside: fewer do not tell its colour
-SQUARE = np.ones((3, 3), np.uint8)
 
 Pictures = Sequence[UInt8[np.ndarray, "_ _ 4"]]
 RGB = tuple[int, int, int]
@@ -42,8 +41,7 @@ def read_drawn_colors(
     """
     labels = [nearest_labels(picture, palette.rgb) for picture in smooth]
     inner = [
-        (cv2.erode(own, SQUARE) == cv2.dilate(own, SQUARE)) & (own != UNLABELLED) & ~off
-        for own, off in zip(labels, apart, strict=True)
+        is_uniform(own) & (own != UNLABELLED) & ~off for own, off in zip(labels, apart, strict=True)
     ]
     label = np.concatenate([own[where] for own, where in zip(labels, inner, strict=True)])
     seen = np.concatenate([one[where, :3] for one, where in zip(drawings, inner, strict=True)])

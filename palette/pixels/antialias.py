@@ -16,9 +16,10 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
+
+from toonset.raster import dilate, is_uniform
 
 NONE = 255
 OPAQUE = 250  # of 255: less alpha is an edge of the figure
@@ -84,15 +85,12 @@ def settle_borders(
 
 def _inner(padded: UInt8[np.ndarray, "height width"]) -> np.ndarray:
     """Return where a pixel and its eight neighbours have the same label."""
-    square = np.ones((3, 3), dtype=np.uint8)
-    same = cv2.erode(padded, square) == cv2.dilate(padded, square)
-    return same & (padded != NONE)
+    return is_uniform(padded) & (padded != NONE)
 
 
 def _paints(padded: np.ndarray, inner: np.ndarray, rgba: np.ndarray, palette: np.ndarray) -> Paints:
     """Return the palette's colours as drawn in the picture, and its noise beside edges."""
-    edge = ((padded != NONE) & ~inner).astype(np.uint8)
-    ring = np.flatnonzero(inner & (cv2.dilate(edge, np.ones((5, 5), dtype=np.uint8)) > 0))
+    ring = np.flatnonzero(inner & dilate((padded != NONE) & ~inner, 2))
     ring = ring[:: max(1, len(ring) // SAMPLE)]
     rows, columns = np.divmod(ring, padded.shape[1])
     labels = padded[rows, columns]

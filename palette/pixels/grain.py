@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.palette.pixels.antialias import OPAQUE
+from toonset.raster import erode
 
 LEAST_LEVELS = 2.0  # of 255: finer grain does labels no harm
 LAPLACIANS = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)  # nothing on slopes
@@ -53,8 +54,7 @@ def noise_levels(pictures: Sequence[Picture]) -> float:
         if not picture.size:
             continue
         light = cv2.cvtColor(np.ascontiguousarray(picture[..., :3]), cv2.COLOR_RGB2GRAY)
-        opaque = (picture[..., 3] >= OPAQUE).astype(np.uint8)
-        inside = cv2.erode(opaque, np.ones((5, 5), np.uint8), borderValue=0) > 0
+        inside = erode(picture[..., 3] >= OPAQUE, 2)
         if inside.any():
             rough = np.abs(cv2.filter2D(light.astype(np.float32), -1, LAPLACIANS))
             found.append(float(np.median(rough[inside])))

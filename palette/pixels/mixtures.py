@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16, UInt8
 
 from toonset.palette.pixels.antialias import YCC_FROM_RGB, noise_beside_edges
+from toonset.raster import dilate, is_uniform
 
 NONE = -1  # of a pixel without a tone
 LINE = 32  # of 255: a line that covers so much of a pixel may be in its neighbours, too
@@ -62,8 +63,7 @@ class Mixtures:
 
 def alone(tones: Tones) -> Bool[np.ndarray, "height width"]:
     """Return where a pixel and its eight neighbours have one tone."""
-    square = np.ones((3, 3), dtype=np.uint8)
-    return np.asarray(cv2.erode(tones, square) == cv2.dilate(tones, square))
+    return is_uniform(tones)
 
 
 def colors_as_drawn(
@@ -109,8 +109,7 @@ def _units(
 ) -> Float[np.ndarray, "3 3"]:
     """Return (3, 3) from 8-bit RGB to units of the noise inside areas that end nearby."""
     inside = alone(tones) & (tones != NONE)
-    border = (~inside).astype(np.uint8)
-    ring = inside & (cv2.dilate(border, np.ones((5, 5), np.uint8)) > 0)
+    ring = inside & (dilate(~inside, 2))
     off = (picture[ring][:, :3] - drawn[tones[ring]]) @ YCC_FROM_RGB.T
     return (YCC_FROM_RGB / (UNEVEN * noise_beside_edges(off))[:, None]).T.astype(np.float32)
 

@@ -12,7 +12,6 @@ from twice that on. Grain, soft edges and soft borders of shadows stay what they
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int16, UInt8
 
@@ -21,6 +20,7 @@ from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.mixtures import LINE, NONE, alone, colors_as_drawn, find_mixtures
 from toonset.palette.pixels.shadow import DRAWN, FLOOR, apply_shadow
+from toonset.raster import dilate
 
 WINDOW = 7  # pixels: a soft edge is three wide, with a tone on either side
 SHADE = 0.06  # in OKLab
@@ -71,7 +71,7 @@ def recolor(picture: Picture, tones: Tones, contour: Map, old: Colors, new: Colo
     moved = np.append(change.any(axis=1), False)  # NONE, the last, does not
     if not moved.any():
         return picture
-    near = _grown(moved[tones], WINDOW) & (picture[..., 3] > 0)
+    near = dilate(moved[tones], WINDOW // 2) & (picture[..., 3] > 0)
     drawn = colors_as_drawn(picture, tones, old)
     pure = near & (tones != NONE) & alone(tones) & (contour < LINE)
     result = picture.copy()
@@ -95,7 +95,3 @@ def _shifted(
     off = np.linalg.norm(oklab_from_rgb(color) - oklab_from_rgb(like), axis=1)
     kept = (2 - off / SHADE).clip(0, 1)[:, None]
     return np.rint(color + kept * shade * change).clip(0, 255).astype(np.uint8)
-
-
-def _grown(mask: Bool[np.ndarray, "height width"], side: int) -> Bool[np.ndarray, "height width"]:
-    return cv2.dilate(mask.view(np.uint8), np.ones((side, side), np.uint8)) > 0

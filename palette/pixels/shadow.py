@@ -23,6 +23,7 @@ from jaxtyping import Bool, Float, Float32, UInt8
 
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.antialias import OPAQUE
+from toonset.raster import erode, nearest
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
 NARROWEST_PX = 2 * SIDE_PX  # a picture; there is no border in it to look across
@@ -111,7 +112,7 @@ def smoothed(picture: Picture) -> UInt8[np.ndarray, "height width 3"]:
 def _clear(picture: Picture, contour: Map) -> Mask:
     """Return pixels that are paint, and have none but paint around."""
     paint = (picture[..., 3] >= OPAQUE) & (contour < LINE)
-    return cv2.erode(paint.view(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
+    return erode(paint)
 
 
 def _logs(rgb: UInt8[np.ndarray, "*n 3"]) -> Float32[np.ndarray, "*n 3"]:
@@ -294,7 +295,7 @@ def _lit(picture: Picture, contour: Map, dark: Mask, shadow: Shadow) -> Picture:
     edge = _beside(dark)
     pure = _clear(picture, contour) & ~edge
     if pure.any():
-        light = np.where((edge & (contour < LINE))[..., None], _nearest(light, pure), light)
+        light = np.where((edge & (contour < LINE))[..., None], light[nearest(pure)], light)
     lit = picture.copy()
     paint = (contour < DRAWN)[..., None]
     lit[..., :3] = np.where(paint, light, picture[..., :3])
@@ -312,12 +313,3 @@ def apply_shadow(
 def _beside(dark: Mask) -> Mask:
     square = np.ones((2 * MIXED_PX + 1, 2 * MIXED_PX + 1), dtype=np.uint8)
     return cv2.morphologyEx(dark.view(np.uint8), cv2.MORPH_GRADIENT, square) > 0
-
-
-def _nearest(values: np.ndarray, pure: Mask) -> np.ndarray:
-    """Return the value of the nearest pure pixel."""
-    from scipy.ndimage import distance_transform_edt
-
-    found = distance_transform_edt(~pure, return_distances=False, return_indices=True)
-    assert isinstance(found, np.ndarray)
-    return values[found[0], found[1]]

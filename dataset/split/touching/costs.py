@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.raster import erode
+
 MOST_ROWS = 320  # of the picture on which cuts are sought
 LINE = 0.9  # of the cost of paint that a drawn line saves
 EDGE = 0.7  # of the same that an edge between colours saves
@@ -59,13 +61,7 @@ class CutCosts:
 
     def _tolls(self) -> Float[np.ndarray, "height width"]:
         inside = self.drawn > 0.5
-        core = cv2.erode(
-            inside.view(np.uint8),
-            np.ones((3, 3), np.uint8),
-            borderType=cv2.BORDER_CONSTANT,
-            borderValue=0,
-        )
-        return TOLL * len(inside) * np.minimum(self.open, 1) * (inside & (core == 0))
+        return TOLL * len(inside) * np.minimum(self.open, 1) * (inside & ~erode(inside))
 
 
 def look_at(

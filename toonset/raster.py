@@ -1,0 +1,59 @@
+"""Grow, shrink and measure masks on the pixel grid: every stage's morphology and distances."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, Shaped
+
+Mask = Bool[np.ndarray, "height width"]
+Places = Int[np.ndarray, "height width"]
+
+
+def dilate(mask: Mask, by: int = 1) -> Mask:
+    """Return the pixels within `by` pixels of a mask, diagonals included."""
+    return cv2.dilate(mask.astype(np.uint8), _square(by)) > 0
+
+
+def erode(mask: Mask, by: int = 1) -> Mask:
+    """Return the pixels of a mask farther than `by` pixels from its outside, the picture's edge."""
+    return cv2.erode(mask.astype(np.uint8), _square(by), borderValue=0) > 0
+
+
+def is_uniform(values: Shaped[np.ndarray, "height width"]) -> Mask:
+    """Return where a pixel and its eight neighbours have one value."""
+    return np.asarray(cv2.erode(values, _square(1)) == cv2.dilate(values, _square(1)))
+
+
+def distance_to(marked: Mask) -> Float[np.ndarray, "height width"]:
+    """Return every pixel's distance to the nearest marked one, inf without any."""
+    if not marked.any():
+        return np.full(marked.shape, np.inf)
+    apart = (~marked).astype(np.uint8)
+    return np.asarray(cv2.distanceTransform(apart, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
+
+
+def depth_inside(mask: Mask) -> Float[np.ndarray, "height width"]:
+    """Return how far inside a mask every pixel's centre lies; beyond the picture is outside."""
+    return distance_to(np.pad(~mask, 1, constant_values=True))[1:-1, 1:-1] - 0.5
+
+
+def nearest(
+    marked: Mask,
+) -> tuple[Int[np.ndarray, "height width"], Int[np.ndarray, "height width"]]:
+    """Return row and column of the marked pixel nearest to every pixel; some must be marked."""
+    from scipy.ndimage import distance_transform_edt
+
+    places = distance_transform_edt(~marked, return_distances=False, return_indices=True)
+    rows, columns = np.asarray(places)
+    return rows, columns
+
+
+def parts(marked: Mask, connectivity: int = 8) -> Places:
+    """Return the number of the connected part, from 1, of every marked pixel; 0 elsewhere."""
+    _, numbers = cv2.connectedComponents(marked.astype(np.uint8), connectivity=connectivity)
+    return np.asarray(numbers, dtype=np.int64)
+
+
+def _square(by: int) -> np.ndarray:
+    return np.ones((2 * by + 1, 2 * by + 1), np.uint8)
