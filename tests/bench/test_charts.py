@@ -132,12 +132,9 @@ def test_png_and_svg_are_of_one_figure_and_repeat() -> None:
     colors = np.asarray(png.convert("RGB")).reshape(-1, 3).astype(int)
     assert (np.abs(colors - (0xD5, 0x5E, 0x00)).max(axis=1) < 8).sum() > 50  # the default
     assert draw_chart(chart(*shown.points[:2])) != draw_chart(shown)
-
-
-def test_errors_of_zero_and_a_lone_free_method_can_be_drawn() -> None:
     zero = chart(point("default", 2, 0.0), point("slow", 3, 1.0), lower_is_better=True)
-    for shown in (zero, chart(point("nothing", 0, 10))):
-        assert Image.open(io.BytesIO(draw_chart(shown))).width > 500
+    for lone in (zero, chart(point("nothing", 0, 10))):  # logarithms of neither
+        assert Image.open(io.BytesIO(draw_chart(lone))).width > 500
 
 
 def test_panels_and_scatters_have_a_legend_of_all() -> None:
@@ -216,16 +213,6 @@ def test_colours_are_pooled_over_conditions_per_size_of_sheet() -> None:
     assert (only.cost, only.n) == (0.4, 4)
     assert only.merit == pytest.approx(0.8)
     assert "n = 4 drawings of all sizes and kinds; seed 0" in large.caption
-
-
-def test_all_sheets_together_have_the_only_chart() -> None:
-    records = [
-        record(metric, "default", {"a": 0.9}, group)
-        for group in ("jpeg", "paper", "all")
-        for metric in ("exactly right", "seconds per megapixel")
-    ]
-    (only,) = charts_of("split", records, "seed 0")
-    assert only.group == "all"
 
 
 def test_captions_say_where_methods_have_fewer_trainings_than_the_default() -> None:

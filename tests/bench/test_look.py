@@ -16,7 +16,6 @@ from bench.look.measure import (
     LOOKS,
     LookResult,
     Recipe,
-    Variant,
     bench_look,
     panels_of,
     records_of,
@@ -27,7 +26,6 @@ from bench.records.record import DEFAULT, methods_table
 from bench.stability import fields
 from bench.stability.pages import PAGES
 from bench.stability.trials import UNJUDGED
-from tests.nerf.look.painted import drawings
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png
@@ -130,17 +128,6 @@ def test_looks_are_records_a_table_a_chart_and_pictures(short: list[LookResult])
     assert len(panels) == 7
     assert all(list(panel.series) == list(LOOKS) for panel in panels)
     assert look_sheet(short).shape[1] == TILE_PX * (len(LOOKS) + 1)
-
-
-def test_the_nearest_drawing_is_alone_and_flows_are_gone() -> None:
-
-    whole = drawings()
-    camera = whole.views[1].camera
-    assert Variant(whole, "").seen_by(camera) is whole
-    assert Variant(whole, "flow").seen_by(camera).flows == ()
-    alone = Variant(whole, "vote")
-    assert alone.seen_by(camera).views == (whole.views[1],)
-    assert alone.seen_by(camera) is alone.seen_by(camera)  # its textures are made once
 
 
 # ---- the sweeps

@@ -11,15 +11,13 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from bench.__main__ import resumable
-from bench.cases.bodies import HAIR, SKIN, random_body
 from bench.cases.workers import THREADS, in_order
 from bench.stability import cameras, colors, fields, scenes, sheets
 from bench.stability import pages as listed
 from bench.stability import run as stability
 from bench.stability.cameras import CALIBRATION
-from bench.stability.colors import EYE, color_away
-from bench.stability.fields import LOOK, TRAINING
+from bench.stability.colors import EYE
+from bench.stability.fields import TRAINING
 from bench.stability.pages import PAGES
 from bench.stability.report import sweep_html
 from bench.stability.run import Key, run_job, run_steps, tried_pages
@@ -39,11 +37,9 @@ from bench.stability.trials import (
     summary_rows,
     tally,
 )
-from toonset.cli.common.output import Printer
 from toonset.errors import SheetError
 from toonset.nerf.score import verdict
 from toonset.nerf.score.verdict import OK, WEAK
-from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
 
 PAGE = {page.name: page for page in PAGES}
@@ -71,17 +67,6 @@ def test_the_base_step_is_the_base_sheet(page: Page, monkeypatch) -> None:
     for (view, camera), (plain, same) in pairs:
         np.testing.assert_array_equal(view.rgba, plain.rgba)
         np.testing.assert_array_equal(camera.center, same.center)
-
-
-@pytest.mark.parametrize("page", CAMERAS, ids=lambda page: page.name)
-def test_the_worst_step_can_be_drawn_twice_alike(page: Page, monkeypatch) -> None:
-    monkeypatch.setattr(sheets, "BASE", replace(BASE, cell_px=80, views=2, supersample=1))
-    of_artist = replace(sheets.ARTIST, cell_px=120, views=2, supersample=1)
-    monkeypatch.setattr(sheets, "ARTIST", of_artist)
-    first, second = (page.draw(page.steps[-1], 5) for _ in range(2))
-    for (view, camera), (again, same) in zip(first.drawings, second.drawings, strict=True):
-        np.testing.assert_array_equal(view.rgba, again.rgba)
-        np.testing.assert_array_equal(camera.rotation, same.rotation)
 
 
 # ---- trials of cameras
@@ -154,13 +139,6 @@ def test_one_drawing_is_odd(monkeypatch) -> None:
     off = [abs(a.camera.angles[0] - b.camera.angles[0]) for a, b in zip(turned, usual, strict=True)]
     off = [abs(math.remainder(angle, math.tau)) for angle in off]
     assert sorted(off) == pytest.approx([0] * 7 + [math.radians(20)])
-
-
-def test_a_colour_lies_as_far_away_as_asked() -> None:
-    for distance in (0.02, 0.1, 0.2):
-        color = color_away(SKIN, HAIR, distance)
-        lab = oklab_from_rgb(np.array([SKIN, color], np.uint8))
-        assert np.linalg.norm(np.diff(lab, axis=0)) == pytest.approx(distance, abs=0.003)
 
 
 def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monkeypatch) -> None:
@@ -325,14 +303,3 @@ def test_mistakes_are_refused_before_any_work(bench, tmp_path) -> None:
     assert "--force" in bench("stability", "-o", tmp_path).reason
     assert "drawing.png" in bench("stability", "-o", tmp_path, "--force").reason
     assert bench("stability", "--cases", tmp_path).code == 2
-
-
-def test_a_body_of_a_seed_is_the_sheets_body(sheet: DrawnSheet) -> None:
-    np.testing.assert_array_equal(sheet.mesh.vertices, random_body(3).vertices)
-    assert LOOK.calm == (UNJUDGED,)
-
-
-def test_an_interrupted_bench_says_that_it_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(KeyboardInterrupt), resumable(Printer(as_json=False, quiet=True)):
-        raise KeyboardInterrupt
-    assert capsys.readouterr().err == "what is done is kept; the same command goes on\n"

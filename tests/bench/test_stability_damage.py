@@ -10,16 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
 from bench.stability import scenes
-from bench.stability.bodies import (
-    EARS,
-    vase,
-    with_arms_raised,
-    with_ears,
-    with_eyes,
-    with_head_grown,
-)
 from bench.stability.damage import (
     MIRROR,
     mirrored,
@@ -115,12 +106,6 @@ def test_a_ball_covers_its_disc_where_the_camera_sees_it(sheet):
     assert (hairy.rgba[away < 3, :3] == (10, 20, 30)).all()
 
 
-def test_no_radius_is_no_ball(sheet):
-    view, camera = sheet.drawings[0]
-    same, _ = with_ball(view, camera, np.zeros(3), 0.0, (0, 0, 0))
-    assert same is view
-
-
 @pytest.mark.parametrize("growth", [-0.2, 0.3])
 def test_a_stretched_drawing_is_seen_by_pixels_that_are_as_tall(growth):
     sheet = draw_sheet(3, outline_px=0, cell_px=120, views=1)
@@ -149,62 +134,6 @@ def test_cut_out_of_a_sheet_drawings_keep_their_cameras():
 
 
 # ---- bodies
-
-
-def part(body, *names):
-    numbers = [i for i, name in enumerate(body.part_names) if name in names]
-    return body.vertices[np.unique(body.faces[np.isin(body.face_parts, numbers)])]
-
-
-def test_arms_rise_by_their_angle_about_the_shoulder():
-    body = random_body(4)
-    up = with_arms_raised(body, math.radians(30))
-    for name, side in (("left arm", 1), ("right arm", -1)):
-        before, after = part(body, name), part(up, name)
-        assert after[:, 1].max() > before[:, 1].max()
-        lengths = (np.linalg.norm(np.ptp(points, axis=0)) for points in (before, after))
-        np.testing.assert_allclose(*lengths, rtol=0.2)
-        hands = (points[(side * points[:, 0]).argmax()] for points in (before, after))
-        turn = np.subtract(*hands)
-        assert side * turn[0] < 0
-        assert turn[1] < 0
-    np.testing.assert_array_equal(part(up, "trunk"), part(body, "trunk"))
-
-
-def test_a_head_grows_over_its_chin_and_nothing_else():
-    body = random_body(4)
-    large = with_head_grown(body, 0.5)
-    for name in ("head", "nose", "hair"):
-        sizes = [np.ptp(part(b, name), axis=0) for b in (body, large)]
-        np.testing.assert_allclose(sizes[1], 1.5 * sizes[0])
-    assert part(large, "head")[:, 1].min() == pytest.approx(part(body, "head")[:, 1].min())
-    np.testing.assert_array_equal(part(large, "left leg"), part(body, "left leg"))
-
-
-def test_ears_and_eyes_are_parts_of_the_radius_asked_for():
-    body = random_body(2)
-    for grown, names in ((with_ears(body, 0.1), EARS), (with_eyes(body, 0.02), ("left eye",))):
-        points = part(grown, names[0])
-        radius = 0.1 if names is EARS else 0.02
-        np.testing.assert_allclose(np.ptp(points, axis=0)[:2], 2 * radius, rtol=0.02)
-        assert points[:, 0].mean() > 0  # the character's left
-    assert with_ears(body, 0) is body
-    assert part(with_eyes(body, 0.02), "left eye")[:, 2].max() > part(body, "head")[:, 2].mean()
-
-
-def test_half_of_the_views_are_squashed_and_half_are_stretched():
-    tall = [c.pixel_aspect > 1 for _, c in PAGE["squash"].draw(20, 0).drawings]
-    assert 0 < sum(tall) < len(tall)
-
-
-def test_a_vase_looks_the_same_from_all_round():
-    mesh = vase()
-    turn = 2 * math.pi / 96 * 7
-    c, s = math.cos(turn), math.sin(turn)
-    turned = mesh.vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    gaps = np.linalg.norm(mesh.vertices[:, None] - turned[None], axis=-1)
-    assert gaps.min(axis=1).max() < 1e-6
-    assert mesh.height == pytest.approx(1.8)
 
 
 # ---- scenes

@@ -79,9 +79,3 @@ def test_names_that_do_not_fit() -> None:
     for line in (first, second, *broken("W" * 64, SMALL.font, 132)):
         assert LARGE.font.getlength(line) <= 192
     assert drawable("été \u5c71\n") == "ete ?"
-
-
-def test_the_same_palette_gives_the_same_picture() -> None:
-    palette = palette_of(5, 2)
-    np.testing.assert_array_equal(draw_swatches(palette), draw_swatches(palette))
-    assert draw_swatches(Palette((PaletteColor((9, 9, 9), 0.0, ""),), "")).dtype == np.uint8

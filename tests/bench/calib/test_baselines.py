@@ -10,16 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.calib.baselines import (
-    LANDMARKS,
-    boxed,
-    by_landmarks,
-    nominal_rotations,
-    solved,
-    spread_vertices,
-    track,
-    tracked,
-)
+from bench.calib.baselines import boxed, by_landmarks, nominal_rotations, solved, track, tracked
 from bench.calib.figures import sheet_records
 from bench.calib.measure import measured_baseline
 from bench.cases.bodies import random_body
@@ -92,19 +83,6 @@ def test_landmarks_of_another_body_are_clicked_where_it_was_drawn(case: CalibCas
     optimistic = by_landmarks(replace(case, mesh=other, drawn=None), 1, noise=0.0)
     assert np.mean(errors_deg(informed, case.rotations)) > 1
     assert max(errors_deg(optimistic, case.rotations)) < 0.01
-
-
-def test_landmarks_are_spread() -> None:
-    def closest(chosen: np.ndarray) -> float:
-        points = BODY.vertices[chosen]
-        apart = np.linalg.norm(points[:, None] - points, axis=-1)
-        return float(apart[~np.eye(len(points), dtype=bool)].min())
-
-    rng = np.random.default_rng(0)
-    chosen = spread_vertices(BODY, LANDMARKS, rng)
-    anyhow = [rng.choice(len(BODY.vertices), LANDMARKS, replace=False) for _ in range(50)]
-    assert len(set(chosen)) == LANDMARKS
-    assert closest(chosen) > 2 * max(map(closest, anyhow))
 
 
 @pytest.mark.parametrize("points", [np.zeros((12, 3)), np.full((12, 3), np.nan)])

@@ -76,11 +76,8 @@ def test_aco_levels_are_those_of_both_kinds_of_writers() -> None:
         colors = [f"0000 {factor * i:04X} {factor * i:04X} 0000 0000" for i in range(256)]
         found = [color.rgb[0] for color in read_aco(aco_section(1, *colors), "f")]
         assert found == list(range(256))
-
-
-def test_aco_grey_is_ink() -> None:
-    colors = ["0008 0000 0000 0000 0000", "0008 2710 0000 0000 0000"]
-    white, black = read_aco(aco_section(1, *colors), "f")
+    ink = ["0008 0000 0000 0000 0000", "0008 2710 0000 0000 0000"]
+    white, black = read_aco(aco_section(1, *ink), "f")
     assert (white.rgb, black.rgb) == ((255, 255, 255), (0, 0, 0))
 
 
@@ -158,9 +155,6 @@ def test_lab_agrees_with_little_cms() -> None:
     off = np.abs(np.array(ours) - expected)
     assert off.max() <= 1
     assert off.mean() < 0.02  # both round
-
-
-def test_ends_of_lab() -> None:
     assert rgb_from_lab(0, 0, 0) == (0, 0, 0)
     assert rgb_from_lab(100, 0, 0) == (255, 255, 255)
     assert rgb_from_lab(50, 128, -128)[1] == 0  # outside sRGB: clipped
