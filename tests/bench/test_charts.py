@@ -17,7 +17,7 @@ from bench.look.measure import LOOKS
 from bench.palette.labels import CONTOURS, LABELLERS
 from bench.palette.methods import METHODS as PALETTE_METHODS
 from bench.records.chart import PLOTS, Chart, Point, charts_of, points_of
-from bench.records.drawing import Panel, draw_chart, draw_panels, draw_scatter
+from bench.records.drawing import draw_chart
 from bench.records.methods import METHODS
 from bench.records.record import Column, Recorder, methods_table
 from bench.split.methods import METHODS as SPLIT_METHODS
@@ -137,17 +137,6 @@ def test_png_and_svg_are_of_one_figure_and_repeat() -> None:
         assert Image.open(io.BytesIO(draw_chart(lone))).width > 500
 
 
-def test_panels_and_scatters_have_a_legend_of_all() -> None:
-    panels = [
-        Panel("FLIP", {"default": [(1, 0.2)], "field": [(2, 0.3)], "nothing": [(0.0, 0.5)]}),
-        Panel("curves", {"default": [(1, 20), (2, 30)]}, ideal=31),
-    ]
-    svg = draw_panels(panels, ("seconds", ""), 2, "svg").decode()
-    assert all(word in svg for word in ("FLIP", "curves", "default", "field", "nothing"))
-    scatter = draw_scatter({"a": [(1, 2)], "b": [(2, 1)]}, ("x", "y"), (1.5, "ok | weak"), (1, 2))
-    assert scatter.startswith(b"\x89PNG")
-
-
 def test_the_csv_has_a_row_per_method_cheapest_first() -> None:
     told = replace(point("told", 1, 40), aside="told, all")
     shown = chart(point("default", 2, 30.5), told, point("slow", 3, 30))
@@ -213,12 +202,3 @@ def test_colours_are_pooled_over_conditions_per_size_of_sheet() -> None:
     assert (only.cost, only.n) == (0.4, 4)
     assert only.merit == pytest.approx(0.8)
     assert "n = 4 drawings of all sizes and kinds; seed 0" in large.caption
-
-
-def test_captions_say_where_methods_have_fewer_trainings_than_the_default() -> None:
-    psnr = [record("held-out PSNR", name, {"a": 30.0, "b": 31.0}) for name in ("default", "mlp")]
-    seconds = [record("CPU seconds", name, {"a": 3.0, "b": 3.0}) for name in ("default", "mlp")]
-    (chart,) = charts_of("train", [replace(psnr[0], n=6), psnr[1], *seconds], "seeds 0, 1, 2")
-    assert "n = 6 trainings of 2 characters, 2 of some methods; seeds 0, 1, 2" in chart.caption
-    (chart,) = charts_of("train", [*psnr, *seconds], "seed 0")
-    assert "n = 2 trainings of 2 characters; seed 0" in chart.caption

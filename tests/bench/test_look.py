@@ -154,15 +154,3 @@ def test_a_look_page_fails_where_the_field_is_better(monkeypatch: pytest.MonkeyP
     ((worse,), _) = fields.try_look(lambda: page.draw(1, 0), 0)
     assert worse.value == pytest.approx(110)
     assert fine.value < page.kind.fine < page.kind.failed < worse.value
-
-
-def test_cameras_of_a_look_page_are_off_as_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fields, "SHEET", replace(DRAWN, cell_px=60, outline_px=1, views=4))
-    true, off = (PAGE["look yaw"].draw(step, 2).train.frames for step in (0, 10))
-    turns = [
-        np.degrees(b.camera.angles[0] - a.camera.angles[0]) for a, b in zip(true, off, strict=True)
-    ]
-    turns = [(turn + 180) % 360 - 180 for turn in turns]
-    assert np.abs(turns) == pytest.approx([10] * 4)
-    assert sum(turns) == pytest.approx(0, abs=1e-6)
-    assert len(PAGE["look views"].draw(5, 2).train.frames) == 5

@@ -8,8 +8,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from bench.messy.cartoon import cartoon_cast
-from bench.messy.figure import Figure, as_line_art, tight_window, with_gaps
+from bench.messy.figure import tight_window
 from bench.messy.options import DIFFICULTIES, EXCLUSIVE, GROUNDS, MessyOptions, mixture
 from bench.messy.sheet import MessySheet, make_messy_sheet
 from toonset.errors import SheetError
@@ -36,9 +35,6 @@ def common_area(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> i
     width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
     height = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
     return max(width, 0) * max(height, 0)
-
-
-# ---- truth
 
 
 @pytest.mark.parametrize("difficulty", [None, *DIFFICULTIES])
@@ -75,11 +71,10 @@ def test_on_a_plain_sheet_nothing_but_figures_differs_from_it(seed: int) -> None
     assert (away[covered(made) == 1] > 8).mean() > 0.5  # clothes may have the paper's colour
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_what_is_no_figure_is_not_in_the_truth(seed: int) -> None:
-    plain = sheet(seed, "plain")
+def test_what_is_no_figure_is_not_in_the_truth() -> None:
+    plain = sheet(0, "plain")
     for extra in ("captions", "title", "arrows", "swatches", "guides", "props", "heads", "shadows"):
-        made = sheet(seed, extra)
+        made = sheet(0, extra)
         white = (made.rgba[..., :3] == 255).all(axis=-1)
         assert (~white & (covered(made) == 0)).sum() > 15, extra
         sizes = [alpha.shape for alpha in made.alphas]
@@ -108,13 +103,6 @@ def test_same_seed_same_bytes_and_other_seeds_others(difficulties: tuple[str, ..
     assert other.rgba.shape != first.rgba.shape or (other.rgba != first.rgba).any()
 
 
-@pytest.mark.parametrize("name", [name for name in DIFFICULTIES if name != "plain"])
-def test_every_difficulty_changes_the_sheet(name: str) -> None:
-    made, plain = sheet(5, name), sheet(5, "plain")
-    assert set(made.what) - {name} <= {"plain"}
-    assert made.rgba.shape != plain.rgba.shape or (made.rgba != plain.rgba).any()
-
-
 def test_mixtures_have_one_ground_and_hold_no_contradiction() -> None:
     rng = np.random.default_rng(0)
     seen: set[str] = set()
@@ -139,38 +127,3 @@ def test_mixtures_have_one_ground_and_hold_no_contradiction() -> None:
 def test_impossible_sheets_are_refused(asked: list[str], match: str) -> None:
     with pytest.raises(SheetError, match=match):
         make_messy_sheet(0, asked)
-
-
-# ---- figures
-
-
-def front(outline_px: float = 3.0) -> Figure:
-    cast = cartoon_cast(3, 1, 200, outline_px, COLORS, floats=False, heads=False)
-    return cast.figures[0]
-
-
-def test_line_art_shows_paper_inside_and_ink_at_its_rim() -> None:
-    figure = front()
-    drawn = as_line_art(figure, (0, 0, 0))
-    np.testing.assert_array_equal(drawn.rgba[..., 3], figure.rgba[..., 3])
-    assert (drawn.paper[figure.rgba[..., 3] == 255] > 0.9).mean() > 0.5
-    rim = (figure.rgba[..., 3] > 0) & (figure.rgba[..., 3] < 200)
-    assert drawn.paper[rim].mean() < 0.2
-
-
-def test_gaps_open_the_contour() -> None:
-    import cv2
-
-    drawn = as_line_art(front(), (0, 0, 0))
-    opened = with_gaps(drawn, 3, 2.0, 3.0, np.random.default_rng(0))
-
-    def enclosed(figure: Figure) -> int:
-        """Return paper that cannot be reached from outside without crossing ink."""
-        ink = (figure.rgba[..., 3] / 255) * (1 - figure.paper)
-        free = np.pad((ink < 0.5).astype(np.uint8), 1, constant_values=1)
-        cv2.floodFill(free, None, (0, 0), 2)
-        return int((free == 1).sum())
-
-    assert enclosed(drawn) > 1.2 * enclosed(opened)
-    assert (opened.paper >= drawn.paper).all()
-    assert 5 < (opened.paper - drawn.paper).sum() < 150

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -19,7 +18,6 @@ from bench.stability.cameras import CALIBRATION
 from bench.stability.colors import EYE
 from bench.stability.fields import TRAINING
 from bench.stability.pages import PAGES
-from bench.stability.report import sweep_html
 from bench.stability.run import Key, run_job, run_steps, tried_pages
 from bench.stability.sheets import BASE, DrawnSheet, draw_sheet
 from bench.stability.trials import (
@@ -90,20 +88,6 @@ def test_a_refused_and_a_crashed_sheet_are_results(sheet: DrawnSheet, monkeypatc
         assert trials[0].words in ("too faint", "KeyError: 'k'")
 
 
-def test_a_missing_mannequin_is_what_users_get_without_one(sheet: DrawnSheet, monkeypatch) -> None:
-    asked = []
-
-    def found(views, mesh):
-        asked.append(mesh)
-        raise SheetError("stop")
-
-    monkeypatch.setattr(cameras, "calibrate", found)
-    monkeypatch.setattr(cameras, "find_cameras", found)
-    for given in ("own", "plain", "none"):
-        cameras.try_cameras(lambda given=given: replace(sheet, given=given), 0)
-    assert asked == [sheet.mesh, None, "none"]
-
-
 # ---- trials of trainings, palettes, labels, looks
 
 
@@ -127,20 +111,6 @@ def test_a_single_drawing_is_refused_and_a_weak_run_says_why(monkeypatch) -> Non
     stability._base_tried.cache_clear()
 
 
-def test_one_drawing_is_odd(monkeypatch) -> None:
-    monkeypatch.setattr(scenes, "SCENE", replace(scenes.SCENE, cell_px=40))
-    monkeypatch.setattr(scenes, "HELD_OUT", 2)
-    usual = scenes.draw_scene(3).train.frames
-    for step in ("flipped", "other pose", "other shirt"):
-        pairs = list(zip(PAGE["train odd"].draw(step, 3).train.frames, usual, strict=True))
-        assert sum(bool((a.rgba != b.rgba).any()) for a, b in pairs) == 1, step
-        assert all((a.camera.rotation == b.camera.rotation).all() for a, b in pairs)
-    turned = PAGE["train one camera"].draw(20, 3).train.frames
-    off = [abs(a.camera.angles[0] - b.camera.angles[0]) for a, b in zip(turned, usual, strict=True)]
-    off = [abs(math.remainder(angle, math.tau)) for angle in off]
-    assert sorted(off) == pytest.approx([0] * 7 + [math.radians(20)])
-
-
 def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monkeypatch) -> None:
     monkeypatch.setattr(colors, "PICTURES", replace(colors.PICTURES, views=2, cell_px=80))
     ((apart,), _), ((alike,), _) = (run_job(("palette near", step, 0)) for step in (20, 0.5))
@@ -150,14 +120,6 @@ def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monke
     assert picture.startswith(b"\x89PNG")
     assert "left out" in eye.words
     assert hex_of(EYE) in eye.words
-
-
-def test_labels_are_right_where_paints_are_plain_and_wrong_in_deep_shadow(monkeypatch) -> None:
-    monkeypatch.setattr(sheets, "ARTIST", replace(sheets.ARTIST, views=3, cell_px=150))
-    ((plain,), picture), ((deep,), _) = (run_job(("labels shadow", step, 0)) for step in (0, 80))
-    assert picture.startswith(b"\x89PNG")
-    assert plain.value < 5
-    assert deep.value > plain.value + 5
 
 
 # ---- figures
@@ -226,19 +188,6 @@ def test_a_training_loses_against_its_own_bodys_clean_scene() -> None:
 
 
 # ---- the report
-
-
-def test_a_report_shows_the_worst_case_and_needs_nothing_else() -> None:
-    page = page_of([FINE, ALARM], [SAID, SAID], [UNSAID])
-    pictures = {("warp", str(step)): b"\x89PNG" for step in WARP.steps[:3]}
-    html = sweep_html([page], "seed 0", pictures)
-    assert "1: 20.0 deg; ok" in html  # of the third step
-    assert "Fails from 0.5 on: there 2 of 2 views fail, 2 of them announced." in html
-    assert "67 % (2 of 3)" in html
-    assert html.count("data:image/png") == 3
-    assert html.count("data:image/svg+xml") == 1
-    assert not re.search(r"<script|src=\"(?!data:)", html)
-    assert "data:image/png" not in sweep_html([page], "seed 0", {})
 
 
 # ---- runs

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.displacement import CONTROLS, Bends, ShiftAndScale
 from toonset.dataset.silhouettes.outlines import FIGURE_PX, Square, outlines_of, signed_distance
-from toonset.dataset.silhouettes.register import fit_moves
+from toonset.dataset.silhouettes.register import _normal, _touches, fit_moves
 from toonset.dataset.silhouettes.tangency import Placed, touch
 from toonset.nerf.prepare.unwarp import MOST, Warp, unwarp_drawings, warped
 
@@ -29,11 +30,6 @@ def test_displacements_are_linear_in_their_numbers(moves) -> None:
     places = np.stack(np.meshgrid(unit[:9, 0], unit[:7, 1]), axis=-1).reshape(-1, 2)
     np.testing.assert_allclose(grid.reshape(-1, 2), moves.at(places, numbers), atol=1e-12)
     assert np.linalg.eigvalsh(moves.covariance).min() > 0
-
-
-@pytest.mark.parametrize("moves", [ShiftAndScale.expected(), Bends.expected()])
-def test_every_family_holds_shift_and_growth(moves) -> None:
-    unit = np.random.default_rng(1).uniform(0, 1, (200, 2))
     shift, growth = np.array([0.3, -0.2]), 0.1
     wanted = shift + growth * (2 * unit - 1)
     np.testing.assert_allclose(moves.at(unit, moves.even(shift, growth)), wanted, atol=1e-9)
@@ -69,8 +65,6 @@ def test_a_thin_part_is_there_where_it_is_seen_from_its_edge(balls) -> None:
 
 def test_gradient_of_the_disagreement(balls) -> None:
     """The fit's first step goes downhill as steeply as finite differences say."""
-    from toonset.dataset.silhouettes.register import _normal, _touches
-
     found, moves = outlines(balls.bent_sheet()[0]), ShiftAndScale.expected()
     generator = np.random.default_rng(3)
     numbers = generator.normal(0, 0.004, (8, 3))
@@ -86,7 +80,7 @@ def test_gradient_of_the_disagreement(balls) -> None:
     assert slope == pytest.approx(difference, rel=0.35)  # weights are held fixed in the slope
 
 
-@pytest.mark.parametrize("views", [3, 5, 8])
+@pytest.mark.parametrize("views", [3, 8])
 def test_a_perfect_sheet_is_left_as_it_is(balls, views: int) -> None:
     scene = balls.sheet(views)
     result, found = unwarp_drawings(scene)
@@ -113,18 +107,14 @@ def test_bent_drawings_are_unbent(balls) -> None:
         before += float((field[outline] ** 2).sum())
         assert np.linalg.norm(move, axis=1).max() <= MOST * warp.square.size
     assert left < 0.75 * before  # the rest moves all outlines alike: another body, no disagreement
-    worst = [np.abs(r.rgba[..., 3].astype(int) - g.rgba[..., 3]).mean() for r, g in
-             zip(result.frames, balls.sheet().frames, strict=True)]  # fmt: skip
-    drawn = [np.abs(r.rgba[..., 3].astype(int) - g.rgba[..., 3]).mean() for r, g in
-             zip(scene.frames, balls.sheet().frames, strict=True)]  # fmt: skip
-    assert np.mean(worst) < 0.85 * np.mean(drawn)
 
+    def wrong(drawn: Scene) -> float:
+        pairs = zip(drawn.frames, balls.sheet().frames, strict=True)
+        return sum(np.abs(r.rgba[..., 3].astype(int) - g.rgba[..., 3]).mean() for r, g in pairs)
 
-def test_the_same_bits_twice(balls) -> None:
-    scene, _ = balls.bent_sheet()
-    first, second = unwarp_drawings(scene)[1], unwarp_drawings(scene)[1]
-    for one, other in zip(first.warps, second.warps, strict=True):
-        assert one.numbers.tobytes() == other.numbers.tobytes()
+    assert wrong(result) < 0.85 * wrong(scene)
+    for one, other in zip(found.warps, unwarp_drawings(scene)[1].warps, strict=True):
+        assert one.numbers.tobytes() == other.numbers.tobytes()  # the same bits twice
 
 
 def test_larger_pictures_are_compared_at_one_size(balls) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from safetensors.torch import load_file, save_file
 from tests.nerf.bodies import Hand
 from tests.nerf.bodies import camera_at as body_camera
 from tests.nerf.ellipsoids import train_scene
-from tests.nerf.look.painted import camera_at, drawings, geometry
+from tests.nerf.look.painted import camera_at, geometry
 from tests.nerf.look.test_shaped import drawn, misty
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.errors import BundleError, ToonsetError
@@ -32,16 +33,30 @@ CONFIG, PICTURES, PAINT = "config.json", "drawings.png", "paint.png"
 SURFACES = "drawings.safetensors"
 
 
+def written(folder: Path, training: Training, look: Drawings) -> Path:
+    result = replace(training.result, drawings=look)
+    write_run(folder, replace(training, result=result), labelled(train_scene())[0])
+    return folder
+
+
 @pytest.fixture(scope="module")
-def egg() -> Drawings:
-    return drawings()
+def egg_run(tmp_path_factory: pytest.TempPathFactory, training: Training, egg: Drawings) -> Path:
+    return written(tmp_path_factory.mktemp("egg"), training, egg)
+
+
+@pytest.fixture(scope="module")
+def shaped_run(tmp_path_factory: pytest.TempPathFactory, training: Training) -> Path:
+    return written(tmp_path_factory.mktemp("shaped"), training, drawn(Hand(shadow=0.7)))
 
 
 @pytest.fixture
-def folder(tmp_path: Path, training: Training, egg: Drawings) -> Path:
-    result = replace(training.result, drawings=egg)
-    write_run(tmp_path, replace(training, result=result), labelled(train_scene())[0])
-    return tmp_path
+def folder(egg_run: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(egg_run, tmp_path / "run"))
+
+
+@pytest.fixture
+def shaped_folder(shaped_run: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(shaped_run, tmp_path / "run"))
 
 
 def test_views_are_the_same_after_loading(folder: Path, egg: Drawings) -> None:
@@ -52,40 +67,22 @@ def test_views_are_the_same_after_loading(folder: Path, egg: Drawings) -> None:
     np.testing.assert_array_equal(a.rgb, b.rgb)
     np.testing.assert_array_equal(a.ink, b.ink)
     assert loaded.outline == egg.outline
-
-
-@pytest.fixture(scope="module")
-def shaped() -> Drawings:
-    return drawn(Hand(shadow=0.7))
-
-
-@pytest.fixture
-def shaped_folder(tmp_path: Path, training: Training, shaped: Drawings) -> Path:
-    result = replace(training.result, drawings=shaped)
-    write_run(tmp_path, replace(training, result=result), labelled(train_scene())[0])
-    return tmp_path
+    pixels = 8 * 120 * 120
+    for name, most in ((PICTURES, 0.5), (PAINT, 0.5), (SURFACES, 1.6)):
+        assert (folder / name).stat().st_size < most * pixels
 
 
 def test_a_mannequins_shape_lines_and_shadow_are_the_same_after_loading(
-    shaped_folder: Path, shaped: Drawings
+    shaped_folder: Path,
 ) -> None:
-    loaded = read_field(shaped_folder).drawings
+    shaped, loaded = drawn(Hand(shadow=0.7)), read_field(shaped_folder).drawings
     assert loaded is not None
     assert loaded.steps == shaped.steps
     assert loaded.shade == shaped.shade
     a, b = (drawn_view(one, misty(body_camera(0.4))) for one in (shaped, loaded))
     np.testing.assert_array_equal(a.rgb, b.rgb)
     assert loaded.shape is not None
-
-
-def test_the_files_are_small(folder: Path) -> None:
-    pixels = 8 * 120 * 120
-    for name, most in ((PICTURES, 0.5), (PAINT, 0.5), (SURFACES, 1.6)):
-        assert (folder / name).stat().st_size < most * pixels
-
-
-def test_a_shape_takes_the_place_of_depth(shaped_folder: Path) -> None:
-    assert "depth" not in load_file(shaped_folder / SURFACES)
+    assert "depth" not in load_file(shaped_folder / SURFACES)  # the shape takes its place
     assert (shaped_folder / SURFACES).stat().st_size < 80_000
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from safetensors.torch import load_file, save_file
+import torch
+from safetensors.torch import load, save
 
 from tests.nerf.ellipsoids import held_out, train_scene
 from toonset.errors import BundleError
@@ -20,10 +23,16 @@ from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.result import Training
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory, training: Training) -> Path:
+    folder = tmp_path_factory.mktemp("written")
+    write_run(folder, training, labelled(train_scene())[0])
+    return folder
+
+
 @pytest.fixture
-def run_folder(tmp_path: Path, training: Training) -> Path:
-    write_run(tmp_path, training, labelled(train_scene())[0])
-    return tmp_path
+def run_folder(written: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(written, tmp_path / "run"))
 
 
 def test_a_run_folder_renders_the_same_after_loading(run_folder: Path, training: Training) -> None:
@@ -39,70 +48,52 @@ def test_a_run_folder_renders_the_same_after_loading(run_folder: Path, training:
     assert json.loads((run_folder / "metrics.json").read_text())["train"]["psnr"] > 24
 
 
-def truncate(folder: Path) -> None:
-    file = folder / "model.safetensors"
-    file.write_bytes(file.read_bytes()[:-1000])
+def model(change: Callable[[bytes], bytes]) -> Callable[[Path], object]:
+    file = "model.safetensors"
+    return lambda folder: (folder / file).write_bytes(change((folder / file).read_bytes()))
 
 
-def not_a_model(folder: Path) -> None:
-    (folder / "model.safetensors").write_bytes(b"PK\x03\x04 nothing of the kind")
+def tensors(change: Callable[[dict[str, torch.Tensor]], object]) -> Callable[[Path], object]:
+    def changed(data: bytes) -> bytes:
+        found = load(data)
+        change(found)
+        return save(found)
+
+    return model(changed)
 
 
-def drop_tensor(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    del tensors["field.out.bias"]
-    save_file(tensors, folder / "model.safetensors")
+def config(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
+    def changed(folder: Path) -> None:
+        content = json.loads((folder / "config.json").read_text())
+        change(content)
+        (folder / "config.json").write_text(json.dumps(content))
+
+    return changed
 
 
-def wrong_shape(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    tensors["field.planes"] = tensors["field.planes"][:-1].clone()
-    save_file(tensors, folder / "model.safetensors")
+def field(**changes: object) -> Callable[[Path], None]:
+    return config(lambda content: content["field"].update(changes))
 
 
-def wrong_type(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    tensors["field.planes"] = tensors["field.planes"].double()
-    save_file(tensors, folder / "model.safetensors")
-
-
-def not_a_number(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    tensors["field.planes"][3, 2] = float("nan")
-    save_file(tensors, folder / "model.safetensors")
-
-
-def change_config(**changes: object) -> Callable[[Path], None]:
-    def change(folder: Path) -> None:
-        config = json.loads((folder / "config.json").read_text())
-        config["field"].update(changes)
-        (folder / "config.json").write_text(json.dumps(config))
-
-    return change
-
-
-def other_format(folder: Path) -> None:
-    config = json.loads((folder / "config.json").read_text())
-    config["format"] = 99
-    (folder / "config.json").write_text(json.dumps(config))
+PLANES = "field.planes"
 
 
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (truncate, "damaged"),
-        (not_a_model, "damaged"),
-        (drop_tensor, "field.out.bias"),
-        (wrong_shape, "field.planes is"),
-        (wrong_type, "float64"),
-        (not_a_number, "not finite"),
-        (other_format, "format 99"),
-        (change_config(hull_voxel=-1.0), "hull_voxel"),
-        (change_config(hull_shape=[100000, 100000, 100000]), "hull_shape"),
-        (change_config(hull_shape=[0, 3, 3]), "hull_shape"),
-        (change_config(resolution=10**9), "resolution"),
-        (change_config(palette=[[300, 0, 0]]), "palette"),
-        (change_config(surprise=1), "surprise"),
+        (model(lambda data: data[:-1000]), "damaged"),
+        (model(lambda data: b"PK\x03\x04 nothing of the kind"), "damaged"),
+        (tensors(lambda t: t.pop("field.out.bias")), "field.out.bias"),
+        (tensors(lambda t: t.update({PLANES: t[PLANES][:-1].clone()})), "field.planes is"),
+        (tensors(lambda t: t.update({PLANES: t[PLANES].double()})), "float64"),
+        (tensors(lambda t: t[PLANES][3, 2].fill_(float("nan"))), "not finite"),
+        (config(lambda content: content.update(format=99)), "format 99"),
+        (field(hull_voxel=-1.0), "hull_voxel"),
+        (field(hull_shape=[100000, 100000, 100000]), "hull_shape"),
+        (field(hull_shape=[0, 3, 3]), "hull_shape"),
+        (field(resolution=10**9), "resolution"),
+        (field(palette=[[300, 0, 0]]), "palette"),
+        (field(surprise=1), "surprise"),
         (lambda folder: (folder / "config.json").unlink(), "does not exist"),
         (lambda folder: (folder / "config.json").write_text("{"), "no valid JSON"),
     ],

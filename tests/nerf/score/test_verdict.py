@@ -80,17 +80,14 @@ def whole(monkeypatch) -> Callable[[Training], Verdict]:
 # ---- verdicts
 
 
-def test_what_agrees_is_ok(whole) -> None:
+def test_what_agrees_is_ok_and_what_shows_nothing_is_weak(whole) -> None:
     found = whole(training(scene(*TURN)))
     assert (found.verdict, found.reasons) == (OK, ())
     assert found.to_json()["off_height"] == {"worst": 0, "bound": MOST_OFF, "views": {"0": 0}}
-
-
-def test_a_field_that_shows_nothing_is_weak() -> None:
     blank = training(scene(*TURN), result=cast(Any, SimpleNamespace(drawings=None)))
-    found = verdict_of(blank, blank.prepared.scene)
-    assert found.verdict == WEAK
-    assert "shows no figure" in found.reasons[0]
+    empty = verdict_of(blank, blank.prepared.scene)
+    assert empty.verdict == WEAK
+    assert "shows no figure" in empty.reasons[0]
 
 
 def test_a_run_is_as_weak_as_its_worst_drawing() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import trimesh
 from PIL import Image
 
 from toonset.dataset.mesh.load import load_mesh
@@ -204,8 +205,6 @@ def test_files_hold_the_same_surface(tmp_path: Path, surface: Surface, name: str
 
 
 def test_another_program_reads_the_same(surface: Surface) -> None:
-    import trimesh
-
     for kind in ("glb", "ply"):
         (data,) = mesh_files(surface, Path(f"b.{kind}")).values()
         scene = trimesh.load_scene(io.BytesIO(data), file_type=kind)
