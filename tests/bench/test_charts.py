@@ -19,7 +19,6 @@ from bench.palette.methods import METHODS as PALETTE_METHODS
 from bench.records.chart import PLOTS, Chart, Point, charts_of, points_of
 from bench.records.drawing import draw_chart
 from bench.records.methods import METHODS
-from bench.records.record import Column, Recorder, methods_table
 from bench.split.methods import METHODS as SPLIT_METHODS
 from bench.train.plan import METHODS as TRAIN_METHODS
 from tests.bench.records import record
@@ -145,32 +144,6 @@ def test_the_csv_has_a_row_per_method_cheapest_first() -> None:
     assert [row["on_front"] for row in rows] == ["False", "True", "False"]
     assert (rows[1]["cost"], rows[1]["merit"]) == ("2", "30.5")
     assert rows[0]["not_compared_because"] == "told, all"
-
-
-def test_the_table_has_a_row_per_method_and_the_columns_of_its_group() -> None:
-    records = [
-        record("PSNR", "default", {"a": 30.0, "b": 34.0}),
-        record("CPU seconds", "default", {"a": 3.0}),
-        record("PSNR", "mlp", {"a": 29.0}),
-        Recorder("default", "other", 0).share("right", [True, False, True, True])[0],
-    ]
-    columns = (
-        Column("PSNR", "dB", "{:.1f}", "mean"),
-        Column("CPU seconds", "s", "{:.0f}"),
-        Column("right", "right %", "{:.0f}", scale=100),
-        Column("nowhere", "?"),
-    )
-    lines = methods_table(records, columns).splitlines()
-    assert [line.split() for line in lines] == [
-        ["exact"],
-        ["method", "n", "dB", "s"],
-        ["default", "2", "32.0", "3"],
-        ["mlp", "1", "29.0", "-"],
-        [],
-        ["other"],
-        ["method", "n", "right", "%"],
-        ["default", "4", "75"],
-    ]
 
 
 # ---- from records

@@ -219,7 +219,6 @@ def test_workers_keep_the_order_and_use_one_thread_each() -> None:
 
 
 def test_a_second_run_takes_the_first_ones_steps(bench, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(listed, "PAGES", (TINY,))
     monkeypatch.setattr(stability, "usable_workers", lambda: 1)
     out = tmp_path / "out"
     command = ("stability", "-o", out, "--count", 1, "--json", "--quiet", "--only", "tiny")

@@ -12,15 +12,8 @@ import numpy as np
 import pytest
 
 from bench.calib import measure as calib
-from bench.calib.baselines import BASELINES
 from bench.calib.figures import MeasuredSheet, ViewError, angle_between, sheet_records
-from bench.calib.measure import (
-    METHODS,
-    bench_calibration,
-    named_directions,
-    own_cache,
-    sheets_table,
-)
+from bench.calib.measure import bench_calibration, named_directions, own_cache
 from bench.cases import cases
 from bench.cases.bodies import random_body
 from bench.cases.cases import CONDITIONS, CalibCase, calib_cases
@@ -193,27 +186,3 @@ def test_another_body_has_the_drawn_sheet_and_a_mannequin_without_its_bag(
     assert next(calib_cases(None, 3, 1, "other")).mesh.height == other.mesh.height
     assert [case.name for case in calib_cases(None, 0, 2, "near 1")] == ["near 1"]
     assert not list(calib_cases(None, 0, 2, "far"))
-
-
-# ---- table
-
-
-def worst_case(method: str) -> list[Record]:
-    bad = sheet(*[(179.0, 88.0, v) for v in SEVERITY for _ in range(30)])
-    good = sheet((0.01, 0.01, "ok"))
-    slow = replace(bad, seconds=1234.5, cpu_seconds=1234.5)
-    return sheet_records([slow, good], Recorder(method, "another body", 0))
-
-
-def test_the_table_has_a_row_per_method_and_fits_a_terminal() -> None:
-    methods = [*BASELINES, *METHODS]
-    lines = sheets_table([r for m in methods for r in worst_case(m)]).splitlines()
-    assert max(map(len, lines)) <= 120
-    for method in methods:
-        assert sum(line.startswith(f"{method}  ") for line in lines) == 1
-    assert lines[0] == "another body"
-    (default,) = [line for line in lines if line.startswith("default ")]
-    assert default.split()[:5] == ["default", "121", "179.00", "179.0", "88.0"]
-
-
-# ---- the command

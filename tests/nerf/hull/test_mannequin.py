@@ -46,7 +46,7 @@ def test_what_no_picture_holds_is_left_out() -> None:
 
 def test_fine_meshes_get_a_coarser_grid(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mannequin_shape, "MOST_FACES", 1000)
-    shape = own_shape()
+    shape = shape_of(body(), ring())
     assert 100 < len(shape.faces) <= 1000
     seen, exact = shape.seen(camera_at(0.3)), depths(body(), camera_at(0.3))
     assert ((seen.alpha > 0.5) ^ np.isfinite(exact)).mean() < 0.03

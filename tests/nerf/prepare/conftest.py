@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.nerf.ellipsoids import Parts, first_hit
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
@@ -39,15 +40,9 @@ def camera_at(yaw_deg: float, elevation_deg: float = 8.0, side: int = SIDE) -> C
     )
 
 
-def draw(camera: Camera, balls=BALLS) -> np.ndarray:
+def draw(camera: Camera, balls: Parts = BALLS) -> np.ndarray:
     """Return the balls' picture: coloured by place, so that what moves can be seen."""
-    fine = camera.resized(4)
-    origins, directions = fine.rays(fine.pixel_grid())
-    hit = np.zeros(origins.shape[:2], dtype=bool)
-    for middle, axes in balls:
-        o, d = (origins - middle) / axes, directions / axes
-        a, b, c = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
-        hit |= b * b > a * c
+    hit = first_hit(camera.resized(4), balls)[0] >= 0
     side = camera.size_wh[0]
     alpha = hit.reshape(side, 4, side, 4).mean(axis=(1, 3))
     grid = camera.pixel_grid() / side

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from toonset.nerf.fields.triplane import TriplaneField
@@ -10,11 +12,14 @@ from toonset.nerf.prepare.prepare import aligned
 from toonset.nerf.train.train import fit_field
 
 
+def asked(drawn, **switches: bool) -> tuple[Any, Any, Any]:
+    """Return the aligned scene, what is said of cameras, and of bends."""
+    return aligned(drawn, **switches)
+
+
 def test_bends_alone_where_they_explain_more(balls) -> None:
     drawn, _ = balls.bent_sheet()
-    scene, registration, unbending = aligned(drawn)
-    assert registration is not None
-    assert unbending is not None
+    scene, registration, unbending = asked(drawn)
     assert unbending.applied
     assert unbending.gain_nats > registration.gain_nats > 0
     assert not registration.applied
@@ -24,28 +29,19 @@ def test_bends_alone_where_they_explain_more(balls) -> None:
 
 def test_cameras_follow_where_places_explain_enough(balls) -> None:
     drawn, _, _ = balls.misplaced(0)
-    scene, registration, unbending = aligned(drawn)
-    assert registration is not None
-    assert unbending is not None
+    scene, registration, _ = asked(drawn)
     assert registration.applied
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
     assert registration.apart_px[1] < 0.5 * registration.apart_px[0]
 
 
 def test_switches_are_heard_and_drawings_that_agree_stay(balls) -> None:
-    scene, registration, unbending = aligned(balls.sheet())
+    scene, registration, unbending = asked(balls.sheet())
     assert scene is balls.sheet()
-    assert registration is not None
-    assert unbending is not None
-    assert not registration.applied
-    assert not unbending.applied
+    assert registration.applied is unbending.applied is False
     drawn, _ = balls.bent_sheet()
-    scene, registration, unbending = aligned(drawn, register=False, unwarp=False)
-    assert scene is drawn
-    assert registration is None
-    assert unbending is None
-    scene, registration, unbending = aligned(drawn, unwarp=False)
-    assert registration is not None
+    assert asked(drawn, register=False, unwarp=False) == (drawn, None, None)
+    scene, registration, unbending = asked(drawn, unwarp=False)
     assert registration.applied
     assert unbending is None
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)

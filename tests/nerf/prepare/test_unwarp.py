@@ -30,9 +30,9 @@ def test_displacements_are_linear_in_their_numbers(moves) -> None:
     places = np.stack(np.meshgrid(unit[:9, 0], unit[:7, 1]), axis=-1).reshape(-1, 2)
     np.testing.assert_allclose(grid.reshape(-1, 2), moves.at(places, numbers), atol=1e-12)
     assert np.linalg.eigvalsh(moves.covariance).min() > 0
-    shift, growth = np.array([0.3, -0.2]), 0.1
-    wanted = shift + growth * (2 * unit - 1)
-    np.testing.assert_allclose(moves.at(unit, moves.even(shift, growth)), wanted, atol=1e-9)
+    shift, growth, within = np.array([0.3, -0.2]), 0.1, generator.uniform(0, 1, (200, 2))
+    wanted = shift + growth * (2 * within - 1)
+    np.testing.assert_allclose(moves.at(within, moves.even(shift, growth)), wanted, atol=1e-9)
 
 
 def test_distance_to_a_rim_between_pixels() -> None:

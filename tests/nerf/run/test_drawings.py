@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,41 +11,35 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file
 
 from tests.nerf.bodies import Hand
 from tests.nerf.bodies import camera_at as body_camera
 from tests.nerf.ellipsoids import train_scene
 from tests.nerf.look.painted import camera_at, geometry
 from tests.nerf.look.test_shaped import drawn, misty
+from tests.nerf.run.damage import Harm, config, tensors, written
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.errors import BundleError, ToonsetError
 from toonset.nerf.look.blend import drawn_view
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
-from toonset.nerf.run.report import write_run
-from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.result import Training
 
-CONFIG, PICTURES, PAINT = "config.json", "drawings.png", "paint.png"
-SURFACES = "drawings.safetensors"
-
-
-def written(folder: Path, training: Training, look: Drawings) -> Path:
-    result = replace(training.result, drawings=look)
-    write_run(folder, replace(training, result=result), labelled(train_scene())[0])
-    return folder
+PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
 
 
 @pytest.fixture(scope="module")
 def egg_run(tmp_path_factory: pytest.TempPathFactory, training: Training, egg: Drawings) -> Path:
-    return written(tmp_path_factory.mktemp("egg"), training, egg)
+    result = replace(training.result, drawings=egg)
+    return written(tmp_path_factory.mktemp("egg"), replace(training, result=result))
 
 
 @pytest.fixture(scope="module")
 def shaped_run(tmp_path_factory: pytest.TempPathFactory, training: Training) -> Path:
-    return written(tmp_path_factory.mktemp("shaped"), training, drawn(Hand(shadow=0.7)))
+    result = replace(training.result, drawings=drawn(Hand(shadow=0.7)))
+    return written(tmp_path_factory.mktemp("shaped"), replace(training, result=result))
 
 
 @pytest.fixture
@@ -87,30 +80,19 @@ def test_a_mannequins_shape_lines_and_shadow_are_the_same_after_loading(
 
 
 def test_a_run_without_drawings_says_how_to_get_them(training: Training, tmp_path: Path) -> None:
-    write_run(tmp_path, training, labelled(train_scene())[0])
-    old = read_field(tmp_path)
+    old = read_field(written(tmp_path, training))
     assert old.drawings is None
     view = render(old, train_scene().frames[0].camera)
     with pytest.raises(BundleError, match="no drawn look; train again"):
         view.picture("drawn")
 
 
-def config(change: Callable[[dict[str, Any]], None]) -> Callable[[Path], None]:
-    def applied(folder: Path) -> None:
-        content = json.loads((folder / CONFIG).read_text())
-        change(content["field"]["drawings"])
-        (folder / CONFIG).write_text(json.dumps(content))
-
-    return applied
+def look(change: Callable[[dict[str, Any]], object]) -> Harm:
+    return config(lambda content: change(content["field"]["drawings"]))
 
 
-def tensors(change: Callable[[dict[str, torch.Tensor]], object]) -> Callable[[Path], None]:
-    def applied(folder: Path) -> None:
-        found = load_file(folder / SURFACES)
-        change(found)
-        save_file(found, folder / SURFACES)
-
-    return applied
+def surfaces(change: Callable[[dict[str, torch.Tensor]], object]) -> Harm:
+    return tensors(SURFACES, change)
 
 
 def smaller(folder: Path) -> None:
@@ -128,23 +110,21 @@ def smaller(folder: Path) -> None:
         (lambda folder: (folder / PICTURES).write_bytes(b"no picture"), PICTURES),
         (lambda folder: (folder / SURFACES).write_bytes(b"no tensors"), "is damaged"),
         (smaller, "config.json asks for 960 x 120"),
-        (tensors(lambda t: t.pop("flow.3")), "flow.3"),
-        (tensors(lambda t: t.update(more=torch.zeros(2))), "more"),
-        (tensors(lambda t: t.update(depth=t["depth"].int())), "depth"),
-        (tensors(lambda t: t["flow.0"].fill_(float("nan"))), "flow.0 holds displacements"),
-        (tensors(lambda t: t["flow.0"].fill_(float("inf"))), "flow.0 holds displacements"),
-        (config(lambda d: d.update(height=-1)), "height"),
-        (config(lambda d: d.update(palette=[])), "palette"),
-        (config(lambda d: d["outline"].update(width_px=1e9)), "width_px"),
-        (config(lambda d: d["pairs"][0].update(pair=[0, 77])), "pair"),
-        (config(lambda d: d["cameras"].pop()), "config.json asks for"),
-        (config(lambda d: d["cameras"][0].update(scale=-1.0)), "scale"),
-        (config(lambda d: d.update(soup=1)), "soup"),
+        (surfaces(lambda t: t.pop("flow.3")), "flow.3"),
+        (surfaces(lambda t: t.update(more=torch.zeros(2))), "more"),
+        (surfaces(lambda t: t.update(depth=t["depth"].int())), "depth"),
+        (surfaces(lambda t: t["flow.0"].fill_(float("nan"))), "flow.0 holds displacements"),
+        (surfaces(lambda t: t["flow.0"].fill_(float("inf"))), "flow.0 holds displacements"),
+        (look(lambda d: d.update(height=-1)), "height"),
+        (look(lambda d: d.update(palette=[])), "palette"),
+        (look(lambda d: d["outline"].update(width_px=1e9)), "width_px"),
+        (look(lambda d: d["pairs"][0].update(pair=[0, 77])), "pair"),
+        (look(lambda d: d["cameras"].pop()), "config.json asks for"),
+        (look(lambda d: d["cameras"][0].update(scale=-1.0)), "scale"),
+        (look(lambda d: d.update(soup=1)), "soup"),
     ],
 )
-def test_damage_gets_one_clear_line(
-    folder: Path, harm: Callable[[Path], object], said: str
-) -> None:
+def test_damage_gets_one_clear_line(folder: Path, harm: Harm, said: str) -> None:
     harm(folder)
     with pytest.raises(ToonsetError) as refused:
         read_field(folder)
@@ -155,20 +135,18 @@ def test_damage_gets_one_clear_line(
 @pytest.mark.parametrize(
     ("harm", "said"),
     [
-        (tensors(lambda t: t.pop("places")), "places"),
-        (tensors(lambda t: t.pop("faces")), "faces"),
-        (tensors(lambda t: t.update(faces=t["faces"].int())), "faces"),
-        (tensors(lambda t: t.update(faces=t["faces"][:0])), "faces"),
-        (tensors(lambda t: t.update(faces=t["faces"][:, :2].contiguous())), "faces"),
-        (tensors(lambda t: t.update(places=t["places"][:9])), "vertices that are not there"),
-        (config(lambda d: d["shape"].update(step=0)), "step"),
-        (config(lambda d: d.update(shape=None)), "depth"),
-        (config(lambda d: d["steps"].update(near_px=-1)), "near_px"),
-        (config(lambda d: d["shade"].update(factor=[1, 2, 3])), "factor"),
-        (config(lambda d: d["shade"].update(slope=[1, 2])), "slope"),
+        (surfaces(lambda t: t.pop("places")), "places"),
+        (surfaces(lambda t: t.pop("faces")), "faces"),
+        (surfaces(lambda t: t.update(faces=t["faces"].int())), "faces"),
+        (surfaces(lambda t: t.update(faces=t["faces"][:0])), "faces"),
+        (surfaces(lambda t: t.update(faces=t["faces"][:, :2].contiguous())), "faces"),
+        (surfaces(lambda t: t.update(places=t["places"][:9])), "vertices that are not there"),
+        (look(lambda d: d["shape"].update(step=0)), "step"),
+        (look(lambda d: d.update(shape=None)), "depth"),
+        (look(lambda d: d["steps"].update(near_px=-1)), "near_px"),
+        (look(lambda d: d["shade"].update(factor=[1, 2, 3])), "factor"),
+        (look(lambda d: d["shade"].update(slope=[1, 2])), "slope"),
     ],
 )
-def test_damage_to_a_shape_gets_one_clear_line(
-    shaped_folder: Path, harm: Callable[[Path], object], said: str
-) -> None:
+def test_damage_to_a_shape_gets_one_clear_line(shaped_folder: Path, harm: Harm, said: str) -> None:
     test_damage_gets_one_clear_line(shaped_folder, harm, said)

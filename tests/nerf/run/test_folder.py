@@ -10,29 +10,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
-from safetensors.torch import load, save
 
-from tests.nerf.ellipsoids import held_out, train_scene
+from tests.nerf.ellipsoids import held_out
+from tests.nerf.run.damage import Harm, config, tensors, written
 from toonset.errors import BundleError
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
-from toonset.nerf.run.report import write_run
-from toonset.nerf.train.labelling import labelled
 from toonset.nerf.train.result import Training
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory, training: Training) -> Path:
-    folder = tmp_path_factory.mktemp("written")
-    write_run(folder, training, labelled(train_scene())[0])
-    return folder
+def whole(tmp_path_factory: pytest.TempPathFactory, training: Training) -> Path:
+    return written(tmp_path_factory.mktemp("run"), training)
 
 
 @pytest.fixture
-def run_folder(written: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(written, tmp_path / "run"))
+def run_folder(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "run"))
 
 
 def test_a_run_folder_renders_the_same_after_loading(run_folder: Path, training: Training) -> None:
@@ -48,45 +43,30 @@ def test_a_run_folder_renders_the_same_after_loading(run_folder: Path, training:
     assert json.loads((run_folder / "metrics.json").read_text())["train"]["psnr"] > 24
 
 
-def model(change: Callable[[bytes], bytes]) -> Callable[[Path], object]:
-    file = "model.safetensors"
-    return lambda folder: (folder / file).write_bytes(change((folder / file).read_bytes()))
+PLANES, MODEL = "field.planes", "model.safetensors"
 
 
-def tensors(change: Callable[[dict[str, torch.Tensor]], object]) -> Callable[[Path], object]:
-    def changed(data: bytes) -> bytes:
-        found = load(data)
-        change(found)
-        return save(found)
-
-    return model(changed)
+def model(change: Callable[[dict[str, Any]], object]) -> Harm:
+    return tensors(MODEL, change)
 
 
-def config(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
-    def changed(folder: Path) -> None:
-        content = json.loads((folder / "config.json").read_text())
-        change(content)
-        (folder / "config.json").write_text(json.dumps(content))
-
-    return changed
-
-
-def field(**changes: object) -> Callable[[Path], None]:
+def field(**changes: object) -> Harm:
     return config(lambda content: content["field"].update(changes))
 
 
-PLANES = "field.planes"
+def truncate(folder: Path) -> None:
+    (folder / MODEL).write_bytes((folder / MODEL).read_bytes()[:-1000])
 
 
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (model(lambda data: data[:-1000]), "damaged"),
-        (model(lambda data: b"PK\x03\x04 nothing of the kind"), "damaged"),
-        (tensors(lambda t: t.pop("field.out.bias")), "field.out.bias"),
-        (tensors(lambda t: t.update({PLANES: t[PLANES][:-1].clone()})), "field.planes is"),
-        (tensors(lambda t: t.update({PLANES: t[PLANES].double()})), "float64"),
-        (tensors(lambda t: t[PLANES][3, 2].fill_(float("nan"))), "not finite"),
+        (truncate, "damaged"),
+        (lambda folder: (folder / MODEL).write_bytes(b"PK\x03\x04 nothing of the kind"), "damaged"),
+        (model(lambda t: t.pop("field.out.bias")), "field.out.bias"),
+        (model(lambda t: t.update({PLANES: t[PLANES][:-1].clone()})), "field.planes is"),
+        (model(lambda t: t.update({PLANES: t[PLANES].double()})), "float64"),
+        (model(lambda t: t[PLANES][3, 2].fill_(float("nan"))), "not finite"),
         (config(lambda content: content.update(format=99)), "format 99"),
         (field(hull_voxel=-1.0), "hull_voxel"),
         (field(hull_shape=[100000, 100000, 100000]), "hull_shape"),
@@ -98,9 +78,7 @@ PLANES = "field.planes"
         (lambda folder: (folder / "config.json").write_text("{"), "no valid JSON"),
     ],
 )
-def test_a_damaged_run_gets_one_clear_line(
-    run_folder: Path, damage: Callable[[Path], object], message: str
-) -> None:
+def test_a_damaged_run_gets_one_clear_line(run_folder: Path, damage: Harm, message: str) -> None:
     damage(run_folder)
     with pytest.raises(BundleError, match=message):
         read_field(run_folder)

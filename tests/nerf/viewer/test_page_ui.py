@@ -138,7 +138,7 @@ def test_there_is_no_swing_where_less_motion_is_wished_for(open_page: Open) -> N
 
 
 def test_the_canvas_has_the_screens_pixels_up_to_two_for_one(open_page: Open) -> None:
-    for density, expected in ((1, 1), (2, 2), (3, 2)):
+    for density, expected in ((1, 1), (3, 2)):
         viewer = open_page(device_scale_factor=density)
         viewer.rest()
         width = viewer.page.evaluate("document.getElementById('stage').clientWidth")
