@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
@@ -134,16 +133,6 @@ def test_png_and_svg_are_of_one_figure_and_repeat() -> None:
     zero = chart(point("default", 2, 0.0), point("slow", 3, 1.0), lower_is_better=True)
     for lone in (zero, chart(point("nothing", 0, 10))):  # logarithms of neither
         assert Image.open(io.BytesIO(draw_chart(lone))).width > 500
-
-
-def test_the_csv_has_a_row_per_method_cheapest_first() -> None:
-    told = replace(point("told", 1, 40), aside="told, all")
-    shown = chart(point("default", 2, 30.5), told, point("slow", 3, 30))
-    rows = list(csv.DictReader(io.StringIO(shown.csv())))
-    assert [row["method"] for row in rows] == ["told", "default", "slow"]
-    assert [row["on_front"] for row in rows] == ["False", "True", "False"]
-    assert (rows[1]["cost"], rows[1]["merit"]) == ("2", "30.5")
-    assert rows[0]["not_compared_because"] == "told, all"
 
 
 # ---- from records

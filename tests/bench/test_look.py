@@ -26,24 +26,11 @@ from bench.records.record import DEFAULT, methods_table
 from bench.stability import fields
 from bench.stability.pages import PAGES
 from bench.stability.trials import UNJUDGED
-from toonset.dataset.bundle.scene import Scene
-from toonset.dataset.bundle.transforms import transforms_dict
-from toonset.dataset.images.picture import encode_png
-from toonset.dataset.mesh.load import save_obj
 from toonset.errors import BundleError
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.score.evaluation_picture import TILE_PX
-from toonset.write import write_bytes, write_json
 
 PAGE = {page.name: page for page in PAGES}
-
-
-def write_scene(folder: Path, scene: Scene) -> None:
-    """Write a scene as a folder with transforms.json and its pictures."""
-    cameras = [(frame.name, frame.camera) for frame in scene.frames]
-    write_json(folder / "transforms.json", transforms_dict(cameras, 1.8, 1.8))
-    for frame in scene.frames:
-        write_bytes(folder / frame.name, encode_png(frame.rgba))
 
 
 # ---- cases and looks
@@ -53,29 +40,6 @@ def test_a_folder_without_cases_and_a_name_that_fits_none(tmp_path: Path, bench)
     with pytest.raises(BundleError, match="holds no case"):
         list(look_cases(tmp_path, 0, 1))
     assert "no case's name contains 'nobody'" in bench("look", "--only", "nobody").reason
-
-
-def test_a_case_folder_comes_with_its_own_and_with_found_cameras(tmp_path: Path) -> None:
-    case, made = drawn_case(3, replace(DRAWN, cell_px=100, views=4, outline_px=1))
-    folder = tmp_path / "figure-drawn"
-    write_scene(folder / "views", case.train)
-    write_scene(folder / "test", case.test)
-    (folder / "sheet.png").write_bytes(encode_png(made.sheet))
-    (folder / "mannequin.obj").write_bytes(save_obj(made.mesh))
-    (true,) = look_cases(tmp_path, 0, 1, quick=True)
-    own, found = look_cases(tmp_path, 0, 1, "figure")
-    assert (own.name, own.group) == (true.name, true.group) == ("figure", "drawn")
-    assert (found.name, found.group) == ("figure", "drawn, calibrated")
-    assert own.turn is None
-    assert [f.rgba.tobytes() for f in own.train.frames] == [
-        f.rgba.tobytes() for f in case.train.frames
-    ]
-    pairs = zip(found.train.frames, own.train.frames, strict=True)
-    off = [np.abs(a.camera.rotation - b.camera.rotation).max() for a, b in pairs]
-    assert 0 < np.median(off) < 0.2
-    (folder / "sheet.png").unlink()
-    with pytest.raises(BundleError, match=r"holds no sheet\.png"):
-        list(look_cases(tmp_path, 0, 1, "calibrated"))
 
 
 @pytest.fixture(scope="module")

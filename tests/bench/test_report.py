@@ -26,10 +26,11 @@ def test_the_page_holds_all_and_needs_nothing_else() -> None:
         records_section(records),
     ]
     page = report_html("a page", "python -m bench train -o 'a b'", "seed 0", sections)
-    kinds = re.findall('<img src="(data:image/[a-z+]*);', page)
+    kinds = re.findall('<img alt="[^"]+" src="(data:image/[a-z+]*);', page)
     assert kinds == ["data:image/svg+xml", "data:image/png"]
     assert page.count("<table") == 2
-    assert not re.search("<script|<link|<iframe|<svg|<caption>|<small>", page)
+    assert not re.search("<script|<link|<iframe|<svg|<caption>|& <small>", page)
+    assert 'alt="what &quot;it&quot; shows"' in page
     words = html.unescape(re.sub("<[^>]*>", "", page))
     for said in ("python -m bench train -o 'a b'", "30.25", "GMSD (dB)", "a <caption>"):
         assert said in words

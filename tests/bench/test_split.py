@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 
 from bench.messy.options import DIFFICULTIES
-from bench.split.cases import (
-    MIXED,
-    Drawn,
-    SplitCase,
-    drawn_at,
-    messy_cases,
-    sheet_cases,
-    sprite_sheet_cases,
-)
+from bench.split.cases import MIXED, Drawn, SplitCase, drawn_at, messy_cases, sheet_cases
 from bench.split.measure import bench_split
 from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
 from bench.split.score import mask_iou, same_box, score
@@ -196,23 +188,6 @@ def test_rendered_sheets_have_the_boxes_of_what_their_cells_show(rendered: Path)
     assert [figure.box for figure in made.figures] == [figure.box for figure in FIGURES]
     with pytest.raises(BundleError, match="dog"):
         list(sheet_cases(rendered, "dog"))
-
-
-@pytest.mark.parametrize(("words", "box"), [("shadow below 200", (14, 22, 8, 8)), ("", None)])
-def test_sprites_are_enlarged_and_their_shadows_cut(
-    tmp_path: Path, words: str, box: tuple[int, int, int, int] | None
-) -> None:
-    place = tmp_path / "imp"
-    place.mkdir()
-    sprite = np.zeros((9, 9, 4), np.uint8)
-    sprite[2:6, 1:7] = 255
-    sprite[2:6, 5:7, 3] = 90  # the shadow
-    (place / "view_0.png").write_bytes(encode_png(sprite))
-    (place / "sheet.png").write_bytes(encode_png(np.full((40, 40, 4), 255, np.uint8)))
-    info = {"sheet_scale": 2, "sheet_boxes_xywh": [[14, 22, 12, 8]], "alpha": words}
-    (place / "info.json").write_text(json.dumps(info))
-    ((figure,),) = (made.figures for made in sprite_sheet_cases(tmp_path))
-    assert figure.box == (box or (14, 22, 12, 8))
 
 
 def test_the_command_writes_records_and_a_picture_of_wrong_sheets(

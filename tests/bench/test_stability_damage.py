@@ -13,15 +13,7 @@ import pytest
 from bench.cases.bodies import random_body
 from bench.stability import scenes
 from bench.stability.bodies import with_arms_raised, with_head_grown
-from bench.stability.damage import (
-    MIRROR,
-    mirrored,
-    padded,
-    stretched,
-    with_ball,
-    without_feet,
-    without_pieces,
-)
+from bench.stability.damage import MIRROR, mirrored, padded, stretched, with_ball, without_pieces
 from bench.stability.fields import TRAINING
 from bench.stability.pages import PAGES
 from bench.stability.scenes import draw_scene
@@ -59,19 +51,6 @@ def test_padding_keeps_the_camera_and_a_mirrored_drawing_is_the_mirrored_body(sh
         again, back = mirrored(view, camera)
         np.testing.assert_array_equal(again.rgba, drawn[0].rgba)
         np.testing.assert_allclose(back.rotation, drawn[1].rotation)
-
-
-def test_cropping_takes_the_lowest_rows_and_nothing_else(sheet):
-    view, camera = sheet.drawings[1]
-    cut, cropped = without_feet(view, camera, 0.25)
-    rows, left = (np.flatnonzero(v.mask.any(axis=1)) for v in (view, cut))
-    assert cropped.size_wh == cut.rgba.shape[1::-1]
-    points = np.random.default_rng(0).normal(size=(5, 3))
-    np.testing.assert_array_equal(cropped.project(points)[0], camera.project(points)[0])
-    assert left[-1] == len(cut.rgba) - 1  # the picture's edge cuts the figure
-    assert len(left) == pytest.approx(0.75 * len(rows), abs=1)
-    np.testing.assert_array_equal(cut.rgba[: left[-1] + 1], view.rgba[: left[-1] + 1])
-    assert without_feet(view, camera, 0)[0] is view
 
 
 def test_missing_pieces_reach_their_share_and_grow_from_step_to_step(sheet):
