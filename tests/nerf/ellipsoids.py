@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.options import TrainOptions
 
-Parts = Sequence[tuple[ArrayLike, ArrayLike]]  # middle and half axes
+Parts = Sequence[tuple[Any, Any]]  # middle and half axes
 SIDE, FINE = 48, 3
 PARTS = (  # middle, half axes, colour: body, head, a pack on one side of the back
     ((0.0, 0.0, 0.0), (0.45, 0.7, 0.35), (200, 40, 40)),
