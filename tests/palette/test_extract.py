@@ -15,7 +15,6 @@ from toonset.palette.names import NAMED, name_of
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette
 from toonset.palette.paints.histogram import count_pixels
-from toonset.palette.pixels.labels import label_pixels
 
 FINE = 8
 COLORS = np.array(
@@ -23,8 +22,8 @@ COLORS = np.array(
 )
 
 
-def flat_drawing(size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a soft-edged RGBA figure, its exact labels (255 = mixed), and its colours' areas."""
+def flat_drawing(size: int = 96) -> tuple[np.ndarray, np.ndarray]:
+    """Return a soft-edged RGBA figure and its colours' areas."""
     fine = np.full((size * FINE, size * FINE), 255, dtype=np.uint8)
     center = size * FINE // 2
     cv2.circle(fine, (center, center), int(0.46 * size * FINE), 4, -1)  # the contour
@@ -39,14 +38,11 @@ def flat_drawing(size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rgb = (soft[..., :3] * soft[..., 3:]).sum(axis=(1, 3)) / np.maximum(
         soft[..., 3:].sum(axis=(1, 3)), 1
     )
-    blocks = fine.reshape(size, FINE, size, FINE).transpose(0, 2, 1, 3).reshape(size, size, -1)
-    pure = (blocks == blocks[..., :1]).all(axis=2)
-    labels = np.where(pure, blocks[..., 0], 255).astype(np.uint8)
     areas = np.bincount(fine[fine < 255], minlength=5) / (fine < 255).sum()
-    return np.rint(np.dstack([rgb, alpha])).astype(np.uint8), labels, areas
+    return np.rint(np.dstack([rgb, alpha])).astype(np.uint8), areas
 
 
-RGBA, LABELS, AREAS = flat_drawing()
+RGBA, AREAS = flat_drawing()
 
 
 def test_a_flat_drawing_gives_exactly_its_colours() -> None:
@@ -57,18 +53,6 @@ def test_a_flat_drawing_gives_exactly_its_colours() -> None:
         assert shares[tuple(color)] == pytest.approx(share, abs=0.03)
     assert [c.share for c in palette.colors] == sorted(shares.values(), reverse=True)
     assert palette.warnings == ()
-
-
-def test_labels_equal_the_truth_on_flat_pixels() -> None:
-    found = label_pixels(RGBA, COLORS)
-    labelled = found != 255
-    assert np.array_equal(found[labelled & (LABELS != 255)], LABELS[labelled & (LABELS != 255)])
-    assert labelled[LABELS != 255].mean() > 0.98  # flat pixels that were taken for mixtures
-    inside = (LABELS == 255) & (RGBA[..., 3] == 255)
-    assert inside.sum() > 150
-    assert labelled[inside].mean() < 0.2  # mixtures that were given a label
-    assert not labelled[RGBA[..., 3] < 250].any()
-    assert np.array_equal(label_pixels(RGBA[:, ::-1], COLORS), found[:, ::-1])
 
 
 def test_palette_is_blind_to_order_orientation_and_repetition() -> None:

@@ -141,16 +141,6 @@ def test_gradients_of_a_product_taken_once_match_central_differences() -> None:
     torch.testing.assert_close(apply_once(table, rows, weights), slow)
 
 
-def test_even_compositing_equals_the_packed_one() -> None:
-    generator = torch.Generator().manual_seed(3)
-    depth = torch.rand(4, 6, generator=generator, dtype=torch.float64, requires_grad=True)
-    color = torch.rand(2, 4, 6, generator=generator, dtype=torch.float64, requires_grad=True)
-    assert torch.autograd.gradcheck(composite_even, (depth, color))
-    ray = torch.arange(4).repeat_interleave(6)
-    packed = composite_packed(depth.view(-1), color.view(2, -1).T, ray, 4)
-    torch.testing.assert_close(composite_even(depth, color), packed)
-
-
 def test_even_compositing_survives_extreme_depths() -> None:
     depth = torch.tensor([[1e30, 1e30, 0.5], [0.0, 0.0, 0.5]], requires_grad=True)
     color, opacity = composite_even(depth, torch.tensor([[[0.7, 0.2, 1.0], [1.0, 1.0, 0.4]]]))

@@ -102,6 +102,7 @@ def test_synthetic_drawings_are_labelled_right(outline: float, seed: int) -> Non
         wholly = view.rgba[..., 3] == 255
         truth = np.where((ink == 255) & wholly, len(made.palette), truth)
         found = label_pixels(view.rgba, palette)
+        assert np.array_equal(label_pixels(view.rgba[:, ::-1], palette), found[:, ::-1])
         pure, mixed = truth != UNLABELLED, (truth == UNLABELLED) & (view.rgba[..., 3] >= 250)
         assert (found[pure] == truth[pure]).mean() >= 0.995
         assert (found[mixed] == UNLABELLED).mean() >= 0.9
