@@ -25,13 +25,13 @@ from toonset.view import View
 RECORDER = Recorder("default", "drawn", 0)
 
 
-def sheet(*views: tuple[float, float, str], sigma: float = 1.0, case: str = "") -> MeasuredSheet:
+def sheet(*views: tuple[float, float, str], sigma: float = 1.0) -> MeasuredSheet:
     """Return a sheet of (error, error modulo twin, verdict) in degrees; yaw errs as the view."""
     rad = math.radians
     found = [
         ViewError(rad(raw), rad(twin), what, rad(raw), rad(sigma)) for raw, twin, what in views
     ]
-    return MeasuredSheet(tuple(found), case, 2.0, 2.0)
+    return MeasuredSheet(tuple(found), "", 2.0, 2.0)
 
 
 def by_metric(records: list[Record]) -> dict[str, Record]:

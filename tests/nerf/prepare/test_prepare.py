@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.nerf.prepare import balls
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import aligned
@@ -17,7 +18,7 @@ def asked(drawn, **switches: bool) -> tuple[Any, Any, Any]:
     return aligned(drawn, **switches)
 
 
-def test_bends_alone_where_they_explain_more(balls) -> None:
+def test_bends_alone_where_they_explain_more() -> None:
     drawn, _ = balls.bent_sheet()
     scene, registration, unbending = asked(drawn)
     assert unbending.applied
@@ -27,7 +28,7 @@ def test_bends_alone_where_they_explain_more(balls) -> None:
         assert after.camera is before.camera
 
 
-def test_cameras_follow_where_places_explain_enough(balls) -> None:
+def test_cameras_follow_where_places_explain_enough() -> None:
     drawn, _, _ = balls.misplaced(0)
     scene, registration, _ = asked(drawn)
     assert registration.applied
@@ -35,7 +36,7 @@ def test_cameras_follow_where_places_explain_enough(balls) -> None:
     assert registration.apart_px[1] < 0.5 * registration.apart_px[0]
 
 
-def test_switches_are_heard_and_drawings_that_agree_stay(balls) -> None:
+def test_switches_are_heard_and_drawings_that_agree_stay() -> None:
     scene, registration, unbending = asked(balls.sheet())
     assert scene is balls.sheet()
     assert registration.applied is unbending.applied is False
@@ -47,7 +48,7 @@ def test_switches_are_heard_and_drawings_that_agree_stay(balls) -> None:
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
 
 
-def test_planes_are_smoother_where_drawings_were_bent_back(balls) -> None:
+def test_planes_are_smoother_where_drawings_were_bent_back() -> None:
     drawn, _ = balls.bent_sheet()
     variation = []
     for trusted in (False, True):

@@ -7,11 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from tests.nerf.prepare import balls
 from toonset.nerf.prepare.registration import register_drawings
 
 
 @pytest.mark.parametrize("views", [2, 3, 8])
-def test_a_perfect_sheet_keeps_its_cameras(balls, views: int) -> None:
+def test_a_perfect_sheet_keeps_its_cameras(views: int) -> None:
     result, found = register_drawings(balls.sheet(views))
     assert result is balls.sheet(views)
     assert not found.applied
@@ -20,7 +21,7 @@ def test_a_perfect_sheet_keeps_its_cameras(balls, views: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_shifts_and_sizes_are_found(balls, seed: int) -> None:
+def test_shifts_and_sizes_are_found(seed: int) -> None:
     scene, shifts, sizes = balls.misplaced(seed)
     result, found = register_drawings(scene)
     assert found.applied
@@ -47,7 +48,7 @@ def test_shifts_and_sizes_are_found(balls, seed: int) -> None:
     assert said["apart_px"][1] < said["apart_px"][0]
 
 
-def test_the_body_stays_where_it_stands(balls) -> None:
+def test_the_body_stays_where_it_stands() -> None:
     """What all drawings share is no error: taken for one, it would push the body off its place."""
     scene, _ = balls.bent_sheet()
     result, _ = register_drawings(scene)
@@ -64,7 +65,7 @@ def test_the_body_stays_where_it_stands(balls) -> None:
         assert abs((aside * np.array(moves)).sum() / np.square(aside).sum()) < 5e-4  # world units
 
 
-def test_registering_twice_changes_little(balls) -> None:
+def test_registering_twice_changes_little() -> None:
     scene, _, _ = balls.misplaced(1)
     once, _ = register_drawings(scene)
     _, again = register_drawings(once)

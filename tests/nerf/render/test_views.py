@@ -54,13 +54,9 @@ def fast(trained: TrainedField, camera: Camera) -> np.ndarray:
     return cast(Sight.of(Baked.of(trained), camera), pixels).T.numpy()
 
 
-def slow(
-    trained: TrainedField, camera: Camera, pixels: Float[np.ndarray, "n 2"] | None = None
-) -> np.ndarray:
+def slow(trained: TrainedField, camera: Camera) -> np.ndarray:
     """Return colour, opacity and weighted depth, one ray and one sample at a time."""
-    rays = rays_of(
-        camera, camera.pixel_grid().reshape(-1, 2) if pixels is None else pixels, trained.hull
-    )
+    rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2), trained.hull)
     near, far = clip(rays, trained.hull)
     rows = []
     for i in range(len(near)):

@@ -29,23 +29,17 @@ TURN = tuple(range(0, 360, 45))
 DONE = (Step(1, 0.0, 0.0, 0.0, 0.0),) * USUAL_STEPS
 
 
-def disc(
-    right: float = 0.0, down: float = 0.0, side: int = SIDE, kept: float = 1.0, soft: float = 1.0
-) -> np.ndarray:
-    """Return a disc with an inner one, moved by pixels, as a straight RGBA picture."""
-    v, u = np.mgrid[:side, :side] + 0.5
-    away = np.hypot(u - side / 2 - right, v - side / 2 - down)
-    edge, inner = (
-        np.clip((r - away) / soft + 0.5, 0, 1)[..., None] for r in (HEIGHT / 2, HEIGHT / 4)
-    )
+def disc() -> np.ndarray:
+    """Return a disc with an inner one as a straight RGBA picture."""
+    v, u = np.mgrid[:SIDE, :SIDE] + 0.5
+    away = np.hypot(u - SIDE / 2, v - SIDE / 2)
+    edge, inner = (np.clip(r - away + 0.5, 0, 1)[..., None] for r in (HEIGHT / 2, HEIGHT / 4))
     color = inner * [250, 200, 40] + (1 - inner) * [30, 60, 160]
-    color = 255 - kept * (255 - color)
     return np.round(np.concatenate([color, 255 * edge], axis=-1)).astype(np.uint8)
 
 
-def scene(*yaws_deg: float, rgba: np.ndarray | None = None) -> Scene:
-    rgba = disc() if rgba is None else rgba
-    size = (rgba.shape[1], rgba.shape[0])
+def scene(*yaws_deg: float) -> Scene:
+    size, rgba = (SIDE, SIDE), disc()
     cameras = (Camera.looking_at(np.zeros(3), math.radians(y), 0.1, 4.0, size) for y in yaws_deg)
     named = zip(yaws_deg, cameras, strict=True)
     return Scene(tuple(Frame(f"{yaw:g}", camera, rgba) for yaw, camera in named), None, "turn")
