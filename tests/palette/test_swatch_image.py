@@ -24,14 +24,7 @@ def palette_of(colors: int, dropped: int, name: str = "dark green") -> Palette:
 
 @pytest.mark.parametrize(
     ("colors", "dropped", "name"),
-    [
-        (1, 0, "dark green"),
-        (3, 2, ""),
-        (8, 11, "dark green"),
-        (20, 1, LONG),
-        (20, 1, "x" * 64),
-        (255, 40, "dark green"),
-    ],
+    [(1, 0, "dark green"), (3, 2, ""), (8, 11, "red"), (20, 1, LONG), (255, 40, "x" * 64)],
 )
 def test_every_colour_has_a_block(colors: int, dropped: int, name: str) -> None:
     palette = palette_of(colors, dropped, name)
