@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -22,6 +22,7 @@ from toonset.nerf.prepare.unwarp import Warp
 WRONG = 0  # the drawing that is wrong: from the front
 
 
+@cache
 def body_of(scene: Scene) -> tuple[Depths, float]:
     """Return how deep the hull of a scene lies, and its height."""
     alphas = [torch.as_tensor(f.rgba[..., 3] / np.float32(255)) for f in scene.frames]
@@ -42,6 +43,7 @@ def swollen(pixels: float) -> np.ndarray:
     return np.dstack([-pixels * size, 0 * size])
 
 
+@cache
 def sheet(pixels: float = 0.0, gain: tuple[float, float, float] = (1, 1, 1)) -> Scene:
     scene = scene_of(ring())
     camera = scene.frames[WRONG].camera
