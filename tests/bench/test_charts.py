@@ -16,7 +16,7 @@ from bench.look.measure import LOOKS
 from bench.palette.labels import CONTOURS, LABELLERS
 from bench.palette.methods import METHODS as PALETTE_METHODS
 from bench.records.chart import PLOTS, Chart, Point, charts_of, points_of
-from bench.records.drawing import draw_chart
+from bench.records.drawing import Panel, draw_chart, draw_panels, draw_scatter
 from bench.records.methods import METHODS
 from bench.split.methods import METHODS as SPLIT_METHODS
 from bench.train.plan import METHODS as TRAIN_METHODS
@@ -133,6 +133,17 @@ def test_png_and_svg_are_of_one_figure_and_repeat() -> None:
     zero = chart(point("default", 2, 0.0), point("slow", 3, 1.0), lower_is_better=True)
     for lone in (zero, chart(point("nothing", 0, 10))):  # logarithms of neither
         assert Image.open(io.BytesIO(draw_chart(lone))).width > 500
+
+
+def test_panels_and_scatters_have_a_legend_of_all() -> None:
+    panels = [
+        Panel("FLIP", {"default": [(1, 0.2)], "field": [(2, 0.3)], "nothing": [(0.0, 0.5)]}),
+        Panel("curves", {"default": [(1, 20), (2, 30)]}, ideal=31),
+    ]
+    svg = draw_panels(panels, ("seconds", ""), 2, "svg").decode()
+    assert all(word in svg for word in ("FLIP", "curves", "default", "field", "nothing"))
+    scatter = draw_scatter({"a": [(1, 2)], "b": [(2, 1)]}, ("x", "y"), (1.5, "ok | weak"), (1, 2))
+    assert scatter.startswith(b"\x89PNG")
 
 
 # ---- from records

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from bench.cases.workers import THREADS, in_order
-from bench.stability import cameras, fields, scenes, sheets
+from bench.stability import cameras, colors, fields, scenes, sheets
 from bench.stability import pages as listed
 from bench.stability import run as stability
 from bench.stability.cameras import CALIBRATION
+from bench.stability.colors import EYE
 from bench.stability.fields import TRAINING
 from bench.stability.pages import PAGES
 from bench.stability.run import Key, run_job, run_steps, tried_pages
@@ -37,6 +38,7 @@ from bench.stability.trials import (
 from toonset.errors import SheetError
 from toonset.nerf.score import verdict
 from toonset.nerf.score.verdict import OK, WEAK
+from toonset.palette.names import hex_of
 
 PAGE = {page.name: page for page in PAGES}
 CAMERAS = [page for page in PAGES if page.kind is CALIBRATION]
@@ -63,6 +65,17 @@ def test_the_base_step_is_the_base_sheet(page: Page, monkeypatch) -> None:
     for (view, camera), (plain, same) in pairs:
         np.testing.assert_array_equal(view.rgba, plain.rgba)
         np.testing.assert_array_equal(camera.center, same.center)
+
+
+@pytest.mark.parametrize("page", CAMERAS, ids=lambda page: page.name)
+def test_the_worst_step_can_be_drawn_twice_alike(page: Page, monkeypatch) -> None:
+    monkeypatch.setattr(sheets, "BASE", replace(BASE, cell_px=80, views=2, supersample=1))
+    of_artist = replace(sheets.ARTIST, cell_px=120, views=2, supersample=1)
+    monkeypatch.setattr(sheets, "ARTIST", of_artist)
+    first, second = (page.draw(page.steps[-1], 5) for _ in range(2))
+    for (view, camera), (again, same) in zip(first.drawings, second.drawings, strict=True):
+        np.testing.assert_array_equal(view.rgba, again.rgba)
+        np.testing.assert_array_equal(camera.rotation, same.rotation)
 
 
 # ---- trials of cameras
@@ -107,6 +120,17 @@ def test_a_single_drawing_is_refused_and_a_weak_run_says_why(monkeypatch) -> Non
     monkeypatch.setattr(verdict, "MOST_OFF", 1.0)
     assert run_job(("train views", 8, 0))[0][0].voice == OK
     stability._base_tried.cache_clear()
+
+
+def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monkeypatch) -> None:
+    monkeypatch.setattr(colors, "PICTURES", replace(colors.PICTURES, views=2, cell_px=80))
+    ((apart,), _), ((alike,), _) = (run_job(("palette near", step, 0)) for step in (20, 0.5))
+    assert (apart.value, alike.value) == (0, 50)
+    ((eye,), picture) = run_job(("palette tiny", 5, 0))
+    assert eye.value == 100
+    assert picture.startswith(b"\x89PNG")
+    assert "left out" in eye.words
+    assert hex_of(EYE) in eye.words
 
 
 # ---- figures
