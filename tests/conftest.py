@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 # (`main` sees to it); here plugins have imported numpy before anything could be set.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of libraries that are loaded from now on, as scipy's
 threadpool_limits(1, user_api="blas")  # of those that are loaded already
+# As `main` does, too: torch's waiting threads spin, which on busy cores costs ten times the work.
+os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
 
 VIEWS, CELL, SEED = 5, 120, 11
 MAINS = {"toonset": "toonset.cli.main", "bench": "bench.__main__"}

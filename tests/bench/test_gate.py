@@ -9,15 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench.commands import check as bench_check
-from bench.records.gate import (
-    Guard,
-    as_plain,
-    as_text,
-    compared,
-    from_plain,
-    guards_of,
-    yardstick_s,
-)
+from bench.records.gate import Guard, as_plain, as_text, compared, from_plain, guards_of
 from bench.records.record import Record, Recorder
 from toonset.cli.common.output import Printer
 from toonset.errors import BundleError
@@ -89,10 +81,6 @@ def test_files_hold_all_there_is() -> None:
         from_plain(as_plain(known) | {"format": 0}, "x")
 
 
-def test_the_yardstick_takes_time() -> None:
-    assert 1e-4 < yardstick_s() < 10
-
-
 def test_the_committed_figures_can_be_read_and_cover_every_subject() -> None:
     known = from_plain(json.loads(bench_check.COMMITTED.read_text()), "committed")
     assert {guard.subject for guard in known} == {s.value for s in bench_check.SUBJECTS}
@@ -124,6 +112,16 @@ def test_check_takes_no_other_option(bench, other: list[str]) -> None:
     found = bench("--check", *other)
     assert found.code == 2
     assert "stand alone" in found.err
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    ["split --half", "train --sprites x", "calib --sprites x --cases y", "palette --only x",
+     "palette --count 3", "labels --only x", "stability --cases x"],
+)  # fmt: skip
+def test_options_of_other_subjects_are_refused(bench, tmp_path: Path, wrong: str) -> None:
+    assert bench(*wrong.split(), "-o", tmp_path / "out").code == 2
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_wrong_subject_is_one_line(bench) -> None:

@@ -16,7 +16,6 @@ from bench.look.measure import (
     LOOKS,
     LookResult,
     Recipe,
-    Variant,
     bench_look,
     panels_of,
     records_of,
@@ -27,25 +26,11 @@ from bench.records.record import DEFAULT, methods_table
 from bench.stability import fields
 from bench.stability.pages import PAGES
 from bench.stability.trials import UNJUDGED
-from tests.nerf.look.painted import drawings
-from toonset.dataset.bundle.scene import Scene
-from toonset.dataset.bundle.transforms import transforms_dict
-from toonset.dataset.images.picture import encode_png
-from toonset.dataset.mesh.load import save_obj
 from toonset.errors import BundleError
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.score.evaluation_picture import TILE_PX
-from toonset.write import write_bytes, write_json
 
 PAGE = {page.name: page for page in PAGES}
-
-
-def write_scene(folder: Path, scene: Scene) -> None:
-    """Write a scene as a folder with transforms.json and its pictures."""
-    cameras = [(frame.name, frame.camera) for frame in scene.frames]
-    write_json(folder / "transforms.json", transforms_dict(cameras, 1.8, 1.8))
-    for frame in scene.frames:
-        write_bytes(folder / frame.name, encode_png(frame.rgba))
 
 
 # ---- cases and looks
@@ -55,29 +40,6 @@ def test_a_folder_without_cases_and_a_name_that_fits_none(tmp_path: Path, bench)
     with pytest.raises(BundleError, match="holds no case"):
         list(look_cases(tmp_path, 0, 1))
     assert "no case's name contains 'nobody'" in bench("look", "--only", "nobody").reason
-
-
-def test_a_case_folder_comes_with_its_own_and_with_found_cameras(tmp_path: Path) -> None:
-    case, made = drawn_case(3, replace(DRAWN, cell_px=100, views=4, outline_px=1))
-    folder = tmp_path / "figure-drawn"
-    write_scene(folder / "views", case.train)
-    write_scene(folder / "test", case.test)
-    (folder / "sheet.png").write_bytes(encode_png(made.sheet))
-    (folder / "mannequin.obj").write_bytes(save_obj(made.mesh))
-    (true,) = look_cases(tmp_path, 0, 1, quick=True)
-    own, found = look_cases(tmp_path, 0, 1, "figure")
-    assert (own.name, own.group) == (true.name, true.group) == ("figure", "drawn")
-    assert (found.name, found.group) == ("figure", "drawn, calibrated")
-    assert own.turn is None
-    assert [f.rgba.tobytes() for f in own.train.frames] == [
-        f.rgba.tobytes() for f in case.train.frames
-    ]
-    pairs = zip(found.train.frames, own.train.frames, strict=True)
-    off = [np.abs(a.camera.rotation - b.camera.rotation).max() for a, b in pairs]
-    assert 0 < np.median(off) < 0.2
-    (folder / "sheet.png").unlink()
-    with pytest.raises(BundleError, match=r"holds no sheet\.png"):
-        list(look_cases(tmp_path, 0, 1, "calibrated"))
 
 
 @pytest.fixture(scope="module")
@@ -132,17 +94,6 @@ def test_looks_are_records_a_table_a_chart_and_pictures(short: list[LookResult])
     assert look_sheet(short).shape[1] == TILE_PX * (len(LOOKS) + 1)
 
 
-def test_the_nearest_drawing_is_alone_and_flows_are_gone() -> None:
-
-    whole = drawings()
-    camera = whole.views[1].camera
-    assert Variant(whole, "").seen_by(camera) is whole
-    assert Variant(whole, "flow").seen_by(camera).flows == ()
-    alone = Variant(whole, "vote")
-    assert alone.seen_by(camera).views == (whole.views[1],)
-    assert alone.seen_by(camera) is alone.seen_by(camera)  # its textures are made once
-
-
 # ---- the sweeps
 
 
@@ -167,15 +118,3 @@ def test_a_look_page_fails_where_the_field_is_better(monkeypatch: pytest.MonkeyP
     ((worse,), _) = fields.try_look(lambda: page.draw(1, 0), 0)
     assert worse.value == pytest.approx(110)
     assert fine.value < page.kind.fine < page.kind.failed < worse.value
-
-
-def test_cameras_of_a_look_page_are_off_as_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fields, "SHEET", replace(DRAWN, cell_px=60, outline_px=1, views=4))
-    true, off = (PAGE["look yaw"].draw(step, 2).train.frames for step in (0, 10))
-    turns = [
-        np.degrees(b.camera.angles[0] - a.camera.angles[0]) for a, b in zip(true, off, strict=True)
-    ]
-    turns = [(turn + 180) % 360 - 180 for turn in turns]
-    assert np.abs(turns) == pytest.approx([10] * 4)
-    assert sum(turns) == pytest.approx(0, abs=1e-6)
-    assert len(PAGE["look views"].draw(5, 2).train.frames) == 5

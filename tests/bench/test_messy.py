@@ -8,18 +8,8 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from bench.cases.jpeg import through_jpeg
-from bench.messy.cartoon import cartoon_cast
-from bench.messy.figure import (
-    Figure,
-    as_line_art,
-    resized,
-    tight_window,
-    with_colored_lines,
-    with_gaps,
-)
-from bench.messy.layout import reach
-from bench.messy.options import DIFFICULTIES, EXCLUSIVE, GROUNDS, MessyOptions, checked, mixture
+from bench.messy.figure import tight_window
+from bench.messy.options import DIFFICULTIES, EXCLUSIVE, GROUNDS, MessyOptions, mixture
 from bench.messy.sheet import MessySheet, make_messy_sheet
 from toonset.errors import SheetError
 
@@ -47,9 +37,6 @@ def common_area(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> i
     return max(width, 0) * max(height, 0)
 
 
-# ---- truth
-
-
 @pytest.mark.parametrize("difficulty", [None, *DIFFICULTIES])
 def test_truth_is_consistent(difficulty: str | None) -> None:
     made = sheet(5, *([difficulty] if difficulty else []))
@@ -75,7 +62,7 @@ def test_on_a_transparent_sheet_alpha_is_the_truth(difficulty: str, seed: int) -
     np.testing.assert_allclose(made.rgba[..., 3] / 255, covered(made), atol=2 / 255)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_on_a_plain_sheet_nothing_but_figures_differs_from_it(seed: int) -> None:
     made = sheet(seed, "tinted")
     ground = made.rgba[0, 0, :3].astype(int)
@@ -84,11 +71,10 @@ def test_on_a_plain_sheet_nothing_but_figures_differs_from_it(seed: int) -> None
     assert (away[covered(made) == 1] > 8).mean() > 0.5  # clothes may have the paper's colour
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_what_is_no_figure_is_not_in_the_truth(seed: int) -> None:
-    plain = sheet(seed, "plain")
+def test_what_is_no_figure_is_not_in_the_truth() -> None:
+    plain = sheet(0, "plain")
     for extra in ("captions", "title", "arrows", "swatches", "guides", "props", "heads", "shadows"):
-        made = sheet(seed, extra)
+        made = sheet(0, extra)
         white = (made.rgba[..., :3] == 255).all(axis=-1)
         assert (~white & (covered(made) == 0)).sum() > 15, extra
         sizes = [alpha.shape for alpha in made.alphas]
@@ -103,22 +89,6 @@ def test_reading_order_is_rows_from_the_top_each_from_the_left() -> None:
             assert next_x > x if same_row else next_y > y + h - 2
 
 
-def test_overlapping_figures_hide_some_of_each_other() -> None:
-    apart, over = sheet(3, "transparent"), sheet(3, "transparent", "overlap")
-    assert len(apart.boxes) == len(over.boxes)
-    lost = sum(int(a.sum()) for a in apart.alphas) - sum(int(a.sum()) for a in over.alphas)
-    assert lost > 255
-    assert any(common_area(a, b) for a, b in combinations(over.boxes, 2))
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_floating_parts_belong_to_their_figure(seed: int) -> None:
-    import cv2
-
-    for alpha in make_messy_sheet(seed, ["floating"], MessyOptions((150, 160))).alphas:
-        assert cv2.connectedComponents((alpha >= 128).astype(np.uint8))[0] - 1 >= 2
-
-
 # ---- seeds and names
 
 
@@ -131,13 +101,6 @@ def test_same_seed_same_bytes_and_other_seeds_others(difficulties: tuple[str, ..
     np.testing.assert_array_equal(first.rgba, again.rgba)
     assert all((a == b).all() for a, b in zip(first.alphas, again.alphas, strict=True))
     assert other.rgba.shape != first.rgba.shape or (other.rgba != first.rgba).any()
-
-
-@pytest.mark.parametrize("name", [name for name in DIFFICULTIES if name != "plain"])
-def test_every_difficulty_changes_the_sheet(name: str) -> None:
-    made, plain = sheet(5, name), sheet(5, "plain")
-    assert set(made.what) - {name} <= {"plain"}
-    assert made.rgba.shape != plain.rgba.shape or (made.rgba != plain.rgba).any()
 
 
 def test_mixtures_have_one_ground_and_hold_no_contradiction() -> None:
@@ -164,81 +127,3 @@ def test_mixtures_have_one_ground_and_hold_no_contradiction() -> None:
 def test_impossible_sheets_are_refused(asked: list[str], match: str) -> None:
     with pytest.raises(SheetError, match=match):
         make_messy_sheet(0, asked)
-
-
-def test_a_sheet_without_a_named_ground_is_plain() -> None:
-    assert checked(["rows"]) == {"rows", "plain"}
-    assert len(sheet(0, "one").boxes) == 1
-    assert 3 <= len(sheet(0, "rows").boxes) <= 16
-
-
-def test_jpeg_is_lossy_and_opaque() -> None:
-    clean = sheet(2, "gradient")
-    noisy = through_jpeg(clean.rgba, 60)
-    assert noisy.shape == clean.rgba.shape
-    assert (noisy[..., 3] == 255).all()
-    assert 0 < np.abs(noisy.astype(int) - clean.rgba.astype(int)).mean() < 10
-
-
-# ---- figures
-
-
-def front(outline_px: float = 3.0) -> Figure:
-    cast = cartoon_cast(3, 1, 200, outline_px, COLORS, floats=False, heads=False)
-    return cast.figures[0]
-
-
-def test_line_art_shows_paper_inside_and_ink_at_its_rim() -> None:
-    figure = front()
-    drawn = as_line_art(figure, (0, 0, 0))
-    np.testing.assert_array_equal(drawn.rgba[..., 3], figure.rgba[..., 3])
-    assert (drawn.paper[figure.rgba[..., 3] == 255] > 0.9).mean() > 0.5
-    rim = (figure.rgba[..., 3] > 0) & (figure.rgba[..., 3] < 200)
-    assert drawn.paper[rim].mean() < 0.2
-
-
-def test_coloured_lines_change_lines_alone() -> None:
-    figure = front()
-    colored = with_colored_lines(figure, (80, 20, 30))
-    no_line, line = figure.ink == 0, (figure.ink == 255) & (figure.rgba[..., 3] == 255)
-    np.testing.assert_array_equal(colored.rgba[no_line], figure.rgba[no_line])
-    assert set(map(tuple, colored.rgba[line].tolist())) == {(80, 20, 30, 255)}
-
-
-def test_gaps_open_the_contour() -> None:
-    import cv2
-
-    drawn = as_line_art(front(), (0, 0, 0))
-    opened = with_gaps(drawn, 3, 2.0, 3.0, np.random.default_rng(0))
-
-    def enclosed(figure: Figure) -> int:
-        """Return paper that cannot be reached from outside without crossing ink."""
-        ink = (figure.rgba[..., 3] / 255) * (1 - figure.paper)
-        free = np.pad((ink < 0.5).astype(np.uint8), 1, constant_values=1)
-        cv2.floodFill(free, None, (0, 0), 2)
-        return int((free == 1).sum())
-
-    assert enclosed(drawn) > 1.2 * enclosed(opened)
-    assert (opened.paper >= drawn.paper).all()
-    assert 5 < (opened.paper - drawn.paper).sum() < 150
-
-
-def test_reduced_line_art_is_still_line_art() -> None:
-    drawn = as_line_art(front(), (0, 0, 0))
-    small = resized(drawn, 0.9)
-    assert small.height == round(0.9 * drawn.height)
-    assert small.paper.mean() == pytest.approx(drawn.paper.mean(), abs=0.02)
-
-
-def test_figures_touch_at_the_reach_and_not_before() -> None:
-    a, b = front().rgba, front().rgba
-    width = a.shape[1] + b.shape[1]
-
-    def overlap(shift: int) -> int:
-        left, right = np.zeros((len(a), width), bool), np.zeros((len(a), width), bool)
-        left[:, : a.shape[1]] = a[..., 3] >= 128
-        right[:, shift : shift + b.shape[1]] = b[..., 3] >= 128
-        return int((left & right).sum())
-
-    assert overlap(reach(a, b)) == 0
-    assert overlap(reach(a, b) - 1) > 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.palette.cases import LEAST_APART, PaletteCase, palette_cases, random_paints
-from bench.palette.measure import bench_palette, f1, score, sheet_of_size
+from bench.palette.measure import bench_palette, f1, score
 from bench.palette.methods import METHODS
 from toonset.errors import BundleError
 from toonset.palette.colors import oklab_from_rgb
@@ -43,12 +43,6 @@ def test_random_paints_are_apart_and_repeat() -> None:
     away = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(8, 1)]
     assert away.min() > LEAST_APART
     assert random_paints(np.random.default_rng(4), 8) == paints
-
-
-def test_sheets_have_the_size_asked_for() -> None:
-    sheet = sheet_of_size(case(), 250, 90)
-    assert sheet.shape == (90, 250, 4)
-    assert np.array_equal(sheet[40:80, 100:200], case().images[0])
 
 
 def test_a_folder_without_characters_is_refused(tmp_path: Path) -> None:

@@ -9,16 +9,8 @@ import numpy as np
 import pytest
 
 from bench.messy.options import DIFFICULTIES
-from bench.split.cases import (
-    MIXED,
-    Drawn,
-    SplitCase,
-    drawn_at,
-    messy_cases,
-    sheet_cases,
-    sprite_sheet_cases,
-)
-from bench.split.measure import ACROSS, TILE_WH, bench_split, contact_sheet, tile
+from bench.split.cases import MIXED, Drawn, SplitCase, drawn_at, messy_cases, sheet_cases
+from bench.split.measure import bench_split
 from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
 from bench.split.score import mask_iou, same_box, score
 from toonset.dataset.images.picture import encode_png
@@ -51,45 +43,35 @@ def found(*figures: Drawn, warned: bool = False, left_out: tuple[Drawn, ...] = (
 # ---- scores
 
 
-def test_the_right_figures_in_the_right_order_are_right() -> None:
-    result = score(case(), found(*FIGURES))
-    assert result.fault == ""
-    assert result.ious == (1.0, 1.0, 1.0)
-    assert not result.announced
-    assert result.megapixels == pytest.approx(0.028)
-
-
-def test_each_fault_has_its_name() -> None:
+def test_right_figures_are_right_and_each_fault_has_its_name() -> None:
     a, b, c = FIGURES
+    result = score(case(), found(*FIGURES))
+    assert (result.fault, result.ious, result.announced) == ("", (1.0, 1.0, 1.0), False)
+    assert result.megapixels == pytest.approx(0.028)
     assert score(case(), found(a, b)).fault == "number"
     assert score(case(), found(a, b, c, block(150, 100, 10, 10))).fault == "number"
     assert score(case(), found(b, a, c)).fault == "order"
     assert score(case(), found(a, b, block(10, 80, 60, 46))).fault == "boxes"
 
 
+FAINT = np.pad(np.full((40, 40), 255, np.uint8), 10, constant_values=40)  # a rim of 10 px
+
+
 @pytest.mark.parametrize(
-    ("other", "right"),
+    ("one", "other", "right"),
     [
-        (block(12, 8), True),  # 2 px off on all sides
-        (block(13, 10), False),
-        (block(10, 10, 63, 40), False),
+        (block(10, 10), block(12, 8), True),  # 2 px off on all sides
+        (block(10, 10), block(13, 10), False),
+        (block(10, 10), block(10, 10, 63, 40), False),
+        (block(0, 0, 400, 400), block(0, 4, 400, 400), True),  # a small share of a large box
+        (block(0, 0, 400, 400), block(0, 7, 400, 400), False),
+        (drawn_at(FAINT, 0, 0), block(10, 10, 40, 40), True),  # faint rims may be in or out
+        (drawn_at(FAINT, 0, 0), block(0, 0, 60, 60), True),
+        (drawn_at(FAINT, 0, 0), block(5, 5, 50, 50), False),
     ],
 )
-def test_boxes_may_be_two_pixels_off(other: Drawn, right: bool) -> None:
-    assert same_box(block(10, 10), other) is right
-
-
-def test_large_boxes_may_be_off_by_a_small_share() -> None:
-    assert same_box(block(0, 0, 400, 400), block(0, 4, 400, 400))
-    assert not same_box(block(0, 0, 400, 400), block(0, 7, 400, 400))
-
-
-def test_faint_rims_may_be_in_or_out() -> None:
-    alpha = np.full((60, 60), 40, np.uint8)
-    alpha[10:50, 10:50] = 255
-    assert same_box(drawn_at(alpha, 0, 0), block(10, 10, 40, 40))
-    assert same_box(drawn_at(alpha, 0, 0), block(0, 0, 60, 60))
-    assert not same_box(drawn_at(alpha, 0, 0), block(5, 5, 50, 50))
+def test_boxes_may_be_two_pixels_off(one: Drawn, other: Drawn, right: bool) -> None:
+    assert same_box(one, other) is right
 
 
 def test_a_wrong_sheet_is_announced_by_a_warning_or_by_showing_what_was_left_out() -> None:
@@ -114,24 +96,20 @@ def test_mask_iou_counts_pixels() -> None:
 # ---- methods
 
 
-def test_the_corner_colour_finds_blocks_in_reading_order_and_drops_specks() -> None:
+def test_the_corner_colour_finds_blocks_in_reading_order_and_reads_alpha() -> None:
     speck = block(150, 120, 6, 6)
     result = by_corner_color(case((*FIGURES, speck)).rgba)
     assert [figure.box for figure in result.figures] == [figure.box for figure in FIGURES]
     assert not result.warned
-
-
-def test_the_corner_colour_reads_alpha_where_there_is_some() -> None:
     rgba = np.zeros((50, 80, 4), np.uint8)
     rgba[5:45, 10:70] = (0, 0, 0, 255)  # as black as the empty ground
     assert [figure.box for figure in by_corner_color(rgba).figures] == [(10, 5, 60, 40)]
-
-
-def test_a_blank_sheet_has_no_figures() -> None:
     assert by_corner_color(np.full((20, 20, 4), 255, np.uint8)).figures == ()
 
 
-def test_our_views_keep_their_place_and_their_warnings(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_our_views_keep_their_place_and_a_refusal_is_a_warning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     rgba = np.zeros((48, 68, 4), np.uint8)
     rgba[4:44, 4:64] = 255
     view = View(rgba, (6, 6, 68, 48), 0.0, "000.png")
@@ -139,18 +117,14 @@ def test_our_views_keep_their_place_and_their_warnings(monkeypatch: pytest.Monke
     monkeypatch.setattr("bench.split.methods.split_picture", lambda *_: sheet)
     result = by_toonset(rgba)
     assert [figure.box for figure in result.figures] == [(10, 10, 60, 40)]
-    assert result.warned
-    assert result.left_out == ((1, 2, 3, 4),)
+    assert (result.warned, result.left_out) == (True, ((1, 2, 3, 4),))
 
-
-def test_a_refusal_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(rgba: np.ndarray, options: SheetOptions) -> Segmentation:
         raise SheetError("blank")
 
     monkeypatch.setattr("bench.split.methods.split_picture", refuse)
-    result = by_toonset(np.zeros((5, 5, 4), np.uint8))
-    assert result.warned
-    assert result.figures == ()
+    refused = by_toonset(rgba)
+    assert (refused.warned, refused.figures) == (True, ())
 
 
 def test_records_count_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,14 +143,6 @@ def test_records_count_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     assert theirs["exactly right"].value == 1.0
     assert "wrong and announced" not in theirs
     assert "corner colour" in result.text
-
-
-def test_the_picture_shows_boxes_in_their_colours() -> None:
-    picture = tile(case(), found(block(10, 10), left_out=(block(100, 10),)), "blocks - number")
-    colors = {tuple(c) for c in picture.reshape(-1, 3).tolist()}
-    assert {(0, 170, 0), (230, 30, 30), (40, 90, 230)} <= colors
-    sheet = contact_sheet([picture] * (ACROSS + 1))
-    assert sheet.shape == (2 * len(picture), ACROSS * TILE_WH[0], 3)
 
 
 # ---- cases
@@ -224,23 +190,6 @@ def test_rendered_sheets_have_the_boxes_of_what_their_cells_show(rendered: Path)
         list(sheet_cases(rendered, "dog"))
 
 
-@pytest.mark.parametrize(("words", "box"), [("shadow below 200", (14, 22, 8, 8)), ("", None)])
-def test_sprites_are_enlarged_and_their_shadows_cut(
-    tmp_path: Path, words: str, box: tuple[int, int, int, int] | None
-) -> None:
-    place = tmp_path / "imp"
-    place.mkdir()
-    sprite = np.zeros((9, 9, 4), np.uint8)
-    sprite[2:6, 1:7] = 255
-    sprite[2:6, 5:7, 3] = 90  # the shadow
-    (place / "view_0.png").write_bytes(encode_png(sprite))
-    (place / "sheet.png").write_bytes(encode_png(np.full((40, 40, 4), 255, np.uint8)))
-    info = {"sheet_scale": 2, "sheet_boxes_xywh": [[14, 22, 12, 8]], "alpha": words}
-    (place / "info.json").write_text(json.dumps(info))
-    ((figure,),) = (made.figures for made in sprite_sheet_cases(tmp_path))
-    assert figure.box == (box or (14, 22, 12, 8))
-
-
 def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
     bench, rendered, tmp_path, monkeypatch
 ):
@@ -255,18 +204,3 @@ def test_the_command_writes_records_and_a_picture_of_wrong_sheets(
     assert {record["method"] for record in records} == set(METHODS)
     again = ("split", "--cases", rendered, "-o", out, "--force", "--only", "dog")
     assert "'dog'" in bench(*again).reason
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        ["split", "--half"],
-        ["train", "--sprites", "x"],
-        ["palette", "--only", "x"],
-        ["palette", "--count", "3"],
-        ["labels", "--only", "x"],
-    ],
-)
-def test_options_of_other_subjects_are_refused(bench, tmp_path, wrong):
-    assert bench(*wrong, "-o", tmp_path / "out").code == 2
-    assert not (tmp_path / "out").exists()

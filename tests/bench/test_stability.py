@@ -5,23 +5,19 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
 from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
-from bench.__main__ import resumable
-from bench.cases.bodies import HAIR, SKIN, random_body
 from bench.cases.workers import THREADS, in_order
 from bench.stability import cameras, colors, fields, scenes, sheets
 from bench.stability import pages as listed
 from bench.stability import run as stability
 from bench.stability.cameras import CALIBRATION
-from bench.stability.colors import EYE, color_away
-from bench.stability.fields import LOOK, TRAINING
+from bench.stability.colors import EYE
+from bench.stability.fields import TRAINING
 from bench.stability.pages import PAGES
-from bench.stability.report import sweep_html
 from bench.stability.run import Key, run_job, run_steps, tried_pages
 from bench.stability.sheets import BASE, DrawnSheet, draw_sheet
 from bench.stability.trials import (
@@ -39,11 +35,9 @@ from bench.stability.trials import (
     summary_rows,
     tally,
 )
-from toonset.cli.common.output import Printer
 from toonset.errors import SheetError
 from toonset.nerf.score import verdict
 from toonset.nerf.score.verdict import OK, WEAK
-from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
 
 PAGE = {page.name: page for page in PAGES}
@@ -105,20 +99,6 @@ def test_a_refused_and_a_crashed_sheet_are_results(sheet: DrawnSheet, monkeypatc
         assert trials[0].words in ("too faint", "KeyError: 'k'")
 
 
-def test_a_missing_mannequin_is_what_users_get_without_one(sheet: DrawnSheet, monkeypatch) -> None:
-    asked = []
-
-    def found(views, mesh):
-        asked.append(mesh)
-        raise SheetError("stop")
-
-    monkeypatch.setattr(cameras, "calibrate", found)
-    monkeypatch.setattr(cameras, "find_cameras", found)
-    for given in ("own", "plain", "none"):
-        cameras.try_cameras(lambda given=given: replace(sheet, given=given), 0)
-    assert asked == [sheet.mesh, None, "none"]
-
-
 # ---- trials of trainings, palettes, labels, looks
 
 
@@ -142,27 +122,6 @@ def test_a_single_drawing_is_refused_and_a_weak_run_says_why(monkeypatch) -> Non
     stability._base_tried.cache_clear()
 
 
-def test_one_drawing_is_odd(monkeypatch) -> None:
-    monkeypatch.setattr(scenes, "SCENE", replace(scenes.SCENE, cell_px=40))
-    monkeypatch.setattr(scenes, "HELD_OUT", 2)
-    usual = scenes.draw_scene(3).train.frames
-    for step in ("flipped", "other pose", "other shirt"):
-        pairs = list(zip(PAGE["train odd"].draw(step, 3).train.frames, usual, strict=True))
-        assert sum(bool((a.rgba != b.rgba).any()) for a, b in pairs) == 1, step
-        assert all((a.camera.rotation == b.camera.rotation).all() for a, b in pairs)
-    turned = PAGE["train one camera"].draw(20, 3).train.frames
-    off = [abs(a.camera.angles[0] - b.camera.angles[0]) for a, b in zip(turned, usual, strict=True)]
-    off = [abs(math.remainder(angle, math.tau)) for angle in off]
-    assert sorted(off) == pytest.approx([0] * 7 + [math.radians(20)])
-
-
-def test_a_colour_lies_as_far_away_as_asked() -> None:
-    for distance in (0.02, 0.1, 0.2):
-        color = color_away(SKIN, HAIR, distance)
-        lab = oklab_from_rgb(np.array([SKIN, color], np.uint8))
-        assert np.linalg.norm(np.diff(lab, axis=0)) == pytest.approx(distance, abs=0.003)
-
-
 def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monkeypatch) -> None:
     monkeypatch.setattr(colors, "PICTURES", replace(colors.PICTURES, views=2, cell_px=80))
     ((apart,), _), ((alike,), _) = (run_job(("palette near", step, 0)) for step in (20, 0.5))
@@ -172,14 +131,6 @@ def test_two_colours_are_found_where_they_differ_and_one_where_they_do_not(monke
     assert picture.startswith(b"\x89PNG")
     assert "left out" in eye.words
     assert hex_of(EYE) in eye.words
-
-
-def test_labels_are_right_where_paints_are_plain_and_wrong_in_deep_shadow(monkeypatch) -> None:
-    monkeypatch.setattr(sheets, "ARTIST", replace(sheets.ARTIST, views=3, cell_px=150))
-    ((plain,), picture), ((deep,), _) = (run_job(("labels shadow", step, 0)) for step in (0, 80))
-    assert picture.startswith(b"\x89PNG")
-    assert plain.value < 5
-    assert deep.value > plain.value + 5
 
 
 # ---- figures
@@ -250,19 +201,6 @@ def test_a_training_loses_against_its_own_bodys_clean_scene() -> None:
 # ---- the report
 
 
-def test_a_report_shows_the_worst_case_and_needs_nothing_else() -> None:
-    page = page_of([FINE, ALARM], [SAID, SAID], [UNSAID])
-    pictures = {("warp", str(step)): b"\x89PNG" for step in WARP.steps[:3]}
-    html = sweep_html([page], "seed 0", pictures)
-    assert "1: 20.0 deg; ok" in html  # of the third step
-    assert "Fails from 0.5 on: there 2 of 2 views fail, 2 of them announced." in html
-    assert "67 % (2 of 3)" in html
-    assert html.count("data:image/png") == 3
-    assert html.count("data:image/svg+xml") == 1
-    assert not re.search(r"<script|src=\"(?!data:)", html)
-    assert "data:image/png" not in sweep_html([page], "seed 0", {})
-
-
 # ---- runs
 
 
@@ -292,7 +230,6 @@ def test_workers_keep_the_order_and_use_one_thread_each() -> None:
 
 
 def test_a_second_run_takes_the_first_ones_steps(bench, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(listed, "PAGES", (TINY,))
     monkeypatch.setattr(stability, "usable_workers", lambda: 1)
     out = tmp_path / "out"
     command = ("stability", "-o", out, "--count", 1, "--json", "--quiet", "--only", "tiny")
@@ -325,14 +262,3 @@ def test_mistakes_are_refused_before_any_work(bench, tmp_path) -> None:
     assert "--force" in bench("stability", "-o", tmp_path).reason
     assert "drawing.png" in bench("stability", "-o", tmp_path, "--force").reason
     assert bench("stability", "--cases", tmp_path).code == 2
-
-
-def test_a_body_of_a_seed_is_the_sheets_body(sheet: DrawnSheet) -> None:
-    np.testing.assert_array_equal(sheet.mesh.vertices, random_body(3).vertices)
-    assert LOOK.calm == (UNJUDGED,)
-
-
-def test_an_interrupted_bench_says_that_it_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(KeyboardInterrupt), resumable(Printer(as_json=False, quiet=True)):
-        raise KeyboardInterrupt
-    assert capsys.readouterr().err == "what is done is kept; the same command goes on\n"

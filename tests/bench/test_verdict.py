@@ -49,13 +49,6 @@ def test_a_move_by_a_pixel_is_told_by_what_is_drawn() -> None:
     assert by_pixel(lambda a, b: np.abs(a - b).mean(axis=-1), np.ones_like(picture)).sum() == 0
 
 
-def test_sheets_are_those_of_the_sweeps_each_once() -> None:
-    names = [name for name, _ in command._synthetic(2)]
-    assert len(set(names)) == len(names)
-    assert {"train odd flipped s0", "train warp 2 s1", "train views 8 s0"} <= set(names)
-    assert "train warp 0 s0" not in names  # the same scene as eight views
-
-
 def test_a_second_run_judges_what_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[str] = []
 

@@ -1,8 +1,12 @@
-"""A body of two balls, one before the other, drawn as an artist would: lines, shadow, errors."""
+"""A body of two balls, one before the other, drawn as an artist would: lines, shadow, errors.
+
+Bodies, sheets and shapes are made once and belong to all tests: nobody may change them.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -12,7 +16,8 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map
 from toonset.mesh import Mesh
-from toonset.nerf.lines.step_lines import StepLines, draw_steps
+from toonset.nerf.hull.mannequin_shape import Shape, shape_of
+from toonset.nerf.lines.step_lines import StepLines, drawn_steps
 
 SIDE, FINE, LINE_PX = 150, 3, 2.0
 SKIN, BELT, ARM = (240, 200, 160), (60, 60, 160), (90, 150, 60)
@@ -44,6 +49,7 @@ class Hand:
 LIGHT = np.array([-0.5, -0.6, -0.6])  # in camera axes, from the surface to it
 
 
+@cache
 def body(scale: float = 1.0, arm: bool = True) -> Mesh:
     """Return a tall ball and a small one before it, at its left."""
     torso = trimesh.creation.icosphere(subdivisions=3)
@@ -100,6 +106,7 @@ def drawing(mesh: Mesh, camera: Camera, hand: Hand = Hand(), seed: int = 0) -> n
     return (rgba + 0.5).clip(0, 255).astype(np.uint8)
 
 
+@cache
 def sheet(mesh: Mesh, hand: Hand = Hand(), mannequin: Mesh | None = None, views: int = 8) -> Scene:
     """Return the drawings of a body, every one with its own errors, and a mannequin."""
     frames = [
@@ -107,6 +114,12 @@ def sheet(mesh: Mesh, hand: Hand = Hand(), mannequin: Mesh | None = None, views:
         for i, camera in enumerate(ring(views))
     ]
     return Scene(tuple(frames), PALETTE, "sheet", mannequin)
+
+
+@cache
+def own_shape(views: int = 8) -> Shape:
+    """Return the body as seen from all round."""
+    return shape_of(body(), ring(views))
 
 
 def depths(mesh: Mesh, camera: Camera) -> np.ndarray:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.options import TrainOptions
 
+Parts = Sequence[tuple[Any, Any]]  # middle and half axes
 SIDE, FINE = 48, 3
 PARTS = (  # middle, half axes, colour: body, head, a pack on one side of the back
     ((0.0, 0.0, 0.0), (0.45, 0.7, 0.35), (200, 40, 40)),
@@ -19,21 +22,25 @@ PARTS = (  # middle, half axes, colour: body, head, a pack on one side of the ba
 QUICK = TrainOptions(steps=60, device="cpu", missing_views=0)
 
 
-def draw(camera: Camera) -> np.ndarray:
-    """Return the RGBA picture of the ellipsoids, area-averaged."""
-    fine = camera.resized(FINE)
-    origins, directions = fine.rays(fine.pixel_grid())
-    best = np.full(origins.shape[:2], np.inf)
-    color = np.zeros((*best.shape, 4))
-    for middle, axes, rgb in PARTS:
+def first_hit(camera: Camera, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
+    """Return which ellipsoid every pixel shows, -1: none, and where in the world."""
+    origins, directions = camera.rays(camera.pixel_grid())
+    which, best = np.full(origins.shape[:2], -1), np.full(origins.shape[:2], np.inf)
+    for number, (middle, axes) in enumerate(parts):
         o, d = (origins - middle) / axes, directions / axes
         a, b, c = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
         inside = b * b - a * c
         t = (-b - np.sqrt(np.maximum(inside, 0))) / a
         nearer = (inside > 0) & (t < best)
-        best[nearer] = t[nearer]
-        color[nearer] = (*np.array(rgb) / 255, 1)
-    mean = color.reshape(SIDE, FINE, SIDE, FINE, 4).mean(axis=(1, 3))
+        which[nearer], best[nearer] = number, t[nearer]
+    return which, origins + np.where(which < 0, 0, best)[..., None] * directions
+
+
+def draw(camera: Camera) -> np.ndarray:
+    """Return the RGBA picture of the ellipsoids, area-averaged."""
+    which, _ = first_hit(camera.resized(FINE), [(middle, axes) for middle, axes, _ in PARTS])
+    table = np.array([*((*np.array(rgb) / 255, 1) for *_, rgb in PARTS), (0, 0, 0, 0)])
+    mean = table[which].reshape(SIDE, FINE, SIDE, FINE, 4).mean(axis=(1, 3))
     mean[..., :3] /= np.maximum(mean[..., 3:], 1e-9)
     return (mean * 255 + 0.5).astype(np.uint8)
 

@@ -6,13 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
-SKIN, TUNIC, TROUSERS, BOOTS, EYE = (
-    (226, 178, 140),
-    (44, 58, 104),
-    (84, 56, 38),
-    (74, 82, 84),
-    (250, 250, 250),
-)
+SKIN, TUNIC, TROUSERS, BOOTS = (226, 178, 140), (44, 58, 104), (84, 56, 38), (74, 82, 84)
+EYE = (250, 250, 250)
 PAINTS = (SKIN, TUNIC, TROUSERS, BOOTS)
 FACTOR = (0.72, 0.70, 0.80)
 # centre and half size of every part, x and y; its paint

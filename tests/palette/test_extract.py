@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.palette.pictures import as_set, block, soft_stripes
+from tests.palette.pictures import as_set, block, opaque, ramp, soft_stripes
 from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import NAMED, name_of
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette
 from toonset.palette.paints.histogram import count_pixels
-from toonset.palette.pixels.labels import label_pixels, nearest_colors
 
 FINE = 8
 COLORS = np.array(
@@ -23,8 +22,8 @@ COLORS = np.array(
 )
 
 
-def flat_drawing(size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a soft-edged RGBA figure, its exact labels (255 = mixed), and its colours' areas."""
+def flat_drawing(size: int = 96) -> tuple[np.ndarray, np.ndarray]:
+    """Return a soft-edged RGBA figure and its colours' areas."""
     fine = np.full((size * FINE, size * FINE), 255, dtype=np.uint8)
     center = size * FINE // 2
     cv2.circle(fine, (center, center), int(0.46 * size * FINE), 4, -1)  # the contour
@@ -39,14 +38,11 @@ def flat_drawing(size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rgb = (soft[..., :3] * soft[..., 3:]).sum(axis=(1, 3)) / np.maximum(
         soft[..., 3:].sum(axis=(1, 3)), 1
     )
-    blocks = fine.reshape(size, FINE, size, FINE).transpose(0, 2, 1, 3).reshape(size, size, -1)
-    pure = (blocks == blocks[..., :1]).all(axis=2)
-    labels = np.where(pure, blocks[..., 0], 255).astype(np.uint8)
     areas = np.bincount(fine[fine < 255], minlength=5) / (fine < 255).sum()
-    return np.rint(np.dstack([rgb, alpha])).astype(np.uint8), labels, areas
+    return np.rint(np.dstack([rgb, alpha])).astype(np.uint8), areas
 
 
-RGBA, LABELS, AREAS = flat_drawing()
+RGBA, AREAS = flat_drawing()
 
 
 def test_a_flat_drawing_gives_exactly_its_colours() -> None:
@@ -59,17 +55,6 @@ def test_a_flat_drawing_gives_exactly_its_colours() -> None:
     assert palette.warnings == ()
 
 
-def test_labels_equal_the_truth_on_flat_pixels() -> None:
-    found = label_pixels(RGBA, COLORS)
-    labelled = found != 255
-    assert np.array_equal(found[labelled & (LABELS != 255)], LABELS[labelled & (LABELS != 255)])
-    assert labelled[LABELS != 255].mean() > 0.98  # flat pixels that were taken for mixtures
-    inside = (LABELS == 255) & (RGBA[..., 3] == 255)
-    assert inside.sum() > 150
-    assert labelled[inside].mean() < 0.2  # mixtures that were given a label
-    assert not labelled[RGBA[..., 3] < 250].any()
-
-
 def test_palette_is_blind_to_order_orientation_and_repetition() -> None:
     other = np.ascontiguousarray(RGBA[10:, 5:80])
     palette = find_palette([RGBA, other])
@@ -79,14 +64,7 @@ def test_palette_is_blind_to_order_orientation_and_repetition() -> None:
     assert as_set(find_palette(big)) == as_set(palette)
 
 
-def test_labels_turn_with_the_picture() -> None:
-    assert np.array_equal(label_pixels(RGBA[:, ::-1], COLORS), label_pixels(RGBA, COLORS)[:, ::-1])
-
-
-def test_a_gradient_is_one_colour_and_two_paints_stay_two() -> None:
-    ramp = np.linspace(0.8, 1.0, 200)[None, :, None] * [210, 60, 50] * np.ones((40, 1, 1))
-    ramp = np.dstack([np.rint(ramp), np.full((40, 200), 255)]).astype(np.uint8)
-    assert len(find_palette([ramp]).colors) == 1
+def test_two_paints_stay_two() -> None:
     base, shadow = (214, 120, 80), (160, 80, 60)
     assert as_set(find_palette([block((base, 60), (shadow, 40))])) == {base, shadow}
 
@@ -107,14 +85,6 @@ def test_jpeg_noise_does_not_shatter_colours(quality: int) -> None:
         assert near_black or np.linalg.norm(away, axis=1).min() < 0.02
 
 
-def test_nearest_is_the_brute_force_nearest() -> None:
-    rng = np.random.default_rng(3)
-    colors = rng.integers(0, 256, (500, 3), dtype=np.uint8)
-    palette = rng.integers(0, 256, (17, 3), dtype=np.uint8)
-    slow = ((colors[:, None].astype(int) - palette) ** 2).sum(axis=2).argmin(axis=1)
-    assert np.array_equal(nearest_colors(colors, palette), slow)
-
-
 def test_oklab_of_known_colours() -> None:
     # Source: B. Ottosson's table and the CSS Color 4 samples
     rgb = np.array([(255, 255, 255), (0, 0, 0), (255, 0, 0), (0, 0, 255)], dtype=np.uint8)
@@ -123,13 +93,15 @@ def test_oklab_of_known_colours() -> None:
 
 
 def test_names_name_themselves() -> None:
-    for name, rgb in NAMED.items():
-        assert name_of(rgb) == name
-    assert name_of((12, 9, 11)) == "black"
-    assert name_of((36, 28, 48)) == "dark purple"
-    assert name_of((27, 25, 43)) == "dark blue"
-    assert name_of((42, 42, 42)) == "dark charcoal"
-    assert name_of((228, 30, 30)) == "red"
+    assert all(name_of(rgb) == name for name, rgb in NAMED.items())
+    names = {
+        (12, 9, 11): "black",
+        (36, 28, 48): "dark purple",
+        (27, 25, 43): "dark blue",
+        (42, 42, 42): "dark charcoal",
+        (228, 30, 30): "red",
+    }
+    assert {rgb: name_of(rgb) for rgb in names} == names
 
 
 def test_counts_are_the_pixels() -> None:
@@ -169,27 +141,22 @@ def test_near_shades_merge_and_near_paints_do_not() -> None:
 @pytest.mark.parametrize("low", [0.8, 0.4])
 def test_long_gradients_are_one_colour(low: float) -> None:
     for color in ((210, 60, 50), (90, 200, 120), (240, 220, 90)):
-        ramp = np.linspace(low, 1.0, 300)[None, :, None] * np.array(color) * np.ones((40, 1, 1))
-        rgba = np.dstack([np.rint(ramp), np.full((40, 300), 255)]).astype(np.uint8)
-        assert len(find_palette([rgba]).colors) == 1, color
+        assert len(find_palette([ramp(low, color)]).colors) == 1, color
 
 
-def test_a_paint_of_very_different_shades_is_said() -> None:
-    for low, count in ((0.7, 0), (0.0, 1)):
-        ramp = np.linspace(low, 1.0, 300)[None, :, None] * [240, 225, 190] * np.ones((40, 1, 1))
-        shaded = np.dstack([np.rint(ramp), np.full((40, 300), 255)]).astype(np.uint8)
-        palette = find_palette([shaded])
-        assert len(palette.colors) == 1
-        assert len(palette.warnings) == count, low
-    assert "stands for very different shades" in palette.warnings[0]
+@pytest.mark.parametrize(("low", "count"), [(0.7, 0), (0.0, 1)])
+def test_a_paint_of_very_different_shades_is_said(low: float, count: int) -> None:
+    palette = find_palette([ramp(low, (240, 225, 190))])
+    assert len(palette.colors) == 1
+    assert len(palette.warnings) == count
+    assert all("stands for very different shades" in said for said in palette.warnings)
 
 
 def test_thin_soft_lines_give_their_pure_ink() -> None:
-    rgb = np.full((80, 80, 3), (230, 180, 60), dtype=np.uint8)
+    rgb = np.full((80, 80, 3), (230, 180, 60))
     for x in range(6, 78, 6):  # 1.5 px wide: a core, and half of it beside
         rgb[:, x], rgb[:, x + 1] = (10, 10, 10), (120, 95, 35)
-    palette = find_palette([np.dstack([rgb, np.full((80, 80), 255, np.uint8)])])
-    assert as_set(palette) == {(230, 180, 60), (10, 10, 10)}
+    assert as_set(find_palette([opaque(rgb)])) == {(230, 180, 60), (10, 10, 10)}
 
 
 def test_extcolors_is_the_library() -> None:

@@ -9,7 +9,6 @@ import pytest
 from tests.palette.shaded import EYE, FACTOR, PAINTS, TUNIC, Drawing, drawings
 from toonset.errors import PaletteError
 from toonset.palette.extract import PaintMap, extract_palette, paint_maps
-from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
@@ -63,13 +62,8 @@ def test_recolouring_back_restores() -> None:
     palette, maps, contours = found(drawn)
     colors = palette.rgb
     colors[index_of(palette, TUNIC)] = GREEN
-    changed = replace(
-        palette,
-        colors=tuple(
-            replace(color, rgb=tuple(rgb))
-            for color, rgb in zip(palette.colors, colors.tolist(), strict=True)
-        ),
-    )
+    pairs = zip(palette.colors, colors.tolist(), strict=True)
+    changed = replace(palette, colors=tuple(replace(one, rgb=tuple(rgb)) for one, rgb in pairs))
     for one, paint, contour in zip(drawn, maps, contours, strict=True):
         new = recolor_drawing(one.rgba, paint, contour, palette, colors)
         back = recolor_drawing(new, paint, contour, changed, palette.rgb)
@@ -111,20 +105,14 @@ def test_a_shadow_of_a_new_colour_stays_within_8_bits() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("changes", "words"),
     [
-        ("teal", "OLD=NEW is needed"),
-        ("#123456=#ffffff", "the palette has #e2b28c"),
-        ("#e2b28c=blueish", "is no colour"),
+        (["teal"], "OLD=NEW is needed"),
+        (["#123456=#ffffff"], "the palette has #e2b28c"),
+        (["#e2b28c=blueish"], "is no colour"),
+        (["#e2b28c=#111111", "#e2b28c=#222222"], "#e2b28c is replaced twice; drop one"),
     ],
 )
-def test_a_change_that_means_nothing_is_refused(change: str, words: str) -> None:
+def test_a_change_that_means_nothing_is_refused(changes: list[str], words: str) -> None:
     with pytest.raises(PaletteError, match=words):
-        change_colors(np.array(PAINTS, dtype=np.uint8), [change])
-
-
-def test_a_colour_is_replaced_once() -> None:
-    colors = np.array(PAINTS, dtype=np.uint8)
-    first = hex_of(tuple(colors[0].tolist()))
-    with pytest.raises(PaletteError, match=f"{first} is replaced twice; drop one"):
-        change_colors(colors, [f"{first}=#111111", f"{first}=#222222"])
+        changed_colors(np.array(PAINTS, dtype=np.uint8), changes)

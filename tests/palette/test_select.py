@@ -1,9 +1,11 @@
 """Palettes: which colours the rule keeps, what is kept on request, and what is said of the rest."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
-from tests.palette.pictures import as_set, block, soft_stripes
+from tests.palette.pictures import as_set, block, ramp, soft_stripes
 from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.paints.extract import find_palette, pick_palette
@@ -21,11 +23,9 @@ def test_the_five_percent_rule_and_what_it_costs() -> None:
     (dropped,) = palette.dropped
     assert dropped.rgb == blue
     assert dropped.share == pytest.approx(0.04)
-    away = oklab_from_rgb(np.array([blue, red, green], dtype=np.uint8))
-    nearest = 1 + int(
-        nearest_colors(np.array([blue], np.uint8), np.array([red, green], np.uint8))[0]
-    )
-    assert dropped.cost == pytest.approx(float(np.linalg.norm(away[0] - away[nearest])))
+    lab = oklab_from_rgb(np.array([blue, red, green], dtype=np.uint8))
+    nearest = nearest_colors(np.array([blue], np.uint8), np.array([red, green], np.uint8))[0]
+    assert dropped.cost == pytest.approx(float(np.linalg.norm(lab[0] - lab[1 + nearest])))
     assert len(find_palette([picture], PaletteOptions(min_share=0.03)).colors) == 3
 
 
@@ -55,19 +55,23 @@ def test_hand_picked_colours_keep_their_order_and_say_their_share() -> None:
     assert palette.warnings == ("no pixel is nearest to #00ff00",)
 
 
-def test_nothing_to_see_is_an_error() -> None:
-    with pytest.raises(PaletteError, match="no picture given"):
-        find_palette([])
-    with pytest.raises(PaletteError, match="no opaque pixel"):
-        find_palette([np.zeros((9, 9, 4), dtype=np.uint8)])
-    with pytest.raises(PaletteError, match="--min-share: 5 is no share; give 0 to 1"):
-        PaletteOptions(min_share=5.0)
-    with pytest.raises(PaletteError, match="--max-colors: 0 colours; 1 to 255 are possible"):
-        PaletteOptions(max_colors=0)
-    with pytest.raises(PaletteError, match="0 colours; 1 to 255 are needed"):
-        Palette((), "none")
-    with pytest.raises(PaletteError, match="256 colours; 1 to 255 are needed"):
-        Palette(tuple(PaletteColor((0, 0, i), 0.0, "x") for i in range(256)), "many")
+BLACK = PaletteColor((0, 0, 0), 0.0, "black")
+
+
+@pytest.mark.parametrize(
+    ("work", "said"),
+    [
+        (lambda: find_palette([]), "no picture given"),
+        (lambda: find_palette([np.zeros((9, 9, 4), dtype=np.uint8)]), "no opaque pixel"),
+        (lambda: PaletteOptions(min_share=5.0), "--min-share: 5 is no share; give 0 to 1"),
+        (lambda: PaletteOptions(max_colors=0), "--max-colors: 0 colours; 1 to 255 are possible"),
+        (lambda: Palette((), "none"), "0 colours; 1 to 255 are needed"),
+        (lambda: Palette((BLACK,) * 256, "many"), "256 colours; 1 to 255 are needed"),
+    ],
+)
+def test_nothing_to_see_is_an_error(work: Callable[[], object], said: str) -> None:
+    with pytest.raises(PaletteError, match=said):
+        work()
 
 
 def test_evidence_says_what_one_colour_less_would_cost() -> None:
@@ -120,8 +124,7 @@ def test_a_found_palette_picked_by_hand_has_the_same_shares() -> None:
 
 
 def test_shades_stay_with_their_paint_and_what_is_left_out_goes_to_the_nearest() -> None:
-    ramp = np.linspace(0.55, 1.0, 200)[None, :, None] * [210, 60, 50] * np.ones((40, 1, 1))
-    shaded = np.dstack([np.rint(ramp), np.full((40, 200), 255)]).astype(np.uint8)
+    shaded = ramp(0.55, (210, 60, 50), 200)
     dark, blue = (100, 20, 50), (20, 60, 180)  # the dark one is nearest to some shades
     rgba = np.concatenate([shaded, block((dark, 60), (blue, 5))], axis=1)
     found = find_palette([rgba])

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from bench.palette.cases import palette_cases, random_paints
-from tests.palette.pictures import as_set, block, soft_stripes
+from tests.palette.pictures import as_set, block, opaque, soft_stripes
 from toonset.cli.common.palette_text import palette_lines
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.paints.extract import LEAST_LISTED, find_palette
@@ -92,10 +92,8 @@ def test_near_equal_colours_of_a_jpeg_are_listed() -> None:
 def test_gradients_and_noise_have_no_near_equal_colours(levels: int) -> None:
     rng = np.random.default_rng(levels)
     ramp = (200 + np.arange(240) * levels // 240)[None, :, None] * np.ones((40, 1, 3))
-    noisy = 200 + rng.normal(0, levels / 8, ramp.shape)
-    for picture in (ramp, noisy):
-        rgba = np.dstack([np.rint(picture), np.full(ramp.shape[:2], 255)]).astype(np.uint8)
-        assert listed(find_palette([rgba])) == []
+    for picture in (ramp, 200 + rng.normal(0, levels / 8, ramp.shape)):
+        assert listed(find_palette([opaque(picture)])) == []
 
 
 def test_the_ends_of_an_uneven_gradient_are_no_near_equal_colours() -> None:
@@ -172,7 +170,7 @@ def test_patches_are_what_squares_fit_into() -> None:
     for px, density in ((1, 0.05), (1, 0.75), (2, 0.4), (2, 0.75), (3, 0.75)):
         mask = rng.random((24, 30)) < density
         rgb = np.where(mask[..., None], np.array([200, 30, 40]), np.array([20, 60, 180]))
-        histogram = count_pixels([np.dstack([rgb, np.full(mask.shape, 255)]).astype(np.uint8)])
+        histogram = count_pixels([opaque(rgb)])
         red = np.flatnonzero(histogram.colors[:, 0] == 200)
         slow = np.zeros(mask.shape, dtype=bool)
         for y in range(24 - px + 1):
@@ -214,18 +212,18 @@ def test_spots_too_small_to_show_their_colour_are_warned_of(radius: float) -> No
     assert "draw the sheet larger" in warning
 
 
-def test_a_single_small_spot_may_be_a_slip() -> None:
-    assert not find_palette([with_dots(EYE, (50.3, 20.2), radius=0.8)]).warnings
-
-
-def test_small_spots_of_a_paint_are_no_unknown_colour() -> None:
-    palette = find_palette([with_dots(SHIRT, (50.3, 20.2), (80.4, 20.6), radius=0.8)])
-    assert not palette.warnings
-
-
-def test_small_spots_across_a_border_are_blends() -> None:
-    soft = with_dots(SKIN, (199.7, 10.0), (200.4, 30.3), radius=0.8)
-    assert not find_palette([soft]).warnings
+@pytest.mark.parametrize(
+    ("color", "at"),
+    [
+        (EYE, [(50.3, 20.2)]),  # alone: perhaps a slip
+        (SHIRT, [(50.3, 20.2), (80.4, 20.6)]),  # a paint
+        (SKIN, [(199.7, 10.0), (200.4, 30.3)]),  # blends, across a border
+    ],
+)
+def test_small_spots_of_no_unknown_colour_are_not_warned_of(
+    color: tuple[int, int, int], at: list[tuple[float, float]]
+) -> None:
+    assert not find_palette([with_dots(color, *at, radius=0.8)]).warnings
 
 
 def test_spots_that_a_line_surrounds_are_blends_of_three() -> None:

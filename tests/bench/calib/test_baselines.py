@@ -10,23 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.calib.baselines import (
-    LANDMARKS,
-    boxed,
-    by_landmarks,
-    nominal_rotations,
-    solved,
-    spread_vertices,
-    track,
-    tracked,
-)
+from bench.calib.baselines import boxed, by_landmarks, solved, track, tracked
 from bench.calib.figures import sheet_records
 from bench.calib.measure import measured_baseline
 from bench.cases.bodies import random_body
 from bench.cases.cases import CalibCase
 from bench.records.record import Recorder
 from toonset.calib.outline.occluding_contour import silhouette_mask
-from toonset.camera import Camera, rotation_distance, rotation_from_angles
+from toonset.camera import Camera, rotation_distance
 from toonset.view import View
 
 BODY = random_body(4)  # with a bag at one side
@@ -74,6 +65,8 @@ def errors_deg(rotations, truth: np.ndarray) -> list[float]:
 def test_landmarks_without_noise_give_the_exact_rotation(case: CalibCase) -> None:
     placed = by_landmarks(case, 1, noise=0.0)
     assert max(errors_deg(placed, case.rotations)) < 0.01
+    for points in (np.zeros((12, 3)), np.full((12, 3), np.nan)):  # landmarks that say nothing
+        assert solved(points, np.zeros((12, 2)), np.diag([1000.0, 1000.0, 1.0])) is None
 
 
 def test_worse_clicks_give_worse_rotations_and_seeds_others(case: CalibCase) -> None:
@@ -92,24 +85,6 @@ def test_landmarks_of_another_body_are_clicked_where_it_was_drawn(case: CalibCas
     optimistic = by_landmarks(replace(case, mesh=other, drawn=None), 1, noise=0.0)
     assert np.mean(errors_deg(informed, case.rotations)) > 1
     assert max(errors_deg(optimistic, case.rotations)) < 0.01
-
-
-def test_landmarks_are_spread() -> None:
-    def closest(chosen: np.ndarray) -> float:
-        points = BODY.vertices[chosen]
-        apart = np.linalg.norm(points[:, None] - points, axis=-1)
-        return float(apart[~np.eye(len(points), dtype=bool)].min())
-
-    rng = np.random.default_rng(0)
-    chosen = spread_vertices(BODY, LANDMARKS, rng)
-    anyhow = [rng.choice(len(BODY.vertices), LANDMARKS, replace=False) for _ in range(50)]
-    assert len(set(chosen)) == LANDMARKS
-    assert closest(chosen) > 2 * max(map(closest, anyhow))
-
-
-@pytest.mark.parametrize("points", [np.zeros((12, 3)), np.full((12, 3), np.nan)])
-def test_landmarks_that_say_nothing_give_no_rotation(points: np.ndarray) -> None:
-    assert solved(points, np.zeros((12, 2)), np.diag([1000.0, 1000.0, 1.0])) is None
 
 
 # ---- the start from the figure's box, and the tracker
@@ -163,8 +138,3 @@ def test_a_lost_view_stays_in_the_sheet(case: CalibCase) -> None:
     views = (case.views[0], blank, case.views[2])
     placed = tracked(replace(case, views=views), 0)
     assert [rotation is None for rotation in placed] == [False, True, False]
-
-
-def test_nominal_angles_are_even_turns() -> None:
-    expected = [rotation_from_angles(turn, math.radians(5), 0) for turn in (0, math.pi)]
-    np.testing.assert_allclose(nominal_rotations(2), expected, atol=1e-12)

@@ -125,24 +125,3 @@ def test_sprites_that_do_not_say_their_yaws_are_refused(tmp_path: Path, info: ob
     (tmp_path / "cat" / "info.json").write_text(json.dumps(info))
     with pytest.raises(BundleError, match="yaw_deg"):
         list(sprite_cases(tmp_path))
-
-
-def test_the_command_draws_a_chart_of_what_is_measured_in_degrees(
-    bench, sprites, tmp_path, monkeypatch
-):
-    out = tmp_path / "out"
-    found = calibration_at(1, 88, 180, 9)
-    for name in ("find_cameras", "calibrate_without_body"):
-        monkeypatch.setattr(f"bench.cases.sprites.{name}", lambda *_, **__: found)
-    command = ("calib", "--sprites", sprites, "--quiet", "-o", out)
-    done = bench(*command, "--only", "exact")
-    assert done.code == 0, done
-    assert "right %" in done.out
-    assert {p.name for p in out.iterdir()} == {
-        "records.json",
-        "report.html",
-        *(f"chart-rendered-sprites-own-mesh.{form}" for form in ("png", "svg", "csv")),
-    }
-    records = json.loads((out / "records.json").read_text())
-    assert {r["method"] for r in records} == METHODS
-    assert "'dog'" in bench(*command, "--force", "--only", "dog").reason

@@ -14,6 +14,7 @@ from bench.cases.cases import TrainCase
 from bench.train.measure import in_order, records_of, run_jobs, table_of
 from bench.train.plan import METHODS, NEAREST, SCOPES, Job, Method, Scope, plan, subset, view_counts
 from bench.train.run import Look, RunResult
+from tests.nerf.ellipsoids import first_hit
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.options import TrainOptions
@@ -27,14 +28,9 @@ QUICK = TrainOptions(device="cpu", carve=False, field="triplane", register=False
 def ball(yaw: float, side: int, name: str) -> Frame:
     """Return a red ball with a blue right half, 2 units wide, drawn from `yaw`."""
     camera = Camera.looking_at(np.zeros(3), yaw, 0.1, side / 3, (side, side), k=0.0)
-    pixel = camera.pixel_grid().reshape(-1, 2)
-    origins, directions = camera.rays(pixel)
-    b, c = (origins * directions).sum(-1), (origins**2).sum(-1) - 1
-    hit = b * b > c
-    point = origins + (-b - np.sqrt(np.maximum(b * b - c, 0)))[:, None] * directions
-    rgba = np.zeros((side * side, 4), dtype=np.uint8)
-    rgba[hit] = np.where(point[hit, :1] > 0, (40, 60, 200, 255), (200, 40, 40, 255))
-    return Frame(name, camera, rgba.reshape(side, side, 4))
+    which, points = first_hit(camera, [(np.zeros(3), np.ones(3))])
+    colors = np.where(points[..., :1] > 0, (40, 60, 200, 255), (200, 40, 40, 255))
+    return Frame(name, camera, np.where(which[..., None] == 0, colors, 0).astype(np.uint8))
 
 
 def case(name: str = "ball-exact", views: int = 8, side: int = 32) -> TrainCase:

@@ -85,21 +85,6 @@ def test_hull_of_a_ball_has_its_place_and_size(radius: float, k: float) -> None:
     assert 0.99 < volume < 1.2  # a hull holds the body, and 16 views leave little more
 
 
-def test_hull_of_a_box_is_the_box() -> None:
-    half = np.array([0.5, 1.0, 0.25])
-    cameras = [Camera.looking_at(np.zeros(3), yaw, 0.0, 24.0, (64, 64)) for yaw in (0, np.pi / 2)]
-    alphas = []
-    for width in (half[0], half[2]):
-        u, v = np.moveaxis(cameras[0].pixel_grid() - 32, -1, 0) / 24.0
-        mask = (np.abs(u) < width) & (np.abs(v) < half[1])
-        alphas.append(torch.as_tensor(mask.astype(np.float32)))
-    hull = carve(cameras, alphas, 96, 0)
-    cells = np.argwhere(hull.inside.numpy())
-    low, high = cells.min(axis=0), cells.max(axis=0) + 1
-    np.testing.assert_allclose(hull.low + hull.voxel * low, -half, atol=0.05)
-    np.testing.assert_allclose(hull.low + hull.voxel * high, half, atol=0.05)
-
-
 def test_evidence_tolerates_one_wrong_view_only_where_there_is_one() -> None:
     cameras, alphas = ball_views(np.zeros(3), 1.0, 12, 0.0)
     assert choose_missing(cameras, alphas).missing == 0
@@ -107,19 +92,15 @@ def test_evidence_tolerates_one_wrong_view_only_where_there_is_one() -> None:
     assert choose_missing(cameras, wrong).missing == 1
 
 
-def test_cameras_along_one_line_are_refused() -> None:
-    cameras, alphas = ball_views(np.zeros(3), 1.0, 4, 0.0)
-    with pytest.raises(BundleError, match="one line"):
-        box_of_masks([cameras[0]] * 3, [alphas[0].numpy() > 0.5] * 3)
-
-
-def test_masks_that_share_nothing_are_refused() -> None:
+def test_masks_that_share_nothing_and_cameras_along_one_line_are_refused() -> None:
     cameras, alphas = ball_views(np.zeros(3), 1.0, 6, 0.0)
     apart = [a.clone() for a in alphas]
     for i, alpha in enumerate(apart):  # heads here, feet there
         alpha[slice(20, None) if i % 2 else slice(None, 44)] = 0
     with pytest.raises(BundleError, match="share no volume"):
         carve(cameras, apart, 32, 0)
+    with pytest.raises(BundleError, match="one line"):
+        box_of_masks([cameras[0]] * 3, [alphas[0].numpy() > 0.5] * 3)
 
 
 @pytest.mark.parametrize("level", [EDGE, LEVEL])
@@ -146,9 +127,8 @@ def test_march_finds_the_same_samples_as_testing_every_step(k: float, level: flo
 @pytest.mark.parametrize("most", [1, 5, 24])
 def test_the_first_samples_are_those_of_the_whole_ray(most: int) -> None:
     x, y, z = torch.meshgrid(*(torch.arange(n) * 0.06 - 1.17 for n in (40, 40, 100)), indexing="ij")
-    apart = 1.2 - (
-        x**2 + y**2 + torch.minimum(z.square(), (3.6 - z).square())
-    )  # two balls, one behind another
+    along = torch.minimum(z.square(), (3.6 - z).square())  # two balls, one behind another
+    apart = 1.2 - (x**2 + y**2 + along)
     both = Hull(np.full(3, -1.2), 0.06, apart.clamp(0, 1))
     camera = Camera.looking_at(np.array([0.0, 0.0, 1.8]), 0.05, 0.02, 12.0, (48, 48), k=0.05)
     rays = rays_of(camera, camera.pixel_grid().reshape(-1, 2), both)
@@ -157,14 +137,6 @@ def test_the_first_samples_are_those_of_the_whole_ray(most: int) -> None:
     assert 0 < int(kept.sum()) < len(every.ray)
     for name in ("points", "ray", "order", "distance", "support"):
         torch.testing.assert_close(getattr(few, name), getattr(every, name)[kept])
-
-
-def test_rays_that_all_miss_have_no_samples() -> None:
-    cameras, alphas = ball_views(np.zeros(3), 1.0, 6, 0.0)
-    hull = carve(cameras, alphas, 40, 0)
-    rays = rays_of(cameras[0], np.zeros((0, 2)), hull)
-    samples = march(rays, hull, hull.voxel, 8)
-    assert len(samples.ray) == len(samples.points) == samples.rays == 0
 
 
 def test_pixels_left_out_certainly_miss() -> None:
@@ -178,6 +150,8 @@ def test_pixels_left_out_certainly_miss() -> None:
     assert hit.any()
     assert near.reshape(-1)[hit].all()
     assert near.mean() < 0.6  # else the test above proves nothing
+    nothing = march(rays_of(camera, np.zeros((0, 2)), hull), hull, hull.voxel, 8)
+    assert len(nothing.ray) == len(nothing.points) == nothing.rays == 0
 
 
 def test_support_is_zero_outside_and_exact_at_centres() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tests.nerf.bodies import Hand, body, camera_at, depths, moved, ring, sheet
+from tests.nerf.bodies import Hand, body, camera_at, depths, moved, own_shape, ring, sheet
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
 from toonset.nerf.hull import mannequin_shape
@@ -40,6 +40,8 @@ def test_what_no_picture_holds_is_left_out() -> None:
     assert len(shape_of(both, ring()).faces) == len(mesh.faces)
     with pytest.raises(MeshError, match="none of the pictures"):
         shape_of(below, ring())
+    with pytest.raises(MeshError, match="smaller than a pixel"):  # a mesh in other units
+        shape_of(replace(mesh, vertices=mesh.vertices / 1000), ring())
 
 
 def test_fine_meshes_get_a_coarser_grid(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,15 +63,6 @@ def test_a_camera_sees_its_outline_between_pixels_and_its_depth_at_them(k: float
     finer = np.isfinite(depths(mesh, camera.resized(FINER)))
     assert sight.alpha.sum() == pytest.approx(finer.sum() / FINER**2, rel=0.01)
     assert np.all(sight.normal[both][:, 2] <= 1e-6)
-
-
-def test_the_box_holds_all_that_is_seen() -> None:
-    shape = shape_of(body(), ring())
-    camera = camera_at(0.4)
-    rows, columns = shape.box(camera) or (slice(0), slice(0))
-    alpha = shape.seen(camera).alpha
-    assert alpha[rows, columns].sum() == alpha.sum()
-    assert shape.box(camera.moved((10_000, 0), (50, 50))) is None
 
 
 @pytest.mark.parametrize("holes", [False, True])
@@ -95,7 +88,7 @@ def test_a_sheet_without_thickness_is_there() -> None:
 @pytest.mark.parametrize("bend", [0.0, 0.008])
 def test_the_drawn_body_is_recognised(bend: float) -> None:
     scene = sheet(body(), Hand(bend=bend))
-    fit = mannequin_fit(scene, shape_of(body(), ring()))
+    fit = mannequin_fit(scene, own_shape())
     assert fit is not None
     assert fit.chosen
     assert fit.drawings is not None
@@ -117,7 +110,7 @@ def test_a_hull_that_predicts_better_wins() -> None:
 
 
 def test_outlines_outside_of_the_shape_are_seen_there() -> None:
-    shape, camera = shape_of(body(), ring()), camera_at(0.4)
+    shape, camera = own_shape(), camera_at(0.4)
     beyond = replace(shape, beyond=2 / camera.scale)
     inner, outer = shape.seen(camera), beyond.seen(camera)
     away = cv2.distanceTransform((inner.alpha < 0.5).astype(np.uint8), cv2.DIST_L2, 5)
@@ -125,19 +118,20 @@ def test_outlines_outside_of_the_shape_are_seen_there() -> None:
     assert np.all(outer.alpha[away >= 3.5] == 0)
     both = np.isfinite(inner.depth)
     np.testing.assert_array_equal(outer.depth[both], inner.depth[both])
-    rows, columns = beyond.box(camera) or (slice(0), slice(0))
-    assert outer.alpha[rows, columns].sum() == pytest.approx(outer.alpha.sum(), rel=1e-6)
+    for one, sight in ((shape, inner), (beyond, outer)):
+        rows, columns = one.box(camera) or (slice(0), slice(0))
+        assert sight.alpha[rows, columns].sum() == pytest.approx(sight.alpha.sum(), rel=1e-6)
+    assert shape.box(camera.moved((10_000, 0), (50, 50))) is None
     wider = hull_of_shape(beyond, 0.02).inside.sum() / hull_of_shape(shape, 0.02).inside.sum()
     assert 1.05 < float(wider) < 1.25
 
 
 def test_two_drawings_and_unseen_mannequins_say_nothing() -> None:
-    assert mannequin_fit(sheet(body(), views=2), shape_of(body(), ring())) is None
-    aside = shape_of(body(), ring())
+    assert mannequin_fit(sheet(body(), views=2), own_shape()) is None
     cut = [
         replace(f, camera=f.camera.moved((400, 0), f.camera.size_wh)) for f in sheet(body()).frames
     ]
-    assert mannequin_fit(replace(sheet(body()), frames=tuple(cut)), aside) is None
+    assert mannequin_fit(replace(sheet(body()), frames=tuple(cut)), own_shape()) is None
 
 
 def test_a_speck_among_the_drawings_is_no_outline() -> None:
@@ -145,7 +139,7 @@ def test_a_speck_among_the_drawings_is_no_outline() -> None:
     speck = np.zeros_like(scene.frames[0].rgba)
     speck[74:77, 74:77] = 255
     frames = (replace(scene.frames[0], rgba=speck), *scene.frames[1:])
-    fit = mannequin_fit(replace(scene, frames=frames), shape_of(body(), ring()))
+    fit = mannequin_fit(replace(scene, frames=frames), own_shape())
     assert fit is not None
     assert np.isfinite([fit.mannequin, fit.drawings or 0.0]).all()
 
@@ -172,9 +166,3 @@ def test_very_fine_meshes_keep_their_place() -> None:
     assert (np.isfinite(exact) ^ np.isfinite(seen)).sum() < 400
     both = np.isfinite(exact) & np.isfinite(seen)
     assert np.sqrt(np.mean((exact - seen)[both] ** 2)) * camera.scale < 0.5
-
-
-def test_a_mesh_in_other_units_is_refused() -> None:
-    tiny = replace(body(), vertices=body().vertices / 1000)
-    with pytest.raises(MeshError, match="smaller than a pixel"):
-        shape_of(tiny, ring())

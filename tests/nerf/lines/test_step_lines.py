@@ -5,8 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.nerf.bodies import FINE, HEIGHT, LINE_PX, STEPS, Hand, body, depths, ring, sheet
-from toonset.nerf.hull.mannequin_shape import FINER, shape_of
+from tests.nerf.bodies import (
+    FINE,
+    HEIGHT,
+    LINE_PX,
+    STEPS,
+    Hand,
+    body,
+    depths,
+    own_shape,
+    ring,
+    sheet,
+)
+from toonset.nerf.hull.mannequin_shape import FINER
 from toonset.nerf.lines.step_lines import (
     StepLines,
     draw_steps,
@@ -35,12 +46,8 @@ def test_steps_are_found_whatever_the_slope(slope: float, turned: bool) -> None:
     assert near[5:-5, 29].all()
     assert far[5:-5, 30].all()
     assert near.sum() + far.sum() == near[:, 29].sum() + far[:, 30].sum()
-    for side in step_sides(stair(0.03, slope), 0.05):
-        assert not side.any()
-
-
-def test_steps_down_are_steps() -> None:
-    near, far = step_sides(-stair(0.1), 0.05)
+    assert not np.any(step_sides(stair(0.03, slope), 0.05))
+    near, far = step_sides(-stair(0.1), 0.05)  # a step down
     assert near[5:-5, 30].all()
     assert far[5:-5, 29].all()
 
@@ -74,11 +81,13 @@ def test_lines_are_as_wide_as_told_on_either_side(scale: float) -> None:
     assert not draw_steps(fine, StepLines(0.2, 2.0, 1.0), 1.0, 3, scale).any()
 
 
+def covers_and_depths(hand: Hand) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    covers = [find_contour(f.rgba, LINE_PX) / 255.0 for f in sheet(body(), hand).frames]
+    return covers, [depths(body(), camera) for camera in ring()]
+
+
 def test_the_rule_of_a_sheet_is_learned() -> None:
-    scene = sheet(body(), Hand())
-    covers = [find_contour(frame.rgba, LINE_PX) / 255.0 for frame in scene.frames]
-    seen = [depths(body(), camera) for camera in ring()]
-    found = learn_steps(covers, seen, HEIGHT, LINE_PX)
+    found = learned_steps(*covers_and_depths(Hand()), HEIGHT, LINE_PX)
     assert found is not None
     assert found.least <= STEPS.least * 1.2
     assert found.width_px == pytest.approx(STEPS.width_px, abs=0.8)
@@ -86,20 +95,17 @@ def test_the_rule_of_a_sheet_is_learned() -> None:
 
 
 def test_an_artist_who_draws_no_steps_has_no_rule() -> None:
-    scene = sheet(body(), Hand(lines=False))
-    seen = [depths(body(), camera) for camera in ring()]
-    covers = [find_contour(frame.rgba, LINE_PX) / 255.0 for frame in scene.frames]
-    assert learn_steps(covers, seen, HEIGHT, LINE_PX) is None
-    assert learn_steps(covers, seen, HEIGHT, 0.0) is None
+    covers, seen = covers_and_depths(Hand(lines=False))
+    assert learned_steps(covers, seen, HEIGHT, LINE_PX) is None
+    assert learned_steps(covers, seen, HEIGHT, 0.0) is None
     flat = [np.zeros_like(depth) for depth in seen]
     assert learn_steps(covers, flat, HEIGHT, LINE_PX) is None
 
 
 def test_lines_of_a_shape_are_those_of_the_drawing() -> None:
-    """What was drawn with these lines is drawn with them again."""
     camera = ring()[1]
-    sight = shape_of(body(), ring()).seen(camera)
-    line = draw_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
+    sight = own_shape().seen(camera)
+    line = drawn_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
     exact = depths(body(), camera.resized(FINE))
     truth = draw_steps(exact, STEPS, HEIGHT, FINE, 1.0)
     assert truth.sum() > 20
@@ -108,7 +114,6 @@ def test_lines_of_a_shape_are_those_of_the_drawing() -> None:
 
 @pytest.mark.parametrize("width", [2, 8, 24])
 def test_lines_of_any_width_are_measured(width: int) -> None:
-    """A line about a step, in a large picture."""
     depth = np.broadcast_to(0.2 * (np.arange(400.0) >= 200), (400, 400)).copy()
     depth[:4] = depth[-4:] = np.nan
     cover = np.zeros((400, 400))

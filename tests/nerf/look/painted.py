@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from tests.nerf.ellipsoids import first_hit
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.look.blend import Geometry
@@ -30,12 +31,8 @@ def ring(views: int = 8) -> list[Camera]:
 
 def surface(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Return the world points that pixels show, and which show any."""
-    origins, ways = camera.rays(camera.pixel_grid())
-    o, d = origins / AXES, ways / AXES
-    a, b, c = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
-    inside = b * b - a * c
-    t = (-b - np.sqrt(np.maximum(inside, 0))) / a
-    return origins + t[..., None] * ways, inside > 0
+    which, points = first_hit(camera, [(np.zeros(3), AXES)])
+    return points, which == 0
 
 
 def depth_of(camera: Camera) -> np.ndarray:

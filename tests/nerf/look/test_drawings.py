@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.nerf.look.painted import LINE_PX, camera_at, depth_of, draw, drawings, ring, surface
+from tests.nerf.look.painted import (
+    LINE_PX,
+    PALETTE,
+    camera_at,
+    depth_of,
+    draw,
+    drawings,
+    ring,
+    scene_of,
+    surface,
+)
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.look import drawings as module
+from toonset.nerf.look.build import drawings_of
+from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.outline import crisp_outline, outline_of, without_crumbs
 from toonset.nerf.look.paint_flow import neighbours
 
@@ -22,30 +37,27 @@ def test_the_outlines_width_is_measured() -> None:
 
 def test_a_soft_border_becomes_crisp_and_stays_where_it_is() -> None:
     y, x = np.mgrid[:100, :100] - 49.5
-    away = 30 - np.hypot(x, y)
-    alpha, ink = crisp_outline(1 / (1 + np.exp(-away / 2)), 0.5, 3.0, 60.0)
+    soft = 1 / (1 + np.exp(-(30 - np.hypot(x, y)) / 2))
+    alpha, ink = crisp_outline(soft, 0.5, 3.0, 60.0)
     exact = np.pi * 30**2
     assert alpha.sum() == pytest.approx(exact, rel=0.01)
     assert ((alpha > 0.01) & (alpha < 0.99)).sum() < 4 * np.pi * 30
     assert ink.sum() == pytest.approx(exact - np.pi * 27**2, rel=0.03)
     assert (ink <= alpha).all()
-
-
-def test_a_higher_border_is_a_smaller_figure() -> None:
-    y, x = np.mgrid[:100, :100] - 49.5
-    soft = 1 / (1 + np.exp(-(30 - np.hypot(x, y)) / 2))
     inner, _ = crisp_outline(soft, 0.65, 0.0, 60.0)
     radius = 30 - 2 * np.log(0.65 / 0.35)  # where the coverage is 0.65
     assert inner.sum() == pytest.approx(np.pi * radius**2, rel=0.01)
 
 
-def test_crumbs_and_pinholes_go() -> None:
-    mask = np.zeros((20, 20), dtype=bool)
-    mask[5:15, 5:15] = True
-    whole = mask.copy()
-    mask[10, 10] = False
-    mask[1, 1] = True
-    np.testing.assert_array_equal(without_crumbs(mask, 4), whole)
+def test_crumbs_pinholes_and_holes_go_up_to_their_size() -> None:
+    whole = np.zeros((20, 20), dtype=bool)
+    whole[3:18, 3:18] = True
+    dotted, torn = whole.copy(), whole.copy()
+    dotted[10, 10], dotted[1, 1] = False, True
+    torn[8:11, 8:11] = False
+    np.testing.assert_array_equal(without_crumbs(dotted, 4), whole)
+    np.testing.assert_array_equal(without_crumbs(torn, 4, 10), whole)
+    np.testing.assert_array_equal(without_crumbs(torn, 4), torn)
 
 
 def test_levels_of_depth_come_back_within_half_a_level() -> None:
@@ -58,8 +70,8 @@ def test_levels_of_depth_come_back_within_half_a_level() -> None:
     np.testing.assert_array_equal(module.levels_of(back, (-1.0, 2.0)), levels)
 
 
-def test_a_drawing_shows_its_own_side_only() -> None:
-    egg, camera = drawings(), camera_at(0.6)
+def test_a_drawing_shows_its_own_side_only(egg: Drawings) -> None:
+    camera = camera_at(0.6)
     points, seen = surface(camera)
     front = module.look_up(egg.textures[0], points, 0.05, 4)
     back = module.look_up(egg.textures[4], points, 0.05, 4)
@@ -79,15 +91,15 @@ def test_depth_has_no_mixtures_of_near_and_far() -> None:
     assert np.isfinite(crisp).all()
 
 
-def test_neighbours_follow_each_other_round_the_figure() -> None:
+def test_neighbours_follow_each_other_round_the_figure(egg: Drawings) -> None:
     pairs = {(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 6), (6, 7), (0, 7)}
-    assert set(neighbours(drawings())) == pairs
+    assert set(neighbours(egg)) == pairs
     assert neighbours(drawings(ring(2))) == []  # front and back show nothing in common
     assert neighbours(drawings([camera_at(0.0), camera_at(0.7)])) == [(0, 1)]
 
 
-def test_drawings_that_agree_are_not_floated() -> None:
-    found = next(flow for flow in drawings().flows if flow.pair == (0, 1))
+def test_drawings_that_agree_are_not_floated(egg: Drawings) -> None:
+    found = next(flow for flow in egg.flows if flow.pair == (0, 1))
     eyes = np.array([[[0.22, 0.35, 0.4], [-0.22, 0.35, 0.4]]])  # a belt says nothing across
     assert np.abs(found.at(eyes)).max() < 0.5
 
@@ -95,10 +107,6 @@ def test_drawings_that_agree_are_not_floated() -> None:
 @pytest.mark.parametrize("shift", [(3.0, 0.0), (0.0, -2.0)])
 def test_paint_that_lies_apart_is_found(shift: tuple[float, float]) -> None:
     """The second drawing's paint moved by `shift`: F at the eyes is that."""
-    from tests.nerf.look.painted import PALETTE
-    from toonset.dataset.bundle.scene import Frame, Scene
-    from toonset.nerf.look.build import drawings_of
-
     cameras = [camera_at(-0.2), camera_at(0.2)]
     moved = np.broadcast_to(-np.array(shift), (120, 120, 2))
     frames = (
@@ -115,11 +123,6 @@ def test_paint_that_lies_apart_is_found(shift: tuple[float, float]) -> None:
 
 
 def test_colours_stand_in_for_a_missing_palette() -> None:
-    from dataclasses import replace
-
-    from tests.nerf.look.painted import scene_of
-    from toonset.nerf.look.build import drawings_of
-
     scene = replace(scene_of(ring()), palette=None)
     found = drawings_of(scene, [frame.rgba for frame in scene.frames], depth_of, bent=False)
     assert found is not None
@@ -127,12 +130,3 @@ def test_colours_stand_in_for_a_missing_palette() -> None:
     assert near <= 16
     empty = replace(scene.frames[0], rgba=np.zeros_like(scene.frames[0].rgba))
     assert drawings_of(replace(scene, frames=(empty,)), [empty.rgba], depth_of, bent=False) is None
-
-
-def test_holes_are_closed_up_to_their_own_size() -> None:
-    mask = np.zeros((20, 20), dtype=bool)
-    mask[2:18, 2:18] = True
-    torn = mask.copy()
-    torn[8:11, 8:11] = False
-    np.testing.assert_array_equal(without_crumbs(torn, 4, 10), mask)
-    np.testing.assert_array_equal(without_crumbs(torn, 4), torn)

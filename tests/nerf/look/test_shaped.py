@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from tests.nerf.bodies import ARM, PALETTE, Hand, body, camera_at, depths, drawing, ring, sheet
+from tests.nerf.bodies import ARM, PALETTE, Hand, body, camera_at, depths, drawing, own_shape, sheet
 from toonset.camera import Camera
-from toonset.nerf.hull.mannequin_shape import shape_of
-from toonset.nerf.look.blend import Geometry, blend_view
+from toonset.nerf.look.blend import Geometry, drawn_view
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.outline import Outline
@@ -18,13 +18,14 @@ from toonset.nerf.render.layers import color_picture
 from toonset.nerf.score.metrics import compare
 
 
+@cache
 def drawn(hand: Hand, views: int = 8) -> Drawings:
     scene = sheet(body(), hand, views=views)
     found = drawings_of(
         scene,
         [frame.rgba for frame in scene.frames],
         lambda camera: depths(body(), camera),
-        shape_of(body(), ring(views)),
+        own_shape(views),
         bent=False,
     )
     assert found is not None

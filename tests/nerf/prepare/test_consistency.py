@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import pytest
 
+from tests.nerf.prepare import balls
 from toonset.errors import BundleError
 from toonset.nerf.prepare.consistency import CELL, TEXT, consistency_of, consistency_picture
 
 
-def test_report_of_a_perfect_sheet(balls) -> None:
+def test_report_of_a_perfect_sheet() -> None:
     found = consistency_of(balls.sheet())
     assert not found.registration.applied
     assert not found.unwarping.applied
@@ -23,7 +24,7 @@ def test_report_of_a_perfect_sheet(balls) -> None:
         assert max(view.unexplained) == 0
 
 
-def test_report_names_the_drawing_with_a_part_of_its_own(balls) -> None:
+def test_report_names_the_drawing_with_a_part_of_its_own() -> None:
     frames = list(balls.sheet().frames)
     rgba = frames[3].rgba.copy()
     rgba[40:52, 70:90] = (200, 30, 30, 255)  # a bag that no other drawing shows
@@ -41,6 +42,6 @@ def test_report_names_the_drawing_with_a_part_of_its_own(balls) -> None:
     json.dumps(found.to_json(), allow_nan=False)
 
 
-def test_report_needs_three_drawings(balls) -> None:
+def test_report_needs_three_drawings() -> None:
     with pytest.raises(BundleError, match=r"balls: 2 picture\(s\).*at least 3"):
         consistency_of(balls.sheet(2))

@@ -2,59 +2,53 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from tests.nerf.prepare import balls
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import aligned
 from toonset.nerf.train.train import fit_field
 
 
-def test_drawings_that_agree_stay(balls) -> None:
-    scene, registration, unwarping = aligned(balls.sheet())
-    assert scene is balls.sheet()
-    assert registration is not None
-    assert unwarping is not None
-    assert not registration.applied
-    assert not unwarping.applied
+def asked(drawn, **switches: bool) -> tuple[Any, Any, Any]:
+    """Return the aligned scene, what is said of cameras, and of bends."""
+    return aligned(drawn, **switches)
 
 
-def test_bends_alone_where_they_explain_more(balls) -> None:
+def test_bends_alone_where_they_explain_more() -> None:
     drawn, _ = balls.bent_sheet()
-    scene, registration, unwarping = aligned(drawn)
-    assert registration is not None
-    assert unwarping is not None
-    assert unwarping.applied
-    assert unwarping.gain_nats > registration.gain_nats > 0
+    scene, registration, unbending = asked(drawn)
+    assert unbending.applied
+    assert unbending.gain_nats > registration.gain_nats > 0
     assert not registration.applied
     for before, after in zip(drawn.frames, scene.frames, strict=True):
         assert after.camera is before.camera
 
 
-def test_cameras_follow_where_places_explain_enough(balls) -> None:
+def test_cameras_follow_where_places_explain_enough() -> None:
     drawn, _, _ = balls.misplaced(0)
-    scene, registration, unwarping = aligned(drawn)
-    assert registration is not None
-    assert unwarping is not None
+    scene, registration, _ = asked(drawn)
     assert registration.applied
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
     assert registration.apart_px[1] < 0.5 * registration.apart_px[0]
 
 
-def test_switches_are_heard(balls) -> None:
+def test_switches_are_heard_and_drawings_that_agree_stay() -> None:
+    scene, registration, unbending = asked(balls.sheet())
+    assert scene is balls.sheet()
+    assert registration.applied is unbending.applied is False
     drawn, _ = balls.bent_sheet()
-    scene, registration, unwarping = aligned(drawn, register=False, unwarp=False)
-    assert scene is drawn
-    assert registration is None
-    assert unwarping is None
-    scene, registration, unwarping = aligned(drawn, unwarp=False)
-    assert registration is not None
+    assert asked(drawn, register=False, unwarp=False) == (drawn, None, None)
+    scene, registration, unbending = asked(drawn, unwarp=False)
     assert registration.applied
     assert unwarping is None
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
 
 
-def test_planes_are_smoother_where_drawings_were_bent_back(balls) -> None:
+def test_planes_are_smoother_where_drawings_were_bent_back() -> None:
     drawn, _ = balls.bent_sheet()
     variation = []
     for trusted in (False, True):

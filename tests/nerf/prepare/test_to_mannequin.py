@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.nerf.bodies import Hand, body, camera_at, drawing, ring, sheet, with_bobble
+from tests.nerf.bodies import Hand, body, camera_at, drawing, own_shape, ring, sheet, with_bobble
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.hull.mannequin_shape import shape_of
 from toonset.nerf.options import TrainOptions
@@ -29,18 +29,15 @@ def outlines_apart(scene: Scene) -> float:
 
 def test_outlines_become_the_mannequins() -> None:
     drawn = sheet(body(), BEND, body())
-    bent, found = bent_to(drawn, shape_of(body(), ring()))
+    bent, found = bent_to(drawn, own_shape())
     assert found.applied
     assert found.gain_nats > 0
     assert found.apart_px[1] < 0.4 * found.apart_px[0]
     assert outlines_apart(bent) < 0.35 * outlines_apart(drawn)
-
-
-def test_exact_drawings_are_untouched_to_the_bit() -> None:
-    drawn = sheet(body(), Hand(), body())
-    bent, found = bent_to(drawn, shape_of(body(), ring()))
+    exact = sheet(body(), Hand(), body())
+    same, found = bent_to(exact, own_shape())
     assert not found.applied
-    assert bent is drawn
+    assert same is exact  # to the bit
 
 
 def test_lines_at_steps_pull_where_outlines_say_nothing() -> None:
@@ -53,7 +50,7 @@ def test_lines_at_steps_pull_where_outlines_say_nothing() -> None:
     wrong = replace(aside, vertices=vertices)
 
     def apart(lines: bool) -> float:
-        """Return how far the arm lies from its place in the front view, pixels, after bending."""
+        """Return how far the arm lies from its place in the front view after bending, pixels."""
         hand = Hand(lines=lines, bend=0.004)
         base = sheet(body(), hand)
         frames = tuple(
@@ -62,27 +59,18 @@ def test_lines_at_steps_pull_where_outlines_say_nothing() -> None:
         )
         bent, found = bent_to(replace(base, frames=frames), shape)
         assert found.applied
-        green = [
-            frame.rgba[..., 1].astype(float) - frame.rgba[..., 0] > 20
-            for frame in (bent.frames[1], sheet_frame(body(), cameras[1]))
-        ]
+        shown = (bent.frames[1].rgba, drawing(body(), cameras[1]))
+        green = [rgba[..., 1].astype(float) - rgba[..., 0] > 20 for rgba in shown]
         middles = [np.argwhere(mask).mean(axis=0) for mask in green]
         return float(np.abs(middles[0] - middles[1])[1])
 
     assert apart(lines=True) < 0.5 * apart(lines=False)
 
 
-def sheet_frame(mesh, camera):
-    base = sheet(mesh, views=1).frames[0]
-    return replace(base, camera=camera, rgba=drawing(mesh, camera))
-
-
 def test_preparation_takes_the_mannequin_where_it_is_the_body() -> None:
     ready = prepare(sheet(body(), BEND, body()), TrainOptions())
     assert ready.shape is not None
     assert ready.bent
-    assert ready.mannequin is not None
-    assert ready.mannequin.chosen
     assert ready.registration is None
     report = ready.to_json()["mannequin"]
     assert report["chosen"] is True
@@ -100,18 +88,12 @@ def test_preparation_leaves_another_body_alone() -> None:
         assert one.rgba.tobytes() == two.rgba.tobytes()
 
 
-@pytest.mark.parametrize("views", [2, 3])
-def test_switched_off_or_too_few_it_is_not_asked(views: int) -> None:
-    scene = sheet(body(), BEND, body(), views=views)
-    options = TrainOptions() if views == 2 else TrainOptions(mannequin=False)
-    ready = prepare(scene, options)
-    assert ready.shape is None
-    assert ready.mannequin is None
-
-
-def test_unbend_off_keeps_drawings_but_takes_the_shape() -> None:
+def test_switched_off_or_too_few_it_is_not_asked() -> None:
+    for views, options in ((2, TrainOptions()), (3, TrainOptions(mannequin=False))):
+        ready = prepare(sheet(body(), BEND, body(), views=views), options)
+        assert ready.shape is ready.mannequin is None
     scene = sheet(body(), BEND, body())
-    ready = prepare(scene, TrainOptions(unwarp=False))
+    ready = prepare(scene, TrainOptions(unwarp=False))  # the shape is taken, drawings are not bent
     assert ready.shape is not None
     assert ready.scene is scene
 
@@ -133,16 +115,11 @@ def test_a_mannequin_that_lacks_a_small_part_is_another_body() -> None:
     found = posed(scene)
     assert found.shape is None
     assert found.scene is scene
+    assert posed(sheet(body(), Hand(beyond_px=9), body())).shape is None  # fatter all round
     assert found.fit is not None
     assert found.fit.left > 0.006
     assert found.fit.drawings is not None
     assert found.fit.mannequin < found.fit.drawings
-
-
-def test_a_fatter_drawing_is_no_line_outside() -> None:
-    """Far more than a line's width all round: another body."""
-    found = posed(sheet(body(), Hand(beyond_px=9), body()))
-    assert found.shape is None
 
 
 def test_figures_that_bends_move_past_their_pictures_edge_stay_whole() -> None:

@@ -53,22 +53,20 @@ def test_recolor_replaces_one_colour_and_nothing_else(training: Training) -> Non
     changed = recolor_run(training.result, [f"{old}=#00ff00"])
     camera = train_scene().frames[4].camera
     before, after = render(training.result, camera), render(changed, camera)
-    a = palette_picture(before, training.result.palette)
-    b = palette_picture(after, changed.palette)
+    a, b = palette_picture(before, palette), palette_picture(after, changed.palette)
     assert before.shares is not None
     untouched = before.shares[..., index] == 0
     np.testing.assert_array_equal(a[untouched], b[untouched])
     full = (before.shares[..., index] > 0.99 * before.alpha) & (before.alpha > 0.5)
     assert full.sum() > 20
     assert np.abs(b[full][:, :3].astype(int) - [0, 255, 0]).max() <= 3
-    with pytest.raises(PaletteError, match="choose one of them"):
-        recolor_run(training.result, ["#123456=#000000"])
-    by_name = recolor_run(training.result, [f"{name_of(tuple(palette[index].tolist()))}=#00ff00"])
+    by_name = recolored(training.result, [f"{name_of(tuple(palette[index].tolist()))}=#00ff00"])
     assert by_name.palette is not None
     assert changed.palette is not None
     assert (by_name.palette == changed.palette).all()
-    with pytest.raises(PaletteError, match="OLD=NEW"):
-        recolor_run(training.result, ["#123456"])
+    for change, said in (("#123456=#000000", "choose one of them"), ("#123456", "OLD=NEW")):
+        with pytest.raises(PaletteError, match=said):
+            recolored(training.result, [change])
     with pytest.raises(PaletteError, match="without palette"):
         recolor_run(replace(training.result, palette=None), [f"{old}=#00ff00"])
 

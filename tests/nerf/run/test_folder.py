@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from safetensors.torch import load_file, save_file
 
-from tests.nerf.ellipsoids import held_out, train_scene
+from tests.nerf.ellipsoids import held_out
+from tests.nerf.run.damage import Harm, config, tensors, written
 from toonset.errors import BundleError
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
-from toonset.nerf.run.report import write_run
-from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.result import Training
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, training: Training) -> Path:
+    return written(tmp_path_factory.mktemp("run"), training)
+
+
 @pytest.fixture
-def run_folder(tmp_path: Path, training: Training) -> Path:
-    write_run(tmp_path, training, label_scene(train_scene())[0])
-    return tmp_path
+def run_folder(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "run"))
 
 
 def test_a_run_folder_renders_the_same_after_loading(run_folder: Path, training: Training) -> None:
@@ -39,77 +43,42 @@ def test_a_run_folder_renders_the_same_after_loading(run_folder: Path, training:
     assert json.loads((run_folder / "metrics.json").read_text())["train"]["psnr"] > 24
 
 
+PLANES, MODEL = "field.planes", "model.safetensors"
+
+
+def model(change: Callable[[dict[str, Any]], object]) -> Harm:
+    return tensors(MODEL, change)
+
+
+def field(**changes: object) -> Harm:
+    return config(lambda content: content["field"].update(changes))
+
+
 def truncate(folder: Path) -> None:
-    file = folder / "model.safetensors"
-    file.write_bytes(file.read_bytes()[:-1000])
-
-
-def not_a_model(folder: Path) -> None:
-    (folder / "model.safetensors").write_bytes(b"PK\x03\x04 nothing of the kind")
-
-
-def drop_tensor(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    del tensors["field.out.bias"]
-    save_file(tensors, folder / "model.safetensors")
-
-
-def wrong_shape(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    tensors["field.planes"] = tensors["field.planes"][:-1].clone()
-    save_file(tensors, folder / "model.safetensors")
-
-
-def wrong_type(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    tensors["field.planes"] = tensors["field.planes"].double()
-    save_file(tensors, folder / "model.safetensors")
-
-
-def not_a_number(folder: Path) -> None:
-    tensors = load_file(folder / "model.safetensors")
-    tensors["field.planes"][3, 2] = float("nan")
-    save_file(tensors, folder / "model.safetensors")
-
-
-def change_config(**changes: object) -> Callable[[Path], None]:
-    def change(folder: Path) -> None:
-        config = json.loads((folder / "config.json").read_text())
-        config["field"].update(changes)
-        (folder / "config.json").write_text(json.dumps(config))
-
-    return change
-
-
-def other_format(folder: Path) -> None:
-    config = json.loads((folder / "config.json").read_text())
-    config["format"] = 99
-    (folder / "config.json").write_text(json.dumps(config))
+    (folder / MODEL).write_bytes((folder / MODEL).read_bytes()[:-1000])
 
 
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
         (truncate, "damaged"),
-        (not_a_model, "damaged"),
-        (drop_tensor, "field.out.bias"),
-        (wrong_shape, "field.planes is"),
-        (wrong_type, "float64"),
-        (not_a_number, "not finite"),
-        (other_format, "format 99"),
-        (change_config(hull_voxel=-1.0), "hull_voxel"),
-        (change_config(hull_shape=[100000, 100000, 100000]), "hull_shape"),
-        (change_config(hull_shape=[0, 3, 3]), "hull_shape"),
-        (change_config(resolution=10**9), "resolution"),
-        (change_config(palette=[[300, 0, 0]]), "palette"),
-        (change_config(surprise=1), "surprise"),
+        (lambda folder: (folder / MODEL).write_bytes(b"PK\x03\x04 nothing of the kind"), "damaged"),
+        (model(lambda t: t.pop("field.out.bias")), "field.out.bias"),
+        (model(lambda t: t.update({PLANES: t[PLANES][:-1].clone()})), "field.planes is"),
+        (model(lambda t: t.update({PLANES: t[PLANES].double()})), "float64"),
+        (model(lambda t: t[PLANES][3, 2].fill_(float("nan"))), "not finite"),
+        (config(lambda content: content.update(format=99)), "format 99"),
+        (field(hull_voxel=-1.0), "hull_voxel"),
+        (field(hull_shape=[100000, 100000, 100000]), "hull_shape"),
+        (field(hull_shape=[0, 3, 3]), "hull_shape"),
+        (field(resolution=10**9), "resolution"),
+        (field(palette=[[300, 0, 0]]), "palette"),
+        (field(surprise=1), "surprise"),
         (lambda folder: (folder / "config.json").unlink(), "does not exist"),
         (lambda folder: (folder / "config.json").write_text("{"), "no valid JSON"),
     ],
 )
-def test_a_damaged_run_gets_one_clear_line(
-    run_folder: Path, damage: Callable[[Path], object], message: str
-) -> None:
+def test_a_damaged_run_gets_one_clear_line(run_folder: Path, damage: Harm, message: str) -> None:
     damage(run_folder)
     with pytest.raises(BundleError, match=message):
         read_field(run_folder)

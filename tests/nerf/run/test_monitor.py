@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.nerf.ellipsoids import first_hit
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.options import TrainOptions
@@ -27,17 +28,11 @@ OPTIONS = TrainOptions(steps=STEPS, device="cpu", resolution=16, missing_views=0
 def ball(yaw: float, side: int = SIDE) -> Frame:
     """Return a drawn ball, red on its left and blue on its right, with labels."""
     camera = Camera.looking_at(np.zeros(3), yaw, 0.1, 0.4 * side, (side, side))
-    origins, directions = camera.rays(camera.pixel_grid())
-    along = -(origins * directions).sum(-1)
-    nearest = origins + along[..., None] * directions
-    inside = (nearest**2).sum(-1) <= 1
-    depth = np.sqrt(np.maximum(1 - (nearest**2).sum(-1), 0))
-    red = (nearest - depth[..., None] * directions)[..., 0] > 0
-    labels = np.where(inside, np.where(red, 0, 1), 255).astype(np.uint8)
-    rgba = np.zeros((side, side, 4), dtype=np.uint8)
-    rgba[inside] = np.concatenate(
-        [PALETTE[labels[inside]], np.full((inside.sum(), 1), 255)], axis=1
-    )
+    which, points = first_hit(camera, [(np.zeros(3), np.ones(3))])
+    labels = np.where(which == 0, points[..., 0] <= 0, 255).astype(np.uint8)
+    table = np.zeros((256, 4), np.uint8)
+    table[:2] = np.column_stack([PALETTE, [255, 255]])
+    rgba = table[labels]
     return Frame(f"{yaw:.2f}.png", camera, rgba, labels)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tests.nerf.look.painted import AXES, INK, PALETTE, camera_at, drawings, paint_of
+from tests.nerf.look.painted import AXES, INK, PALETTE, camera_at, paint_of
 from toonset.dataset.mesh.gltf import open_gltf
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import OutputError, SetupError
@@ -25,20 +25,15 @@ from toonset.nerf.surface.unwrap import GUTTER, parts_of, texel_faces, texel_pla
 
 
 @pytest.fixture(scope="module")
-def drawn() -> Drawings:
-    return drawings()
-
-
-@pytest.fixture(scope="module")
-def egg() -> Surface:
+def shell() -> Surface:
     ball = trimesh.creation.icosphere(subdivisions=4)
     vertices, faces = np.asarray(ball.vertices) * AXES, np.asarray(ball.faces)
     return Surface(vertices, faces, paint_of(vertices[faces].mean(axis=1)), PALETTE)
 
 
 @pytest.fixture(scope="module")
-def textured(egg: Surface, drawn: Drawings) -> TexturedSurface:
-    return painted(egg, drawn, outline=True)
+def textured(shell: Surface, egg: Drawings) -> TexturedSurface:
+    return painted(shell, egg, outline=True)
 
 
 def middles(textured: TexturedSurface) -> np.ndarray:
@@ -81,12 +76,12 @@ def test_an_eye_comes_from_one_drawing(textured: TexturedSurface) -> None:
         assert len(np.unique(textured.source[eye])) == 1
 
 
-def test_frontal_drawings_are_taken(textured: TexturedSurface, drawn: Drawings) -> None:
+def test_frontal_drawings_are_taken(textured: TexturedSurface, egg: Drawings) -> None:
     surface = textured.surface
     a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    ways = np.stack([view.camera.rotation[2] for view in drawn.views])
+    ways = np.stack([view.camera.rotation[2] for view in egg.views])
     level = np.abs(normal[:, 1]) < 0.3
     shown = (textured.source >= 0) & level
     frontal = -(normal[shown] * ways[textured.source[shown]]).sum(axis=1)
@@ -117,27 +112,27 @@ def test_gutters_go_on_as_the_chart_does(textured: TexturedSurface) -> None:
     assert (off.min(axis=1) < 40).mean() > 0.9  # paint, neither black nor a mean of charts
 
 
-def test_small_parts_stay_in_the_chart_around_them(egg: Surface) -> None:
-    parts = parts_of(egg.vertices, egg.faces, egg.labels)
-    middle = egg.vertices[egg.faces].mean(axis=1)
+def test_small_parts_stay_in_the_chart_around_them(shell: Surface) -> None:
+    parts = parts_of(shell.vertices, shell.faces, shell.labels)
+    middle = shell.vertices[shell.faces].mean(axis=1)
     face = (paint_of(middle) == 0) & (middle[:, 1] > 0) & (middle[:, 2] > 0)
-    assert len(np.unique(parts)) == len(np.unique(parts[egg.labels != 1]))  # no part for an eye
+    assert len(np.unique(parts)) == len(np.unique(parts[shell.labels != 1]))  # no part for an eye
     assert len(np.unique(parts[face])) == 1
 
 
-def test_other_colours(egg: Surface, drawn: Drawings) -> None:
+def test_other_colours(shell: Surface, egg: Drawings) -> None:
     other = PALETTE.copy()
     other[2] = (40, 200, 40)  # the belt
-    result = painted(replace(egg, palette=other), replace(drawn, repaint=other))
-    belt = (paint_of(egg.vertices[egg.faces].mean(axis=1)) == 2) & (result.source >= 0)
+    result = painted(replace(shell, palette=other), replace(egg, repaint=other))
+    belt = (paint_of(shell.vertices[shell.faces].mean(axis=1)) == 2) & (result.source >= 0)
     assert np.median(np.abs(middles(result)[belt] - other[2].astype(int)).max(axis=1)) <= 12
     assert result.pen is None
 
 
-def test_the_same_bytes(egg: Surface, drawn: Drawings, tmp_path: Path) -> None:
+def test_the_same_bytes(shell: Surface, egg: Drawings, tmp_path: Path) -> None:
     sums = []
     for name in ("a.glb", "b.glb"):
-        painted(egg, drawn).save(tmp_path / name)
+        painted(shell, egg).save(tmp_path / name)
         sums.append(hashlib.sha256((tmp_path / name).read_bytes()).hexdigest())
     assert sums[0] == sums[1]
 
@@ -181,10 +176,10 @@ def test_what_files_cannot_hold_is_refused(textured: TexturedSurface, tmp_path: 
     assert not list(tmp_path.iterdir())
 
 
-def test_without_the_package(monkeypatch: pytest.MonkeyPatch, egg: Surface) -> None:
+def test_without_the_package(monkeypatch: pytest.MonkeyPatch, shell: Surface) -> None:
     monkeypatch.setattr(unwrapping, "find_spec", lambda name: None)
     with pytest.raises(SetupError, match="pip install xatlas"):
-        unwrapping.unwrap(egg.vertices, egg.faces, np.zeros(len(egg.faces), dtype=int), 10.0)
+        unwrapping.unwrap(shell.vertices, shell.faces, np.zeros(len(shell.faces), dtype=int), 10.0)
 
 
 SIDE = 80

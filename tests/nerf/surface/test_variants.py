@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tests.nerf.look.painted import AXES, PALETTE, drawings, paint_of
+from tests.nerf.look.painted import AXES, PALETTE, paint_of
 from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.mesh.gltf import GltfFile, open_gltf
 from toonset.errors import OutputError
@@ -24,12 +24,7 @@ VARIANTS = (Variant("dusk", DUSK), Variant("as it is", PALETTE))
 
 
 @pytest.fixture(scope="module")
-def drawn() -> Drawings:
-    return drawings()
-
-
-@pytest.fixture(scope="module")
-def egg() -> Surface:
+def shell() -> Surface:
     ball = trimesh.creation.icosphere(subdivisions=3)
     vertices, faces = np.asarray(ball.vertices) * AXES, np.asarray(ball.faces)
     labels = paint_of(vertices[faces].mean(axis=1))
@@ -72,8 +67,8 @@ def primitives(file: GltfFile) -> Sequence[dict[str, Any]]:
     return [primitive for mesh in file.json["meshes"] for primitive in mesh["primitives"]]
 
 
-def test_a_palette_per_variant(egg: Surface, tmp_path: Path) -> None:
-    egg.save(tmp_path / "egg.glb")
+def test_a_palette_per_variant(shell: Surface, tmp_path: Path) -> None:
+    shell.save(tmp_path / "egg.glb")
     file = read(tmp_path / "egg.glb")
     assert file.json["extensionsUsed"] == ["KHR_materials_unlit", "KHR_materials_variants"]
     assert "extensionsRequired" not in file.json  # viewers without it show the first
@@ -87,14 +82,14 @@ def test_a_palette_per_variant(egg: Surface, tmp_path: Path) -> None:
     np.testing.assert_array_equal(shown(file, dusk), palette_texture(DUSK))
     found = trimesh.load(tmp_path / "egg.glb", force="mesh")
     assert isinstance(found, trimesh.Trimesh)
-    assert len(found.faces) == len(egg.faces)
+    assert len(found.faces) == len(shell.faces)
     visual: Any = found.visual
     assert visual.material.name == "palette"
 
 
-def test_a_painted_picture_per_variant(egg: Surface, drawn: Drawings, tmp_path: Path) -> None:
-    others = [replace(drawn, repaint=palette) for palette in (DUSK, PALETTE)]
-    textured = painted(egg, drawn, outline=True, others=others)
+def test_a_painted_picture_per_variant(shell: Surface, egg: Drawings, tmp_path: Path) -> None:
+    others = [replace(egg, repaint=palette) for palette in (DUSK, PALETTE)]
+    textured = painted(shell, egg, outline=True, others=others)
     textured.save(tmp_path / "egg.glb")
     file = read(tmp_path / "egg.glb")
     figure, outline = primitives(file)
@@ -110,17 +105,17 @@ def test_a_painted_picture_per_variant(egg: Surface, drawn: Drawings, tmp_path: 
         assert (np.abs(other - new).max(axis=-1)[plain] <= 12).mean() > 0.95
 
 
-def test_colours_and_choice_are_those_of_the_recoloured_run(egg: Surface, drawn: Drawings) -> None:
-    dusk = replace(drawn, repaint=DUSK)
-    variants = replace(egg, variants=VARIANTS[:1])
-    found = painted(variants, drawn, others=[dusk])
-    alone = painted(replace(egg, palette=DUSK, variants=()), dusk)
+def test_colours_and_choice_are_those_of_the_recoloured_run(shell: Surface, egg: Drawings) -> None:
+    dusk = replace(egg, repaint=DUSK)
+    variants = replace(shell, variants=VARIANTS[:1])
+    found = painted(variants, egg, others=[dusk])
+    alone = painted(replace(shell, palette=DUSK, variants=()), dusk)
     apart = np.abs(found.others[0].astype(int) - alone.picture)
     assert (apart.max(axis=-1) <= 2).mean() > 0.97  # lines may be told a little otherwise in them
 
 
-def test_without_variants_nothing_is_said_of_them(egg: Surface, tmp_path: Path) -> None:
-    replace(egg, variants=()).save(tmp_path / "egg.glb")
+def test_without_variants_nothing_is_said_of_them(shell: Surface, tmp_path: Path) -> None:
+    replace(shell, variants=()).save(tmp_path / "egg.glb")
     file = read(tmp_path / "egg.glb")
     assert "extensions" not in file.json
     assert file.json["extensionsUsed"] == ["KHR_materials_unlit"]
@@ -128,10 +123,10 @@ def test_without_variants_nothing_is_said_of_them(egg: Surface, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", ["egg.obj", "egg.ply"])
-def test_only_glb_holds_variants(egg: Surface, drawn: Drawings, tmp_path: Path, name: str) -> None:
+def test_only_glb_holds_variants(shell: Surface, egg: Drawings, tmp_path: Path, name: str) -> None:
     with pytest.raises(OutputError, match=r"holds no variants; end -o in \.glb"):
-        egg.save(tmp_path / name)
-    textured = painted(egg, drawn, others=[drawn, drawn])
+        shell.save(tmp_path / name)
+    textured = painted(shell, egg, others=[egg, egg])
     with pytest.raises(OutputError, match=r"holds no variants; end -o in \.glb"):
         textured.save(tmp_path / name)
     assert not list(tmp_path.iterdir())

@@ -149,15 +149,7 @@ def test_without_3d_fixed_pictures_turn(open_page: Open) -> None:
     page.wait_for_selector("#message:not(:empty)")
 
 
-def test_a_renderer_that_fails_later_is_replaced(open_page: Open) -> None:
-    viewer = open_page()
-    viewer.page.evaluate("globalThis.breaks = true")
-    viewer.drag(40, 0)
-    viewer.page.wait_for_selector("#fallback:not([hidden])")
-    assert viewer.page.locator("#poster").is_visible()
-
-
-def test_a_lost_context_is_replaced(open_page: Open) -> None:
+def test_a_lost_context_and_a_renderer_that_fails_are_replaced(open_page: Open) -> None:
     viewer = open_page()
     tell = "name => document.getElementById('view').dispatchEvent(new Event(name))"
     viewer.page.evaluate(tell, "webglcontextlost")
@@ -169,6 +161,10 @@ def test_a_lost_context_is_replaced(open_page: Open) -> None:
     viewer.page.get_by_label("red").fill("#00ff00")
     viewer.rest()
     assert viewer.shots[-1]["colors"][0] == [0, 255, 0]
+    viewer.page.evaluate("globalThis.breaks = true")
+    viewer.drag(40, 0)
+    viewer.page.wait_for_selector("#fallback:not([hidden])")
+    assert viewer.page.locator("#poster").is_visible()
 
 
 def test_a_scene_with_little_in_it_works(open_page: Open) -> None:
@@ -221,23 +217,19 @@ def test_hostile_names_are_text(open_page: Open, title: str) -> None:
     assert max(page.evaluate(heights)) < 200
 
 
-def test_the_page_reads_from_right_to_left_too(open_page: Open) -> None:
-    viewer = open_page(viewport={"width": 360, "height": 740})
-    viewer.page.evaluate("document.documentElement.dir = 'rtl'")
-    assert viewer.page.evaluate("document.documentElement.scrollWidth") == 360
-    title, pegs = (viewer.page.locator(name).bounding_box() for name in ("h1", ".pegs"))
-    assert title is not None
-    assert pegs is not None
-    assert title["x"] < pegs["x"]
-
-
-def test_what_is_touched_is_large_enough(open_page: Open) -> None:
+def test_a_small_page_can_be_touched_and_reads_from_right_to_left_too(open_page: Open) -> None:
     viewer = open_page("#view=1&compare=onion", viewport={"width": 360, "height": 740})
     small = """[...document.querySelectorAll("button, select, input, [role=slider]")]
       .map((e) => [e.id || e.name || e.textContent, e.getBoundingClientRect()])
       .filter(([, box]) => box.width && Math.min(box.width, box.height) < 24)
       .map(([name]) => name)"""
     assert viewer.page.evaluate(small) == []
+    viewer.page.evaluate("document.documentElement.dir = 'rtl'")
+    assert viewer.page.evaluate("document.documentElement.scrollWidth") == 360
+    title, pegs = (viewer.page.locator(name).bounding_box() for name in ("h1", ".pegs"))
+    assert title is not None
+    assert pegs is not None
+    assert title["x"] < pegs["x"]
 
 
 STATES = ("", "#cameras=1", "#view=2", "#view=1&compare=onion")

@@ -26,13 +26,18 @@ def pose(viewer: Viewer) -> dict[str, Any]:
 # Turning
 
 
-def test_a_drag_turns_the_figure_with_the_pointer(open_page: Open) -> None:
+def test_a_drag_turns_the_figure_with_the_pointer_and_moves_it_with_shift(open_page: Open) -> None:
     viewer = open_page()
     viewer.drag(60, 40)
     assert viewer.state["yaw"] < -10  # its front goes to the right
     assert viewer.state["elevation"] > 10  # and down
     viewer.drag(0, 2000)
     assert viewer.state["elevation"] == 85
+    yaw = viewer.state["yaw"]
+    viewer.page.keyboard.down("Shift")
+    viewer.drag(50, 0)
+    assert viewer.state["yaw"] == yaw
+    assert viewer.state["pan"][0] > 0.05
 
 
 def test_it_is_drawn_roughly_while_it_moves_and_well_at_rest(open_page: Open) -> None:
@@ -84,14 +89,6 @@ def test_the_wheel_zooms_about_the_pointer(open_page: Open) -> None:
     assert pose(viewer) == START
 
 
-def test_shift_and_drag_moves_the_figure(open_page: Open) -> None:
-    viewer = open_page()
-    viewer.page.keyboard.down("Shift")
-    viewer.drag(50, 0)
-    assert viewer.state["yaw"] == 0
-    assert viewer.state["pan"][0] > 0.05
-
-
 def test_fingers_turn_zoom_and_move(open_page: Open) -> None:
     viewer = open_page(has_touch=True, viewport={"width": 360, "height": 740})
     session = viewer.page.context.new_cdp_session(viewer.page)
@@ -141,7 +138,7 @@ def test_there_is_no_swing_where_less_motion_is_wished_for(open_page: Open) -> N
 
 
 def test_the_canvas_has_the_screens_pixels_up_to_two_for_one(open_page: Open) -> None:
-    for density, expected in ((1, 1), (2, 2), (3, 2)):
+    for density, expected in ((1, 1), (3, 2)):
         viewer = open_page(device_scale_factor=density)
         viewer.rest()
         width = viewer.page.evaluate("document.getElementById('stage').clientWidth")
@@ -154,18 +151,14 @@ def test_the_canvas_has_the_screens_pixels_up_to_two_for_one(open_page: Open) ->
 # Layers and colours
 
 
-def test_layers_are_a_radio_group(open_page: Open) -> None:
-    viewer = open_page()
-    viewer.page.get_by_role("radio", name="Normals").check()
-    viewer.rest()
-    assert viewer.shots[-1]["layer"] == "normal"
-    viewer.page.keyboard.press("ArrowRight")
-    assert viewer.state["layer"] == "depth"
-
-
-def test_a_recoloured_paint_shows_at_once_and_is_undone(open_page: Open) -> None:
+def test_layers_are_a_radio_group_and_a_recoloured_paint_is_undone(open_page: Open) -> None:
     viewer = open_page()
     page = viewer.page
+    page.get_by_role("radio", name="Normals").check()
+    viewer.rest()
+    assert viewer.shots[-1]["layer"] == "normal"
+    page.keyboard.press("ArrowRight")
+    assert viewer.state["layer"] == "depth"
     page.get_by_label("red").fill("#00ff00")
     page.get_by_label("Lines").fill("#0000ff")
     viewer.rest()
@@ -213,10 +206,6 @@ def test_a_dropped_palette_replaces_the_colours(open_page: Open) -> None:
         assert viewer.state["colors"] == [list(rgb) for rgb in NEW], name
     viewer.page.get_by_role("button", name="Undo").click()
     assert viewer.state["colors"] == list(COLORS)
-
-
-def test_a_palette_of_another_length_says_so(open_page: Open) -> None:
-    viewer = open_page()
     said = viewer.drop("a.hex", b"#123456\r\n\r\n; no more\r\n")
     assert said == "a.hex: 1 colour for 3 paints; the other paints keep theirs."
     assert viewer.state["colors"] == [[0x12, 0x34, 0x56], *COLORS[1:]]

@@ -57,6 +57,9 @@ def test_a_bundle_becomes_one_quiet_file(
     assert len(re.findall("<script", text)) == 4  # numbers, pictures, arrays, the modules
     assert "<title>a&lt;" in text
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", text)
+    (policy,) = re.findall("""<meta http-equiv=.*content="([^"]*)""", text)
+    assert policy.startswith("default-src 'none'")
+    assert "unsafe" not in policy
 
 
 def test_what_cannot_be_written_is_refused_first(
@@ -72,6 +75,7 @@ def test_what_cannot_be_written_is_refused_first(
         ([bundle, "-o", there], "exists already; pass --force"),
         ([bundle, "-o", there / "page.html"], "is a file"),
         ([tmp_path / "nothing", "-o", tmp_path / "x.html"], "no such file"),
+        ([tmp_path / "nothing", "-o", there], "no such file; check the name of the run or bundle"),
     ]
     for words, said in cases:
         assert view(monkeypatch, *words) == 2
@@ -84,17 +88,5 @@ def test_more_colours_than_a_page_shows_are_refused(training: Training) -> None:
     many = np.zeros((MOST_PAINTS + 1, 3), np.uint8)
     with pytest.raises(BundleError, match=f"{MOST_PAINTS + 1} colours"):
         field_record(replace(training.result, palette=many), Blob())
-
-
-def test_pages_and_shaders_agree_how_many_colours_there_may_be() -> None:
-    text = (FOLDER / "field_layers.js").read_text(encoding="utf-8")
-    assert f"MOST_PAINTS = {MOST_PAINTS};" in text
-
-
-def test_a_place_that_is_missing_is_told_before_a_page_that_is_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    there = tmp_path / "there.html"
-    there.write_text("mine")
-    assert view(monkeypatch, tmp_path / "nothing", "-o", there) == 2
-    assert "no such file; check the name of the run or bundle" in capsys.readouterr().err
+    shader = (FOLDER / "field_layers.js").read_text(encoding="utf-8")
+    assert f"MOST_PAINTS = {MOST_PAINTS};" in shader

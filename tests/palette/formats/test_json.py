@@ -82,12 +82,11 @@ def test_foreign_text_prints_as_one_line() -> None:
 @pytest.mark.parametrize(
     ("content", "fragment"),
     [
-        ([], "states no schema, 'toonset-palette/1' is needed"),
         ({}, "states no schema, 'toonset-palette/1' is needed"),
         (GOOD | {"schema": "toonset-palette/1x"}, "schema 'toonset-palette/1x', "),
         (GOOD | {"schema": "toonset-palette/9"}, "'toonset-palette/9' is newer than this toonset"),
         (
-            {k: v for k, v in GOOD.items() if k != "colors"},
+            {key: GOOD[key] for key in GOOD if key != "colors"},
             "field colors: Field required; correct the file",
         ),
         (GOOD | {"colors": []}, "colors: List should have at least 1 item"),

@@ -36,7 +36,8 @@ def test_noise_is_measured_in_levels(grain: float) -> None:
 @pytest.mark.parametrize("grain", [0.0, 1.0])
 def test_clean_drawings_stay_as_they_are(grain: float) -> None:
     picture = drawn(figure(), grain)
-    assert remove_grain([picture])[0] is picture
+    assert without_grain([picture])[0] is picture
+    assert noise_levels([np.zeros((9, 9, 4), np.uint8), np.zeros((0, 5, 4), np.uint8)]) == 0
 
 
 def test_a_sheet_saved_as_jpeg_stays_as_it_is() -> None:
@@ -77,10 +78,6 @@ def test_borders_stay_where_they_are() -> None:
 def test_lines_are_not_seen_in_grain() -> None:
     found = find_contours([drawn(figure(), 24.0)])[0]
     assert (found >= 128).mean() < 0.01
-
-
-def test_pictures_without_an_opaque_pixel_have_no_noise() -> None:
-    assert noise_levels([np.zeros((9, 9, 4), np.uint8), np.zeros((0, 5, 4), np.uint8)]) == 0
 
 
 @pytest.mark.parametrize("seed", range(3))

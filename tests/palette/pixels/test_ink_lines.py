@@ -86,33 +86,25 @@ def test_lines_of_any_dark_colour_are_found_and_pupils_are_not(ink: tuple[int, i
         assert (found & ~line).sum() < 0.02 * line.sum()
 
 
-def test_contours_turn_with_the_picture() -> None:
+def test_contours_turn_with_the_picture_and_bands_change_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     view = drawn(3, 3.0).views[1]
     found = find_contour(view.rgba, 3.0)
     assert np.array_equal(find_contour(view.rgba[:, ::-1], 3.0), found[:, ::-1])
     assert np.array_equal(find_contour(view.rgba.transpose(1, 0, 2), 3.0), found.T)
-
-
-def test_bands_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    view = drawn(3, 3.0).views[0]
-    whole = find_contour(view.rgba, 3.0)
     monkeypatch.setattr(contour_module, "BAND_PX", 1000)
-    assert np.array_equal(find_contour(view.rgba, 3.0), whole)
+    assert np.array_equal(find_contour(view.rgba, 3.0), found)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 30), (5, 7)])
-@pytest.mark.parametrize("alpha", [0, 255])
-def test_tiny_and_empty_pictures_have_no_lines(shape: tuple[int, int], alpha: int) -> None:
-    picture = np.full((*shape, 4), alpha, dtype=np.uint8)
-    assert not find_contour(picture).any()
-    assert not find_contour(picture, 3.0).any()
-
-
-def test_wholly_black_figures_have_no_lines() -> None:
-    picture = ring((0, 0, 0))
-    picture[..., :3] = 0
-    assert not find_contour(picture).any()
-    assert not find_contour(picture, 3.0).any()
+def test_tiny_empty_and_wholly_black_pictures_have_no_lines() -> None:
+    black = ring((0, 0, 0))
+    black[..., :3] = 0
+    shapes = ((1, 1), (1, 30), (5, 7))
+    plain = [np.full((*shape, 4), alpha, np.uint8) for shape in shapes for alpha in (0, 255)]
+    for picture in (black, *plain):
+        assert not find_contour(picture).any()
+        assert not find_contour(picture, 3.0).any()
 
 
 @pytest.mark.parametrize("sigma", [1.0, 2.0])

@@ -5,18 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
-import pytest
 
+from tests.nerf.ellipsoids import Parts, first_hit
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
-from toonset.dataset.silhouettes.outlines import Square
 from toonset.dataset.synthetic.hand_error import displacement_field
-from toonset.nerf.prepare.unwarp import Warp
 
 SIDE = 96
 BALLS = (  # middle, half axes: body, head, two arms, a pack
@@ -39,15 +35,9 @@ def camera_at(yaw_deg: float, elevation_deg: float = 8.0, side: int = SIDE) -> C
     )
 
 
-def draw(camera: Camera, balls=BALLS) -> np.ndarray:
+def draw(camera: Camera, balls: Parts = BALLS) -> np.ndarray:
     """Return the balls' picture: coloured by place, so that what moves can be seen."""
-    fine = camera.resized(4)
-    origins, directions = fine.rays(fine.pixel_grid())
-    hit = np.zeros(origins.shape[:2], dtype=bool)
-    for middle, axes in balls:
-        o, d = (origins - middle) / axes, directions / axes
-        a, b, c = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
-        hit |= b * b > a * c
+    hit = first_hit(camera.resized(4), balls)[0] >= 0
     side = camera.size_wh[0]
     alpha = hit.reshape(side, 4, side, 4).mean(axis=(1, 3))
     grid = camera.pixel_grid() / side
@@ -90,18 +80,3 @@ def misplaced(seed: int) -> tuple[Scene, np.ndarray, np.ndarray]:
         rgba = np.dstack([np.full((SIDE, SIDE, 3), 128, np.uint8), alpha])
         frames.append(replace(frame, rgba=rgba))
     return replace(sheet(), frames=tuple(frames)), shifts, sizes
-
-
-def random_warp(seed: int, size: float = 0.01) -> Warp:
-    numbers = np.random.default_rng(seed).normal(0, 1, 2 * CONTROLS**2)
-    root = np.linalg.cholesky(Bends.expected().covariance)
-    return Warp(Square(np.array([10.0, 6.0]), 80.0), size * root @ numbers)
-
-
-@pytest.fixture(scope="session")
-def balls() -> SimpleNamespace:
-    """Return the functions above by name."""
-    shared = (camera_at, draw, sheet, bent_sheet, misplaced, random_warp)
-    return SimpleNamespace(
-        SIDE=SIDE, BALLS=BALLS, **{function.__name__: function for function in shared}
-    )
