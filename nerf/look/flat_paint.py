@@ -24,7 +24,7 @@ from toonset.nerf.lines.step_lines import (
     step_sides,
 )
 from toonset.nerf.look.outline import Outline
-from toonset.nerf.look.shade import Shade, learned_shade, smoothed, unlit
+from toonset.nerf.look.shade import Shade, learn_shade, smoothed
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.raster import depth_inside, distance_to, nearest
 
@@ -89,17 +89,13 @@ def flat_paint(
             kept &= ~_at_steps(covers[number], sights[number], steps, height)
             at = _same_surface(kept, sights[number].depth, SAME * height)
         found.append(_without_grain(rgba[at][..., :3], _inner(rgba, width + SOFT_PX)))
+    paints = [(paint.clip(0, 1) * 255 + 0.5).astype(np.uint8) for paint in found]
     if sights:
         normals = [smoothed(s.normal, height * s.camera.scale) for s in sights]
         pairs = zip(drawings, sights, strict=True)
         clear = [_clear(rgba, sight, width, height) for rgba, sight in pairs]
-        tall = height * float(np.median([sight.camera.scale for sight in sights]))
-        shade = learned_shade(found, normals, clear, tall)
-        if shade:
-            parts = zip(found, normals, clear, strict=True)
-            found = [unlit(*part, shade) for part in parts]
-    paints = tuple((paint.clip(0, 1) * 255 + 0.5).astype(np.uint8) for paint in found)
-    return FlatPaint(paints, steps, shade)
+        shade, paints = learn_shade(paints, normals, clear)
+    return FlatPaint(tuple(paints), steps, shade)
 
 
 def pixels_on_steps(sight: ShapeView, least: float) -> Mask:

@@ -223,6 +223,21 @@ def find_tones(pictures: Sequence[Picture], contours: Sequence[Map], shadow: Sha
     return dark
 
 
+def border_votes(
+    picture: Picture, contour: Map, shadow: Shadow
+) -> Float32[np.ndarray, "height width"]:
+    """Return 1 on the dark side of a drawing's borders of the shadow, -1 on the light side, else 0.
+
+    Args:
+        picture: the drawing.
+        contour: how far lines cover each of its pixels.
+        shadow: of the sheet.
+    """
+    if min(contour.shape) <= NARROWEST_PX:
+        return np.zeros(contour.shape, dtype=np.float32)
+    return _votes(smoothed(picture), _clear(picture, contour), np.log(shadow.factor))
+
+
 def _votes(rgb: np.ndarray, clear: Mask, factor: np.ndarray) -> Float32[np.ndarray, "height width"]:
     """Return 1 on the dark side of the shadow's borders, -1 on the light side, 0 elsewhere."""
     votes = np.zeros(clear.shape, dtype=np.float32)

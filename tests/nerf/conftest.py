@@ -7,7 +7,7 @@ import pytest
 from tests.nerf.ellipsoids import QUICK, train_scene
 from tests.nerf.look.painted import drawings
 from toonset.nerf.look.drawings import Drawings
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.result import Training
 from toonset.nerf.train.train import fit_field
 
@@ -15,7 +15,7 @@ from toonset.nerf.train.train import fit_field
 @pytest.fixture(scope="session")
 def training() -> Training:
     """Return the field of the ellipsoids; nobody may change it."""
-    return fit_field(labelled(train_scene())[0], QUICK)
+    return fit_field(label_scene(train_scene())[0], QUICK)
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ from toonset.palette.extract import PaintMap, extract_palette, paint_maps
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
-from toonset.palette.recolor import change_colors, recolor_drawing
+from toonset.palette.recolor import recolor_drawing
 
 GREEN = (40, 140, 70)
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from toonset.calib.without_body.find import ASK
+from toonset.calib.without_body.judge import ASK
 from toonset.cli.editor import opening
 from toonset.cli.editor import session as session_module
 from toonset.cli.editor.lock import locked

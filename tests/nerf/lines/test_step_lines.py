@@ -87,7 +87,7 @@ def covers_and_depths(hand: Hand) -> tuple[list[np.ndarray], list[np.ndarray]]:
 
 
 def test_the_rule_of_a_sheet_is_learned() -> None:
-    found = learned_steps(*covers_and_depths(Hand()), HEIGHT, LINE_PX)
+    found = learn_steps(*covers_and_depths(Hand()), HEIGHT, LINE_PX)
     assert found is not None
     assert found.least <= STEPS.least * 1.2
     assert found.width_px == pytest.approx(STEPS.width_px, abs=0.8)
@@ -96,8 +96,8 @@ def test_the_rule_of_a_sheet_is_learned() -> None:
 
 def test_an_artist_who_draws_no_steps_has_no_rule() -> None:
     covers, seen = covers_and_depths(Hand(lines=False))
-    assert learned_steps(covers, seen, HEIGHT, LINE_PX) is None
-    assert learned_steps(covers, seen, HEIGHT, 0.0) is None
+    assert learn_steps(covers, seen, HEIGHT, LINE_PX) is None
+    assert learn_steps(covers, seen, HEIGHT, 0.0) is None
     flat = [np.zeros_like(depth) for depth in seen]
     assert learn_steps(covers, flat, HEIGHT, LINE_PX) is None
 
@@ -105,7 +105,7 @@ def test_an_artist_who_draws_no_steps_has_no_rule() -> None:
 def test_lines_of_a_shape_are_those_of_the_drawing() -> None:
     camera = ring()[1]
     sight = own_shape().seen(camera)
-    line = drawn_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
+    line = draw_steps(sight.fine, STEPS, HEIGHT, FINER, 1.0)
     exact = depths(body(), camera.resized(FINE))
     truth = draw_steps(exact, STEPS, HEIGHT, FINE, 1.0)
     assert truth.sum() > 20

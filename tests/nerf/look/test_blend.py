@@ -48,7 +48,7 @@ def test_nothing_pops_where_one_pair_of_drawings_follows_another(egg: Drawings) 
 
 
 def test_both_eyes_stay_whole(egg: Drawings) -> None:
-    view = drawn_view(egg, geometry(camera_at(np.radians(12))))
+    view = blend_view(egg, geometry(camera_at(np.radians(12))))
     count, _, about, _ = cv2.connectedComponentsWithStats((view.labels == 1).astype(np.uint8))
     sizes = sorted(about[1:, cv2.CC_STAT_AREA])
     assert count == 3
@@ -87,7 +87,7 @@ def test_the_outline_is_as_wide_as_it_was_drawn_and_can_be_another(egg: Drawings
     assert blend_view(replace(egg, pen=None), shown).ink.sum() == 0
     line = other.ink > 0.99
     np.testing.assert_allclose(other.rgb[line].mean(axis=0) * 255, (90, 0, 120), atol=1)
-    bare = drawn_view(replace(egg, pen=None), geometry(egg.views[2].camera))  # a drawn view
+    bare = blend_view(replace(egg, pen=None), geometry(egg.views[2].camera))  # a drawn view
     assert not ((bare.rgb.max(axis=-1) < 0.2) & (bare.alpha > 0.9)).any()
 
 
@@ -132,7 +132,7 @@ def test_a_figure_of_one_colour_has_no_hole(egg: Drawings, color: tuple[int, int
     views = tuple(
         replace(view, rgba=np.dstack([flat, view.rgba[..., 3]]), paint=flat) for view in egg.views
     )
-    view = drawn_view(replace(egg, views=views), geometry(camera_at(0.4)))
+    view = blend_view(replace(egg, views=views), geometry(camera_at(0.4)))
     solid = view.alpha > 0.99
     assert np.isfinite(view.rgb).all()
     paint = solid & (view.ink == 0)
@@ -170,6 +170,6 @@ def test_bent_drawings_have_a_narrower_figure_between_them_and_their_own_where_d
 ) -> None:
     bent = replace(egg, bent=True)
     between, drawn = geometry(camera_at(0.4)), geometry(camera_at(0.0))
-    assert drawn_view(bent, between).alpha.sum() < drawn_view(egg, between).alpha.sum() - 20
-    own = (drawn_view(each, drawn).alpha for each in (bent, egg))
+    assert blend_view(bent, between).alpha.sum() < blend_view(egg, between).alpha.sum() - 20
+    own = (blend_view(each, drawn).alpha for each in (bent, egg))
     np.testing.assert_allclose(next(own), next(own), atol=1e-6)

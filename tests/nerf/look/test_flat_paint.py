@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from tests.nerf.bodies import ARM, HEIGHT, SKIN, Hand, body, drawing, own_shape, ring, sheet
-from toonset.nerf.hull.mannequin_shape import Sight
+from toonset.nerf.hull.mannequin_shape import ShapeView
 from toonset.nerf.look.flat_paint import FlatPaint, flat_paint
 from toonset.nerf.look.outline import outline_of
-from toonset.nerf.look.shade import Shade, learned_shade, smoothed, unlit
+from toonset.nerf.look.shade import learn_shade, smoothed
 
 FACTOR = 0.7
 
 
 @cache
-def painted(hand: Hand, views: int = 8) -> tuple[FlatPaint, list[Sight], list[np.ndarray]]:
+def painted(hand: Hand, views: int = 8) -> tuple[FlatPaint, list[ShapeView], list[np.ndarray]]:
     drawn = [drawing(body(), camera, hand, i) for i, camera in enumerate(ring(views))]
     shape = own_shape(views)
     sights = [shape.seen(camera, normals=True) for camera in ring(views)]
@@ -112,10 +112,12 @@ def test_a_shadow_that_stays_with_the_world_is_none() -> None:
     for sight in sights:
         world = sight.normal @ sight.camera.rotation
         dark = (world @ np.array([0.8, 0.5, 0.2]) < 0.1)[..., None]
-        paints.append(np.where(dark, 0.7, 1.0) * np.array(SKIN) / 255.0)
+        paints.append(np.rint(np.where(dark, 0.7, 1.0) * np.array(SKIN)).astype(np.uint8))
     normals = [smoothed(sight.normal, 135) for sight in sights]
     clear = [sight.alpha == 1 for sight in sights]
-    assert learned_shade([p.astype(np.float32) for p in paints], normals, clear, 135) is None
+    shade, same = learn_shade(paints, normals, clear)
+    assert shade is None
+    assert all(one is other for one, other in zip(same, paints, strict=True))
 
 
 def test_casting_a_shadow_undoes_taking_it_off() -> None:
@@ -128,10 +130,12 @@ def test_casting_a_shadow_undoes_taking_it_off() -> None:
         assert wrong.mean() < 0.12
 
 
-def test_unlit_black_and_empty_pictures_stay_finite() -> None:
-    shade = Shade((1.0, 2.0, 2.0), 0.5, (0.7, 0.7, 0.7))
-    normal = np.zeros((20, 20, 3), np.float32)
-    for value in (0.0, 1.0):
-        for clear in (np.zeros((20, 20), bool), np.ones((20, 20), bool)):
-            paint = np.full((20, 20, 3), value, np.float32)
-            assert np.isfinite(unlit(paint, normal, clear, shade)).all()
+@pytest.mark.parametrize("size", [4, 20])
+@pytest.mark.parametrize("value", [0, 255])
+@pytest.mark.parametrize("there", [False, True])
+def test_black_white_small_and_empty_pictures_have_no_shadow(
+    size: int, value: int, there: bool
+) -> None:
+    paint = np.full((size, size, 3), value, np.uint8)
+    normal, clear = np.zeros((size, size, 3), np.float32), np.full((size, size), there)
+    assert learn_shade([paint], [normal], [clear]) == (None, [paint])

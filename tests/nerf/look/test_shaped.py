@@ -10,7 +10,7 @@ import pytest
 
 from tests.nerf.bodies import ARM, PALETTE, Hand, body, camera_at, depths, drawing, own_shape, sheet
 from toonset.camera import Camera
-from toonset.nerf.look.blend import Geometry, drawn_view
+from toonset.nerf.look.blend import Geometry, blend_view
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.outline import Outline

@@ -86,7 +86,7 @@ def test_exact_drawings_are_untouched_to_the_bit() -> None:
     after = agree_on_paint(ready, *body_of(scene))
     assert after.paint is None
     unbent = Prepared(drawn := sheet(3.0), drawn, None, None, None, None)
-    assert with_paint(unbent, *body_of(drawn)) is unbent  # drawings that did not bend stay
+    assert agree_on_paint(unbent, *body_of(drawn)) is unbent  # drawings that did not bend stay
     for one, other in zip(after.scene.frames, scene.frames, strict=True):
         assert one.rgba.tobytes() == other.rgba.tobytes()
 

@@ -44,7 +44,7 @@ def test_switches_are_heard_and_drawings_that_agree_stay() -> None:
     assert asked(drawn, register=False, unwarp=False) == (drawn, None, None)
     scene, registration, unbending = asked(drawn, unwarp=False)
     assert registration.applied
-    assert unwarping is None
+    assert unbending is None
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
 
 

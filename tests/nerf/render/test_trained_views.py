@@ -60,13 +60,13 @@ def test_recolor_replaces_one_colour_and_nothing_else(training: Training) -> Non
     full = (before.shares[..., index] > 0.99 * before.alpha) & (before.alpha > 0.5)
     assert full.sum() > 20
     assert np.abs(b[full][:, :3].astype(int) - [0, 255, 0]).max() <= 3
-    by_name = recolored(training.result, [f"{name_of(tuple(palette[index].tolist()))}=#00ff00"])
+    by_name = recolor_run(training.result, [f"{name_of(tuple(palette[index].tolist()))}=#00ff00"])
     assert by_name.palette is not None
     assert changed.palette is not None
     assert (by_name.palette == changed.palette).all()
     for change, said in (("#123456=#000000", "choose one of them"), ("#123456", "OLD=NEW")):
         with pytest.raises(PaletteError, match=said):
-            recolored(training.result, [change])
+            recolor_run(training.result, [change])
     with pytest.raises(PaletteError, match="without palette"):
         recolor_run(replace(training.result, palette=None), [f"{old}=#00ff00"])
 

@@ -12,14 +12,14 @@ from safetensors.torch import load_file, save_file
 
 from tests.nerf.ellipsoids import train_scene
 from toonset.nerf.run.report import write_run
-from toonset.nerf.train.labelling import labelled
+from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.result import Training
 
 Harm = Callable[[Path], object]
 
 
 def written(folder: Path, training: Training) -> Path:
-    write_run(folder, training, labelled(train_scene())[0])
+    write_run(folder, training, label_scene(train_scene())[0])
     return folder
 
 

@@ -18,7 +18,6 @@ from toonset.nerf.options import USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.prepare import Prepared
 from toonset.nerf.prepare.registration import Registration
 from toonset.nerf.prepare.symmetry import Symmetry
-from toonset.nerf.prepare.unwarp import Unwarping
 from toonset.nerf.score import verdict
 from toonset.nerf.score.left_out import LeftOut
 from toonset.nerf.score.verdict import MOST_OFF, OK, WEAK, Verdict, blended, judged, verdict_of

@@ -133,7 +133,9 @@ def test_empty_pictures_are_passed_over() -> None:
     ("field_of", "steps", "least"), [(voxels, 60, 22.0), (painted, 0, 17.0), (network, 3, 5.0)]
 )
 def test_other_fields_are_trained_and_rendered(field_of: FieldOf, steps: int, least: float) -> None:
-    training = fit_field(labelled(train_scene())[0], replace(QUICK, steps=steps), field_of=field_of)
+    training = fit_field(
+        label_scene(train_scene())[0], replace(QUICK, steps=steps), field_of=field_of
+    )
     assert mean_psnr(training.result) > least
 
 

@@ -36,7 +36,7 @@ def test_noise_is_measured_in_levels(grain: float) -> None:
 @pytest.mark.parametrize("grain", [0.0, 1.0])
 def test_clean_drawings_stay_as_they_are(grain: float) -> None:
     picture = drawn(figure(), grain)
-    assert without_grain([picture])[0] is picture
+    assert remove_grain([picture])[0] is picture
     assert noise_levels([np.zeros((9, 9, 4), np.uint8), np.zeros((0, 5, 4), np.uint8)]) == 0
 
 
