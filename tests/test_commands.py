@@ -11,14 +11,25 @@ import re
 import shlex
 import shutil
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
+from PIL import Image
 
+from tests.conftest import calibration_report
 from tests.test_documents import DOCUMENTS, text_of
 from toonset.cli.main import VERBS
+from toonset.dataset.bundle.bundle import bundle_folder
+from toonset.dataset.bundle.camera_record import NativeCamera
+from toonset.dataset.bundle.transforms_read import read_cameras
+from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.mannequin.landmark_formats import SCHEMA
+from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.split.sheet import split_picture
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACEHOLDER = re.compile(r"\.\.\.|(?<![\w#-])[A-Z]{3,}(?![\w-])")  # of a command's form, not of one
@@ -73,18 +84,17 @@ def runs_here(command: str) -> bool:
 
 
 @pytest.fixture(scope="module")
-def drawings(tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path:
+def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path:
     """Return a folder with every file that the documents speak of, the README's example first."""
     folder = tmp_path_factory.mktemp("drawings")
     shutil.copytree(ROOT / "examples", folder / "examples")
-    sheet, mesh = folder / "examples" / "sheet.png", folder / "examples" / "mannequin.obj"
-    shutil.copy(sheet, folder / "sheet.png")
-    for name in ("mannequin.obj", "m.obj"):
-        shutil.copy(mesh, folder / name)
-    made = ("calibrate", sheet, "--mesh", mesh, "-o", folder / "bundle", "-q")
-    assert toonset(*made).code == 0
-    shutil.copytree(folder / "bundle", folder / "other")
-    shutil.copytree(folder / "bundle", folder / "held_out")
+    for name in ("sheet.png", "mannequin.obj"):
+        shutil.copy(folder / "examples" / name, folder / name)
+    shutil.copy(folder / "mannequin.obj", folder / "m.obj")
+    shutil.copy(folder / "sheet.png", folder / "strip.png")
+    _bundle(folder)
+    for name in ("other", "held_out"):
+        shutil.copytree(folder / "bundle", folder / name)
     for to in ("nerfstudio", "colmap"):
         place = folder / {"nerfstudio": "folder", "colmap": "colmap_folder"}[to]
         assert toonset("export", folder / "bundle", "--to", to, "-o", place, "-q").code == 0
@@ -93,17 +103,38 @@ def drawings(tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
     _six_figures(folder)
     _clicks(folder)
-    views = json.loads((folder / "bundle" / "calibration.json").read_text())["views"]
-    front = {"version": 1, "views": [{"box": views[0]["box"], "label": "front"}]}
-    (folder / "corrections.json").write_text(json.dumps(front))
-    _glb(folder)
+    shutil.copytree(drawn, folder / "small")
+    shutil.copy(drawn / "mannequin.obj", folder / "small" / "m.obj")
+    box = split_picture(load_rgba(drawn / "sheet.png")).views[0].figure_box
+    front = {"version": 1, "views": [{"box": box, "label": "front"}]}
+    (folder / "small" / "corrections.json").write_text(json.dumps(front))
+    trimesh.creation.capsule(0.5, 1.0).export(folder / "mesh.glb")
     return folder
+
+
+def _bundle(folder: Path) -> None:
+    """Write the example's bundle with the cameras that it was drawn with."""
+    views = split_picture(load_rgba(folder / "sheet.png")).views
+    truth = json.loads((folder / "examples" / "truth.json").read_text())["views"]
+    cameras = [
+        NativeCamera(**told["camera"])
+        .camera()
+        .moved(np.subtract(view.box[:2], told["cell_box"][:2]), view.box[2:])
+        for view, told in zip(views, truth, strict=True)
+    ]
+    mesh = load_mesh(folder / "mannequin.obj")
+    report = calibration_report([view.name for view in views], cameras)
+    report["inputs"] = [
+        {"name": name, "sha256": sha256((folder / name).read_bytes()).hexdigest(), "role": role}
+        for name, role in (("sheet.png", "sheet"), ("mannequin.obj", "mesh"))
+    ]
+    size, overlay = (mesh.height, mesh.radius), views[0].rgba[..., :3]
+    with bundle_folder(folder / "bundle", views, cameras, mesh, size, report, overlay):
+        pass
 
 
 def _six_figures(folder: Path) -> None:
     """Write a sheet of six figures, a strip of eight, single views and the boxes of the sheet."""
-    from PIL import Image
-
     cells = []
     for number in range(6):
         cell = np.full((120, 80, 3), (244, 240, 232), np.uint8)
@@ -111,8 +142,6 @@ def _six_figures(folder: Path) -> None:
         cells.append(cell)
     (folder / "six").mkdir()
     Image.fromarray(np.concatenate(cells, axis=1)).save(folder / "six" / "sheet.png")
-    strip = Image.open(folder / "sheet.png")
-    strip.save(folder / "strip.png")
     for number, name in enumerate(("front.png", "side.png")):
         Image.fromarray(cells[number]).save(folder / name)
     rows = [f"{80 * number + 15},5,50,110" for number in range(6)]
@@ -121,10 +150,6 @@ def _six_figures(folder: Path) -> None:
 
 def _clicks(folder: Path) -> None:
     """Write points of the mannequin where the example's cameras see them."""
-    from toonset.dataset.bundle.transforms_read import read_cameras
-    from toonset.dataset.mannequin.landmark_formats import SCHEMA
-    from toonset.dataset.mesh.load import load_mesh
-
     vertices = load_mesh(folder / "bundle" / "mannequin.obj").vertices
     points = vertices[np.linspace(0, len(vertices) - 1, 9).astype(int)]
     names = [f"p{number}" for number in range(len(points))]
@@ -137,19 +162,12 @@ def _clicks(folder: Path) -> None:
     (folder / "points.json").write_text(json.dumps(content))
 
 
-def _glb(folder: Path) -> None:
-    import trimesh
-
-    shape = trimesh.creation.capsule(0.5, 1.0)
-    shape.export(folder / "mesh.glb")
-
-
 GIVEN = {  # what lies in a document's folder before its first command
     "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase",
-    "docs/architecture.md": "sheet.png m.obj",
+    "docs/architecture.md": "small/sheet.png small/m.obj",
     "docs/formats.md": "bundle sheet.png views",
     "docs/guide_cameras.md": "sheet.png mannequin.obj m.obj points.json other colmap_folder",
-    "docs/guide_corrections.md": "sheet.png mannequin.obj corrections.json",
+    "docs/guide_corrections.md": "small/sheet.png small/mannequin.obj small/corrections.json",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
     "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",
     "docs/guide_training.md": "bundle held_out other dark.ase",

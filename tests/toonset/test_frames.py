@@ -9,7 +9,7 @@ from kornia.geometry.camera import PinholeCamera
 
 from toonset import frames
 from toonset.camera import Camera, rotation_from_angles
-from toonset.projection import project_offsets, rotate
+from toonset.projection import CameraTensors, project, rotate
 
 POINTS = np.random.default_rng(0).uniform(-0.8, 0.8, (60, 3))
 
@@ -52,42 +52,35 @@ def test_colmap_projects_the_same_pixels(yaw):
     np.testing.assert_allclose(pixels.reshape(-1, 2), view.project(POINTS)[0], atol=1e-6)
 
 
-def batch(views):
-    return (
-        torch.from_numpy(np.stack([v.rotation for v in views])),
-        torch.from_numpy(np.stack([v.center for v in views])),
-        torch.tensor([[v.scale, v.scale * v.pixel_aspect] for v in views], dtype=torch.float64),
-        torch.tensor([v.k for v in views], dtype=torch.float64),
-        torch.from_numpy(np.stack([POINTS - v.target for v in views])),
-    )
+def cameras():
+    return [camera(k, yaw) for k, yaw in ((0.0, 0.3), (0.2, 2.0), (1e-6, -1.0))]
 
 
-def test_torch_projection_equals_numpy():
-    views = [camera(k) for k in (0.0, 1e-6, 0.2)]
-    rotation, center, scale, k, offsets = batch(views)
-    pixels = project_offsets(rotation, center, scale, k, offsets)
-    for i, view in enumerate(views):
-        np.testing.assert_allclose(pixels[i], view.project(POINTS)[0], atol=1e-9)
+@pytest.mark.parametrize("device", ["cpu", *(["cuda"] if torch.cuda.is_available() else [])])
+def test_torch_projects_the_same_pixels(device):
+    pixels = project(cameras(), torch.from_numpy(POINTS)[None].to(device))
+    assert pixels.device.type == device
+    for found, view in zip(pixels.cpu(), cameras(), strict=True):
+        np.testing.assert_allclose(found, view.project(POINTS)[0], atol=1e-9)
 
 
 def test_torch_projection_has_no_pixel_behind_a_pinhole():
-    rotation, center, scale, k, offsets = batch([camera(0.2)])
-    behind = offsets - 8.0 * rotation[:, 2][:, None]
-    assert torch.isnan(project_offsets(rotation, center, scale, k, behind)).all()
+    behind = camera().target - 8 * camera().rotation[2]
+    assert torch.isnan(project([camera()], torch.from_numpy(behind)[None, None])).all()
 
 
-def test_torch_projection_is_differentiable_through_k_zero():
-    rotation, center, scale, k, offsets = batch([camera(0.0)])
+def test_torch_projection_is_differentiable_in_cameras_and_points_through_k_zero():
+    held = CameraTensors.of(cameras())
 
-    def pixels(turn, shift, log_scale, depth_k):
-        turned = rotate(rotation, turn)
-        return project_offsets(
-            turned, center + shift, scale * log_scale.exp(), k + depth_k, offsets[:, :5]
+    def pixels(turn, target, center, scale_uv, k, points):
+        return project(
+            CameraTensors(rotate(held.rotation, turn), target, center, scale_uv, k), points
         )
 
-    zeros = [torch.zeros(s, dtype=torch.float64, requires_grad=True) for s in ((1, 3), (1, 2))]
-    zeros += [torch.zeros(s, dtype=torch.float64, requires_grad=True) for s in ((1, 1), (1,))]
-    assert torch.autograd.gradcheck(pixels, tuple(zeros), atol=1e-5)
+    parts = [torch.zeros(3, 3), held.target, held.center, held.scale_uv, held.k]
+    parts += [torch.rand(1, 5, 3, generator=torch.Generator().manual_seed(0))]
+    free = [part.double().clone().requires_grad_() for part in parts]
+    assert torch.autograd.gradcheck(pixels, tuple(free), atol=1e-5)
 
 
 def test_kornia_cameras_project_the_same_pixels():
