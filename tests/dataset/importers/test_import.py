@@ -67,9 +67,13 @@ def test_pinholes_return_within_a_hundredth_pixel(tmp_path: Path, kind: str, k: 
     written = WRITERS[kind](tmp_path / "out", views, tetrahedron())
     expected = written if isinstance(written, tuple) else views
     (tmp_path / "out" / "toonset.json").unlink()
+    if kind.startswith("colmap"):
+        rigs = list((tmp_path / "out" / "sparse" / "0").glob("rigs.*"))
+        assert len(rigs) == (kind != "colmap-old")
     write_imported(tmp_path / "back", read_import(tmp_path / "out"), None)
     frames = read_scene(tmp_path / "back").frames
     for frame, view in zip(frames, expected, strict=True):
+        assert (view.error_px > 0) == (k == 0)
         assert not frame.camera.is_orthographic
         assert off_px(frame.camera, view.pinhole) < 0.01
         assert off_px(frame.camera, view.camera) <= view.error_px + 0.01

@@ -42,9 +42,9 @@ def opencv(tmp_path: Path) -> Path:
         ("data: [ 0., 0., 0., 0., 0. ]", "data: [ .1, 0., 0., 0., 0. ]", "undistort the pictures"),
         ("images/000.png", "../000.png", "lies outside of the folder"),
         ("images/000.png", "images/9.png", "the picture does not exist"),
-        ("image_width: 60", "image_width: 61", "its camera says 61 x 80"),
-        ("image_width: 60", "image_width: -1", "must be positive"),
-        ("image_width: 60", "image_width: 2000000000", "megapixels"),
+        ("image_width: 90", "image_width: 91", "its camera says 91 x 120"),
+        ("image_width: 90", "image_width: -1", "must be positive"),
+        ("image_width: 90", "image_width: 2000000000", "megapixels"),
         ("views:", "shots:", "0 entries in its list `views`"),
         ("camera_matrix:", "lens:", "camera_matrix is missing or no matrix"),
         ("tvec: !!opencv", "t: !!opencv", "tvec is missing"),
@@ -52,7 +52,7 @@ def opencv(tmp_path: Path) -> Path:
         ("%YAML 1.2", "hello", "no OpenCV YAML"),
         ("%YAML 1.2", "<?xml version='1.0'?>", "no OpenCV YAML"),
         ("0., 0., 1. ]", ".Nan, 0., 1. ]", "not finite"),
-        ("data: [ 185", "data: [ -185", "camera_matrix is not"),
+        ("data: [ 235", "data: [ -235", "camera_matrix is not"),
         ("-\n      name", "name", "no OpenCV YAML"),
     ],
 )
@@ -146,11 +146,11 @@ def test_distorted_colmap_cameras_are_refused_by_name(toonset, tmp_path: Path) -
     sparse = tmp_path / "out" / "sparse" / "0"
     model = pycolmap.Reconstruction(sparse)
     lens = model.cameras[1]
-    lens.model = pycolmap.CameraModelId.OPENCV
-    lens.params = [100.0, 100.0, 30.0, 40.0, 0.1, 0, 0, 0]
+    lens.model = pycolmap.CameraModelId.SIMPLE_RADIAL
+    lens.params = [100.0, 50.0, 60.0, 0.1]
     model.write(sparse)
     reason = toonset("import", tmp_path / "out", "-o", tmp_path / "b").reason
-    assert "OPENCV camera" in reason
+    assert "SIMPLE_RADIAL camera, PINHOLE or SIMPLE_PINHOLE" in reason
     assert "undistort" in reason
 
 
@@ -174,5 +174,5 @@ def test_pictures_of_another_size_are_refused(toonset, tmp_path: Path) -> None:
     small = replace(views[0], rgba=views[0].rgba[:9, :9])
     write_bytes(tmp_path / "out" / "images" / "000.png", encode_png(small.rgba))
     reason = toonset("import", tmp_path / "out", "-o", tmp_path / "b").reason
-    assert "is 9 x 9 px, its camera says 60 x 80" in reason
+    assert "is 9 x 9 px, its camera says 90 x 120" in reason
     assert not (tmp_path / "b").exists()
