@@ -131,6 +131,8 @@ def test_hints_and_cuts_reach_the_bundle_as_from_the_command(
     sheet = ts.split_sheet(drawn / "sheet.png", drop="1", background="#ffffff")
     ts.write_bundle("mine", ts.calibrate(sheet.views, "none", hints=ts.Hints(labels=labels)))
     assert_same_files(tmp_path / "bundle", tmp_path / "mine")
+    options = json.loads((tmp_path / "mine/calibration.json").read_text())["options"]
+    assert (options["drop"], options["views"]) == ("1", labels)
 
 
 def test_labels_of_a_split_folder_are_known_without_saying_them_again(

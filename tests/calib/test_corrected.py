@@ -112,12 +112,6 @@ def test_a_dragged_camera_is_refitted_in_its_basin(drawn: Drawn, plain):
     assert flipped.views[1].verdict != "ok"
 
 
-def test_an_excluded_view_is_left_out(drawn: Drawn, plain):
-    found = drawn.found({"box": drawn.plain.views[3].box, "exclude": True})
-    assert [view.name for view in found.views] == ["000.png", "001.png", "002.png"]
-    assert max(off_deg(found, drawn.truth.cameras[:3])) < 2
-
-
 def landmarks(drawn: Drawn, number: int, count: int) -> list[dict[str, Any]]:
     camera, view = drawn.truth.cameras[number], drawn.plain.views[number]
     points = drawn.truth.mesh.vertices

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from toonset.camera import Camera
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.score.evaluate import ScoredView, chosen_frames, report
@@ -127,7 +128,7 @@ def test_an_output_is_not_replaced_unasked(
 
 
 def test_the_views_of_a_run_among_those_of_its_bundle() -> None:
-    camera = read_camera()
+    camera = Camera.looking_at(np.zeros(3), 0.0, 0.0, 1.0, (4, 4))
     blank = np.zeros((4, 4, 4), dtype=np.uint8)
     scene = Scene(tuple(Frame(n, camera, blank) for n in ("a.png", "b.png", "c.png")), None, "s")
 
@@ -137,12 +138,6 @@ def test_the_views_of_a_run_among_those_of_its_bundle() -> None:
     assert names({"scene": {"views": ["c.png", "a.png"]}}) == ["a.png", "c.png"]
     assert names({"scene": {"views": ["d.png"]}}) == []
     assert names({}) == names({"scene": {"views": 3}}) == names([]) == ["a.png", "b.png", "c.png"]
-
-
-def read_camera():
-    from toonset.camera import Camera
-
-    return Camera.looking_at(np.zeros(3), 0.0, 0.0, 1.0, (4, 4))
 
 
 def test_a_run_without_palette_has_no_palette_figures() -> None:

@@ -30,7 +30,9 @@ def test_force_replaces_a_bundle_with_its_palette(drawn: Path, bundle: Path, too
     assert toonset("palette", bundle, "-q").code == 0
     arguments = ("calibrate", drawn / "single.png", "--mesh", drawn / "mannequin.obj", "-o", bundle)
     assert "exists already; pass --force to replace it" in toonset(*arguments, "-q").reason
-    assert toonset(*arguments, "-q", "--force").code == 3  # a single drawing
+    done = toonset(*arguments, "-q", "--force")  # a single drawing
+    assert (done.code, done.err.count("\n")) == (3, 1)  # only why
+    assert done.err.startswith("sheet: weak (")
     assert {path.name for path in bundle.iterdir()} == before
 
 

@@ -81,20 +81,18 @@ def test_no_mesh_takes_the_default_mannequin_and_says_so(drawn: Path, toonset, t
 
 
 @pytest.mark.parametrize(
-    ("files", "labels", "words"),
+    ("labels", "words"),
     [
-        (["sheet.png"], "front,3q,side", "--views: 3 labels for 5 views"),
-        (["sheet.png", "single.png"], LABELS, "--views: 5 labels for 6 views"),
-        (["sheet.png"], "front,3q,side,bakc,?", "'bakc' is no direction; did you mean 'back'"),
-        (["single.png"], "nan", "'nan' is no direction"),
+        (LABELS, "--views: 5 labels for 6 views"),
+        ("front,3q,side,bakc,?,?", "'bakc' is no direction; did you mean 'back'"),
+        ("nan,?,?,?,?,?", "'nan' is no direction"),
     ],
 )
-def test_labels_that_do_not_fit(files, labels, words, drawn, toonset, snapshot, tmp_path):
-    before = snapshot(tmp_path)
-    sheets = [drawn / name for name in files]
-    done = toonset("calibrate", *sheets, "--views", labels, "-o", tmp_path / "b", "-q")
-    assert words in done.reason
-    assert snapshot(tmp_path) == before
+def test_labels_that_do_not_fit(labels, words, drawn, toonset, tmp_path):
+    out = tmp_path / "b"
+    sheets = [drawn / "sheet.png", drawn / "single.png"]
+    assert words in toonset("calibrate", *sheets, "--views", labels, "-o", out, "-q").reason
+    assert not out.exists()
 
 
 def test_labels_over_several_files_count_on(drawn: Path, toonset, tmp_path):
@@ -219,13 +217,6 @@ def test_locks_keep_what_init_has(locked, drawn, bundle: Path, toonset, tmp_path
             assert end.k == pytest.approx(start.k, rel=1e-4)
 
 
-def test_yaw_may_be_locked_to_labels(drawn: Path, toonset, tmp_path):
-    done = started(drawn, toonset, tmp_path / "b", "--views", LABELS, "--lock", "yaw")
-    assert done.code in (0, 3)
-    off = [v["camera"]["yaw_deg"] - 72 * i for i, v in enumerate(done.json["views"])]
-    assert max(abs((turn + 180) % 360 - 180) for turn in off) < 0.01
-
-
 @pytest.mark.parametrize(
     ("more", "words"),
     [
@@ -283,15 +274,8 @@ def test_corrections_are_an_input_and_change_only_what_they_say(
     ("content", "more", "words"),
     [
         ({"view": []}, [], "corrections.json: unknown key 'view'"),
-        ({"views": [{"box": [0, 0, 9, 9], "label": "up"}]}, [], "views.0.label: 'up' is no dir"),
-        ({"boxes": [[0, 0, 9999, 9]]}, [], "boxes: box 0 (x 0, y 0, 9999 x 9 px) leaves the sheet"),
         ({"boxes": [[0, 0, 99, 99]]}, ["--boxes", "b.csv"], "boxes and --boxes say the same"),
-        (
-            {"views": [{"box": [0, 0, 9, 9], "label": "0"}]},
-            ["--front", "1"],
-            "views.label and --fr",
-        ),
-        ({}, ["--landmarks-only", "--landmarks", "l.json"], "--corrections does nothing beside"),
+        ({"views": [{"box": [0, 0, 9, 9], "label": "0"}]}, ["--front", "1"], "label and --front"),
     ],
 )
 def test_corrections_that_cannot_be(
@@ -299,7 +283,6 @@ def test_corrections_that_cannot_be(
 ):
     monkeypatch.chdir(tmp_path)
     Path("b.csv").write_text("0,0,99,99\n")
-    Path("l.json").write_text("{}")
     path = corrections(tmp_path, **content)
     before = snapshot(tmp_path)
     mesh = ("--mesh", drawn / "mannequin.obj")

@@ -143,7 +143,7 @@ def test_longer_legs_than_the_characters_are_no_cut(elevation):
         faces = [part.faces + 8 * i for i, part in enumerate(parts)]
         return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
-    options = replace(OPTIONS, views=8, cell_px=200, elevation_deg=elevation)
+    options = replace(OPTIONS, views=4, cell_px=200, elevation_deg=elevation)
     views = split_picture(make_turnaround(figure(1.0), options, 0).sheet).views
     assert any(side.side == "bottom" for view in views for side in flat_sides(view))
     assert find_cameras(views, figure(1.3)).cuts == ()

@@ -60,3 +60,9 @@ def open_page(open_at: Open, tmp_path: Path) -> Open:
         return open_at(path.as_uri(), path.as_uri(), **options)
 
     return open_one
+
+
+@pytest.fixture
+def editor(open_page: Open) -> Editor:
+    """Return the page of a made-up bundle with a mannequin."""
+    return open_page()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from dataclasses import replace
@@ -217,20 +216,12 @@ def test_impossible_habits_are_refused() -> None:
 # ---- files
 
 
-def digest(folder: Path) -> dict[str, str]:
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in files
-    }
-
-
 def test_same_seed_same_bytes_and_the_truth_is_written(
-    made: Turnaround, body: Mesh, tmp_path: Path
+    made: Turnaround, body: Mesh, tmp_path: Path, snapshot
 ) -> None:
     write_turnaround(made, tmp_path / "a")
     write_turnaround(make_turnaround(body, SMALL, 1), tmp_path / "b")
-    assert digest(tmp_path / "a") == digest(tmp_path / "b")
+    assert snapshot(tmp_path / "a") == snapshot(tmp_path / "b")
     assert (make_turnaround(body, SMALL, 2).sheet != made.sheet).any()
     assert not (tmp_path / "a" / "sheet.png").exists()
     truth = json.loads((tmp_path / "a" / "truth.json").read_text())
@@ -249,21 +240,15 @@ def test_same_seed_same_bytes_and_the_truth_is_written(
 
 
 def test_command_takes_a_condition_and_what_is_typed(
-    mannequin: Mannequin, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    mannequin: Mannequin, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, toonset
 ) -> None:
-    import typer
-    from typer.testing import CliRunner
-
-    from toonset.cli import synth
-
-    app = typer.Typer()
-    app.command()(synth.synth)
-    monkeypatch.setattr(synth, "TEST_VIEWS", 3)
+    monkeypatch.setattr("toonset.cli.synth.TEST_VIEWS", 3)
     monkeypatch.chdir(tmp_path)
     unnamed = replace(mannequin.mesh, face_parts=None, part_names=("body",))
     Path("m.obj").write_bytes(save_obj(unnamed))
-    asked = ["m.obj", "-q", "--condition", "artist", "--views", "3", "--cell", "64", "--warp", "0"]
-    assert CliRunner().invoke(app, [*asked, "-o", "out"]).exception is None
+    size = ("--views", 3, "--cell", 64, "--warp", 0)
+    asked = ("synth", "m.obj", "-q", "--condition", "artist", *size)
+    assert toonset(*asked, "-o", "out").code == 0
     options = json.loads(Path("out/truth.json").read_text())["options"]
     assert (options["warp_percent"], options["yaw_jitter_deg"]) == (0, 5)
     assert options["artist"]["jpeg_quality"] == 88
@@ -271,7 +256,6 @@ def test_command_takes_a_condition_and_what_is_typed(
     points = {name: point.tolist() for name, point in mannequin.landmarks.items()}
     marks = {"schema": "toonset-landmarks/1", "units": "world", "points": points}
     Path("m.landmarks.json").write_text(json.dumps(marks))
-    assert CliRunner().invoke(app, [*asked, "-o", "marked"]).exception is None
+    assert toonset(*asked, "-o", "marked").code == 0
     assert Path("out/sheet.jpg").read_bytes() != Path("marked/sheet.jpg").read_bytes()
-    wrong = CliRunner().invoke(app, ["m.obj", "-o", "x", "--condition", "artsy"])
-    assert wrong.exit_code == 2
+    assert toonset("synth", "m.obj", "-o", "x", "--condition", "artsy").code == 2

@@ -9,6 +9,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import load_indexed_png, load_rgba
-from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.dataset.synthetic import gl_render
 from toonset.dataset.synthetic.files import write_turnaround
 from toonset.dataset.synthetic.gl_render import render_labels
@@ -87,13 +88,12 @@ def test_depth_unprojects_onto_the_surface(k: float) -> None:
     assert np.isinf(seen.depth[~inside]).all()
 
 
-def test_both_sides_of_a_face_are_drawn() -> None:
+@pytest.mark.parametrize("yaw", [0.0, math.pi])
+def test_both_sides_of_a_face_are_drawn(yaw: float) -> None:
     vertices = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], dtype=float)
-    sheet = Mesh(vertices, np.array([[0, 1, 2]]))
-    for yaw in (0.0, math.pi):
-        camera = Camera.looking_at(np.zeros(3), yaw, 0.0, 20.0, (64, 64))
-        seen = render_labels(sheet, np.zeros(1, dtype=int), camera)
-        assert (seen.labels == 0).sum() == pytest.approx(2 * 20 * 20, rel=0.05)
+    camera = Camera.looking_at(np.zeros(3), yaw, 0.0, 20.0, (64, 64))
+    seen = render_labels(Mesh(vertices, np.array([[0, 1, 2]])), np.zeros(1, dtype=int), camera)
+    assert (seen.labels == 0).sum() == pytest.approx(2 * 20 * 20, rel=0.05)
 
 
 def test_camera_that_stands_in_the_mesh_is_refused() -> None:
@@ -122,10 +122,7 @@ def test_figures_stay_in_their_cells_and_boxes_hold_them() -> None:
     drawn = (made.sheet[..., :3] != 255).any(axis=-1)
     for view, (x, y, w, h) in zip(made.views, made.figure_boxes, strict=True):
         left, top, side, _ = view.box
-        assert left < x
-        assert top < y
-        assert x + w < left + side
-        assert y + h < top + side
+        assert (left < x, top < y, x + w < left + side, y + h < top + side) == (True,) * 4
         drawn[y : y + h, x : x + w] = False
     assert not drawn.any()
 
@@ -246,52 +243,33 @@ def test_files_hold_the_truth(tmp_path: Path) -> None:
         np.testing.assert_array_equal(labels, made.labels[i])
 
 
-def test_command_writes_and_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from toonset.dataset.mesh.load import save_obj
-
+def test_command_writes_and_refuses(tmp_path: Path, toonset) -> None:
     (tmp_path / "m.obj").write_bytes(save_obj(figure()))
-    monkeypatch.chdir(tmp_path)
-    command = ["m.obj", "-o", "out", "--views", "3", "--cell", "64", "--following", "ear", "-q"]
-    assert run_synth(command) is None
+    size = ("--views", 3, "--cell", 64, "--following", "ear", "-q")
+    command = ("synth", tmp_path / "m.obj", "-o", tmp_path / "out", *size)
+    assert toonset(*command).code == 0
     assert load_rgba(tmp_path / "out" / "sheet.png").shape == (64, 192, 4)
-    assert "exists already" in str(run_synth(command))
-    assert run_synth([*command, "--force"]) is None
+    assert "exists already" in toonset(*command).reason
+    assert toonset(*command, "--force").code == 0
 
 
-def run_synth(arguments: list[str]) -> BaseException | None:
-    """Run the verb alone (the program loads every other verb) and return what it raised."""
-    import typer
-    from typer.testing import CliRunner
-
-    from toonset.cli.synth import synth
-
-    app = typer.Typer()
-    app.command()(synth)
-    return CliRunner().invoke(app, arguments).exception
-
-
-MISSING = {
-    "no Mesa vendor": ValueError("Invalid device ID (0)"),
-    "no driver": type("EGLError", (Exception,), {})("eglInitialize failed\nlong story"),
-}
+MISSING = [
+    ValueError("Invalid device ID (0)"),  # no Mesa vendor
+    type("EGLError", (Exception,), {})("eglInitialize failed\nlong story"),  # no driver
+]
 INSTALL = "apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
 
 
 def test_missing_library_at_import_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(name: str) -> object:
-        raise ImportError("Unable to load EGL library")
-
-    monkeypatch.setattr("importlib.import_module", fail)
+    monkeypatch.setattr("importlib.import_module", Mock(side_effect=ImportError("no EGL")))
     with pytest.raises(SetupError, match=INSTALL):
         gl_render._pyrender.__wrapped__()
 
 
-@pytest.mark.parametrize("case", MISSING)
-def test_missing_driver_is_named(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(width: int, height: int) -> object:
-        raise MISSING[case]
-
-    monkeypatch.setattr(gl_render, "_pyrender", lambda: SimpleNamespace(OffscreenRenderer=fail))
+@pytest.mark.parametrize("error", MISSING)
+def test_missing_driver_is_named(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = SimpleNamespace(OffscreenRenderer=Mock(side_effect=error))
+    monkeypatch.setattr(gl_render, "_pyrender", lambda: program)
     with pytest.raises(SetupError, match=INSTALL):
         gl_render._renderer.__wrapped__()
 
