@@ -1,7 +1,5 @@
 """The public interface: what it names, that it costs nothing to import, and the commands' bytes."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os
@@ -64,9 +62,6 @@ def test_the_import_is_light(line: str) -> None:
     assert done.stdout.strip() == "[]"
 
 
-# ---- the same bytes as the commands
-
-
 def plain(path: Path) -> Any:
     """Return a file's content, JSON without what differs from run to run."""
     if path.suffix != ".json":
@@ -104,16 +99,12 @@ def written(found: ts.Calibration, tmp_path: Path) -> ts.Bundle:
     return ts.write_bundle(tmp_path / "mine", found, ts.extract_palette(found.drawings))
 
 
-def test_calibrate_writes_what_the_command_writes(
-    found: ts.Calibration, bundle: Path, tmp_path: Path
-) -> None:
+def test_calibrate_writes_what_the_command_writes(found, bundle, tmp_path):
     ts.write_bundle(tmp_path / "mine", found)
     assert_same_files(bundle, tmp_path / "mine")
 
 
-def test_palette_writes_what_the_command_writes(
-    written: ts.Bundle, bundle: Path, toonset: Any
-) -> None:
+def test_palette_writes_what_the_command_writes(written, bundle, toonset):
     assert toonset("palette", bundle).code == 0
     assert_same_files(bundle, written.folder)
     assert written.palette is not None
@@ -121,9 +112,7 @@ def test_palette_writes_what_the_command_writes(
         np.testing.assert_array_equal(frame.labels, ts.label_image(frame.rgba, written.palette))
 
 
-def test_hints_and_cuts_reach_the_bundle_as_from_the_command(
-    drawn: Path, toonset: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hints_and_cuts_reach_the_bundle_as_from_the_command(drawn, toonset, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     labels = "front,?,?,288"
     cut = ("--drop", "1", "--background", "#ffffff", "--views", labels, "--mesh", "none")
@@ -135,18 +124,14 @@ def test_hints_and_cuts_reach_the_bundle_as_from_the_command(
     assert (options["drop"], options["views"]) == ("1", labels)
 
 
-def test_labels_of_a_split_folder_are_known_without_saying_them_again(
-    drawn: Path, toonset: Any, tmp_path: Path
-) -> None:
+def test_labels_of_a_split_folder_are_known_without_saying_them_again(drawn, toonset, tmp_path):
     labels = "front,72,144,216,288"
     toonset("split", drawn / "sheet.png", "--views", labels, "-o", tmp_path / "views")
     found = ts.calibrate(ts.split_sheet(tmp_path / "views").views, mesh="none")
     assert found.origin["options"]["views"] == labels
 
 
-def test_train_and_render_write_what_the_commands_write(
-    written: ts.Bundle, toonset: Any, tmp_path: Path
-) -> None:
+def test_train_and_render_write_what_the_commands_write(written, toonset, tmp_path):
     few = ("--steps", FEW["steps"], "--device", "cpu", "--threads", 2)
     assert toonset("train", written.folder, "-o", tmp_path / "run", *few).code in (0, 3)
     run = ts.train(written.scene, ts.TrainOptions(**FEW), threads=2)
@@ -168,9 +153,7 @@ def test_train_and_render_write_what_the_commands_write(
     assert_same_files(out, tmp_path / "mine-turn")
 
 
-def test_evaluate_and_surface_give_what_the_commands_write(
-    run: Path, small_scene: Path, toonset: Any, tmp_path: Path
-) -> None:
+def test_evaluate_and_surface_give_what_the_commands_write(run, small_scene, toonset, tmp_path):
     test, field = ts.read_bundle(small_scene).scene, ts.read_run(run)
     out = tmp_path / "judged"
     assert toonset("evaluate", run, "--test", small_scene, "-o", out, "--quiet").code == 0
@@ -195,9 +178,6 @@ def small_scene(bundle: Path) -> Path:
     cameras["frames"] = cameras["frames"][:2]
     (bundle / "transforms.json").write_text(json.dumps(cameras))
     return bundle
-
-
-# ---- a library leaves its host as it found it
 
 
 @pytest.fixture
@@ -226,9 +206,7 @@ def host() -> Iterator[dict[str, Any]]:
         assert state() == before
 
 
-def test_calls_leave_the_host_as_it_was(
-    found: ts.Calibration, drawn: Path, bundle: Path, host: dict[str, Any], tmp_path: Path
-) -> None:
+def test_calls_leave_the_host_as_it_was(found, drawn, bundle, host, tmp_path):
     sheet = ts.split_sheet(drawn / "single.png")
     ts.calibrate(sheet.views, ts.load_mesh(drawn / "mannequin.obj"))
     run = ts.train(ts.read_bundle(bundle).scene, ts.TrainOptions(steps=2, device="cpu"), threads=3)
@@ -249,9 +227,7 @@ def test_a_field_that_changes_is_rendered_anew(run: Path) -> None:
     assert not np.allclose(ts.render(field, camera).rgb, before)
 
 
-def test_the_same_bytes_with_blas_on_two_threads(
-    found: ts.Calibration, drawn: Path, tmp_path: Path
-) -> None:
+def test_the_same_bytes_with_blas_on_two_threads(found, drawn, tmp_path):
     code = (
         "import sys, toonset as ts\n"
         "folder, out = sys.argv[1:]\n"
@@ -265,8 +241,6 @@ def test_the_same_bytes_with_blas_on_two_threads(
     ts.write_bundle(tmp_path / "one", found, ts.extract_palette(found.drawings))
     assert_same_files(tmp_path / "one", tmp_path / "two")
 
-
-# ---- mistakes are one ToonsetError with the commands' words
 
 MISTAKES = [
     (lambda d: ts.split_sheet(d / "none.png"), ("split", "none.png")),
@@ -292,9 +266,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("call", "command"), MISTAKES)
-def test_a_mistake_is_one_error_with_the_commands_line(
-    call: Any, command: tuple[str, ...], drawn: Path, toonset: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mistake_is_one_error_with_the_commands_line(call, command, drawn, toonset, monkeypatch):
     monkeypatch.chdir(drawn)
     with pytest.raises(ts.ToonsetError) as error:
         call(Path())
@@ -359,18 +331,14 @@ def test_calls_that_mean_nothing_are_refused(call: Any, words: str, drawn: Path,
 
 
 @pytest.mark.parametrize(("options", "words"), NO_OPTIONS)
-def test_options_out_of_range_are_refused(
-    options: dict[str, Any], words: str, bundle: Path
-) -> None:
+def test_options_out_of_range_are_refused(options, words, bundle):
     with pytest.raises(ts.ToonsetError, match=words):
         ts.train(ts.read_bundle(bundle).scene, ts.TrainOptions(**options))
     with pytest.raises(ts.ToonsetError, match="threads: 0"):
         ts.train(ts.read_bundle(bundle).scene, threads=0)
 
 
-def test_force_replaces_nothing_but_earlier_results(
-    found: ts.Calibration, bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_force_replaces_nothing_but_earlier_results(found, bundle, tmp_path, monkeypatch):
     kept = tmp_path / "mine" / "notes.txt"
     kept.parent.mkdir()
     kept.write_text("mine")

@@ -4,8 +4,6 @@ A document has a folder of its own with the drawings that it speaks of, and noth
 commands must not stand in each other's way. Exit code 3 is fine: written, but look.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
@@ -78,9 +76,6 @@ def is_form(command: str) -> bool:
 
 def runs_here(command: str) -> bool:
     return not is_form(command) and not any(command.startswith(words) for words in ELSEWHERE)
-
-
-# ---- what the documents presuppose
 
 
 @pytest.fixture(scope="module")
@@ -203,12 +198,8 @@ def given(
     indirect=["given"],
 )
 def test_commands_of_a_document_run_as_they_stand(
-    document: str,
-    given: Path,
-    toonset: Toonset,
-    interrupted: Toonset,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    document, given, toonset, interrupted, monkeypatch
+):
     monkeypatch.setenv("BROWSER", "true")
     for command in filter(runs_here, commands(document)):
         words = arguments(command)
@@ -227,9 +218,7 @@ def test_no_command_is_left_out_silently() -> None:
 
 
 @pytest.mark.slow
-def test_what_verbs_say_comes_next_runs_as_printed(
-    drawn: Path, toonset: Toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_verbs_say_comes_next_runs_as_printed(drawn, toonset, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(drawn / "sheet.png", "a sheet.png")
     shutil.copy(drawn / "mannequin.obj", "m.obj")

@@ -1,7 +1,5 @@
 """The numbered examples run as they stand, one after the other, and write what they say."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

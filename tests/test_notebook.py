@@ -1,7 +1,5 @@
 """What notebooks show: small, escaped, and never an error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Cameras as a person corrected them: what moves, what stays, and what the verdict says of it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

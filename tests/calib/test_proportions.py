@@ -1,7 +1,5 @@
 """A mannequin that stands a little otherwise than the character, or is built a little otherwise."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Broken bundles and runs: one clear line, exit code 2, nothing written."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable
@@ -62,9 +60,7 @@ BAD_CAMERAS: dict[str, tuple[Callable[[Path], Any], str]] = {
     [(case, "palette") for case in BAD_CAMERAS]
     + [(case, verb) for case in ("gone", "nan") for verb in ("train", "render", "evaluate")],
 )
-def test_a_broken_bundle(
-    case, verb, bundle: Path, run: Path, toonset, snapshot, tmp_path, monkeypatch
-):
+def test_a_broken_bundle(case, verb, bundle, run, toonset, snapshot, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     spoil, words = BAD_CAMERAS[case]
     spoil(bundle)
@@ -112,9 +108,7 @@ def test_broken_pictures_of_a_bundle(spoil, words, small_bundle: Path, run, toon
         ("evaluate", ["--test", "bundle"]),
     ],
 )
-def test_a_bundle_for_a_run(
-    verb, arguments, bundle: Path, run: Path, toonset, snapshot, tmp_path, monkeypatch
-):
+def test_a_bundle_for_a_run(verb, arguments, bundle, run, toonset, snapshot, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run.rename(bundle / "run")
     before = snapshot(tmp_path)

@@ -1,7 +1,5 @@
 """Places that cannot be written: one clear line, exit code 2, everything as it was."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -27,7 +25,7 @@ ROOT_ON_LINUX = sys.platform == "linux" and os.geteuid() == 0 and shutil.which("
 )
 @pytest.mark.parametrize("verb", ["calibrate", "palette", "train", "render"])
 def test_an_output_that_cannot_be(
-    verb, out, words, drawn: Path, bundle: Path, run: Path, toonset, snapshot, tmp_path, monkeypatch
+    verb, out, words, drawn, bundle, run, toonset, snapshot, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").mkdir()
@@ -66,7 +64,7 @@ def test_an_output_that_cannot_be(
     ],
 )
 def test_an_input_that_is_not_there_is_told_before_an_output_that_is(
-    verb, words, toonset, drawn: Path, snapshot, tmp_path, monkeypatch
+    verb, words, toonset, drawn, snapshot, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     shutil.copy(drawn / "single.png", "a.png")
@@ -110,7 +108,7 @@ def test_a_real_disk_that_takes_nothing(options, words, drawn: Path, snapshot, t
     + [("palette", 6), ("render", 8)],
 )
 def test_a_full_disk_leaves_everything_as_it_was(
-    verb, files_that_fit, drawn, bundle: Path, run: Path, toonset, snapshot, tmp_path, monkeypatch
+    verb, files_that_fit, drawn, bundle, run, toonset, snapshot, tmp_path, monkeypatch
 ):
     arguments = {
         "calibrate": [drawn / "single.png", "--mesh", drawn / "mannequin.obj", "-o", bundle],

@@ -1,7 +1,5 @@
 """The command line as a user types it: results, exit codes, what is printed where."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess
@@ -46,9 +44,6 @@ def imported_by(*commands: list[str]) -> tuple[list[int], set[str]]:
     )
     codes, modules = json.loads(done.stdout.splitlines()[-1])
     return codes, set(modules)
-
-
-# ---- help and usage
 
 
 def test_help_of_every_verb_imports_nothing_heavy():
@@ -121,9 +116,6 @@ def test_usage_mistakes_name_the_argument(
     assert snapshot(tmp_path) == {}
 
 
-# ---- one sheet through every verb
-
-
 def test_calibrate_prints_one_json_object_and_nothing_else(calibrated):
     bundle, done = calibrated
     assert (done.code, done.err) == (0, "")
@@ -194,7 +186,7 @@ def test_a_single_figure_is_fitted_and_called_weak(drawn: Path, toonset, tmp_pat
 
 
 def test_several_files_are_views_in_the_order_given(
-    drawn: Path, calibrated, toonset, tmp_path, monkeypatch
+    drawn, calibrated, toonset, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     sheet = Image.open(drawn / "sheet.png")
@@ -213,7 +205,7 @@ def test_several_files_are_views_in_the_order_given(
 
 
 def test_the_bundle_keeps_the_mannequin_and_export_takes_it_if_the_drawings_show_it(
-    drawn: Path, bundle: Path, toonset, tmp_path
+    drawn, bundle, toonset, tmp_path
 ):
     kept = load_mesh(bundle / "mannequin.obj")
     given = load_mesh(drawn / "mannequin.obj")
@@ -248,9 +240,6 @@ def test_transforms_json_means_what_nerfstudio_reads(drawn: Path, calibrated):
         error = np.linalg.norm(pixels - native[frame["file_path"]].project(vertices)[0], axis=1)
         assert error.max() <= frame["toonset"]["pinhole_error_px"] + 1e-6
         assert frame["toonset"]["pinhole_error_px"] < 1
-
-
-# ---- what must not be needed, and what must not be left
 
 
 def test_no_verb_of_a_user_needs_opengl(drawn: Path, tmp_path):

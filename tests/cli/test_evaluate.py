@@ -1,7 +1,5 @@
 """`toonset evaluate`: sections, reasons, files and the picture."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -45,9 +43,7 @@ def scored(name: str, wrong_px: int, *, palette: bool = True) -> ScoredView:
     )
 
 
-def test_held_out_and_training_views_apart(
-    bundle: Path, trained, toonset, tmp_path, monkeypatch
-) -> None:
+def test_held_out_and_training_views_apart(bundle, trained, toonset, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(trained[0], bundle / "run")
     done = toonset("evaluate", "bundle/run", "--test", "bundle", "--json", "-o", "judged")
@@ -114,9 +110,7 @@ def test_the_table(bundle: Path, run: Path, toonset) -> None:
     assert "LPIPS" not in lines[1] or "lpips: " not in done.out
 
 
-def test_an_output_is_not_replaced_unasked(
-    bundle: Path, run: Path, toonset, snapshot, tmp_path
-) -> None:
+def test_an_output_is_not_replaced_unasked(bundle, run, toonset, snapshot, tmp_path):
     out = tmp_path / "judged"
     out.mkdir()
     (out / "drawing.png").write_bytes(b"mine")

@@ -1,7 +1,5 @@
 """--force: it replaces what an earlier run of the same command wrote, and nothing of a user's."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -45,7 +43,7 @@ def test_force_replaces_a_bundle_with_its_palette(drawn: Path, bundle: Path, too
     ],
 )
 def test_force_never_takes_a_users_folder(
-    out, words, drawn: Path, toonset, snapshot, tmp_path, monkeypatch
+    out, words, drawn, toonset, snapshot, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     for name in ("work", "drawings/images", "drawings/run"):
@@ -60,9 +58,7 @@ def test_force_never_takes_a_users_folder(
     assert snapshot(tmp_path) == before
 
 
-def test_force_never_takes_the_folder_one_stands_in(
-    drawn: Path, bundle: Path, toonset, snapshot, monkeypatch
-):
+def test_force_never_takes_the_folder_one_stands_in(drawn, bundle, toonset, snapshot, monkeypatch):
     monkeypatch.chdir(bundle / "images")
     before = snapshot(bundle)
     done = toonset(

@@ -1,7 +1,5 @@
 """`toonset info` and `toonset check`: what a person is told, and with which exit code."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -135,9 +133,7 @@ def test_check_goes_on_where_the_cameras_cannot_be_read(place: Path, toonset):
     assert "(and 1 more problem); correct the file" in toonset("info", place).reason
 
 
-def test_info_of_a_split_tells_what_came_and_went_and_check_every_problem(
-    drawn: Path, tmp_path: Path, toonset
-):
+def test_info_of_a_split_tells_what_came_and_went_and_check_every_problem(drawn, tmp_path, toonset):
     views = tmp_path / "views"
     assert toonset("split", drawn / "sheet.png", "-o", views).code == 0
     assert "gone" not in toonset("info", views).out

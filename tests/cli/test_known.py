@@ -1,7 +1,5 @@
 """What a person knows, said on the command line of calibrate: no mesh, landmarks, starts, locks."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from hashlib import sha256
@@ -63,9 +61,6 @@ def turned_deg(bundle: Path, truth) -> list[float]:
     ]
 
 
-# ---- no mesh
-
-
 def test_no_mesh_takes_the_default_mannequin_and_says_so(drawn: Path, toonset, tmp_path):
     out = tmp_path / "b"
     done = toonset("calibrate", drawn / "sheet.png", "-o", out, "--json")
@@ -75,9 +70,6 @@ def test_no_mesh_takes_the_default_mannequin_and_says_so(drawn: Path, toonset, t
     assert done.json["options"]["mannequin"] == {"heads_tall": 3.0, "pose": "relaxed", **looks}
     assert [given["role"] for given in done.json["inputs"]] == ["sheet"]
     assert "left_hand" in load_mesh(out / "mannequin.obj").part_names
-
-
-# ---- labels
 
 
 @pytest.mark.parametrize(
@@ -104,9 +96,6 @@ def test_labels_over_several_files_count_on(drawn: Path, toonset, tmp_path):
     assert done.json["options"]["views"] == f"{LABELS},front"
     yaws = [view["camera"]["yaw_deg"] for view in done.json["views"]]
     assert abs((yaws[5] - yaws[0] + 180) % 360 - 180) < SURE_DEG
-
-
-# ---- landmarks
 
 
 @pytest.mark.parametrize("alone", [False, True])
@@ -159,9 +148,6 @@ def test_landmarks_that_are_not_enough(drawn: Path, toonset, snapshot, tmp_path)
     assert set(snapshot(tmp_path)) == {"marks.json"}
 
 
-# ---- cameras to start from, and locks
-
-
 def started(drawn: Path, toonset, out: Path, *more: object):
     mesh = ("--mesh", drawn / "mannequin.obj")
     return toonset("calibrate", drawn / "sheet.png", *mesh, "-o", out, *more, "--json")
@@ -182,7 +168,7 @@ def moved_start(bundle: Path, path: Path) -> list[Camera]:
 
 
 def test_a_start_is_found_back_without_a_search(
-    drawn, bundle: Path, truth, toonset, tmp_path, monkeypatch
+    drawn, bundle, truth, toonset, tmp_path, monkeypatch
 ):
     def refuse(*arguments: object) -> None:
         raise AssertionError("the search has been asked")
@@ -229,7 +215,7 @@ def test_locks_keep_what_init_has(locked, drawn, bundle: Path, toonset, tmp_path
     ],
 )
 def test_starts_and_locks_that_cannot_be(
-    more, words, drawn, bundle: Path, toonset, snapshot, tmp_path, monkeypatch
+    more, words, drawn, bundle, toonset, snapshot, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     content = json.loads((bundle / "transforms.json").read_text())
@@ -248,18 +234,13 @@ def test_starts_and_locks_that_cannot_be(
     assert snapshot(tmp_path) == before
 
 
-# ---- corrections
-
-
 def corrections(folder: Path, **content: Any) -> Path:
     path = folder / "corrections.json"
     path.write_text(json.dumps({"version": 1, **content}))
     return path
 
 
-def test_corrections_are_an_input_and_change_only_what_they_say(
-    drawn, bundle: Path, toonset, tmp_path
-):
+def test_corrections_are_an_input_and_change_only_what_they_say(drawn, bundle, toonset, tmp_path):
     boxes = [view["box"] for view in json.loads((bundle / "calibration.json").read_text())["views"]]
     views = [{"box": boxes[2], "label": "144"}, {"box": boxes[4], "exclude": True}]
     path = corrections(tmp_path, views=views)

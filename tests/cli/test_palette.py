@@ -44,9 +44,7 @@ def tree(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
-def test_a_bundle_gets_its_palette_and_labels(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bundle_gets_its_palette_and_labels(tmp_path, monkeypatch, capsys):
     make_bundle(tmp_path / "bundle")
     monkeypatch.chdir(tmp_path)
     palette()
@@ -81,9 +79,7 @@ def test_a_second_run_replaces_the_first_by_the_same_bytes(tmp_path: Path, snaps
     assert set(np.unique(load_indexed_png(bundle / "labels" / "000.png"))) == {0, 255}
 
 
-def test_pictures_go_into_a_folder_of_their_own(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_pictures_go_into_a_folder_of_their_own(tmp_path, capsys):
     opaque = np.full((60, 40, 4), 255, dtype=np.uint8)
     opaque[figure()[..., 3] > 0] = figure()[figure()[..., 3] > 0]
     write_bytes(tmp_path / "front.png", encode_png(opaque))  # on white: the ground is cut away
@@ -146,13 +142,7 @@ def test_the_number_of_colours_is_explained_without_empty_figures() -> None:
         (["outside"], {}, "lies outside of the folder"),
     ],
 )
-def test_mistakes_write_nothing(
-    arguments: list[str],
-    options: dict[str, object],
-    fragment: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_mistakes_write_nothing(arguments, options, fragment, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     make_bundle(Path("bundle"))
     Path("empty").mkdir()

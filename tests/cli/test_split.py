@@ -1,7 +1,5 @@
 """`toonset split`: what it writes and says, what it takes as input, and how it is corrected."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from hashlib import sha256
@@ -49,9 +47,6 @@ def color_of(view: Path) -> tuple[int, int, int]:
 
 def colors_of(folder: Path) -> list[tuple[int, int, int]]:
     return [color_of(path) for path in sorted((folder / "images").iterdir())]
-
-
-# ---- what it writes and says
 
 
 def test_a_sheet_becomes_a_folder_to_look_at(sheet: Path, toonset, snapshot):
@@ -106,9 +101,6 @@ def test_a_doubt_is_exit_code_3_and_is_drawn(sheet: Path, toonset):
     assert (done.code, done.out) == (3, "views\n")
     assert "look: other.png is a copy of sheet.png: is one of them another view?" in done.err
     assert len(read_split(Path("views"))[0].views) == 2 * COUNT
-
-
-# ---- corrections
 
 
 def test_dropped_views_go_and_the_others_are_numbered_anew(sheet: Path, toonset):
@@ -182,9 +174,6 @@ def test_a_known_background_is_used(sheet: Path, toonset):
     assert colors_of(Path("views")) == list(COLORS)
 
 
-# ---- inputs
-
-
 def test_a_folder_of_views_is_read_in_the_order_people_count(singles: Path, toonset):
     done = toonset("split", singles)
     assert done.code == 0
@@ -223,9 +212,6 @@ def test_a_corrected_folder_is_read_again(sheet: Path, toonset):
     assert [source.name for source in found.sources] == ["sheet.png"]
     assert toonset("split", "again/split.json", "-o", "third").code == 0
     assert colors_of(Path("third")) == [COLORS[0], COLORS[2], COLORS[3]]
-
-
-# ---- calibrate takes the same
 
 
 def test_calibrate_takes_a_split_folder_with_its_labels(drawn: Path, toonset, tmp_path):

@@ -1,7 +1,5 @@
 """Laws of the face's evidence: symmetries, normalisation, and drawn heads that turn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

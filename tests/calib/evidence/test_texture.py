@@ -1,7 +1,5 @@
 """Laws of the paint on a turning body: symmetries, and a slow reference."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal

@@ -1,7 +1,5 @@
 """Sheets that are no turnaround: a verdict with the reason, never an exception, never ok."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from dataclasses import replace
@@ -88,9 +86,7 @@ def test_views_of_two_characters_are_not_ok(views: list[View]) -> None:
     assert "views 2, 3 have other colours than views 0, 1" in found.views[0].reason
 
 
-def test_with_a_mannequin_views_of_two_characters_are_not_ok(
-    made: Turnaround, views: list[View]
-) -> None:
+def test_with_a_mannequin_views_of_two_characters_are_not_ok(made, views):
     found = find_cameras([*views[:2], *map(repainted, views[2:])], made.mesh)
     assert {view.verdict for view in found.views} == {"weak"}
     assert "other colours" in found.views[0].reason
@@ -133,9 +129,7 @@ def test_a_mirrored_copy_and_plain_silhouettes_are_other_drawings(views: list[Vi
 @pytest.mark.parametrize(
     ("sizes", "verdict"), [((0.6, 1.6, 1.0, 1.3), "failed"), ((0.75, 1.35, 1.0, 1.0), "weak")]
 )
-def test_views_at_several_scales_are_not_ok(
-    views: list[View], sizes: tuple[float, ...], verdict: str
-) -> None:
+def test_views_at_several_scales_are_not_ok(views, sizes, verdict):
     found = alone([resized(view, size) for view, size in zip(views, sizes, strict=True)])
     assert {view.verdict for view in found.views} == {verdict}
     assert "at one scale?" in found.views[0].reason
@@ -171,9 +165,7 @@ def test_too_few_drawings_say_what_is_missing(count: int, views: list[View]) -> 
 
 
 @pytest.mark.parametrize("chosen", [[0, 1], [0, 2]])
-def test_with_a_mannequin_two_drawings_are_enough(
-    made: Turnaround, views: list[View], chosen: list[int]
-) -> None:
+def test_with_a_mannequin_two_drawings_are_enough(made, views, chosen):
     found = find_cameras([views[i] for i in chosen], made.mesh)
     assert off_ring(found, RING[chosen]) < np.radians(5)
 

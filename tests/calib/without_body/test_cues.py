@@ -1,7 +1,5 @@
 """What an earlier fit has found in the same drawings changes nothing of the next."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Cameras without a body: turns, labels, elevation, verdicts, and the bundle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What tests of the correcting page share: pages that must stay quiet."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

@@ -1,13 +1,9 @@
 """The page as a file: figures, cameras, palette, as a person corrects them."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page
 
 from tests.cli.editor.conftest import Open
 from tests.cli.editor.page_under_test import BOXES, HEXES, HOSTILE, Editor
@@ -18,9 +14,6 @@ def is_valid(editor: Editor) -> bool:
     """Return whether the page's file is one that the command line takes."""
     data = json.dumps(editor.download()).encode()
     return parse_corrections(data, "page").version == 1
-
-
-# Figures
 
 
 def test_a_box_is_drawn_moved_sized_and_dropped(editor: Editor) -> None:
@@ -92,9 +85,6 @@ def test_keys_do_what_the_mouse_does(editor: Editor) -> None:
     assert editor.said["boxes"][0] == [22, 40, 60, 122]
     editor.page.keyboard.press("Delete")
     assert editor.views[0]["exclude"]
-
-
-# Views
 
 
 def test_compass_flip_lock_and_leaving_out(editor: Editor) -> None:
@@ -191,9 +181,6 @@ def test_without_a_mannequin_there_are_compasses(open_page: Open) -> None:
     assert "mannequin" not in editor.page.locator("#help_cameras").inner_text()
 
 
-# Palette
-
-
 def test_paints_are_merged_split_dropped_kept_and_named(editor: Editor) -> None:
     editor.mode("Palette")
     editor.choose(*HEXES[:2])
@@ -244,9 +231,6 @@ def test_a_wrong_label_is_painted_over(editor: Editor) -> None:
     assert is_valid(editor)
 
 
-# What is kept
-
-
 def test_undo_redo_and_a_reload(editor: Editor) -> None:
     editor.card("Leave out", 1)
     editor.card("Leave out", 2)
@@ -271,9 +255,7 @@ def test_undo_redo_and_a_reload(editor: Editor) -> None:
     assert editor.views[0]["label"] == "left"
 
 
-def test_a_file_that_is_newer_than_what_the_browser_kept_counts(
-    editor: Editor, open_page: Open
-) -> None:
+def test_a_file_that_is_newer_than_what_the_browser_kept_counts(editor, open_page):
     editor.card("Leave out", 1)
     newer = open_page({"version": 1, "background": "#ffffff"})
     assert newer.said == {"version": 1, "background": "#ffffff"}
@@ -301,9 +283,7 @@ def test_names_that_mean_harm_on_a_phone(open_page: Open, scheme: str) -> None:
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(360, "light"), (1600, "dark")])
-def test_nothing_bars_the_way(
-    open_page: Open, barriers: Callable[[Page], list[str]], width: int, scheme: str
-) -> None:
+def test_nothing_bars_the_way(open_page, barriers, width, scheme):
     editor = open_page(viewport={"width": width, "height": 740}, color_scheme=scheme)
     editor.mode("Figures")
     assert barriers(editor.page) == []

@@ -1,7 +1,5 @@
 """A bundle is what its schema says: read back wherever it lies, old versions too, lies refused."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable
@@ -35,9 +33,6 @@ def edit(place: Path, name: str, change: Edit) -> None:
 
 def problems(place: Path) -> list[str]:
     return [f"{problem.where}: {problem.what}" for problem in bundle_problems(place)]
-
-
-# ---- what is written is read, wherever it lies
 
 
 def test_a_moved_bundle_has_no_problem_and_names_no_place(place: Path, small_bundle: Path):
@@ -99,9 +94,6 @@ def test_coverage_is_checked_like_labels(place: Path):
     assert problems(place)[1:] == ["coverage/002.png: is missing; run `toonset palette` again"]
 
 
-# ---- versions
-
-
 @pytest.mark.parametrize(
     ("name", "newest"), [("transforms", 1), ("calibration", 2), ("palette", 1)]
 )
@@ -136,9 +128,6 @@ def test_a_calibration_that_no_calibration_writes_is_refused(change, words, plac
     assert words in said
 
 
-# ---- strict JSON
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -167,9 +156,6 @@ def test_plain_json_is_read_with_and_without_byte_order_mark():
         assert parse_json(mark + b'{"a": [1, 2.5, "x", null]}', "x", BundleError) == {
             "a": [1, 2.5, "x", None]
         }
-
-
-# ---- check names every problem, each file on its own line
 
 
 def spoil_everything(place: Path) -> None:

@@ -4,8 +4,6 @@ Every mutation spoils one file of a whole bundle. All readers then look at it, a
 `toonset check`: what it calls clean is read, what a reader refuses it has named.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -48,9 +46,6 @@ SCHEMAS = (
     *("toonset-{}", "toonset-{}/1e3", "Toonset-{}/1", "toonset-{}/٣", "toonset-other/1", 1, ["1"]),
 )
 MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16", "F", "CMYK")
-
-
-# ---- places inside a JSON value
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -108,9 +103,6 @@ def mutate_bytes(data: bytes, rng: random.Random) -> bytes:
     for _ in range(rng.choice((1, 1, 1, 5, 50))):
         flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
     return bytes(flipped)
-
-
-# ---- one mutation of a bundle in place
 
 
 def spoil_json(place: Path, rng: random.Random) -> None:
@@ -217,9 +209,6 @@ SPOILERS: tuple[tuple[Callable[[Path, random.Random], None], int], ...] = (
 )
 
 
-# ---- what must hold
-
-
 def tree(root: Path) -> list[tuple[str, int, int]]:
     """Return every path below with what changes when it is written to."""
     stats = ((path, path.lstat()) for path in sorted(root.rglob("*")))
@@ -305,9 +294,7 @@ def test_mutated_bundles_are_refused_in_one_line_or_read(small_bundle, tmp_path,
     assert 0.02 * count < clean < 0.5 * count  # the mutations bite, and not everything is refused
 
 
-def test_verbs_refuse_mutated_bundles_in_one_line(
-    small_bundle: Path, outside: Path, toonset, snapshot
-):
+def test_verbs_refuse_mutated_bundles_in_one_line(small_bundle, outside, toonset, snapshot):
     kept = snapshot(outside)
     for number in range(50_000, 50_020):
         place = Path(shutil.copytree(small_bundle, outside.parent / "bundle"))

@@ -1,7 +1,5 @@
 """Views all round a target, as exports are given them, and where their cameras see it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

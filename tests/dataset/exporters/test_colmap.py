@@ -1,7 +1,5 @@
 """COLMAP export: what another program reads is what the bundle says."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -78,9 +76,6 @@ def test_pictures_are_over_white_and_masks_tell_the_figure(views, tmp_path: Path
         np.testing.assert_array_equal(mask[..., 0] == 255, figure)
 
 
-# ---- points
-
-
 def quad(x: float, z: float, half: float) -> Mesh:
     """Return a square that faces +Z."""
     corners = [[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]
@@ -125,9 +120,6 @@ def test_surface_samples_lie_on_the_surface_and_follow_the_seed() -> None:
     np.testing.assert_allclose(points[:, 2], -0.2)
     np.testing.assert_allclose(points.mean(axis=0)[:2], [0.3, 0], atol=0.03)
     np.testing.assert_array_equal(points, sample_surface(mesh, 2000, 7))
-
-
-# ---- what cannot be read
 
 
 @pytest.fixture
@@ -187,9 +179,6 @@ def test_two_pictures_of_one_name_are_refused(tmp_path: Path) -> None:
     bundle = bundle_of((one, replace(two, name="000.jpg")), tmp_path / "bundle")
     with pytest.raises(BundleError, match=r"two pictures would be written as 000\.png"):
         read_views(bundle)
-
-
-# ---- the verb
 
 
 def test_export_writes_what_pycolmap_reads(toonset, tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Exports: what another program reads is what the bundle says, format by format."""
 
-from __future__ import annotations
-
 import json
 import math
 import shlex
@@ -45,9 +43,6 @@ def through(pose: np.ndarray, focal: tuple[float, float], center: np.ndarray) ->
     """Project the points as a NeRF program does: world_from_camera with OpenGL axes."""
     local = (around(TARGET) - pose[:3, 3]) @ pose[:3, :3]
     return local[:, :2] * [1, -1] / -local[:, 2:] * np.array(focal) + center
-
-
-# ---- lenses
 
 
 @MODELS
@@ -119,9 +114,6 @@ def test_square_pixels_enlarge_the_shorter_direction() -> None:
     assert square_pixels(view) is view
 
 
-# ---- transforms.json
-
-
 @MODELS
 @pytest.mark.parametrize("instant_ngp", [False, True])
 def test_transforms_hold_every_lens(tmp_path: Path, k: float, instant_ngp: bool) -> None:
@@ -166,9 +158,6 @@ def test_instant_ngp_sees_the_same_in_its_unit_cube(tmp_path: Path, k: float) ->
         assert off_px(pixels, view.pinhole) < 0.01
 
 
-# ---- NeRF's synthetic scenes
-
-
 @MODELS
 def test_synthetic_scene_follows_from_one_angle(tmp_path: Path, k: float) -> None:
     views = write_blender_synthetic(tmp_path / "out", views_all_round(k=k))
@@ -183,9 +172,6 @@ def test_synthetic_scene_follows_from_one_angle(tmp_path: Path, k: float) -> Non
         pixels = through(np.array(frame["transform_matrix"]), (focal, focal), middle)
         assert off_px(pixels, view.pinhole) < 0.01
         assert off_px(pixels, view.camera) <= view.error_px + 0.01
-
-
-# ---- OpenCV
 
 
 @MODELS
@@ -208,9 +194,6 @@ def test_opencv_projects_to_the_same_pixels(tmp_path: Path, k: float) -> None:
         assert node.getNode("name").string() == view.name
 
 
-# ---- points
-
-
 def test_ply_is_read_back_by_trimesh() -> None:
     rng = np.random.default_rng(3)
     xyz, rgb = rng.normal(size=(50, 3)), rng.integers(0, 256, (50, 3)).astype(np.uint8)
@@ -220,9 +203,6 @@ def test_ply_is_read_back_by_trimesh() -> None:
     assert isinstance(cloud, trimesh.PointCloud)
     np.testing.assert_allclose(cloud.vertices, xyz, atol=1e-6)
     np.testing.assert_array_equal(np.asarray(cloud.colors)[:, :3], rgb)
-
-
-# ---- the verb
 
 
 FORMATS = [
@@ -241,9 +221,7 @@ def test_views_keep_distance_and_radius_of_their_bundle(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_every_format_is_written_whole_and_replaced_only_by_force(
-    toonset, tmp_path: Path, to: str
-) -> None:
+def test_every_format_is_written_whole_and_replaced_only_by_force(toonset, tmp_path, to):
     bundle = bundle_of(views_all_round(3), tmp_path / "bundle", egg())
     out = tmp_path / "out"
     first = toonset("export", bundle, "--to", to, "-o", out, "--json")

@@ -1,7 +1,5 @@
 """Points of the drawings' visual hull: on its surface, seen by the right views, coloured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

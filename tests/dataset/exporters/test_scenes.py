@@ -1,7 +1,5 @@
 """Exports of 3D scenes: cameras, drawings and mannequin stand in register in glTF and Blender."""
 
-from __future__ import annotations
-
 import json
 import math
 import runpy
@@ -86,9 +84,7 @@ def seen_by(
 
 
 @MODELS
-def test_no_drawing_hangs_between_another_camera_and_the_mannequin(
-    tmp_path: Path, k: float
-) -> None:
+def test_no_drawing_hangs_between_another_camera_and_the_mannequin(tmp_path, k):
     mesh, views = egg(), views_all_round(8, k=k)
     write_gltf(tmp_path / "out", views, mesh)
     path = tmp_path / "out" / "scene.glb"
@@ -165,9 +161,7 @@ def test_blender_script_holds_every_view(tmp_path: Path, k: float) -> None:
         assert (tmp_path / "out" / "images" / record["name"]).is_file()
 
 
-def test_blender_script_shows_a_scene_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_blender_script_shows_a_scene_of_its_own(tmp_path, monkeypatch):
     """Blender starts with a cube where the character stands; it must not be in the picture."""
     write_blender_script(tmp_path / "out", views_all_round(2), egg())
     blender = MagicMock()

@@ -1,7 +1,5 @@
 """Views of many sizes, written by every export, for imports to read back."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

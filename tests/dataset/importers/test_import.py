@@ -1,7 +1,5 @@
 """Imports: other programs' folders become bundles, with the cameras that they had."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -37,9 +35,6 @@ EVERY = pytest.mark.parametrize("kind", WRITERS)
 def off_px(a: Camera, b: Camera) -> float:
     points = around(TARGET)
     return float(np.linalg.norm(a.project(points)[0] - b.project(points)[0], axis=1).max())
-
-
-# ---- round trips
 
 
 @MODELS
@@ -88,9 +83,6 @@ def test_far_pinholes_of_a_round_trip_stand_where_they_stood(tmp_path: Path) -> 
         assert frame["toonset"]["pinhole_error_px"] == pytest.approx(view.error_px)
         centre = np.array(frame["transform_matrix"])[:3, 3]
         np.testing.assert_allclose(centre, view.pinhole.world_from_camera[:3, 3], atol=1e-6)
-
-
-# ---- other programs' ways
 
 
 def test_a_whole_synthetic_scene_is_one_bundle(tmp_path: Path) -> None:
@@ -195,9 +187,6 @@ def test_opencv_lists_and_shared_lenses_are_read(tmp_path: Path) -> None:
     write_bytes(tmp_path / "rig.yaml", text.encode())
     (read,) = read_import(tmp_path / "rig.yaml").views
     assert off_px(read.camera, view.camera) < 1e-6
-
-
-# ---- the verb
 
 
 @pytest.fixture

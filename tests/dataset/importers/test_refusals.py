@@ -1,8 +1,5 @@
 """Imports: what cannot be honoured, or contradicts itself, is refused by name."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -56,9 +53,7 @@ def opencv(tmp_path: Path) -> Path:
         ("-\n      name", "name", "no OpenCV YAML"),
     ],
 )
-def test_damaged_opencv_files_are_refused(
-    toonset, opencv: Path, tmp_path: Path, old: str, new: str, words: str
-) -> None:
+def test_damaged_opencv_files_are_refused(toonset, opencv, tmp_path, old, new, words):
     file = opencv / "cameras.yml"
     text = file.read_text()
     assert old in text
@@ -91,9 +86,7 @@ def test_cut_off_opencv_files_are_refused_or_whole(toonset, opencv: Path, tmp_pa
 
 
 @pytest.mark.parametrize("kind", OWN_CAMERAS)
-def test_cameras_that_were_changed_beside_toonset_json_are_refused(
-    tmp_path: Path, kind: str
-) -> None:
+def test_cameras_that_were_changed_beside_toonset_json_are_refused(tmp_path, kind):
     WRITERS[kind](tmp_path / "out", views_all_round(k=0.2), tetrahedron())
 
     def edit(content: dict[str, Any]) -> None:
@@ -115,9 +108,7 @@ def test_cameras_that_were_changed_beside_toonset_json_are_refused(
         (lambda c: c.update(views=[]), "views"),
     ],
 )
-def test_damaged_records_are_refused(
-    tmp_path: Path, edit: Callable[[Any], object], words: str
-) -> None:
+def test_damaged_records_are_refused(tmp_path, edit, words):
     write_gltf(tmp_path / "out", views_all_round(2))
     change(tmp_path / "out" / "toonset.json", edit)
     with pytest.raises(ToonsetError, match=words):

@@ -1,7 +1,5 @@
 """The mannequin made by code: a clean symmetric body whatever is asked, and its two files."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections import Counter
@@ -64,9 +62,6 @@ def part_extent(mesh: Mesh, name: str) -> np.ndarray:
     return np.ptp(mesh.vertices[own].reshape(-1, 3), axis=0)
 
 
-# ---- the surface
-
-
 @pytest.mark.parametrize("options", EXTREMES, ids=str)
 def test_one_closed_surface_of_even_triangles_without_handles(options):
     """Euler's number is 2: nothing is torn, no hand grows into a hip, no arm into a trunk."""
@@ -118,9 +113,6 @@ def test_stands_on_the_ground_in_its_size(options):
     assert 4000 < len(mesh.faces) < 9000
     for side in ("left", "right"):
         assert part_extent(mesh, f"{side}_foot")[2] > 1.5 * part_extent(mesh, f"{side}_foot")[0]
-
-
-# ---- proportions, pose, landmarks
 
 
 @pytest.mark.parametrize("heads", [2.0, 3.0, 8.0])
@@ -184,9 +176,6 @@ def test_impossible_bodies_are_refused(wrong, words):
         MannequinOptions(**wrong)
 
 
-# ---- solids
-
-
 def test_a_limb_is_measured_exactly():
     straight = limb((0, 0, 0), (1, 0, 0), 0.25, 0.25)
     points = np.array([[0.5, 1, 0], [-1, 0, 0], [2, 0, 0], [0.5, 0, 0]])
@@ -201,9 +190,6 @@ def test_blending_only_adds_and_only_nearby():
     np.testing.assert_array_equal(soft[far], hard[far])
     assert (soft <= hard).all()
     assert (hard - soft).max() <= 0.1 / 4 + 1e-12
-
-
-# ---- files and the command
 
 
 def test_the_files_hold_the_body(toonset, tmp_path):

@@ -129,9 +129,7 @@ BAD_FILES: list[tuple[str, bytes | str, str]] = [
 
 
 @pytest.mark.parametrize(("name", "data", "fragment"), BAD_FILES, ids=range(len(BAD_FILES)))
-def test_bad_files_are_refused_by_name(
-    name: str, data: bytes | str, fragment: str, tmp_path: Path
-) -> None:
+def test_bad_files_are_refused_by_name(name, data, fragment, tmp_path):
     with pytest.raises(MeshError, match=fragment) as caught:
         load(tmp_path, name, data)
     assert name in str(caught.value)

@@ -1,7 +1,5 @@
 """Blocky characters: their profiles are rectangles, and they look alike from behind."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Messy sheets are split right: each difficulty alone, and what must not be mistaken for one."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Boxes by hand: every way to write them reads alike, and what is no box is named."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

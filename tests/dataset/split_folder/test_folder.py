@@ -1,7 +1,5 @@
 """A split folder is read back as it was written, and as a person has corrected it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -75,9 +73,6 @@ def test_a_folder_is_read_back_as_it_was_written_wherever_it_lies(folder: Path, 
 def test_writing_twice_gives_the_same_bytes(folder: Path, tmp_path: Path, snapshot):
     write_split(tmp_path / "again", read_split(folder)[0], OVERLAY, {"drop": "4"})
     assert snapshot(tmp_path / "again") == snapshot(folder)
-
-
-# ---- what a person changes in images/
 
 
 def test_a_deleted_picture_leaves_its_view_out(folder: Path):
@@ -154,9 +149,6 @@ def test_twins_are_told_by_their_names(tmp_path: Path):
     found, notes = read_split(tmp_path / "views")
     assert [view.box for view in found.views] == [view.box for view in views]
     assert notes == ()
-
-
-# ---- what cannot be read
 
 
 def edited(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], object]:
@@ -236,9 +228,6 @@ def test_what_a_later_version_adds_is_read_over(folder: Path):
     assert_same(read_split(folder)[0], cut())
 
 
-# ---- several sheets, and views that are left out
-
-
 def test_dropping_numbers_anew_and_keeps_a_record():
     kept = without(cut(), frozenset({0, 2}))
     assert [view.name for view in kept.views] == ["000.png", "001.png"]
@@ -275,9 +264,6 @@ def test_odd_files_are_named():
     assert odd_files(joined([cut(), replace(cut(), sources=single("b", 9, "b").sources)])) == ()
 
 
-# ---- folders of pictures
-
-
 def test_pictures_of_a_folder_come_in_the_order_people_count(tmp_path: Path):
     names = ["View10.png", "view2.PNG", "view1.jpg", "a.webp", "view02.png", "10.gif", "9.bmp"]
     for name in (*names, ".hidden.png", "notes.txt", "sub"):
@@ -293,9 +279,6 @@ def test_pictures_of_a_folder_come_in_the_order_people_count(tmp_path: Path):
 def test_natural_keys_of_any_names_compare():
     names = ["", "1", "a1", "1a", "a", "1.10.2", "1.9", "²", "٣", "view", "ä2"]
     assert sorted(sorted(names), key=natural_key) == sorted(reversed(names), key=natural_key)
-
-
-# ---- files that came to harm
 
 
 def mutated(rng: np.random.Generator, data: bytes) -> bytes:

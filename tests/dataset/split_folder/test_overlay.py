@@ -1,7 +1,5 @@
 """The picture of a split: it shows every view, and its tags hide nobody's face."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

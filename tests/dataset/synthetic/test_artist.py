@@ -1,7 +1,5 @@
 """Sheets as artists draw them: each habit alone, all of them together, and their truth."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -51,9 +49,6 @@ def made(body: Mesh) -> Turnaround:
 def alone(**habits: object) -> SynthOptions:
     """Return the small sheet's options with these habits and no others."""
     return replace(SMALL, artist=replace(ArtistOptions(), **habits))
-
-
-# ---- bodies
 
 
 def moved(body: Mesh, errors: BodyErrors, yaw: float = 0.0, seed: int = 0) -> np.ndarray:
@@ -120,9 +115,6 @@ def test_face_is_pulled_to_the_viewer(mannequin: Mannequin) -> None:
     assert sides[1] > 0.01 * body.height
     assert sides[3] == pytest.approx(-sides[1], abs=1e-3 * body.height)
     np.testing.assert_allclose([sides[0], sides[2]], body.vertices[nose, 0], atol=1e-9)
-
-
-# ---- sheets
 
 
 def test_no_strength_is_the_plain_drawing(body: Mesh) -> None:
@@ -213,12 +205,7 @@ def test_impossible_habits_are_refused() -> None:
         BodyErrors(field_height_fraction=math.nan)
 
 
-# ---- files
-
-
-def test_same_seed_same_bytes_and_the_truth_is_written(
-    made: Turnaround, body: Mesh, tmp_path: Path, snapshot
-) -> None:
+def test_same_seed_same_bytes_and_the_truth_is_written(made, body, tmp_path, snapshot):
     write_turnaround(made, tmp_path / "a")
     write_turnaround(make_turnaround(body, SMALL, 1), tmp_path / "b")
     assert snapshot(tmp_path / "a") == snapshot(tmp_path / "b")
@@ -239,9 +226,7 @@ def test_same_seed_same_bytes_and_the_truth_is_written(
     assert "color_factor" not in truth["views"][0]
 
 
-def test_command_takes_a_condition_and_what_is_typed(
-    mannequin: Mannequin, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, toonset
-) -> None:
+def test_command_takes_a_condition_and_what_is_typed(mannequin, tmp_path, monkeypatch, toonset):
     monkeypatch.setattr("toonset.cli.synth.TEST_VIEWS", 3)
     monkeypatch.chdir(tmp_path)
     unnamed = replace(mannequin.mesh, face_parts=None, part_names=("body",))

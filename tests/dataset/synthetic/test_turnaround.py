@@ -1,7 +1,5 @@
 """Synthetic turnarounds: the truth they carry is true."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """Touching figures: least-cost ways, evidence for a cut, and which cuts are announced."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest
