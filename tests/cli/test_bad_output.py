@@ -85,8 +85,7 @@ def test_an_input_that_is_not_there_is_told_before_an_output_that_is(
 def test_a_real_disk_that_takes_nothing(options, words, drawn: Path, snapshot, tmp_path):
     script = 'mount -t tmpfs -o "$1" tmpfs disk && shift && "$@"; code=$?; ls -A disk; exit $code'
     (tmp_path / "disk").mkdir()
-    mesh = drawn / "mannequin.obj"
-    verb = ["calibrate", str(drawn / "single.png"), "--mesh", str(mesh), "-o", "disk/b", "-q"]
+    verb = ["split", str(drawn / "single.png"), "-o", "disk/b", "-q"]
     shell = ["unshare", "-m", "sh", "-c", script, "sh", options]
     done = subprocess.run(
         [*shell, sys.executable, "-m", "toonset", *verb],

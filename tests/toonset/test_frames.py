@@ -2,10 +2,8 @@
 
 import cv2
 import numpy as np
-import pycolmap
 import pytest
 import torch
-from kornia.geometry.camera import PinholeCamera
 
 from toonset import frames
 from toonset.camera import Camera, rotation_from_angles
@@ -39,19 +37,6 @@ def test_opencv_projects_the_same_pixels():
     )
 
 
-@pytest.mark.parametrize("yaw", [0.0, 1.0, 2.2, np.pi, -3.0])
-def test_colmap_projects_the_same_pixels(yaw):
-    view = camera(yaw=yaw)
-    rotation, translation = view.camera_from_world[:3, :3], view.camera_from_world[:3, 3]
-    rigid = pycolmap.Rigid3d(pycolmap.Rotation3d(rotation), translation)
-    K = view.K
-    lens = pycolmap.Camera(
-        model="PINHOLE", width=160, height=180, params=[K[0, 0], K[1, 1], K[0, 2], K[1, 2]]
-    )
-    pixels = np.array([lens.img_from_cam(rigid * point) for point in POINTS], dtype=float)
-    np.testing.assert_allclose(pixels.reshape(-1, 2), view.project(POINTS)[0], atol=1e-6)
-
-
 def cameras():
     return [camera(k, yaw) for k, yaw in ((0.0, 0.3), (0.2, 2.0), (1e-6, -1.0))]
 
@@ -81,16 +66,3 @@ def test_torch_projection_is_differentiable_in_cameras_and_points_through_k_zero
     parts += [torch.rand(1, 5, 3, generator=torch.Generator().manual_seed(0))]
     free = [part.double().clone().requires_grad_() for part in parts]
     assert torch.autograd.gradcheck(pixels, tuple(free), atol=1e-5)
-
-
-def test_kornia_cameras_project_the_same_pixels():
-    views = [camera(0.2), camera(0.05, yaw=-1.0)]
-    points = torch.from_numpy(POINTS)[None].repeat(2, 1, 1)
-    intrinsics = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
-    intrinsics[:, :3, :3] = torch.from_numpy(np.stack([view.K for view in views]))
-    extrinsics = torch.from_numpy(np.stack([view.camera_from_world for view in views]))
-    size = torch.tensor([float(n) for n in views[0].size_wh]).repeat(2, 1)
-    pinholes = PinholeCamera(intrinsics, extrinsics, size[:, 1], size[:, 0])
-    pixels = pinholes.project(points)
-    for i, view in enumerate(views):
-        np.testing.assert_allclose(pixels[i], view.project(POINTS)[0], atol=1e-5)

@@ -12,6 +12,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from tests.figures import boxes
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.bundle.transforms_read import read_cameras
@@ -27,33 +28,15 @@ from toonset.errors import CameraError, MeshError, SetupError, SheetError
 from toonset.mesh import Mesh
 from toonset.palette.pixels.labels import UNLABELLED
 
-CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-SIDES = np.array(
-    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-)
-SIDES = SIDES[:, [0, 1, 2, 0, 2, 3]].reshape(12, 3)
 RED, BLUE, GREEN = (220, 40, 30), (30, 60, 200), (20, 160, 60)
 SMALL = SynthOptions(views=4, cell_px=96, outline_px=2.0)
 
 
-def boxes(*placed: tuple[tuple[float, ...], tuple[float, ...], tuple[int, ...], str]) -> Mesh:
-    """A mesh of boxes (centre, half sizes, colour, part name)."""
-    n = len(placed)
-    return Mesh(
-        np.concatenate([CUBE * half + np.array(centre) for centre, half, _, _ in placed]),
-        np.concatenate([SIDES + 8 * i for i in range(n)]),
-        np.repeat(np.array([color for _, _, color, _ in placed], np.uint8), 12, axis=0),
-        np.repeat(np.arange(n), 12),
-        tuple(name for _, _, _, name in placed),
-    )
-
-
 def figure() -> Mesh:
-    return boxes(
-        ((0.0, 1.0, 0.0), (0.5, 1.0, 0.3), RED, "body"),
-        ((0.8, 1.4, 0.1), (0.3, 0.15, 0.15), BLUE, "bag"),
-        ((0.0, 2.2, 0.0), (0.35, 0.2, 0.05), GREEN, "ear"),
-    )
+    body = ((1.0, 2.0, 0.6), (0.0, 1.0, 0.0))
+    bag, ear = ((0.6, 0.3, 0.3), (0.8, 1.4, 0.1)), ((0.7, 0.4, 0.1), (0.0, 2.2, 0.0))
+    made = boxes(body, bag, ear, colors=(RED, BLUE, GREEN))
+    return replace(made, face_parts=np.repeat(range(3), 12), part_names=("body", "bag", "ear"))
 
 
 @pytest.mark.parametrize("k", [0.0, 0.25])
@@ -78,7 +61,7 @@ def test_pixels_lie_where_the_camera_projects(k: float) -> None:
 @pytest.mark.parametrize("k", [0.0, 0.25])
 def test_depth_unprojects_onto_the_surface(k: float) -> None:
     camera = Camera.looking_at(np.zeros(3), 0.5, 0.2, 20.0, (80, 80), k=k)
-    cube = boxes(((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), RED, "cube"))
+    cube = boxes(((2.0, 2.0, 2.0), (0.0, 0.0, 0.0)))
     seen = render_labels(cube, np.zeros(12, dtype=int), camera)
     inside = seen.labels == 0
     points = camera.unproject(camera.pixel_grid()[inside], seen.depth[inside])
