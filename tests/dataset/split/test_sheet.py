@@ -154,6 +154,7 @@ def test_a_transparent_sheet_is_cut_by_its_own_alpha() -> None:
     assert sheet.background is None
     assert np.array_equal(pasted(sheet, picture.shape), drawing.coverage)
     assert main_colors(sheet) == [0, 1, 2, 3]
+    assert [view.name for view in sheet.views] == ["000.png", "001.png", "002.png", "003.png"]
 
 
 def test_transparency_counts_even_where_the_figure_fills_the_border() -> None:
@@ -169,12 +170,6 @@ def test_a_stray_transparent_pixel_shows_paper() -> None:
     picture[3, 4] = (0, 0, 0, 0)
     assert main_colors(split_picture(picture)) == [0, 1, 2, 3]
     assert split_picture(picture).warnings == ()
-
-
-def test_views_come_in_reading_order() -> None:
-    sheet = split_picture(row_of_four().rgba)
-    assert main_colors(sheet) == [0, 1, 2, 3]
-    assert [view.name for view in sheet.views] == ["000.png", "001.png", "002.png", "003.png"]
 
 
 def test_mirroring_the_sheet_mirrors_the_order() -> None:
