@@ -62,6 +62,11 @@ def test_by_nerfs_rules_alone_the_far_pinhole_is_within_its_bound(folder):
             assert off.max() <= frame["toonset"]["pinhole_error_px"] + 1e-6
 
 
+def test_a_place_without_cameras_is_told(folder):
+    with pytest.raises(BundleError, match="does not exist; give a bundle folder or a transforms"):
+        read_cameras(folder / "none")
+
+
 def test_blender_style_files_are_read(folder):
     def blender(content):
         angle = 2 * math.atan(SIZE[0] / 2 / content["frames"][1]["fl_x"])
@@ -88,6 +93,10 @@ def test_blender_style_files_are_read(folder):
         (lambda c: c["frames"][1].update(fl_x=7.0), "disagree"),
         (lambda c: c.update(camera_model="EQUIRECTANGULAR"), "'EQUIRECTANGULAR' is not supported"),
         (lambda c: c["frames"][0].update(k1=0.1), "lens distortion k1"),
+        (
+            lambda c: [c["frames"][0].pop(key) for key in ("toonset", "fl_x")],
+            "has neither fl_x nor a camera_angle_x",
+        ),
     ],
 )
 def test_what_cannot_be_honoured_is_refused(folder, edit, words):

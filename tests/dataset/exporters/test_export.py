@@ -211,12 +211,12 @@ FORMATS = [
 ]
 
 
-def test_views_keep_distance_and_radius_of_their_bundle(tmp_path: Path) -> None:
-    views = views_all_round(3)
-    bundle = bundle_of(views, tmp_path / "bundle", egg())
-    for read, view in zip(read_views(bundle), views, strict=True):
+@MODELS
+def test_views_keep_distance_and_radius_of_their_bundle(tmp_path: Path, k: float) -> None:
+    views = views_all_round(3, k=k)
+    for read, view in zip(read_views(bundle_of(views, tmp_path)), views, strict=True):
         assert read.distance == pytest.approx(view.distance)
-        assert read.radius == pytest.approx(RADIUS)
+        assert read.radius == pytest.approx(RADIUS if k == 0 else 0)
         assert read.error_px == pytest.approx(view.error_px)
 
 
