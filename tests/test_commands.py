@@ -8,7 +8,7 @@ import json
 import re
 import shlex
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -18,16 +18,20 @@ import pytest
 import trimesh
 from PIL import Image
 
+from bench.cases.bodies import random_body
 from tests.conftest import calibration_report
 from tests.test_documents import DOCUMENTS, text_of
+from toonset.camera import Camera
 from toonset.cli.main import VERBS
 from toonset.dataset.bundle.bundle import bundle_folder
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.bundle.transforms_read import read_cameras
-from toonset.dataset.images.picture import load_rgba
+from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.mannequin.landmark_formats import SCHEMA
-from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACEHOLDER = re.compile(r"\.\.\.|(?<![\w#-])[A-Z]{3,}(?![\w-])")  # of a command's form, not of one
@@ -85,9 +89,11 @@ def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Too
     shutil.copytree(ROOT / "examples", folder / "examples")
     for name in ("sheet.png", "mannequin.obj"):
         shutil.copy(folder / "examples" / name, folder / name)
-    shutil.copy(folder / "mannequin.obj", folder / "m.obj")
     shutil.copy(folder / "sheet.png", folder / "strip.png")
-    _bundle(folder)
+    truth = json.loads((folder / "examples" / "truth.json").read_text())["views"]
+    placed = [(NativeCamera(**told["camera"]).camera(), told["cell_box"]) for told in truth]
+    _bundle(folder / "bundle", placed)
+    _eight_small(folder / "eight")
     for name in ("other", "held_out"):
         shutil.copytree(folder / "bundle", folder / name)
     for to in ("nerfstudio", "colmap"):
@@ -97,7 +103,7 @@ def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Too
     for name in ("dark.ase", "my.ase"):
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
     _six_figures(folder)
-    _clicks(folder)
+
     shutil.copytree(drawn, folder / "small")
     shutil.copy(drawn / "mannequin.obj", folder / "small" / "m.obj")
     box = split_picture(load_rgba(drawn / "sheet.png")).views[0].figure_box
@@ -107,25 +113,45 @@ def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Too
     return folder
 
 
-def _bundle(folder: Path) -> None:
-    """Write the example's bundle with the cameras that it was drawn with."""
-    views = split_picture(load_rgba(folder / "sheet.png")).views
-    truth = json.loads((folder / "examples" / "truth.json").read_text())["views"]
+def _bundle(bundle: Path, placed: list[tuple[Camera, Sequence[int]]]) -> None:
+    """Write the bundle of the sheet beside it with the cameras of cells that it was drawn with."""
+    sheet, body = bundle.with_name("sheet.png"), bundle.with_name("mannequin.obj")
+    views = split_picture(load_rgba(sheet)).views
     cameras = [
-        NativeCamera(**told["camera"])
-        .camera()
-        .moved(np.subtract(view.box[:2], told["cell_box"][:2]), view.box[2:])
-        for view, told in zip(views, truth, strict=True)
+        camera.moved(np.subtract(view.box[:2], cell[:2]), view.box[2:])
+        for view, (camera, cell) in zip(views, placed, strict=True)
     ]
-    mesh = load_mesh(folder / "mannequin.obj")
     report = calibration_report([view.name for view in views], cameras)
     report["inputs"] = [
-        {"name": name, "sha256": sha256((folder / name).read_bytes()).hexdigest(), "role": role}
-        for name, role in (("sheet.png", "sheet"), ("mannequin.obj", "mesh"))
+        {"name": file.name, "sha256": sha256(file.read_bytes()).hexdigest(), "role": role}
+        for file, role in ((sheet, "sheet"), (body, "mesh"))
     ]
+    mesh = load_mesh(body)
     size, overlay = (mesh.height, mesh.radius), views[0].rgba[..., :3]
-    with bundle_folder(folder / "bundle", views, cameras, mesh, size, report, overlay):
+    with bundle_folder(bundle, views, cameras, mesh, size, report, overlay):
         pass
+
+
+def _eight_small(folder: Path) -> None:
+    """Write a sheet of eight small views, its bundle, and points where its cameras see them."""
+    options = SynthOptions(views=8, cell_px=120, outline_px=0, elevation_deg=8)
+    made = make_turnaround(random_body(11), options, 11)
+    folder.mkdir()
+    (folder / "sheet.png").write_bytes(encode_png(made.sheet))
+    for name in ("mannequin.obj", "m.obj"):
+        (folder / name).write_bytes(save_obj(made.mesh))
+    boxes = [view.box for view in made.views]
+    _bundle(folder / "other", list(zip(made.cameras, boxes, strict=True)))
+    vertices = load_mesh(folder / "m.obj").vertices
+    points = vertices[np.linspace(0, len(vertices) - 1, 9).astype(int)]
+    names = [f"p{number}" for number in range(len(points))]
+    views = {
+        str(number): dict(zip(names, camera.project(points)[0].tolist(), strict=True))
+        for number, (_, camera) in enumerate(read_cameras(folder / "other"))
+    }
+    content = {"schema": SCHEMA, "pixels": "view", "views": views}
+    content["points"] = dict(zip(names, points.tolist(), strict=True))
+    (folder / "points.json").write_text(json.dumps(content))
 
 
 def _six_figures(folder: Path) -> None:
@@ -143,25 +169,12 @@ def _six_figures(folder: Path) -> None:
     (folder / "boxes.csv").write_text("\n".join(["x,y,width,height", *rows, ""]))
 
 
-def _clicks(folder: Path) -> None:
-    """Write points of the mannequin where the example's cameras see them."""
-    vertices = load_mesh(folder / "bundle" / "mannequin.obj").vertices
-    points = vertices[np.linspace(0, len(vertices) - 1, 9).astype(int)]
-    names = [f"p{number}" for number in range(len(points))]
-    views = {
-        str(number): dict(zip(names, camera.project(points)[0].tolist(), strict=True))
-        for number, (_, camera) in enumerate(read_cameras(folder / "bundle"))
-    }
-    content = {"schema": SCHEMA, "pixels": "view", "views": views}
-    content["points"] = dict(zip(names, points.tolist(), strict=True))
-    (folder / "points.json").write_text(json.dumps(content))
-
-
 GIVEN = {  # what lies in a document's folder before its first command
     "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase",
     "docs/architecture.md": "small/sheet.png small/m.obj",
     "docs/formats.md": "bundle sheet.png views",
-    "docs/guide_cameras.md": "sheet.png mannequin.obj m.obj points.json other colmap_folder",
+    "docs/guide_cameras.md": "eight/sheet.png eight/mannequin.obj eight/m.obj eight/points.json"
+    " eight/other colmap_folder",
     "docs/guide_corrections.md": "small/sheet.png small/mannequin.obj small/corrections.json",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
     "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",

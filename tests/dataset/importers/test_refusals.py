@@ -115,21 +115,18 @@ def test_damaged_records_are_refused(tmp_path, edit, words):
         read_import(tmp_path / "out")
 
 
-def test_a_bundle_is_no_import(toonset, tmp_path: Path) -> None:
-    write_opencv(tmp_path / "out", views_all_round(2))
-    bundle = tmp_path / "bundle"
-    write_imported(bundle, read_import(tmp_path / "out"), None)
-    assert "is of a bundle already" in toonset("import", bundle, "-o", tmp_path / "b").reason
-
-
-def test_what_holds_no_cameras_is_refused(toonset, tmp_path: Path) -> None:
+def test_what_holds_no_cameras_is_refused(toonset, opencv: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
-    out = tmp_path / "b"
-    assert "holds no cameras" in toonset("import", tmp_path / "empty", "-o", out).reason
-    assert "does not exist" in toonset("import", tmp_path / "none", "-o", out).reason
     (tmp_path / "x.png").write_bytes(encode_png(np.zeros((2, 2, 4), np.uint8)))
-    assert "holds no cameras" in toonset("import", tmp_path / "x.png", "-o", out).reason
-    assert not out.exists()
+    write_imported(tmp_path / "bundle", read_import(opencv), None)
+    for name, words in (
+        ("empty", "holds no cameras"),
+        ("none", "does not exist"),
+        ("x.png", "holds no cameras"),
+        ("bundle", "is of a bundle already"),
+    ):
+        assert words in toonset("import", tmp_path / name, "-o", tmp_path / "b").reason
+    assert not (tmp_path / "b").exists()
 
 
 def test_distorted_colmap_cameras_are_refused_by_name(toonset, tmp_path: Path) -> None:

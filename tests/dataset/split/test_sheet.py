@@ -165,16 +165,12 @@ def test_transparency_counts_even_where_the_figure_fills_the_border() -> None:
     assert np.array_equal(sheet.views[0].rgba[..., 3], picture[..., 3])
 
 
-def test_a_stray_transparent_pixel_shows_paper() -> None:
+def test_a_stray_transparent_pixel_shows_paper_and_a_mirrored_sheet_is_read_mirrored() -> None:
     picture = row_of_four().rgba
     picture[3, 4] = (0, 0, 0, 0)
     assert main_colors(split_picture(picture)) == [0, 1, 2, 3]
     assert split_picture(picture).warnings == ()
-
-
-def test_mirroring_the_sheet_mirrors_the_order() -> None:
-    mirrored = np.ascontiguousarray(row_of_four().rgba[:, ::-1])
-    assert main_colors(split_picture(mirrored)) == [3, 2, 1, 0]
+    assert main_colors(split_picture(np.ascontiguousarray(picture[:, ::-1]))) == [3, 2, 1, 0]
 
 
 @pytest.mark.parametrize("shift", [(0, 7), (11, 0), (23, 40)])
@@ -239,11 +235,8 @@ def test_contour_width(line: float) -> None:
     drawing = Drawing(170, 230).ellipse(85, 120, 45, 90, SKIN, line)
     view = split_picture(drawing.rgba).views[0]
     assert view.line_width_px == pytest.approx(line, abs=0.5)
-
-
-def test_a_dark_figure_has_no_contour() -> None:
-    view = split_picture(Drawing(170, 230).ellipse(85, 120, 45, 90, (20, 22, 30)).rgba).views[0]
-    assert view.line_width_px == 0
+    dark = Drawing(170, 230).ellipse(85, 120, 45, 90, (20, 22, 30))
+    assert split_picture(dark.rgba).views[0].line_width_px == 0
 
 
 @pytest.mark.parametrize("line", [0, 2])
