@@ -118,7 +118,7 @@ def _bundle(bundle: Path, placed: list[tuple[Camera, Sequence[int]]]) -> None:
     sheet, body = bundle.with_name("sheet.png"), bundle.with_name("mannequin.obj")
     views = split_picture(load_rgba(sheet)).views
     cameras = [
-        camera.moved(np.subtract(view.box[:2], cell[:2]), view.box[2:])
+        camera.moved((view.box[0] - cell[0], view.box[1] - cell[1]), view.box[2:])
         for view, (camera, cell) in zip(views, placed, strict=True)
     ]
     report = calibration_report([view.name for view in views], cameras)

@@ -62,7 +62,9 @@ def test_pycolmap_projects_points_to_their_keypoints(tmp_path: Path, text: bool)
             image = model.images[element.image_id]
             seen = image.points2D[element.point2D_idx]
             lens, placed = model.cameras[image.camera_id], image.cam_from_world() * point.xyz
-            np.testing.assert_allclose(seen.xy, lens.img_from_cam(placed), atol=1e-4)
+            projected = lens.img_from_cam(placed)
+            assert projected is not None
+            np.testing.assert_allclose(seen.xy, projected, atol=1e-4)
 
 
 def test_pictures_are_over_white_and_masks_tell_the_figure(views, tmp_path: Path) -> None:
