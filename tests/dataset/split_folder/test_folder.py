@@ -257,8 +257,10 @@ def test_odd_files_are_named():
     assert odd_files(joined(views)) == ()
     copy = odd_files(joined([*views, single("copy.png", 100, "1")]))
     assert copy == ("copy.png is a copy of 1.png: is one of them another view?",)
-    high = odd_files(joined([*views, single("high.png", 160, "h")]))
-    assert high == ("high.png: 160 px high, most views are 100: is it drawn at another scale?",)
+    for height in (160, 50):
+        (line,) = odd_files(joined([*views, single("h.png", height, "h")]))
+        said = f"{height} px high, most views are 100: is it drawn at another scale?"
+        assert line == f"h.png: {said}"
     sheet = odd_files(joined([*views, cut()]))
     assert sheet == ("sheet.png shows 4 figures, the others one: is it a sheet of the same views?",)
     assert odd_files(joined([cut(), replace(cut(), sources=single("b", 9, "b").sources)])) == ()
