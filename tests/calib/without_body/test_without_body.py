@@ -169,13 +169,14 @@ def test_drawings_that_are_no_turn_are_never_ok() -> None:
 
 
 def test_a_bundle_without_a_body_has_no_mannequin(tmp_path: Path) -> None:
-    found = calibrate(sheet(RING), "none", Hints(labels="front,?,?,?,?,?,?,?"))
+    ring = RING[::2]
+    found = calibrate(sheet(ring), "none", Hints(labels="front,?,?,?"))
     assert found.views[0].p_flip < 1 - SURE
     bundle = write_bundle(tmp_path / "bundle", found)
     assert bundle.mannequin is None
     names = sorted(path.name for path in (tmp_path / "bundle").iterdir())
     assert names == ["calibration.json", "images", "overlay.png", "transforms.json"]
-    np.testing.assert_allclose(off_from(RING, bundle.scene.frames), 0, atol=1e-6)
+    np.testing.assert_allclose(off_from(ring, bundle.scene.frames), 0, atol=1e-6)
 
 
 def test_a_body_that_explains_nothing_loses_to_none() -> None:
@@ -183,14 +184,8 @@ def test_a_body_that_explains_nothing_loses_to_none() -> None:
     assert found.mesh is None
     assert found.verdict != "failed"
     assert np.abs(off_from(RING, found.views)).max() < np.radians(22.5)
-    labels = Hints(labels="front,45,left,135,back,225,right,315")
-    pole = pole_mesh()
-    given = calibrate(sheet(RING), pole, labels)
+    made = trimesh.creation.box((0.05, 2.0, 0.02))
+    pole = Mesh(np.array(made.vertices), np.array(made.faces))  # no drawing resembles it
+    given = calibrate(sheet(RING[::2]), pole, Hints(labels="front,left,back,right"))
     assert (given.mesh, given.verdict) == (None, "weak")
     assert given.views[0].reason == WITHOUT
-
-
-def pole_mesh() -> Mesh:
-    """Return a mesh that no drawing resembles."""
-    made = trimesh.creation.box((0.05, 2.0, 0.02))
-    return Mesh(np.array(made.vertices), np.array(made.faces))
