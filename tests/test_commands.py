@@ -4,25 +4,34 @@ A document has a folder of its own with the drawings that it speaks of, and noth
 commands must not stand in each other's way. Exit code 3 is fine: written, but look.
 """
 
-from __future__ import annotations
-
-import importlib
 import json
 import re
 import shlex
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
+import trimesh
+from PIL import Image
 
-from tests.bench.stand_ins import measure_nothing
+from bench.cases.bodies import random_body
+from tests.conftest import calibration_report
 from tests.test_documents import DOCUMENTS, text_of
+from toonset.camera import Camera
 from toonset.cli.main import VERBS
+from toonset.dataset.bundle.bundle import bundle_folder
+from toonset.dataset.bundle.camera_record import NativeCamera
+from toonset.dataset.bundle.transforms_read import read_cameras
+from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.mannequin.landmark_formats import SCHEMA
+from toonset.dataset.mesh.load import load_mesh, save_obj
+from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.synthetic.options import SynthOptions
+from toonset.dataset.synthetic.turnaround import make_turnaround
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACEHOLDER = re.compile(r"\.\.\.|(?<![\w#-])[A-Z]{3,}(?![\w-])")  # of a command's form, not of one
@@ -73,22 +82,20 @@ def runs_here(command: str) -> bool:
     return not is_form(command) and not any(command.startswith(words) for words in ELSEWHERE)
 
 
-# ---- what the documents presuppose
-
-
 @pytest.fixture(scope="module")
-def drawings(tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path:
+def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path:
     """Return a folder with every file that the documents speak of, the README's example first."""
     folder = tmp_path_factory.mktemp("drawings")
     shutil.copytree(ROOT / "examples", folder / "examples")
-    sheet, mesh = folder / "examples" / "sheet.png", folder / "examples" / "mannequin.obj"
-    shutil.copy(sheet, folder / "sheet.png")
-    for name in ("mannequin.obj", "m.obj"):
-        shutil.copy(mesh, folder / name)
-    made = ("calibrate", sheet, "--mesh", mesh, "-o", folder / "bundle", "-q")
-    assert toonset(*made).code == 0
-    shutil.copytree(folder / "bundle", folder / "other")
-    shutil.copytree(folder / "bundle", folder / "held_out")
+    for name in ("sheet.png", "mannequin.obj"):
+        shutil.copy(folder / "examples" / name, folder / name)
+    shutil.copy(folder / "sheet.png", folder / "strip.png")
+    truth = json.loads((folder / "examples" / "truth.json").read_text())["views"]
+    placed = [(NativeCamera(**told["camera"]).camera(), told["cell_box"]) for told in truth]
+    _bundle(folder / "bundle", placed)
+    _eight_small(folder / "eight")
+    for name in ("other", "held_out"):
+        shutil.copytree(folder / "bundle", folder / name)
     for to in ("nerfstudio", "colmap"):
         place = folder / {"nerfstudio": "folder", "colmap": "colmap_folder"}[to]
         assert toonset("export", folder / "bundle", "--to", to, "-o", place, "-q").code == 0
@@ -96,18 +103,59 @@ def drawings(tmp_path_factory: pytest.TempPathFactory, toonset: Toonset) -> Path
     for name in ("dark.ase", "my.ase"):
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
     _six_figures(folder)
-    _clicks(folder)
-    views = json.loads((folder / "bundle" / "calibration.json").read_text())["views"]
-    front = {"version": 1, "views": [{"box": views[0]["box"], "label": "front"}]}
-    (folder / "corrections.json").write_text(json.dumps(front))
-    _glb(folder)
+
+    shutil.copytree(drawn, folder / "small")
+    shutil.copy(drawn / "mannequin.obj", folder / "small" / "m.obj")
+    box = split_picture(load_rgba(drawn / "sheet.png")).views[0].figure_box
+    front = {"version": 1, "views": [{"box": box, "label": "front"}]}
+    (folder / "small" / "corrections.json").write_text(json.dumps(front))
+    trimesh.creation.capsule(0.5, 1.0).export(folder / "mesh.glb")
     return folder
+
+
+def _bundle(bundle: Path, placed: list[tuple[Camera, Sequence[int]]]) -> None:
+    """Write the bundle of the sheet beside it with the cameras of cells that it was drawn with."""
+    sheet, body = bundle.with_name("sheet.png"), bundle.with_name("mannequin.obj")
+    views = split_picture(load_rgba(sheet)).views
+    cameras = [
+        camera.moved((view.box[0] - cell[0], view.box[1] - cell[1]), view.box[2:])
+        for view, (camera, cell) in zip(views, placed, strict=True)
+    ]
+    report = calibration_report([view.name for view in views], cameras)
+    report["inputs"] = [
+        {"name": file.name, "sha256": sha256(file.read_bytes()).hexdigest(), "role": role}
+        for file, role in ((sheet, "sheet"), (body, "mesh"))
+    ]
+    mesh = load_mesh(body)
+    size, overlay = (mesh.height, mesh.radius), views[0].rgba[..., :3]
+    with bundle_folder(bundle, views, cameras, mesh, size, report, overlay):
+        pass
+
+
+def _eight_small(folder: Path) -> None:
+    """Write a sheet of eight small views, its bundle, and points where its cameras see them."""
+    options = SynthOptions(views=8, cell_px=120, outline_px=0, elevation_deg=8)
+    made = make_turnaround(random_body(11), options, 11)
+    folder.mkdir()
+    (folder / "sheet.png").write_bytes(encode_png(made.sheet))
+    for name in ("mannequin.obj", "m.obj"):
+        (folder / name).write_bytes(save_obj(made.mesh))
+    boxes = [view.box for view in made.views]
+    _bundle(folder / "other", list(zip(made.cameras, boxes, strict=True)))
+    vertices = load_mesh(folder / "m.obj").vertices
+    points = vertices[np.linspace(0, len(vertices) - 1, 9).astype(int)]
+    names = [f"p{number}" for number in range(len(points))]
+    views = {
+        str(number): dict(zip(names, camera.project(points)[0].tolist(), strict=True))
+        for number, (_, camera) in enumerate(read_cameras(folder / "other"))
+    }
+    content = {"schema": SCHEMA, "pixels": "view", "views": views}
+    content["points"] = dict(zip(names, points.tolist(), strict=True))
+    (folder / "points.json").write_text(json.dumps(content))
 
 
 def _six_figures(folder: Path) -> None:
     """Write a sheet of six figures, a strip of eight, single views and the boxes of the sheet."""
-    from PIL import Image
-
     cells = []
     for number in range(6):
         cell = np.full((120, 80, 3), (244, 240, 232), np.uint8)
@@ -115,45 +163,19 @@ def _six_figures(folder: Path) -> None:
         cells.append(cell)
     (folder / "six").mkdir()
     Image.fromarray(np.concatenate(cells, axis=1)).save(folder / "six" / "sheet.png")
-    strip = Image.open(folder / "sheet.png")
-    strip.save(folder / "strip.png")
     for number, name in enumerate(("front.png", "side.png")):
         Image.fromarray(cells[number]).save(folder / name)
     rows = [f"{80 * number + 15},5,50,110" for number in range(6)]
     (folder / "boxes.csv").write_text("\n".join(["x,y,width,height", *rows, ""]))
 
 
-def _clicks(folder: Path) -> None:
-    """Write points of the mannequin where the example's cameras see them."""
-    from toonset.dataset.bundle.transforms_read import read_cameras
-    from toonset.dataset.mannequin.landmark_formats import SCHEMA
-    from toonset.dataset.mesh.load import load_mesh
-
-    vertices = load_mesh(folder / "bundle" / "mannequin.obj").vertices
-    points = vertices[np.linspace(0, len(vertices) - 1, 9).astype(int)]
-    names = [f"p{number}" for number in range(len(points))]
-    views = {
-        str(number): dict(zip(names, camera.project(points)[0].tolist(), strict=True))
-        for number, (_, camera) in enumerate(read_cameras(folder / "bundle"))
-    }
-    content = {"schema": SCHEMA, "pixels": "view", "views": views}
-    content["points"] = dict(zip(names, points.tolist(), strict=True))
-    (folder / "points.json").write_text(json.dumps(content))
-
-
-def _glb(folder: Path) -> None:
-    import trimesh
-
-    shape = trimesh.creation.capsule(0.5, 1.0)
-    shape.export(folder / "mesh.glb")
-
-
 GIVEN = {  # what lies in a document's folder before its first command
     "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase",
-    "docs/architecture.md": "sheet.png m.obj",
+    "docs/architecture.md": "small/sheet.png small/m.obj",
     "docs/formats.md": "bundle sheet.png views",
-    "docs/guide_cameras.md": "sheet.png mannequin.obj m.obj points.json other colmap_folder",
-    "docs/guide_corrections.md": "sheet.png mannequin.obj corrections.json",
+    "docs/guide_cameras.md": "eight/sheet.png eight/mannequin.obj eight/m.obj eight/points.json"
+    " eight/other colmap_folder",
+    "docs/guide_corrections.md": "small/sheet.png small/mannequin.obj small/corrections.json",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
     "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",
     "docs/guide_training.md": "bundle held_out other dark.ase",
@@ -189,12 +211,8 @@ def given(
     indirect=["given"],
 )
 def test_commands_of_a_document_run_as_they_stand(
-    document: str,
-    given: Path,
-    toonset: Toonset,
-    interrupted: Toonset,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    document, given, toonset, interrupted, monkeypatch
+):
     monkeypatch.setenv("BROWSER", "true")
     for command in filter(runs_here, commands(document)):
         words = arguments(command)
@@ -239,9 +257,7 @@ def test_benches_run_as_they_stand(
 
 
 @pytest.mark.slow
-def test_what_verbs_say_comes_next_runs_as_printed(
-    drawn: Path, toonset: Toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_verbs_say_comes_next_runs_as_printed(drawn, toonset, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(drawn / "sheet.png", "a sheet.png")
     shutil.copy(drawn / "mannequin.obj", "m.obj")

@@ -1,7 +1,5 @@
 """What the documents say is there: commands, rooms, files and links between them."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Imports run one way, and every place that lists the stage folders lists all of them."""
 
-from __future__ import annotations
-
 import ast
 import tomllib
 from collections.abc import Iterator

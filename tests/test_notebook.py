@@ -1,7 +1,5 @@
 """What notebooks show: small, escaped, and never an error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -99,7 +97,7 @@ def test_foreign_names_are_text(bundle: Path) -> None:
     assert "<script>alert('x')</script>" in page.words
 
 
-def test_many_large_views_stay_small(bundle: Path) -> None:
+def test_many_large_views_and_long_texts_stay_small(bundle: Path) -> None:
     found = ts.read_bundle(bundle)
     frames = [
         replace(found.scene.frames[0], name=f"{i:03d}.png", rgba=noise(300, 300))
@@ -110,12 +108,9 @@ def test_many_large_views_stay_small(bundle: Path) -> None:
     page = Page(html)
     assert page.tags.count("img") == MOST_ROWS
     assert "and 3 more" in page.words
-
-
-def test_long_texts_are_cut() -> None:
-    page = Page(table("long", ("a",), [["x" * 10_000]]))
-    assert "x" * 299 + "…" in page.words
-    assert "x" * 300 not in page.words
+    words = Page(table("long", ("a",), [["x" * 10_000]])).words
+    assert "x" * 299 + "…" in words
+    assert "x" * 300 not in words
 
 
 def test_a_run_and_a_rendering(run: Path) -> None:

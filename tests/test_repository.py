@@ -1,7 +1,5 @@
 """What must hold for the repository as a whole, whatever the code does."""
 
-from __future__ import annotations
-
 import ast
 import re
 import shutil
@@ -147,9 +145,6 @@ def test_licence_is_the_declared_one() -> None:
     assert (ROOT / "LICENSE").read_text(encoding="utf-8").startswith("MIT License")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["license"] == "MIT"
-
-
-# ---- locks --------------------------------------------------------------------------------------
 
 
 def locked(name: str) -> dict[str, list[tuple[Requirement, int]]]:

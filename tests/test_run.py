@@ -1,7 +1,5 @@
 """./run as a user types it, with a stand-in for the environment that it would set up."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil
@@ -224,9 +222,7 @@ def test_lint_runs_every_tool_and_fails_if_one_does(checkout: Path) -> None:
         (1000, 0, "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri"),
     ],
 )
-def test_drawing_libraries_are_installed_or_named(
-    checkout: Path, tmp_path: Path, user: int, code: int, line: str
-) -> None:
+def test_drawing_libraries_are_installed_or_named(checkout, tmp_path, user, code, line):
     python_that(checkout, '[ "$*" != - ] || exit 1')
     tools = tmp_path / "tools"
     program(tools / "apt-get", f'echo "$*" >>{shlex.quote(str(tmp_path / "apt"))}; exit {code}')

@@ -1,7 +1,5 @@
 """Cameras from landmarks alone: what they are called, and when."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -8,6 +8,7 @@ import pytest
 import torch
 import trimesh
 
+from tests.figures import boxes, drawn
 from toonset.calib.evidence.face import FaceEvidence
 from toonset.calib.fit.align import ElevationPrior, Fit, align, tilt, upright_prior
 from toonset.calib.outline.correspondences import Drawing
@@ -38,26 +39,17 @@ def as_mesh(shape) -> Mesh:
     return Mesh(np.array(shape.vertices), np.array(shape.faces))
 
 
-def blocky_figure() -> Mesh:
-    """Return an asymmetric body of boxes: trunk, head in front, one arm out, one foot ahead."""
-    parts = [([0.5, 1.0, 0.3], [0, 0.5, 0]), ([0.4, 0.4, 0.5], [0, 1.2, 0.15])]
-    parts += [([0.6, 0.15, 0.15], [0.5, 0.8, 0]), ([0.2, 0.2, 0.6], [-0.15, 0.1, 0.3])]
-    boxes = []
-    for extents, middle in parts:
-        box = trimesh.creation.box(extents)
-        box.apply_translation(middle)
-        boxes.append(box)
-    return as_mesh(trimesh.util.concatenate(boxes))
+FIGURE = boxes(  # trunk, head in front, one arm out, one foot ahead
+    ((0.5, 1.0, 0.3), (0, 0.5, 0)),
+    ((0.4, 0.4, 0.5), (0, 1.2, 0.15)),
+    ((0.6, 0.15, 0.15), (0.5, 0.8, 0)),
+    ((0.2, 0.2, 0.6), (-0.15, 0.1, 0.3)),
+)
 
 
-def view_of(mesh: Mesh, pose: Pose, size=(300, 320), fine=4) -> View:
-    pixels = project(pose, prepare_surface(mesh).vertices) * fine
-    faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
-    mask = silhouette_mask(pixels, faces, (size[0] * fine, size[1] * fine))
-    alpha = mask.reshape(size[1], fine, size[0], fine).mean(axis=(1, 3))
-    rgba = np.full((size[1], size[0], 4), 90, np.uint8)
-    rgba[..., 3] = np.round(alpha * 255)
-    return View(rgba, (0, 0, *size), 0.0, "000.png")
+def view_of(mesh: Mesh, pose: Pose) -> View:
+    middle = prepare_surface(mesh).middle
+    return drawn(mesh, lambda points: project(pose, points - middle), (300, 320))
 
 
 @pytest.mark.parametrize("k", [0.0, 0.3])
@@ -172,11 +164,11 @@ def test_rim_of_an_open_sheet_is_its_border():
 
 
 def test_templates_find_the_direction_of_an_asymmetric_body():
-    surface = prepare_surface(blocky_figure())
+    surface = prepare_surface(FIGURE)
     templates = build_templates(surface)
     for yaw in (0.0, 1.0, 2.5, 4.0, 5.5):
         truth = pose_at(yaw, 0.15, 0.0)
-        found = find_hypotheses(view_of(blocky_figure(), truth), templates, 6)
+        found = find_hypotheses(view_of(FIGURE, truth), templates, 6)
         errors = [rotation_distance(h.pose.rotation, truth.rotation) for h in found]
         assert min(errors) < math.radians(15)
         best = found[int(np.argmin(errors))].pose
@@ -186,10 +178,10 @@ def test_templates_find_the_direction_of_an_asymmetric_body():
 
 @pytest.mark.parametrize("yaw", [0.4, 2.0, 3.9])
 def test_alignment_recovers_the_pose_from_ten_degrees_off(yaw):
-    mesh, truth = blocky_figure(), pose_at(yaw, 0.15, 0.0)
-    drawing = Drawing(drawn_contour(view_of(mesh, truth)), 200, 300)
+    truth = pose_at(yaw, 0.15, 0.0)
+    drawing = Drawing(drawn_contour(view_of(FIGURE, truth)), 200, 300)
     start = replace(truth, rotation=rotation_from_angles(yaw + 0.17, 0.05, 0.02), scale=95.0)
-    fit = align(drawing, prepare_surface(mesh), start, np.geomspace(0.06, 0.005, 12))
+    fit = align(drawing, prepare_surface(FIGURE), start, np.geomspace(0.06, 0.005, 12))
     assert math.degrees(rotation_distance(fit.pose.rotation, truth.rotation)) < 0.6
     assert fit.pose.scale == pytest.approx(truth.scale, rel=0.003)
     np.testing.assert_allclose(fit.pose.shift, truth.shift, atol=0.4)

@@ -67,12 +67,7 @@ def test_a_spread_is_what_the_deviations_show_between_its_expectation_and_them()
 
 def test_labels_name_directions_and_numbers():
     found = parse_labels("front, 3q, Side,back,?,270", 6)
-    assert degrees(found[0]) == [0]
-    assert degrees(found[1]) == [45, 315]
-    assert degrees(found[2]) == [90, 270]
-    assert degrees(found[3]) == [180]
-    assert found[4] == ()
-    assert degrees(found[5]) == [270]
+    assert [degrees(one) for one in found] == [[0], [45, 315], [90, 270], [180], [], [270]]
 
 
 def test_open_sides_turn_one_way_more_likely_than_not():

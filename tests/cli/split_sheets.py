@@ -1,7 +1,5 @@
 """A sheet of figures in four colours, drawn with Pillow."""
 
-from __future__ import annotations
-
 from PIL import Image, ImageDraw
 
 COLORS = ((200, 60, 40), (40, 120, 200), (60, 160, 70), (220, 180, 40))

@@ -1,7 +1,5 @@
 """`toonset evaluate`: sections, reasons, files and the picture."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from toonset.camera import Camera
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.score.evaluate import ScoredView, chosen_frames, report
@@ -44,9 +43,7 @@ def scored(name: str, wrong_px: int, *, palette: bool = True) -> ScoredView:
     )
 
 
-def test_held_out_and_training_views_apart(
-    bundle: Path, trained, toonset, tmp_path, monkeypatch
-) -> None:
+def test_held_out_and_training_views_apart(bundle, trained, toonset, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(trained[0], bundle / "run")
     done = toonset("evaluate", "bundle/run", "--test", "bundle", "--json", "-o", "judged")
@@ -113,9 +110,7 @@ def test_the_table(bundle: Path, run: Path, toonset) -> None:
     assert "LPIPS" not in lines[1] or "lpips: " not in done.out
 
 
-def test_an_output_is_not_replaced_unasked(
-    bundle: Path, run: Path, toonset, snapshot, tmp_path
-) -> None:
+def test_an_output_is_not_replaced_unasked(bundle, run, toonset, snapshot, tmp_path):
     out = tmp_path / "judged"
     out.mkdir()
     (out / "drawing.png").write_bytes(b"mine")
@@ -127,7 +122,7 @@ def test_an_output_is_not_replaced_unasked(
 
 
 def test_the_views_of_a_run_among_those_of_its_bundle() -> None:
-    camera = read_camera()
+    camera = Camera.looking_at(np.zeros(3), 0.0, 0.0, 1.0, (4, 4))
     blank = np.zeros((4, 4, 4), dtype=np.uint8)
     scene = Scene(tuple(Frame(n, camera, blank) for n in ("a.png", "b.png", "c.png")), None, "s")
 
@@ -137,12 +132,6 @@ def test_the_views_of_a_run_among_those_of_its_bundle() -> None:
     assert names({"scene": {"views": ["c.png", "a.png"]}}) == ["a.png", "c.png"]
     assert names({"scene": {"views": ["d.png"]}}) == []
     assert names({}) == names({"scene": {"views": 3}}) == names([]) == ["a.png", "b.png", "c.png"]
-
-
-def read_camera():
-    from toonset.camera import Camera
-
-    return Camera.looking_at(np.zeros(3), 0.0, 0.0, 1.0, (4, 4))
 
 
 def test_a_run_without_palette_has_no_palette_figures() -> None:

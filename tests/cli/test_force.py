@@ -1,7 +1,5 @@
 """--force: it replaces what an earlier run of the same command wrote, and nothing of a user's."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -30,7 +28,9 @@ def test_force_replaces_a_bundle_with_its_palette(drawn: Path, bundle: Path, too
     assert toonset("palette", bundle, "-q").code == 0
     arguments = ("calibrate", drawn / "single.png", "--mesh", drawn / "mannequin.obj", "-o", bundle)
     assert "exists already; pass --force to replace it" in toonset(*arguments, "-q").reason
-    assert toonset(*arguments, "-q", "--force").code == 3  # a single drawing
+    done = toonset(*arguments, "-q", "--force")  # a single drawing
+    assert (done.code, done.err.count("\n")) == (3, 1)  # only why
+    assert done.err.startswith("sheet: weak (")
     assert {path.name for path in bundle.iterdir()} == before
 
 
@@ -43,7 +43,7 @@ def test_force_replaces_a_bundle_with_its_palette(drawn: Path, bundle: Path, too
     ],
 )
 def test_force_never_takes_a_users_folder(
-    out, words, drawn: Path, toonset, snapshot, tmp_path, monkeypatch
+    out, words, drawn, toonset, snapshot, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     for name in ("work", "drawings/images", "drawings/run"):
@@ -58,9 +58,7 @@ def test_force_never_takes_a_users_folder(
     assert snapshot(tmp_path) == before
 
 
-def test_force_never_takes_the_folder_one_stands_in(
-    drawn: Path, bundle: Path, toonset, snapshot, monkeypatch
-):
+def test_force_never_takes_the_folder_one_stands_in(drawn, bundle, toonset, snapshot, monkeypatch):
     monkeypatch.chdir(bundle / "images")
     before = snapshot(bundle)
     done = toonset(

@@ -1,7 +1,5 @@
 """`toonset info` and `toonset check`: what a person is told, and with which exit code."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -32,16 +30,13 @@ def test_info_tells_views_colours_and_sizes(place: Path, toonset, snapshot):
         "toonset 0.1.0, seed 0",
     ):
         assert words in done.out
-    assert snapshot(place) == before
-
-
-def test_info_as_json_holds_the_same(place: Path, toonset):
     found = toonset("info", place, "--json").json
     assert found["kind"] == "bundle"
     assert [view["line_width_px"] for view in found["views"]] == [1.5] * 3
     assert (found["labels"], found["contours"], found["damaged"]) == (3, 3, [])
     on_disk = sum(path.stat().st_size for path in place.rglob("*") if path.is_file())
     assert sum(found["bytes"].values()) == on_disk
+    assert snapshot(place) == before
 
 
 def test_info_of_another_programs_cameras(place: Path, toonset):
@@ -113,9 +108,10 @@ def test_check_lists_each_problem_aligned_and_exits_2(place: Path, toonset, snap
 
 
 @pytest.mark.parametrize("verb", ["info", "check"])
-def test_what_is_no_bundle_is_refused(verb, tmp_path: Path, toonset):
+def test_what_is_no_bundle_is_refused(verb, drawn: Path, tmp_path: Path, toonset):
     assert "does not exist" in toonset(verb, tmp_path / "nothing").reason
     assert "holds no transforms.json, split.json or config.json" in toonset(verb, tmp_path).reason
+    assert "is a picture; name a folder" in toonset(verb, drawn / "sheet.png").reason
     (tmp_path / "x.txt").write_text("hello")
     if verb == "info":
         assert "is no valid JSON" in toonset(verb, tmp_path / "x.txt").reason
@@ -137,23 +133,15 @@ def test_check_goes_on_where_the_cameras_cannot_be_read(place: Path, toonset):
     assert "(and 1 more problem); correct the file" in toonset("info", place).reason
 
 
-@pytest.fixture
-def views(drawn: Path, tmp_path: Path, toonset) -> Path:
-    folder = tmp_path / "views"
-    assert toonset("split", drawn / "sheet.png", "-o", folder).code == 0
-    return folder
-
-
-def test_info_of_a_split_tells_what_came_and_went(views: Path, toonset):
+def test_info_of_a_split_tells_what_came_and_went_and_check_every_problem(drawn, tmp_path, toonset):
+    views = tmp_path / "views"
+    assert toonset("split", drawn / "sheet.png", "-o", views).code == 0
     assert "gone" not in toonset("info", views).out
     (views / "images" / "001.png").rename(views / "images" / "side.png")
     done = toonset("info", views)
     assert "gone      001.png\n" in done.out
     assert "new       side.png (or renamed)\n" in done.out
     assert toonset("check", views).code == 0
-
-
-def test_check_of_a_split_lists_every_problem(views: Path, toonset):
     content = json.loads((views / "split.json").read_text())
     content["views"][0]["crop"][0] = -4
     content["views"][1]["label"] = 5
@@ -162,14 +150,5 @@ def test_check_of_a_split_lists_every_problem(views: Path, toonset):
     (views / "overlay.png").write_bytes(b"x")
     done = toonset("check", views)
     assert done.code == 2
-    assert [line.split()[0] for line in done.out.splitlines()[:-1]] == [
-        "split.json",
-        "split.json",
-        "images/002.png",
-        "overlay.png",
-    ]
-
-
-@pytest.mark.parametrize("verb", ["info", "check"])
-def test_a_picture_is_no_bundle(verb, drawn: Path, toonset):
-    assert "is a picture; name a folder" in toonset(verb, drawn / "sheet.png").reason
+    where = [line.split()[0] for line in done.out.splitlines()[:-1]]
+    assert where == ["split.json", "split.json", "images/002.png", "overlay.png"]

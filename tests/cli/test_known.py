@@ -1,7 +1,5 @@
 """What a person knows, said on the command line of calibrate: no mesh, landmarks, starts, locks."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from hashlib import sha256
@@ -63,12 +61,9 @@ def turned_deg(bundle: Path, truth) -> list[float]:
     ]
 
 
-# ---- no mesh
-
-
 def test_no_mesh_takes_the_default_mannequin_and_says_so(drawn: Path, toonset, tmp_path):
     out = tmp_path / "b"
-    done = toonset("calibrate", drawn / "sheet.png", "-o", out, "--json")
+    done = toonset("calibrate", drawn / "single.png", "-o", out, "--json")
     assert done.code in (0, 3)
     assert "no --mesh: the default mannequin, 3 heads tall, relaxed pose" in done.err
     looks = {"head_scale": 1.0, "torso_scale": 1.0, "limb_scale": 1.0}
@@ -77,24 +72,10 @@ def test_no_mesh_takes_the_default_mannequin_and_says_so(drawn: Path, toonset, t
     assert "left_hand" in load_mesh(out / "mannequin.obj").part_names
 
 
-# ---- labels
-
-
-@pytest.mark.parametrize(
-    ("files", "labels", "words"),
-    [
-        (["sheet.png"], "front,3q,side", "--views: 3 labels for 5 views"),
-        (["sheet.png", "single.png"], LABELS, "--views: 5 labels for 6 views"),
-        (["sheet.png"], "front,3q,side,bakc,?", "'bakc' is no direction; did you mean 'back'"),
-        (["single.png"], "nan", "'nan' is no direction"),
-    ],
-)
-def test_labels_that_do_not_fit(files, labels, words, drawn, toonset, snapshot, tmp_path):
-    before = snapshot(tmp_path)
-    sheets = [drawn / name for name in files]
-    done = toonset("calibrate", *sheets, "--views", labels, "-o", tmp_path / "b", "-q")
-    assert words in done.reason
-    assert snapshot(tmp_path) == before
+def test_labels_that_do_not_fit(drawn, toonset, tmp_path):
+    line = ("calibrate", drawn / "sheet.png", drawn / "single.png", "-o", tmp_path / "b", "-q")
+    assert "--views: 5 labels for 6 views" in toonset(*line, "--views", LABELS).reason
+    assert not (tmp_path / "b").exists()
 
 
 def test_labels_over_several_files_count_on(drawn: Path, toonset, tmp_path):
@@ -106,9 +87,6 @@ def test_labels_over_several_files_count_on(drawn: Path, toonset, tmp_path):
     assert done.json["options"]["views"] == f"{LABELS},front"
     yaws = [view["camera"]["yaw_deg"] for view in done.json["views"]]
     assert abs((yaws[5] - yaws[0] + 180) % 360 - 180) < SURE_DEG
-
-
-# ---- landmarks
 
 
 @pytest.mark.parametrize("alone", [False, True])
@@ -161,9 +139,6 @@ def test_landmarks_that_are_not_enough(drawn: Path, toonset, snapshot, tmp_path)
     assert set(snapshot(tmp_path)) == {"marks.json"}
 
 
-# ---- cameras to start from, and locks
-
-
 def started(drawn: Path, toonset, out: Path, *more: object):
     mesh = ("--mesh", drawn / "mannequin.obj")
     return toonset("calibrate", drawn / "sheet.png", *mesh, "-o", out, *more, "--json")
@@ -184,7 +159,7 @@ def moved_start(bundle: Path, path: Path) -> list[Camera]:
 
 
 def test_a_start_is_found_back_without_a_search(
-    drawn, bundle: Path, truth, toonset, tmp_path, monkeypatch
+    drawn, bundle, truth, toonset, tmp_path, monkeypatch
 ):
     def refuse(*arguments: object) -> None:
         raise AssertionError("the search has been asked")
@@ -219,13 +194,6 @@ def test_locks_keep_what_init_has(locked, drawn, bundle: Path, toonset, tmp_path
             assert end.k == pytest.approx(start.k, rel=1e-4)
 
 
-def test_yaw_may_be_locked_to_labels(drawn: Path, toonset, tmp_path):
-    done = started(drawn, toonset, tmp_path / "b", "--views", LABELS, "--lock", "yaw")
-    assert done.code in (0, 3)
-    off = [v["camera"]["yaw_deg"] - 72 * i for i, v in enumerate(done.json["views"])]
-    assert max(abs((turn + 180) % 360 - 180) for turn in off) < 0.01
-
-
 @pytest.mark.parametrize(
     ("more", "words"),
     [
@@ -238,7 +206,7 @@ def test_yaw_may_be_locked_to_labels(drawn: Path, toonset, tmp_path):
     ],
 )
 def test_starts_and_locks_that_cannot_be(
-    more, words, drawn, bundle: Path, toonset, snapshot, tmp_path, monkeypatch
+    more, words, drawn, bundle, toonset, snapshot, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     content = json.loads((bundle / "transforms.json").read_text())
@@ -257,18 +225,13 @@ def test_starts_and_locks_that_cannot_be(
     assert snapshot(tmp_path) == before
 
 
-# ---- corrections
-
-
 def corrections(folder: Path, **content: Any) -> Path:
     path = folder / "corrections.json"
     path.write_text(json.dumps({"version": 1, **content}))
     return path
 
 
-def test_corrections_are_an_input_and_change_only_what_they_say(
-    drawn, bundle: Path, toonset, tmp_path
-):
+def test_corrections_are_an_input_and_change_only_what_they_say(drawn, bundle, toonset, tmp_path):
     boxes = [view["box"] for view in json.loads((bundle / "calibration.json").read_text())["views"]]
     views = [{"box": boxes[2], "label": "144"}, {"box": boxes[4], "exclude": True}]
     path = corrections(tmp_path, views=views)
@@ -283,15 +246,8 @@ def test_corrections_are_an_input_and_change_only_what_they_say(
     ("content", "more", "words"),
     [
         ({"view": []}, [], "corrections.json: unknown key 'view'"),
-        ({"views": [{"box": [0, 0, 9, 9], "label": "up"}]}, [], "views.0.label: 'up' is no dir"),
-        ({"boxes": [[0, 0, 9999, 9]]}, [], "boxes: box 0 (x 0, y 0, 9999 x 9 px) leaves the sheet"),
         ({"boxes": [[0, 0, 99, 99]]}, ["--boxes", "b.csv"], "boxes and --boxes say the same"),
-        (
-            {"views": [{"box": [0, 0, 9, 9], "label": "0"}]},
-            ["--front", "1"],
-            "views.label and --fr",
-        ),
-        ({}, ["--landmarks-only", "--landmarks", "l.json"], "--corrections does nothing beside"),
+        ({"views": [{"box": [0, 0, 9, 9], "label": "0"}]}, ["--front", "1"], "label and --front"),
     ],
 )
 def test_corrections_that_cannot_be(
@@ -299,7 +255,6 @@ def test_corrections_that_cannot_be(
 ):
     monkeypatch.chdir(tmp_path)
     Path("b.csv").write_text("0,0,99,99\n")
-    Path("l.json").write_text("{}")
     path = corrections(tmp_path, **content)
     before = snapshot(tmp_path)
     mesh = ("--mesh", drawn / "mannequin.obj")

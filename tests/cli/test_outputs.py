@@ -1,14 +1,10 @@
 """The lines that a user types to take a mesh out of a run."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from toonset.cli.common import output
 from toonset.dataset.mesh.load import load_mesh
@@ -62,9 +58,7 @@ def test_a_mesh_in_several_palettes(toonset: Callable[..., Any], run: Path, tmp_
     assert not list(tmp_path.glob("a.*"))
 
 
-def test_a_mesh_is_light_unless_asked_and_says_how_far_it_is(
-    toonset: Callable[..., Any], run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mesh_is_light_unless_asked_and_says_how_far_it_is(toonset, run, tmp_path, monkeypatch):
     monkeypatch.setattr(output, "SECONDS_BETWEEN_LOG_LINES", 0.0)
     light = toonset("mesh", run, "-o", tmp_path / "light.glb")
     assert len(load_mesh(tmp_path / "light.glb").faces) in range(7900, 8001)

@@ -1,7 +1,5 @@
 """`toonset render` in the drawn look: its default, its pen, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import sys
 import zipfile
@@ -33,9 +31,7 @@ def shown(folder: Path, name: str = "000.png") -> np.ndarray:
     return load_rgba(folder / name).astype(int)
 
 
-def test_turntables_of_lined_sheets_are_drawn_and_cameras_are_the_fields(
-    lined: Path, toonset, tmp_path: Path
-) -> None:
+def test_turntables_of_lined_sheets_are_drawn_and_cameras_are_the_fields(lined, toonset, tmp_path):
     turn = toonset("render", lined, "--turntable", 2, "-o", tmp_path / "turn", "--json")
     assert turn.json["layer"] == "drawn"
     cameras = lined.parent / "sheet" / "views" / "transforms.json"
@@ -50,9 +46,7 @@ def test_turntables_of_lined_sheets_are_drawn_and_cameras_are_the_fields(
         assert np.abs(found - drawn)[drawn[..., 3] == 255].max() <= 1
 
 
-def test_turntables_of_sheets_without_lines_are_the_fields(
-    trained, toonset, tmp_path: Path
-) -> None:
+def test_turntables_of_sheets_without_lines_are_the_fields(trained, toonset, tmp_path):
     turn = toonset("render", trained[0], "--turntable", 1, "-o", tmp_path / "turn", "--json")
     assert turn.json["layer"] == "rgb"
     asked = ("render", trained[0], "--turntable", 1, "-o", tmp_path / "drawn", "--layer", "drawn")
@@ -125,9 +119,7 @@ def test_a_run_made_before_says_how_to_get_the_layer(lined: Path, toonset, tmp_p
     assert toonset(*turn).code == 0  # the field's colour, as before
 
 
-def test_a_film_without_its_codec_is_refused_before_any_work(
-    toonset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_film_without_its_codec_is_refused_before_any_work(toonset, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     film = ("--turntable", 8, "--format", "webp,mp4", "-o", tmp_path / "film")
     assert toonset("render", tmp_path / "no run is read", *film).reason.endswith(INSTALL_AV)

@@ -1,7 +1,5 @@
 """`toonset split`: what it writes and says, what it takes as input, and how it is corrected."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from hashlib import sha256
@@ -49,9 +47,6 @@ def color_of(view: Path) -> tuple[int, int, int]:
 
 def colors_of(folder: Path) -> list[tuple[int, int, int]]:
     return [color_of(path) for path in sorted((folder / "images").iterdir())]
-
-
-# ---- what it writes and says
 
 
 def test_a_sheet_becomes_a_folder_to_look_at(sheet: Path, toonset, snapshot):
@@ -106,9 +101,6 @@ def test_a_doubt_is_exit_code_3_and_is_drawn(sheet: Path, toonset):
     assert (done.code, done.out) == (3, "views\n")
     assert "look: other.png is a copy of sheet.png: is one of them another view?" in done.err
     assert len(read_split(Path("views"))[0].views) == 2 * COUNT
-
-
-# ---- corrections
 
 
 def test_dropped_views_go_and_the_others_are_numbered_anew(sheet: Path, toonset):
@@ -182,16 +174,6 @@ def test_a_known_background_is_used(sheet: Path, toonset):
     assert colors_of(Path("views")) == list(COLORS)
 
 
-def test_boxes_and_a_grid_contradict(sheet: Path, toonset):
-    done = toonset("split", sheet, "--boxes", "b.csv", "--grid", "4x1")
-    assert (done.code, done.out) == (2, "")
-    said = " ".join(done.err.replace("│", " ").split())
-    assert "--boxes and --grid both say where the figures are; drop one" in said
-
-
-# ---- inputs
-
-
 def test_a_folder_of_views_is_read_in_the_order_people_count(singles: Path, toonset):
     done = toonset("split", singles)
     assert done.code == 0
@@ -208,22 +190,6 @@ def test_files_and_folders_are_joined_in_the_order_given(singles: Path, toonset)
     assert done.code == 0
     assert colors_of(Path("views")) == [(20, 90, 90), *COLORS]
     assert [view.name for view in read_split(Path("views"))[0].views][-1] == "004.png"
-
-
-def test_a_sheet_among_its_views_is_a_doubt(singles: Path, sheet: Path, toonset):
-    shutil.copy(sheet, singles / "all.png")
-    done = toonset("split", singles)
-    assert done.code == 3
-    assert "all.png shows 4 figures, the others one: is it a sheet of the same views?" in done.err
-
-
-def test_a_view_at_another_scale_is_a_doubt(singles: Path, toonset):
-    small = Image.open(singles / "view9.png")
-    small.resize((small.width // 2, small.height // 2)).save(singles / "view9.png")
-    done = toonset("split", singles)
-    assert done.code == 3
-    assert "view9.png: " in done.err
-    assert "is it drawn at another scale?" in done.err
 
 
 def test_one_blank_file_of_many_is_refused_by_name(singles: Path, toonset, snapshot):
@@ -248,9 +214,6 @@ def test_a_corrected_folder_is_read_again(sheet: Path, toonset):
     assert colors_of(Path("third")) == [COLORS[0], COLORS[2], COLORS[3]]
 
 
-# ---- calibrate takes the same
-
-
 def test_calibrate_takes_a_split_folder_with_its_labels(drawn: Path, toonset, tmp_path):
     views, out, mesh = tmp_path / "views", tmp_path / "b", drawn / "mannequin.obj"
     labels = "0,72,144,216,288"
@@ -267,32 +230,6 @@ def test_calibrate_takes_a_split_folder_with_its_labels(drawn: Path, toonset, tm
     assert max(map(abs, off)) < 5
 
 
-def test_calibrate_drops_views_and_keeps_what_was_said(drawn: Path, toonset, tmp_path):
-    mesh, out = drawn / "mannequin.obj", tmp_path / "b"
-    common = ("calibrate", drawn / "sheet.png", "--mesh", mesh, "--drop", "1,3-4", "-o", out)
-    wrong = toonset(*common, "--views", "0,72,144,216,288", "-q")
-    assert "--views: 5 labels for 2 views (--drop left 2 of 5)" in wrong.reason
-    done = toonset(*common, "--views", "0,144", "--json")
-    assert done.code in (0, 3)
-    assert done.json["options"]["drop"] == "1,3-4"
-    assert len(done.json["views"]) == 2
-
-
-def test_boxes_by_hand_are_the_views_in_their_order(sheet: Path, toonset):
-    boxes = [[20 + PITCH * n, 15, 70, 171] for n in (2, 0)]
-    Path("boxes.json").write_text(json.dumps(boxes))
-    assert toonset("split", sheet, "--boxes", "boxes.json").code in (0, 3)
-    assert colors_of(Path("views")) == [COLORS[2], COLORS[0]]
-    found = read_split(Path("views"))[0]
-    for view, (x, y, width, height) in zip(found.views, boxes, strict=True):
-        assert x <= view.figure_box[0]
-        assert y <= view.figure_box[1]
-        assert view.figure_box[0] + view.figure_box[2] <= x + width
-        assert view.figure_box[1] + view.figure_box[3] <= y + height
-    content = json.loads(Path("views/split.json").read_text())
-    assert content["options"] == {"boxes": "boxes.json"}
-
-
 def test_a_corrected_split_json_cuts_anew(sheet: Path, toonset):
     assert toonset("split", sheet).code == 0
     content = json.loads(Path("views/split.json").read_text())
@@ -303,3 +240,5 @@ def test_a_corrected_split_json_cuts_anew(sheet: Path, toonset):
     assert [v.box for v in second.views] == [first.views[i].box for i in (0, 2, 3)]
     for number, again in zip((0, 2, 3), second.views, strict=True):
         assert np.array_equal(first.views[number].mask, again.mask)
+    content = json.loads(Path("again/split.json").read_text())
+    assert content["options"] == {"boxes": "mine.json"}

@@ -1,7 +1,5 @@
 """`toonset split`: every mistake is one line that names it, and nothing is written."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -65,7 +63,7 @@ def prepared(toonset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     ],
 )
 def test_a_mistake_is_one_line(
-    arguments, words, prepared: Path, toonset, snapshot, tmp_path, monkeypatch
+    arguments, words, prepared, toonset, snapshot, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(shutil.copytree(prepared, tmp_path / "here"))
     before = snapshot(Path())

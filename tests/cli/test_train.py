@@ -1,7 +1,5 @@
 """`toonset train` as a user lives with it: stopping, going on, and what it says on the way."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal
@@ -39,7 +37,7 @@ def ctrl_c_after(monkeypatch):
 
 
 def test_a_run_that_is_stopped_is_whole_and_a_rerun_gives_the_same_bytes(
-    bundle: Path, toonset, ctrl_c_after, tmp_path, snapshot, monkeypatch
+    bundle, toonset, ctrl_c_after, tmp_path, snapshot, monkeypatch
 ):
     before = snapshot(bundle)
     whole, cut, again = (tmp_path / name for name in ("whole", "cut", "again"))
@@ -123,9 +121,7 @@ def test_a_training_that_went_wrong_is_written_with_its_reason(bundle: Path, too
         (torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"), "the GPU"),
     ],
 )
-def test_running_out_of_memory_is_one_line(
-    bundle: Path, toonset, monkeypatch, snapshot, error: RuntimeError, said: str
-):
+def test_running_out_of_memory_is_one_line(bundle, toonset, monkeypatch, snapshot, error, said):
     before = snapshot(bundle)
 
     def full(*_: object, **__: object) -> None:

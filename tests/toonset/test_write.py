@@ -63,6 +63,7 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
 
 def test_an_existing_folder_needs_force_and_is_replaced_whole(tmp_path):
     target = tmp_path / "out"
+    target.mkdir()  # one with nothing in it is no result
     with new_folder(target) as temporary:
         (temporary / "old").write_text("1")
     with pytest.raises(OutputError, match="exists already; pass --force"), new_folder(target):

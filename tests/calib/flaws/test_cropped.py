@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 
 from bench.cases.bodies import random_body
+from tests.figures import boxes
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.flaws.cropped import at_cuts, ending_at, flat_sides
 from toonset.calib.outline.correspondences import Drawing
@@ -136,14 +136,10 @@ def test_longer_legs_than_the_characters_are_no_cut(elevation):
     """Flat soles on whole pixels, in one view or in all, and a mannequin that reaches below."""
 
     def figure(leg: float) -> Mesh:
-        sizes = [(1, 1, 1), (0.9, 1, 0.5), (0.35, leg, 0.4), (0.35, leg, 0.4)]
-        middles = [(0, leg + 1.5, 0), (0, leg + 0.5, 0), (-0.25, leg / 2, 0), (0.25, leg / 2, 0)]
-        parts = [trimesh.creation.box(size) for size in sizes]
-        vertices = [part.vertices + at for part, at in zip(parts, middles, strict=True)]
-        faces = [part.faces + 8 * i for i, part in enumerate(parts)]
-        return Mesh(np.concatenate(vertices), np.concatenate(faces))
+        legs = [((0.35, leg, 0.4), (side, leg / 2, 0)) for side in (-0.25, 0.25)]
+        return boxes(((1, 1, 1), (0, leg + 1.5, 0)), ((0.9, 1, 0.5), (0, leg + 0.5, 0)), *legs)
 
-    options = replace(OPTIONS, views=8, cell_px=200, elevation_deg=elevation)
+    options = replace(OPTIONS, views=4, cell_px=200, elevation_deg=elevation)
     views = split_picture(make_turnaround(figure(1.0), options, 0).sheet).views
     assert any(side.side == "bottom" for view in views for side in flat_sides(view))
     assert find_cameras(views, figure(1.3)).cuts == ()

@@ -47,70 +47,55 @@ def drawn(name: str, hole=None, patch=None, soft: bool = False) -> View:
     return View(rgba, (0, 0, *SIZE), 0.0, name)
 
 
-def filled(views, yaws, papers=None, verdict="ok", elevation: float = 0.0):
+def filled(views, yaws=(0, 180), papers=(WHITE, WHITE), verdict="ok", elevation=0.0):
     looks = [SimpleNamespace(camera=camera_at(y, elevation), verdict=verdict) for y in yaws]
     found = cast("list[ViewCalibration]", looks)
-    papers = papers or [WHITE] * len(views)
     views = [replace(view, paper=paper) for view, paper in zip(views, papers, strict=True)]
     return fill_false_holes(views, found, slab())
 
 
+HOLED, PLAIN = drawn("0", HOLE), drawn("1")
+PALE = replace(PLAIN, rgba=np.where(PLAIN.rgba > 0, 255, 0).astype(np.uint8))
+
+
 def test_a_hole_that_the_back_does_not_show_is_paint():
-    views, holes = filled([drawn("0", HOLE), drawn("1")], [0, 180])
+    views, holes = filled([HOLED, PLAIN])
     assert [(h.view, h.box, h.by) for h in holes] == [("0", (24, 45, 10, 10), "1")]
     assert views[0].mask[HOLE].all()
     assert (views[0].rgba[HOLE][..., :3] == WHITE).all()
-    assert np.array_equal(views[1].rgba, drawn("1").rgba)
+    assert np.array_equal(views[1].rgba, PLAIN.rgba)
     assert "0: the hole at 24, 45 (10 x 10 px) is paint: 1" in str(holes[0])
+    assert filled([HOLED, PLAIN], elevation=np.radians(15))[1]
 
 
 def test_a_filled_hole_is_the_sheet_again_where_its_edge_was_mixed():
-    view = drawn("0", HOLE, soft=True)
-    (after, _), _ = filled([view, drawn("1")], [0, 180])
+    (after, _), _ = filled([drawn("0", HOLE, soft=True), PLAIN])
     edge = after.rgba[50, HOLE[1].start - 1]
     share = 120 / 255
     assert edge[3] == 255
     assert np.allclose(edge[:3], share * np.array(RED) + (1 - share) * 255, atol=1)
-    assert np.array_equal(after.rgba[..., 3] == 0, drawn("1").rgba[..., 3] == 0)  # nothing else
+    assert np.array_equal(after.rgba[..., 3] == 0, PLAIN.rgba[..., 3] == 0)  # nothing else
 
 
 @pytest.mark.parametrize(
-    ("other", "yaw"),
+    ("hole", "other", "given"),
     [
-        (drawn("1", (slice(45, 55), slice(26, 36))), 180),  # the same gap, seen from behind
-        (drawn("1", patch=(slice(46, 56), slice(27, 37))), 180),  # taken for paint there
-        (drawn("1"), 90),  # a side view sees no gap between arm and body
-        (drawn("1"), 0),  # the same side, drawn another time
+        (HOLE, drawn("1", (slice(45, 55), slice(26, 36))), {}),  # the same gap, seen from behind
+        (HOLE, drawn("1", patch=(slice(46, 56), slice(27, 37))), {}),  # taken for paint there
+        (HOLE, PALE, {}),  # paint in the paper's colour proves nothing
+        (HOLE, PLAIN, {"yaws": (0, 90)}),  # a side view sees no gap between arm and body
+        (HOLE, PLAIN, {"yaws": (0, 0)}),  # the same side, drawn another time
+        (HOLE, PLAIN, {"elevation": np.radians(25)}),  # they do not look against each other
+        (HOLE, PLAIN, {"verdict": "failed"}),
+        (HOLE, PLAIN, {"papers": (WHITE, None)}),
+        (HOLE, PLAIN, {"papers": (None, WHITE)}),
+        ((slice(45, 55), slice(13, 17)), PLAIN, {}),  # near the outline
     ],
 )
-def test_a_hole_stays_unless_it_is_contradicted(other: View, yaw: float):
-    views, holes = filled([drawn("0", HOLE), other], [0, yaw])
+def test_a_hole_stays_unless_it_is_contradicted(hole, other, given):
+    views, holes = filled([drawn("0", hole), other], **given)
     assert holes == ()
-    assert views[0] is not None
-    assert not views[0].mask[HOLE].any()
-
-
-def test_a_hole_near_the_outline_stays():
-    beside = (slice(45, 55), slice(13, 17))
-    assert filled([drawn("0", beside), drawn("1")], [0, 180])[1] == ()
-
-
-def test_views_from_above_do_not_look_against_each_other():
-    pair = [drawn("0", HOLE), drawn("1")]
-    assert filled(pair, [0, 180], elevation=np.radians(15))[1]
-    assert filled(pair, [0, 180], elevation=np.radians(25))[1] == ()
-
-
-def test_drawings_without_camera_or_paper_have_no_say():
-    pair = [drawn("0", HOLE), drawn("1")]
-    assert filled(pair, [0, 180], verdict="failed")[1] == ()
-    assert filled(pair, [0, 180], papers=[WHITE, None])[1] == ()
-    assert filled(pair, [0, 180], papers=[None, WHITE])[1] == ()
-
-
-def test_paint_in_the_papers_colour_proves_nothing():
-    white = replace(drawn("1"), rgba=np.where(drawn("1").rgba > 0, 255, 0).astype(np.uint8))
-    assert filled([drawn("0", HOLE), white], [0, 180])[1] == ()
+    assert not views[0].mask[hole].any()
 
 
 def test_calibrate_fills_a_white_buckle_and_says_so(toonset, tmp_path):

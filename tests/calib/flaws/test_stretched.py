@@ -1,7 +1,5 @@
 """Drawings and mannequins that are taller or lower than their width asks for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

@@ -1,7 +1,5 @@
 """Drawings that are strongly off: their errors make no alternative camera and no other body."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -44,9 +42,7 @@ def test_unsteady_drawings_do_not_bend_the_mannequin_on_little_evidence() -> Non
 
 
 @pytest.mark.parametrize("percent", [0.0, 2.0])
-def test_the_chosen_camera_and_its_twin_stay_among_the_candidates(
-    monkeypatch: pytest.MonkeyPatch, percent: float
-) -> None:
+def test_the_chosen_camera_and_its_twin_stay_among_the_candidates(monkeypatch, percent):
     seen: list[tuple[Candidates, Candidates, Pose]] = []
 
     def watched(drawing: Drawing, joint: JointFit, index: int, found: Candidates) -> Candidates:

@@ -1,7 +1,5 @@
 """Rays of turning outlines: what is kept of unmoved pairs is what would be found anew."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -23,9 +21,7 @@ def figures() -> Figures:
 
 @pytest.mark.parametrize("tilt", [0.0, 0.17])
 @pytest.mark.parametrize("view", range(VIEWS))
-def test_turning_one_view_is_cutting_all_rays_anew(
-    figures: Figures, view: int, tilt: float
-) -> None:
+def test_turning_one_view_is_cutting_all_rays_anew(figures, view, tilt):
     yaws = np.arange(VIEWS) * 2 * np.pi / VIEWS + 0.1
     turned = yaws + 0.7 * (np.arange(VIEWS) == view)
     kept = figures.rays(figures.cameras(yaws, tilt)).with_turned(

@@ -1,7 +1,5 @@
 """What shells are told when a user presses the tab key: no shell is needed, only its protocol."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -72,7 +70,5 @@ def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
         ("synth mesh.glb --condition a", {"artist"}),
     ],
 )
-def test_choices_are_completed(
-    line: str, choices: set[str], completed: Callable[[str], set[str]]
-) -> None:
+def test_choices_are_completed(line, choices, completed):
     assert completed(f"toonset {line}") == choices

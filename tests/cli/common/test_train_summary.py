@@ -1,7 +1,5 @@
 """What `train` says at its end about drawings that were, or were not, set right."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What tests of the correcting page share: pages that must stay quiet."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -60,3 +58,9 @@ def open_page(open_at: Open, tmp_path: Path) -> Open:
         return open_at(path.as_uri(), path.as_uri(), **options)
 
     return open_one
+
+
+@pytest.fixture
+def editor(open_page: Open) -> Editor:
+    """Return the page of a made-up bundle with a mannequin."""
+    return open_page()

@@ -1,7 +1,5 @@
 """A made-up sheet of three figures, its bundle's scene, and the page of both in a browser."""
 
-from __future__ import annotations
-
 import json
 import time
 from dataclasses import dataclass, field

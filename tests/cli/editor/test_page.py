@@ -1,13 +1,9 @@
 """The page as a file: figures, cameras, palette, as a person corrects them."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page
 
 from tests.cli.editor.conftest import Open
 from tests.cli.editor.page_under_test import BOXES, HEXES, HOSTILE, Editor
@@ -20,11 +16,7 @@ def is_valid(editor: Editor) -> bool:
     return parse_corrections(data, "page").version == 1
 
 
-# Figures
-
-
-def test_a_box_is_drawn_moved_sized_and_dropped(open_page: Open) -> None:
-    editor = open_page()
+def test_a_box_is_drawn_moved_sized_and_dropped(editor: Editor) -> None:
     editor.mode("Figures")
     editor.drag((340, 20), (390, 150))
     assert len(editor.said["boxes"]) == 4
@@ -42,8 +34,7 @@ def test_a_box_is_drawn_moved_sized_and_dropped(open_page: Open) -> None:
     assert is_valid(editor)
 
 
-def test_boxes_are_merged_and_cut(open_page: Open) -> None:
-    editor = open_page()
+def test_boxes_are_merged_and_cut(editor: Editor) -> None:
     editor.mode("Figures")
     editor.tap(50, 100)
     editor.page.keyboard.down("Shift")
@@ -67,8 +58,7 @@ def test_boxes_are_merged_and_cut(open_page: Open) -> None:
     assert editor.said["boxes"][0] == pytest.approx([20, 40, 180, 60], abs=2)
 
 
-def test_what_was_left_out_is_named_and_comes_back(open_page: Open) -> None:
-    editor = open_page()
+def test_what_was_left_out_is_named_and_comes_back(editor: Editor) -> None:
     editor.mode("Figures")
     editor.click("Take “a”, text, as a figure")
     assert editor.said["boxes"][3] == [300, 170, 90, 20]
@@ -78,8 +68,7 @@ def test_what_was_left_out_is_named_and_comes_back(open_page: Open) -> None:
     assert editor.page.locator("#left_out_row").is_visible()
 
 
-def test_the_paper_is_picked(open_page: Open) -> None:
-    editor = open_page()
+def test_the_paper_is_picked(editor: Editor) -> None:
     editor.mode("Figures")
     editor.page.locator("#pick_paper").click()
     editor.tap(50, 60)
@@ -88,8 +77,7 @@ def test_the_paper_is_picked(open_page: Open) -> None:
     assert "background" not in editor.said
 
 
-def test_keys_do_what_the_mouse_does(open_page: Open) -> None:
-    editor = open_page()
+def test_keys_do_what_the_mouse_does(editor: Editor) -> None:
     editor.mode("Figures")
     editor.page.locator("#sheet").focus()
     editor.page.keyboard.press("ArrowRight")
@@ -99,11 +87,9 @@ def test_keys_do_what_the_mouse_does(open_page: Open) -> None:
     assert editor.views[0]["exclude"]
 
 
-# Views
-
-
-def test_compass_flip_lock_and_leaving_out(open_page: Open) -> None:
-    editor = open_page()
+def test_compass_flip_lock_and_leaving_out(editor: Editor) -> None:
+    shown = editor.page.locator(".card").nth(2).inner_text()
+    assert all(words in shown for words in ("why it is ambiguous", "180° ± 45°"))
     compass = editor.page.get_by_role("radiogroup", name="Direction of drawing 2")
     compass.get_by_role("radio", name="back left").check()
     assert editor.views == [{"box": BOXES[1], "label": "back-left"}]
@@ -124,16 +110,7 @@ def test_compass_flip_lock_and_leaving_out(open_page: Open) -> None:
     assert len(editor.views) == 2
 
 
-def test_verdict_and_reason_stand_under_each_drawing(open_page: Open) -> None:
-    editor = open_page()
-    cards = editor.page.locator(".card")
-    assert "ambiguous" in cards.nth(2).inner_text()
-    assert "why it is ambiguous" in cards.nth(2).inner_text()
-    assert "180° ± 45°" in cards.nth(2).inner_text()
-
-
-def test_the_mannequin_is_dragged_and_the_error_is_live(open_page: Open) -> None:
-    editor = open_page()
+def test_the_mannequin_is_dragged_and_the_error_is_live(editor: Editor) -> None:
     error = editor.page.locator("#fit_error")
     editor.until("document.getElementById('fit_error').textContent.includes('%')")
     before = error.inner_text()
@@ -160,8 +137,7 @@ def test_the_mannequin_is_dragged_and_the_error_is_live(open_page: Open) -> None
     assert is_valid(editor)
 
 
-def test_a_click_with_a_trembling_hand_turns_nothing(open_page: Open) -> None:
-    editor = open_page()
+def test_a_click_with_a_trembling_hand_turns_nothing(editor: Editor) -> None:
     x, y = editor.place(170, 100)
     editor.page.mouse.move(x, y)
     editor.page.mouse.down()
@@ -171,8 +147,7 @@ def test_a_click_with_a_trembling_hand_turns_nothing(open_page: Open) -> None:
     assert editor.views == []
 
 
-def test_keys_and_numbers_place_the_mannequin(open_page: Open) -> None:
-    editor = open_page()
+def test_keys_and_numbers_place_the_mannequin(editor: Editor) -> None:
     editor.page.locator("#sheet").focus()
     for key in ("ArrowLeft", "ArrowDown", "]", "+", "Shift+ArrowRight"):
         editor.page.keyboard.press(key)
@@ -185,8 +160,7 @@ def test_keys_and_numbers_place_the_mannequin(open_page: Open) -> None:
     assert editor.views[0]["camera"]["yaw"] == -30
 
 
-def test_a_landmark_is_two_clicks(open_page: Open) -> None:
-    editor = open_page()
+def test_a_landmark_is_two_clicks(editor: Editor) -> None:
     editor.click("Add a landmark")
     editor.tap(40, 80)
     editor.tap(45, 85)
@@ -207,11 +181,7 @@ def test_without_a_mannequin_there_are_compasses(open_page: Open) -> None:
     assert "mannequin" not in editor.page.locator("#help_cameras").inner_text()
 
 
-# Palette
-
-
-def test_paints_are_merged_split_dropped_kept_and_named(open_page: Open) -> None:
-    editor = open_page()
+def test_paints_are_merged_split_dropped_kept_and_named(editor: Editor) -> None:
     editor.mode("Palette")
     editor.choose(*HEXES[:2])
     editor.click("Merge")
@@ -233,8 +203,7 @@ def test_paints_are_merged_split_dropped_kept_and_named(open_page: Open) -> None
     assert is_valid(editor)
 
 
-def test_names_are_written_while_the_palette_is_fitted(open_page: Open) -> None:
-    editor = open_page()
+def test_names_are_written_while_the_palette_is_fitted(editor: Editor) -> None:
     editor.mode("Palette")
     editor.page.get_by_label(f"Name of {HEXES[0]}").fill("coat")
     editor.page.keyboard.press("Tab")
@@ -251,8 +220,7 @@ def test_names_are_written_while_the_palette_is_fitted(open_page: Open) -> None:
     assert editor.palette["names"] == {HEXES[0]: "coat", HEXES[1]: "cape"}
 
 
-def test_a_wrong_label_is_painted_over(open_page: Open) -> None:
-    editor = open_page()
+def test_a_wrong_label_is_painted_over(editor: Editor) -> None:
     editor.mode("Palette")
     editor.choose(HEXES[1])
     editor.drag((150, 60), (190, 60))
@@ -263,11 +231,7 @@ def test_a_wrong_label_is_painted_over(open_page: Open) -> None:
     assert is_valid(editor)
 
 
-# What is kept
-
-
-def test_undo_redo_and_a_reload(open_page: Open) -> None:
-    editor = open_page()
+def test_undo_redo_and_a_reload(editor: Editor) -> None:
     editor.card("Leave out", 1)
     editor.card("Leave out", 2)
     editor.click("Undo")
@@ -284,19 +248,14 @@ def test_undo_redo_and_a_reload(open_page: Open) -> None:
         editor.click("Undo")
     assert editor.views == []
     assert editor.page.locator("#undo").is_disabled()
-
-
-def test_the_key_of_undo_works_wherever_nothing_is_written(open_page: Open) -> None:
-    editor = open_page()
     editor.page.get_by_role("radio", name="its left side").first.check()
-    editor.page.keyboard.press("Control+z")
+    editor.page.keyboard.press("Control+z")  # wherever nothing is written
     assert editor.views == []
     editor.page.keyboard.press("Control+y")
     assert editor.views[0]["label"] == "left"
 
 
-def test_a_file_that_is_newer_than_what_the_browser_kept_counts(open_page: Open) -> None:
-    editor = open_page()
+def test_a_file_that_is_newer_than_what_the_browser_kept_counts(editor, open_page):
     editor.card("Leave out", 1)
     newer = open_page({"version": 1, "background": "#ffffff"})
     assert newer.said == {"version": 1, "background": "#ffffff"}
@@ -324,9 +283,7 @@ def test_names_that_mean_harm_on_a_phone(open_page: Open, scheme: str) -> None:
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(360, "light"), (1600, "dark")])
-def test_nothing_bars_the_way(
-    open_page: Open, barriers: Callable[[Page], list[str]], width: int, scheme: str
-) -> None:
+def test_nothing_bars_the_way(open_page, barriers, width, scheme):
     editor = open_page(viewport={"width": width, "height": 740}, color_scheme=scheme)
     editor.mode("Figures")
     assert barriers(editor.page) == []

@@ -1,16 +1,13 @@
 """The page that its server has opened: kept at once, fitted without a reload, two tabs."""
 
-from __future__ import annotations
-
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page
 
 from tests.cli.editor.conftest import Open
 from tests.cli.editor.page_under_test import Editor
@@ -90,9 +87,7 @@ def test_two_tabs_show_the_same(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(desk.kept["views"]) == 2
 
 
-def test_a_tab_that_is_behind_shows_what_is_there(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_tab_that_is_behind_shows_what_is_there(desk, monkeypatch):
     monkeypatch.setattr(desk.session, "_fit", lambda changed: None)
     editor = desk.open()
     with desk.session._news:  # it hears nothing of it yet
@@ -114,9 +109,7 @@ def test_an_error_is_shown_and_undone(desk: Desk) -> None:
     fitted(editor)
 
 
-def test_an_address_that_was_used_is_refused(
-    desk: Desk, barriers: Callable[[Page], list[str]]
-) -> None:
+def test_an_address_that_was_used_is_refused(desk, barriers):
     used = desk.server.address
     desk.open()
     late = desk.open_at(used, desk.server.origin + "/")

@@ -1,7 +1,5 @@
 """The page's server: who may ask, what is refused, and nothing else is reachable."""
 
-from __future__ import annotations
-
 import json
 import socket
 from collections.abc import Iterator

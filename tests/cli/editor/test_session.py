@@ -1,7 +1,5 @@
 """A bundle that is corrected: what is kept, what is fitted, what is left when all ends at once."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -84,9 +82,7 @@ def test_a_correction_is_kept_at_once_and_fitted_soon(session: Session, bundle: 
     assert "exclude" in page
 
 
-def test_the_command_line_makes_the_same_of_it(
-    session: Session, bundle: Path, toonset: Command
-) -> None:
+def test_the_command_line_makes_the_same_of_it(session, bundle, toonset):
     view = session.scene["views"][2]
     yaw = (view["yaw"] + 180) % 360
     said = {"version": 1, "views": [{"box": view["box"], "label": str(yaw), "lock": True}]}
@@ -102,9 +98,7 @@ def test_the_command_line_makes_the_same_of_it(
         assert (other / name).read_bytes() == (bundle / name).read_bytes(), name
 
 
-def test_only_what_is_touched_is_found_again(
-    session: Session, bundle: Path, toonset: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_what_is_touched_is_found_again(session, bundle, toonset, monkeypatch):
     def refuse(*_: Any) -> Any:
         raise AssertionError("cameras were not touched")
 
@@ -141,9 +135,7 @@ def test_what_cannot_be_fitted_is_said_and_undone(session: Session, bundle: Path
     assert bundle_problems(bundle) == []
 
 
-def test_a_newer_correction_takes_the_place_of_one_that_waits(
-    session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_newer_correction_takes_the_place_of_one_that_waits(session, monkeypatch):
     began, go_on, fitted = threading.Event(), threading.Event(), []
 
     def slow(*arguments: Any) -> Any:
@@ -172,9 +164,7 @@ def test_a_tab_that_is_behind_is_told(session: Session, bundle: Path) -> None:
     assert json.loads((bundle / CORRECTIONS).read_bytes())["background"] == "#ffffff"
 
 
-def test_what_was_written_by_hand_meanwhile_is_not_written_over(
-    session: Session, bundle: Path
-) -> None:
+def test_what_was_written_by_hand_meanwhile_is_not_written_over(session, bundle):
     session.save({"version": 1, "background": "#ffffff"}, 0)
     settled(session)
     by_hand = b'{"version": 1, "background": "#fffffe"}'
@@ -217,9 +207,7 @@ def test_what_is_no_bundle_is_refused(bundle: Path, tmp_path: Path) -> None:
         open_session(other, bundle, None, lambda text: None)
 
 
-def test_corrections_that_calibrate_was_given_are_taken_over(
-    bundle: Path, toonset: Command
-) -> None:
+def test_corrections_that_calibrate_was_given_are_taken_over(bundle, toonset):
     box = [0, 0, 120, 120]
     said = {"version": 1, "views": [{"box": box, "exclude": True}]}
     (bundle.parent / "mine.json").write_text(json.dumps(said))

@@ -1,19 +1,24 @@
 """Views all round a target, as exports are given them, and where their cameras see it."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
 from toonset.camera import Camera
+from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.exporters.common import ExportView
+from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.load import save_obj
 from toonset.mesh import Mesh
+from toonset.write import write_bytes, write_json
 
 TARGET = np.array([0.1, 0.9, -0.05])
+SHOWN = np.array([[0.2, 1.0, 0.1]])  # where the spot is
 RADIUS, HEIGHT, SCALE = 1.0, 1.8, 47.0
 MODELS = pytest.mark.parametrize("k", [0.0, 0.2], ids=["orthographic", "pinhole"])
 
@@ -56,8 +61,22 @@ def camera_at(
     )
 
 
+def noise(size_wh: tuple[int, int], at: tuple[float, float]) -> np.ndarray:
+    """Return noise on a transparent ground; its figure is an ellipse, whatever the place."""
+    width, height = size_wh
+    rgba = np.random.default_rng(width).integers(0, 256, (height, width, 4)).astype(np.uint8)
+    v, u = np.mgrid[:height, :width]
+    inside = ((u - width / 2) / width) ** 2 + ((v - height / 2) / height) ** 2 < 0.16
+    rgba[..., 3] = np.where(inside, 255, 0)
+    return rgba
+
+
 def views_all_round(
-    count: int = 5, *, k: float = 0.0, aspect: float = 1.0
+    count: int = 5,
+    *,
+    k: float = 0.0,
+    aspect: float = 1.0,
+    picture: Callable[[tuple[int, int], tuple[float, float]], np.ndarray] = spot,
 ) -> tuple[ExportView, ...]:
     """Return views that each have a size, scale, roll and principal point of their own."""
     views = []
@@ -65,11 +84,20 @@ def views_all_round(
         size = (90 + 3 * i, 120 - 2 * i)
         camera = camera_at(i, count, size, SCALE + i, (44.3 + i, 61.7), k)
         camera = replace(camera, pixel_aspect=aspect)
-        shown = camera.project(np.array([[0.2, 1.0, 0.1]]))[0][0]
+        u, v = camera.project(SHOWN)[0][0].tolist()
         distance = 100 * HEIGHT if k == 0 else 1 / k
-        rgba = spot(size, (float(shown[0]), float(shown[1])))
-        views.append(ExportView(f"{i:03d}.png", rgba, camera, distance, RADIUS))
+        views.append(ExportView(f"{i:03d}.png", picture(size, (u, v)), camera, distance, RADIUS))
     return tuple(views)
+
+
+def bundle_of(views: tuple[ExportView, ...], folder: Path, mesh: Mesh | None = None) -> Path:
+    named = [(f"images/{view.name}", view.camera) for view in views]
+    for view in views:
+        write_bytes(folder / "images" / view.name, encode_png(view.rgba))
+    write_json(folder / "transforms.json", transforms_dict(named, HEIGHT, RADIUS))
+    if mesh is not None:
+        write_bytes(folder / "mannequin.obj", save_obj(mesh))
+    return folder
 
 
 def around(target: np.ndarray) -> np.ndarray:

@@ -1,10 +1,7 @@
 """COLMAP export: what another program reads is what the bundle says."""
 
-from __future__ import annotations
-
 import json
 import math
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,107 +10,49 @@ import pycolmap
 import pytest
 
 from bench.cases.bodies import random_body
-from tests.dataset.exporters.exported_views import camera_at
+from tests.dataset.exporters.exported_views import bundle_of, noise, views_all_round
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame
-from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.exporters.colmap import write_colmap
 from toonset.dataset.exporters.common import ExportView, read_views
-from toonset.dataset.exporters.points import sample_surface, track_points
-from toonset.dataset.images.picture import encode_png, load_rgba
+from toonset.dataset.exporters.points import TrackedPoints, sample_surface, track_points
+from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.importers.colmap import read_colmap
 from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.errors import BundleError
 from toonset.mesh import Mesh
-from toonset.write import write_json
-
-RADIUS = 1.1
 
 
-def painted(size_wh: tuple[int, int], seed: int = 0) -> np.ndarray:
-    """Return noise on a transparent ground; its figure is an ellipse."""
-    width, height = size_wh
-    rng = np.random.default_rng(seed)
-    rgba = rng.integers(0, 256, (height, width, 4)).astype(np.uint8)
-    v, u = np.mgrid[:height, :width]
-    inside = ((u - width / 2) / width) ** 2 + ((v - height / 2) / height) ** 2 < 0.16
-    rgba[..., 3] = np.where(inside, 255, 0)
-    return rgba
+@pytest.fixture
+def views(tmp_path: Path) -> tuple[ExportView, ...]:
+    return read_views(bundle_of(views_all_round(3, picture=noise), tmp_path / "bundle"))
 
 
-def posed(count: int, *, k: float = 0.0) -> list[Frame]:
-    """Return frames all round, each with another elevation, roll, size and principal point."""
-    frames = []
-    for i in range(count):
-        size = (90 + 3 * i, 120 - 2 * i)
-        camera = camera_at(i, count, size, 47.0 + i, (44.3 + i, 61.7), k)
-        frames.append(Frame(f"{i:03d}.png", camera, painted(size, i)))
-    return frames
+def with_points(text: bool, out: Path, count: int, *, old: bool = False) -> TrackedPoints:
+    """Write a dataset with points of a body that fills every picture: none is dropped."""
+    mesh = random_body(3)
+    views = [replace(v, rgba=np.full_like(v.rgba, 255)) for v in views_all_round(4)]
+    cameras = [view.pinhole for view in views]
+    frames = [view.frame for view in views]
+    points = track_points(sample_surface(mesh, count, 0), mesh, frames, cameras)
+    write_colmap(out, views, points, text=text, old_layout=old)
+    return points
 
 
-def bundle_of(frames: list[Frame], folder: Path) -> Path:
-    named = [(f"images/{frame.name}", frame.camera) for frame in frames]
-    (folder / "images").mkdir(parents=True)
-    for frame in frames:
-        (folder / "images" / frame.name).write_bytes(encode_png(frame.rgba))
-    write_json(folder / "transforms.json", transforms_dict(named, 1.8, RADIUS))
-    return folder
-
-
-def around(target: np.ndarray, seed: int = 5) -> np.ndarray:
-    """Return 1,000 points within RADIUS of the target."""
-    rng = np.random.default_rng(seed)
-    direction = rng.normal(size=(1000, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    return target + direction * RADIUS * rng.random((1000, 1)) ** (1 / 3)
-
-
-@pytest.mark.parametrize("text", [False, True], ids=["bin", "txt"])
-@pytest.mark.parametrize("k", [0.0, 0.2], ids=["orthographic", "pinhole"])
-@pytest.mark.parametrize("old", [False, True], ids=["new", "old"])
-def test_cameras_return_with_the_same_pixels(
-    tmp_path: Path, text: bool, k: float, old: bool
-) -> None:
-    frames = posed(5, k=k)
-    views = read_views(bundle_of(frames, tmp_path / "bundle"))
-    write_colmap(tmp_path / "out", views, text=text, old_layout=old)
-    found = read_colmap(tmp_path / "out")
-    assert [name for name, _ in found] == [frame.name for frame in frames]
-    for (_, camera), view, frame in zip(found, views, frames, strict=True):
-        points = around(frame.camera.target)
-        pixels = camera.project(points)[0]
-        assert np.abs(pixels - view.pinhole.project(points)[0]).max() < 0.01
-        off = np.linalg.norm(pixels - frame.camera.project(points)[0], axis=1).max()
-        assert off <= view.error_px + 0.01
-        assert (view.error_px > 0) == frame.camera.is_orthographic
-        assert camera.size_wh == frame.camera.size_wh
-    rigs = list((tmp_path / "out" / "sparse" / "0").glob("rigs.*"))
-    assert len(rigs) == (not old)
-
-
-def test_exact_cameras_stand_beside_the_model(tmp_path: Path) -> None:
-    frames = posed(3)
-    views = read_views(bundle_of(frames, tmp_path / "bundle"))
+def test_exact_cameras_stand_beside_the_model(views, tmp_path: Path) -> None:
     write_colmap(tmp_path / "out", views)
     beside = json.loads((tmp_path / "out" / "toonset.json").read_text())
     assert beside["pinhole_error_px"] == max(view.error_px for view in views) > 0
-    for record, frame in zip(beside["views"], frames, strict=True):
-        assert record["name"] == frame.name
+    for record, view in zip(beside["views"], views, strict=True):
+        assert record["name"] == view.name
         assert record["camera"]["model"] == "orthographic"
-        np.testing.assert_array_equal(record["camera"]["rotation"], frame.camera.rotation)
+        np.testing.assert_array_equal(record["camera"]["rotation"], view.camera.rotation)
 
 
 @pytest.mark.parametrize("text", [False, True], ids=["bin", "txt"])
 def test_pycolmap_projects_points_to_their_keypoints(tmp_path: Path, text: bool) -> None:
-    mesh = random_body(3)
-    frames = [
-        replace(f, rgba=np.full_like(f.rgba, 255)) for f in posed(4)
-    ]  # all figure: no point is dropped
-    views = [ExportView(f.name, f.rgba, f.camera, 180.0, RADIUS) for f in frames]
-    cameras = [view.pinhole for view in views]
-    points = track_points(sample_surface(mesh, 300, 0), mesh, frames, cameras)
-    write_colmap(tmp_path / "out", views, points, text=text)
-    model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+    points = with_points(text, tmp_path, 300)
+    model = pycolmap.Reconstruction(tmp_path / "sparse" / "0")
     assert (model.num_reg_images(), model.num_points3D()) == (4, len(points.xyz))
     for i, (_, point) in enumerate(sorted(model.points3D.items())):
         np.testing.assert_allclose(point.xyz, points.xyz[i], atol=1e-9)
@@ -122,27 +61,21 @@ def test_pycolmap_projects_points_to_their_keypoints(tmp_path: Path, text: bool)
         for element in point.track.elements:
             image = model.images[element.image_id]
             seen = image.points2D[element.point2D_idx]
-            projected = model.cameras[image.camera_id].img_from_cam(
-                image.cam_from_world() * point.xyz
-            )
+            lens, placed = model.cameras[image.camera_id], image.cam_from_world() * point.xyz
+            projected = lens.img_from_cam(placed)
             assert projected is not None
             np.testing.assert_allclose(seen.xy, projected, atol=1e-4)
 
 
-def test_pictures_are_over_white_and_masks_tell_the_figure(tmp_path: Path) -> None:
-    frames = posed(2)
-    views = read_views(bundle_of(frames, tmp_path / "bundle"))
+def test_pictures_are_over_white_and_masks_tell_the_figure(views, tmp_path: Path) -> None:
     write_colmap(tmp_path / "out", views)
-    for frame in frames:
-        figure = frame.rgba[..., 3] == 255
-        picture = load_rgba(tmp_path / "out" / "images" / frame.name)
-        mask = load_rgba(tmp_path / "out" / "masks" / f"{frame.name}.png")
+    for view in views:
+        figure = view.rgba[..., 3] == 255
+        picture = load_rgba(tmp_path / "out" / "images" / view.name)
+        mask = load_rgba(tmp_path / "out" / "masks" / f"{view.name}.png")
         assert (picture[~figure] == 255).all()
-        np.testing.assert_array_equal(picture[figure, :3], frame.rgba[figure, :3])
+        np.testing.assert_array_equal(picture[figure, :3], view.rgba[figure, :3])
         np.testing.assert_array_equal(mask[..., 0] == 255, figure)
-
-
-# ---- points
 
 
 def quad(x: float, z: float, half: float) -> Mesh:
@@ -191,13 +124,8 @@ def test_surface_samples_lie_on_the_surface_and_follow_the_seed() -> None:
     np.testing.assert_array_equal(points, sample_surface(mesh, 2000, 7))
 
 
-# ---- what cannot be read
-
-
 @pytest.fixture
-def dataset(tmp_path: Path) -> Path:
-    frames = posed(2)
-    views = read_views(bundle_of(frames, tmp_path / "bundle"))
+def dataset(views, tmp_path: Path) -> Path:
     write_colmap(tmp_path / "out", views)
     return tmp_path / "out"
 
@@ -219,11 +147,7 @@ def test_a_damaged_model_is_refused(dataset: Path, name: str) -> None:
 @pytest.mark.parametrize("text", [False, True], ids=["bin", "txt"])
 def test_flipped_bits_end_in_one_line_or_a_camera(tmp_path: Path, text: bool, old: bool) -> None:
     """A damaged count must not fill memory, whichever file it stands in."""
-    mesh, frames = random_body(3), [replace(f, rgba=np.full_like(f.rgba, 255)) for f in posed(2)]
-    views = [ExportView(f.name, f.rgba, f.camera, 180.0, RADIUS) for f in frames]
-    cameras = [view.pinhole for view in views]
-    points = track_points(sample_surface(mesh, 20, 0), mesh, frames, cameras)
-    write_colmap(tmp_path / "out", views, points, text=text, old_layout=old)
+    with_points(text, tmp_path / "out", 20, old=old)
     files = sorted((tmp_path / "out" / "sparse" / "0").iterdir())
     rng = np.random.default_rng(8)
     reasons = []
@@ -252,66 +176,41 @@ def test_a_model_without_rigs_of_an_older_colmap_is_read(dataset: Path) -> None:
         np.testing.assert_allclose(a.rotation, b.rotation, atol=1e-12)
 
 
-def test_lens_distortion_is_refused_by_name(dataset: Path) -> None:
-    sparse = dataset / "sparse" / "0"
-    model = pycolmap.Reconstruction(sparse)
-    lens = model.cameras[1]
-    lens.model = pycolmap.CameraModelId.SIMPLE_RADIAL
-    lens.params = [100.0, 50.0, 60.0, 0.1]
-    model.write(sparse)
-    with pytest.raises(BundleError, match="SIMPLE_RADIAL camera, PINHOLE or SIMPLE_PINHOLE"):
-        read_colmap(dataset)
-
-
 def test_two_pictures_of_one_name_are_refused(tmp_path: Path) -> None:
-    frames = posed(2)
-    frames[1] = replace(frames[1], name="000.jpg")
-    bundle = bundle_of(frames, tmp_path / "bundle")
+    one, two = views_all_round(2)
+    bundle = bundle_of((one, replace(two, name="000.jpg")), tmp_path / "bundle")
     with pytest.raises(BundleError, match=r"two pictures would be written as 000\.png"):
         read_views(bundle)
 
 
-# ---- the verb
-
-
 def test_export_writes_what_pycolmap_reads(toonset, tmp_path: Path) -> None:
-    mesh = random_body(4)
-    frames = posed(3)
-    bundle = bundle_of(frames, tmp_path / "bundle")
-    (tmp_path / "m.obj").write_bytes(save_obj(mesh))
-    out = tmp_path / "out"
-    bare = toonset("export", bundle, "--to", "colmap", "-o", out, "--json")
+    out, obj = tmp_path / "out", tmp_path / "m.obj"
+    export = (
+        "export",
+        bundle_of(views_all_round(3, picture=noise), tmp_path / "b"),
+        "--to",
+        "colmap",
+    )
+    obj.write_bytes(save_obj(random_body(4)))
+    bare = toonset(*export, "-o", out, "--json")
     assert bare.code == 0, bare
     assert bare.json["points"] > 1000
     assert "visual hull" in json.loads((out / "toonset.json").read_text())["points_are"]
     assert f"at most {bare.json['pinhole_error_px']:.2f} px off" in bare.err
-    again = toonset(
-        "export", bundle, "--to", "colmap", "-o", out, "--mesh", tmp_path / "m.obj", "--text"
-    )
-    assert "exists already" in again.reason
-    full = toonset(
-        *("export", bundle, "--to", "colmap", "-o", out, "--mesh", tmp_path / "m.obj", "--text"),
-        "--force",
-        "--json",
-    )
+    full = toonset(*export, "-o", out, "--mesh", obj, "--text", "--force", "--json")
     model = pycolmap.Reconstruction(out / "sparse" / "0")
     assert model.num_points3D() == full.json["points"] > 100
     assert (out / "sparse" / "0" / "points3D.txt").is_file()
     on_mesh = np.array([point.xyz for point in model.points3D.values()])
-    low, high = load_mesh(tmp_path / "m.obj").bounds
+    low, high = load_mesh(obj).bounds
     assert ((on_mesh > low - 1e-6) & (on_mesh < high + 1e-6)).all()
 
 
 def test_export_refuses_a_mannequin_that_is_not_there(toonset, tmp_path: Path) -> None:
-    bundle = bundle_of(posed(2), tmp_path / "bundle")
-    far_off = random_body(4)
-    moved = replace(far_off, vertices=far_off.vertices + np.array([50.0, 0, 0]))
-    (tmp_path / "m.obj").write_bytes(save_obj(moved))
-    out = tmp_path / "out"
-    outcome = toonset(
-        "export", bundle, "--to", "colmap", "-o", out, "--mesh", tmp_path / "m.obj", "-q"
-    )
+    body = random_body(4)
+    away = replace(body, vertices=body.vertices + np.array([50.0, 0, 0]))
+    (tmp_path / "m.obj").write_bytes(save_obj(away))
+    export = ("export", bundle_of(views_all_round(2), tmp_path / "bundle"), "--to", "colmap")
+    outcome = toonset(*export, "-o", tmp_path / "out", "--mesh", tmp_path / "m.obj", "-q")
     assert "give the mannequin of the calibration" in outcome.reason
-    assert not out.exists()
-    shutil.rmtree(bundle)
-    assert "does not exist" in toonset("export", bundle, "--to", "colmap", "-o", out).reason
+    assert not (tmp_path / "out").exists()

@@ -1,7 +1,5 @@
 """Exports of 3D scenes: cameras, drawings and mannequin stand in register in glTF and Blender."""
 
-from __future__ import annotations
-
 import json
 import math
 import runpy
@@ -9,6 +7,7 @@ import struct
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from unittest.mock import MagicMock
 
 import numpy as np
@@ -28,6 +27,13 @@ from toonset.dataset.exporters.gltf import write_gltf
 from toonset.dataset.mesh.gltf import open_gltf
 
 
+def opened(path: Path) -> tuple[Any, dict[str, Any], np.ndarray]:
+    """Return a scene's content, its nodes by name, and the size of its window."""
+    content = open_gltf(path.read_bytes(), path, 10**6)
+    nodes = {node["name"]: node for node in content.json["nodes"]}
+    return content, nodes, np.array(content.json["scenes"][0]["extras"]["window_px"])
+
+
 def world_matrix(node: dict) -> np.ndarray:
     return np.array(node["matrix"]).reshape(4, 4).T
 
@@ -36,10 +42,7 @@ def world_matrix(node: dict) -> np.ndarray:
 def test_gltf_cameras_see_mannequin_and_drawing_in_register(tmp_path: Path, k: float) -> None:
     views = views_all_round(k=k)
     write_gltf(tmp_path / "out", views, egg())
-    path = tmp_path / "out" / "scene.glb"
-    content = open_gltf(path.read_bytes(), path, 10**6)
-    nodes = {node["name"]: node for node in content.json["nodes"]}
-    window = np.array(content.json["scenes"][0]["extras"]["window_px"])
+    content, nodes, window = opened(tmp_path / "out" / "scene.glb")
     for view in views:
         node = nodes[f"camera {view.name}"]
         lens = content.json["cameras"][node["camera"]]
@@ -86,15 +89,10 @@ def seen_by(
 
 
 @MODELS
-def test_no_drawing_hangs_between_another_camera_and_the_mannequin(
-    tmp_path: Path, k: float
-) -> None:
+def test_no_drawing_hangs_between_another_camera_and_the_mannequin(tmp_path, k):
     mesh, views = egg(), views_all_round(8, k=k)
     write_gltf(tmp_path / "out", views, mesh)
-    path = tmp_path / "out" / "scene.glb"
-    content = open_gltf(path.read_bytes(), path, 10**6)
-    nodes = {node["name"]: node for node in content.json["nodes"]}
-    window = np.array(content.json["scenes"][0]["extras"]["window_px"])
+    content, nodes, window = opened(tmp_path / "out" / "scene.glb")
     steps = np.linspace(0, 1, 21)
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     for view in views:
@@ -165,9 +163,7 @@ def test_blender_script_holds_every_view(tmp_path: Path, k: float) -> None:
         assert (tmp_path / "out" / "images" / record["name"]).is_file()
 
 
-def test_blender_script_shows_a_scene_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_blender_script_shows_a_scene_of_its_own(tmp_path, monkeypatch):
     """Blender starts with a cube where the character stands; it must not be in the picture."""
     write_blender_script(tmp_path / "out", views_all_round(2), egg())
     blender = MagicMock()

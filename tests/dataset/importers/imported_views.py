@@ -1,7 +1,5 @@
 """Views of many sizes, written by every export, for imports to read back."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.dataset.exporters.exported_views import camera_at
+from tests.dataset.exporters import exported_views
 from toonset.dataset.exporters.blender import write_blender_script
 from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
 from toonset.dataset.exporters.colmap import write_colmap
@@ -38,15 +36,7 @@ OWN_CAMERAS = [name for name in WRITERS if name not in ("blender", "gltf")]
 
 
 def views_all_round(count: int = 4, *, k: float = 0.0) -> tuple[ExportView, ...]:
-    views = []
-    for i in range(count):
-        size = (60 + 3 * i, 80 - 2 * i)
-        camera = camera_at(i, count, size, 37.0 + i, (31.3 + i, 38.7), k)
-        rng = np.random.default_rng(i)
-        rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
-        rgba[..., 3] = np.where(np.add.outer(np.arange(size[1]), np.arange(size[0])) > 40, 255, 0)
-        views.append(ExportView(f"{i:03d}.png", rgba, camera, 180.0 if k == 0 else 1 / k, 1.0))
-    return tuple(views)
+    return exported_views.views_all_round(count, k=k, picture=exported_views.noise)
 
 
 def tetrahedron() -> Mesh:

@@ -55,8 +55,16 @@ def gltf(document: dict[str, Any], *arrays: np.ndarray) -> dict[str, Any]:
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
 FACES = np.array([0, 2, 1, 0, 1, 3], dtype=np.uint16)
+
+
+def one_primitive(**more: int) -> list[dict[str, Any]]:
+    """Return the meshes of a glTF with one mesh, with more attributes of accessors."""
+    material = {"material": more.pop("material")} if "material" in more else {}
+    return [{"primitives": [{"attributes": {"POSITION": 0, **more}, "indices": 1, **material}]}]
+
+
 ONE_NODE: dict[str, Any] = {
     "scenes": [{"nodes": [0]}],
     "nodes": [{"mesh": 0}],
-    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    "meshes": one_primitive(),
 }

@@ -20,6 +20,7 @@ from tests.dataset.mesh.mesh_files import (
     exported,
     gltf,
     load,
+    one_primitive,
 )
 from toonset.dataset.mesh.load import save_obj
 from toonset.mesh import Mesh
@@ -120,18 +121,12 @@ def test_vertex_colours_become_face_colours(kind: str, tmp_path: Path) -> None:
 
 def test_gltf_applies_transforms_and_names_parts(tmp_path: Path) -> None:
     half = 0.5**0.5
-    document = gltf(
-        ONE_NODE
-        | {
-            "nodes": [
-                {"children": [1, 2], "translation": [10, 0, 0]},
-                {"mesh": 0, "name": "arm", "rotation": [0, 0, half, half]},
-                {"mesh": 0, "name": "leg", "scale": [-2, 2, 2]},
-            ]
-        },
-        POINTS,
-        FACES,
-    )
+    nodes = [
+        {"children": [1, 2], "translation": [10, 0, 0]},
+        {"mesh": 0, "name": "arm", "rotation": [0, 0, half, half]},
+        {"mesh": 0, "name": "leg", "scale": [-2, 2, 2]},
+    ]
+    document = gltf(ONE_NODE | {"nodes": nodes}, POINTS, FACES)
     mesh = load(tmp_path, "a.gltf", json.dumps(document))
     assert mesh.part_names == ("arm", "leg")
     turned = np.stack([10 - POINTS[:, 1], POINTS[:, 0], POINTS[:, 2]], axis=1)
@@ -144,9 +139,8 @@ def test_gltf_applies_transforms_and_names_parts(tmp_path: Path) -> None:
 def test_gltf_colours_are_converted_from_linear_light(tmp_path: Path) -> None:
     linear = ((np.array([0x80, 0x20, 0xF0]) / 255 + 0.055) / 1.055) ** 2.4
     surface = {"pbrMetallicRoughness": {"baseColorFactor": [*linear.tolist(), 1]}}
-    document = gltf(ONE_NODE | {"materials": [surface]}, POINTS, FACES)
-    document["meshes"][0]["primitives"][0]["material"] = 0
-    mesh = load(tmp_path, "a.gltf", json.dumps(document))
+    painted = ONE_NODE | {"materials": [surface], "meshes": one_primitive(material=0)}
+    mesh = load(tmp_path, "a.gltf", json.dumps(gltf(painted, POINTS, FACES)))
     assert mesh.face_colors is not None
     assert (mesh.face_colors == (0x80, 0x20, 0xF0)).all()
 
@@ -155,29 +149,14 @@ def test_gltf_texture_is_sampled(tmp_path: Path) -> None:
     picture = io.BytesIO()
     Image.fromarray(np.array([[[10, 20, 30], [200, 100, 50]]], dtype=np.uint8)).save(picture, "PNG")
     uri = "data:image/png;base64," + base64.b64encode(picture.getvalue()).decode()
-    document = gltf(
-        {
-            **ONE_NODE,
-            "images": [{"uri": uri}],
-            "textures": [{"source": 0}],
-            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
-            "meshes": [
-                {
-                    "primitives": [
-                        {
-                            "attributes": {"POSITION": 0, "TEXCOORD_0": 2},
-                            "indices": 1,
-                            "material": 0,
-                        }
-                    ]
-                }
-            ],
-        },
-        POINTS,
-        FACES,
-        np.array([[0.9, 0], [0.9, 1], [0.8, 0.5], [-0.9, 0.5]], dtype=np.float32),
-    )
-    mesh = load(tmp_path, "a.gltf", json.dumps(document))
+    surface = {
+        "images": [{"uri": uri}],
+        "textures": [{"source": 0}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "meshes": one_primitive(TEXCOORD_0=2, material=0),
+    }
+    uv = np.array([[0.9, 0], [0.9, 1], [0.8, 0.5], [-0.9, 0.5]], dtype=np.float32)
+    mesh = load(tmp_path, "a.gltf", json.dumps(gltf(ONE_NODE | surface, POINTS, FACES, uv)))
     assert mesh.face_colors is not None
     assert mesh.face_colors.tolist() == [[200, 100, 50], [10, 20, 30]]
 
@@ -186,27 +165,15 @@ def test_gltf_skin_is_shown_in_its_rest_pose(tmp_path: Path) -> None:
     inverse = np.eye(4, dtype=np.float32).T.reshape(1, 16)
     joints = np.zeros((4, 4), dtype=np.uint8)
     weights = np.tile(np.array([1, 0, 0, 0], dtype=np.float32), (4, 1))
-    document = gltf(
-        {
-            "scenes": [{"nodes": [0, 1]}],
-            "nodes": [
-                {"mesh": 0, "skin": 0, "translation": [99, 99, 99]},
-                {"translation": [0, 5, 0], "scale": [2, 2, 2]},
-            ],
-            "skins": [{"joints": [1], "inverseBindMatrices": 2}],
-            "meshes": [
-                {
-                    "primitives": [
-                        {"attributes": {"POSITION": 0, "JOINTS_0": 3, "WEIGHTS_0": 4}, "indices": 1}
-                    ]
-                }
-            ],
-        },
-        POINTS,
-        FACES,
-        inverse,
-        joints,
-        weights,
-    )
+    skinned = {
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [
+            {"mesh": 0, "skin": 0, "translation": [99, 99, 99]},
+            {"translation": [0, 5, 0], "scale": [2, 2, 2]},
+        ],
+        "skins": [{"joints": [1], "inverseBindMatrices": 2}],
+        "meshes": one_primitive(JOINTS_0=3, WEIGHTS_0=4),
+    }
+    document = gltf(skinned, POINTS, FACES, inverse, joints, weights)
     mesh = load(tmp_path, "a.gltf", json.dumps(document))
     np.testing.assert_allclose(corners(mesh), (2 * POINTS + [0, 5, 0])[FACES.reshape(-1, 3)])

@@ -1,7 +1,5 @@
 """A mesh as a camera sees it: depth and normals at pixel centres."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

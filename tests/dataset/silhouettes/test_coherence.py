@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 from scipy.spatial import KDTree
 
+from tests import figures
+from tests.figures import boxes
 from toonset.calib.evidence.common_elevation import common_elevation
-from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.coherence import coherence
 from toonset.errors import CameraError
@@ -18,18 +18,12 @@ SIZE = (150, 160)
 YAWS = np.radians([0, 47, 88, 136, 181, 223, 272, 314])
 
 
-def body() -> tuple[np.ndarray, np.ndarray]:
-    """Return an asymmetric figure about 1.6 high: trunk, head, one arm out, one foot ahead."""
-    parts = [([0.5, 1.0, 0.3], [0, 0, 0]), ([0.4, 0.4, 0.5], [0, 0.7, 0.15])]
-    parts += [([0.6, 0.15, 0.15], [0.5, 0.3, 0.2]), ([0.2, 0.2, 0.6], [-0.15, -0.4, 0.3])]
-    boxes = []
-    for extents, middle in parts:
-        box = trimesh.creation.box(extents)
-        box.apply_translation(middle)
-        boxes.append(box)
-    vertices = np.concatenate([box.vertices for box in boxes])
-    faces = np.concatenate([box.faces + 8 * i for i, box in enumerate(boxes)])
-    return vertices, np.ascontiguousarray(faces, dtype=np.int32)
+BODY = boxes(  # about 1.6 high: trunk, head, one arm out, one foot ahead
+    ((0.5, 1.0, 0.3), (0, 0, 0)),
+    ((0.4, 0.4, 0.5), (0, 0.7, 0.15)),
+    ((0.6, 0.15, 0.15), (0.5, 0.3, 0.2)),
+    ((0.2, 0.2, 0.6), (-0.15, -0.4, 0.3)),
+)
 
 
 def cameras_at(yaws, elevation=0.12, k=0.0) -> list[Camera]:
@@ -37,15 +31,8 @@ def cameras_at(yaws, elevation=0.12, k=0.0) -> list[Camera]:
     return [Camera.looking_at(target, yaw, elevation, 75.0, SIZE, k=k) for yaw in yaws]
 
 
-def drawn(camera: Camera, fine: int = 4) -> View:
-    vertices, faces = body()
-    pixels = camera.project(vertices)[0] * fine
-    width, height = camera.size_wh
-    mask = silhouette_mask(pixels, faces, (width * fine, height * fine))
-    rgba = np.full((height, width, 4), 90, np.uint8)
-    alpha = mask.reshape(height, fine, width, fine).mean(axis=(1, 3))
-    rgba[..., 3] = np.round(255 * alpha)
-    return View(rgba, (0, 0, width, height), 0.0, "000.png")
+def drawn(camera: Camera) -> View:
+    return figures.drawn(BODY, lambda points: camera.project(points)[0], camera.size_wh)
 
 
 def turned(camera: Camera, yaw: float) -> Camera:

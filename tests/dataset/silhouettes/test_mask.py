@@ -1,7 +1,5 @@
 """What of a picture is the figure: thin parts count, borders stay as they are."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

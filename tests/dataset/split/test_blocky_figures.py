@@ -1,11 +1,10 @@
 """Blocky characters: their profiles are rectangles, and they look alike from behind."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
+from tests.figures import boxes
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.align import Fit
 from toonset.calib.outline.occluding_contour import prepare_surface
@@ -23,28 +22,13 @@ from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.mesh import Mesh
 
 RED, BLUE, SKIN = (200, 40, 30), (40, 60, 180), (240, 190, 150)
-CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2
-BOX = np.array(
-    [
-        *[[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]],
-        *[[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]],
-    ]
-)
-
-
-def boxes(*parts: tuple[tuple[float, float, float], tuple[float, float, float]]) -> Mesh:
-    """Return boxes of given sizes and middles as one mesh, in two colours."""
-    vertices = [CORNERS * size + middle for size, middle in parts]
-    faces = [BOX + 8 * i for i in range(len(parts))]
-    colors = np.repeat(np.array([RED, BLUE, SKIN, SKIN], np.uint8)[: len(parts)], 12, axis=0)
-    return Mesh(np.concatenate(vertices), np.concatenate(faces), face_colors=colors)
 
 
 @pytest.fixture(scope="module")
 def stack() -> Mesh:
     head, trunk = ((1, 1, 1), (0, 1.5, 0)), ((1, 1, 1), (0, 0.5, 0))
     arms = [((0.4, 0.8, 0.4), (side * 0.7, 0.6, 0)) for side in (-1, 1)]
-    return boxes(head, trunk, *arms)
+    return boxes(head, trunk, *arms, colors=(RED, BLUE, SKIN, SKIN))
 
 
 def test_a_profile_that_is_a_rectangle_is_a_view(stack):
@@ -67,10 +51,7 @@ def test_a_patch_of_one_colour_is_none(stack):
 
 
 def test_what_looks_alike_from_behind_is_ambiguous(stack):
-    near = {
-        "elevation_deg": 8,
-        "distance_heights": 2.5,
-    }  # no mirror twins, so that this alone counts
+    near = {"elevation_deg": 8, "distance_heights": 2.5}  # no mirror twins: this alone counts
     options = SynthOptions(views=5, cell_px=200, outline_px=0, **near)
     found = find_cameras(make_turnaround(stack, options, 0).views, stack)
     assert {view.verdict for view in found.views} == {"ambiguous"}

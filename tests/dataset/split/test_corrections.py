@@ -1,7 +1,5 @@
 """Corrections of a sheet's first look: each can be left out, and is missed where it is needed."""
 
-from __future__ import annotations
-
 import pytest
 
 from bench.messy.sheet import make_messy_sheet

@@ -154,6 +154,7 @@ def test_a_transparent_sheet_is_cut_by_its_own_alpha() -> None:
     assert sheet.background is None
     assert np.array_equal(pasted(sheet, picture.shape), drawing.coverage)
     assert main_colors(sheet) == [0, 1, 2, 3]
+    assert [view.name for view in sheet.views] == ["000.png", "001.png", "002.png", "003.png"]
 
 
 def test_transparency_counts_even_where_the_figure_fills_the_border() -> None:
@@ -164,22 +165,12 @@ def test_transparency_counts_even_where_the_figure_fills_the_border() -> None:
     assert np.array_equal(sheet.views[0].rgba[..., 3], picture[..., 3])
 
 
-def test_a_stray_transparent_pixel_shows_paper() -> None:
+def test_a_stray_transparent_pixel_shows_paper_and_a_mirrored_sheet_is_read_mirrored() -> None:
     picture = row_of_four().rgba
     picture[3, 4] = (0, 0, 0, 0)
     assert main_colors(split_picture(picture)) == [0, 1, 2, 3]
     assert split_picture(picture).warnings == ()
-
-
-def test_views_come_in_reading_order() -> None:
-    sheet = split_picture(row_of_four().rgba)
-    assert main_colors(sheet) == [0, 1, 2, 3]
-    assert [view.name for view in sheet.views] == ["000.png", "001.png", "002.png", "003.png"]
-
-
-def test_mirroring_the_sheet_mirrors_the_order() -> None:
-    mirrored = np.ascontiguousarray(row_of_four().rgba[:, ::-1])
-    assert main_colors(split_picture(mirrored)) == [3, 2, 1, 0]
+    assert main_colors(split_picture(np.ascontiguousarray(picture[:, ::-1]))) == [3, 2, 1, 0]
 
 
 @pytest.mark.parametrize("shift", [(0, 7), (11, 0), (23, 40)])
@@ -244,11 +235,8 @@ def test_contour_width(line: float) -> None:
     drawing = Drawing(170, 230).ellipse(85, 120, 45, 90, SKIN, line)
     view = split_picture(drawing.rgba).views[0]
     assert view.line_width_px == pytest.approx(line, abs=0.5)
-
-
-def test_a_dark_figure_has_no_contour() -> None:
-    view = split_picture(Drawing(170, 230).ellipse(85, 120, 45, 90, (20, 22, 30)).rgba).views[0]
-    assert view.line_width_px == 0
+    dark = Drawing(170, 230).ellipse(85, 120, 45, 90, (20, 22, 30))
+    assert split_picture(dark.rgba).views[0].line_width_px == 0
 
 
 @pytest.mark.parametrize("line", [0, 2])

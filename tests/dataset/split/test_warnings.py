@@ -28,22 +28,16 @@ def sheet_of(*figures: np.ndarray) -> np.ndarray:
     return rgba
 
 
-@pytest.mark.parametrize("height", [165, 200])
-def test_a_small_figure_of_the_same_kind_is_doubted(height: int) -> None:
-    red = (200, 40, 40)
-    views = [figure(280, red) for _ in range(4)]
-    sheet = split_picture(sheet_of(*views, figure(height, red)))
-    assert len(sheet.views) == 4
-    assert any("left out: if it is a view" in line for line in sheet.warnings)
-
-
-def test_a_small_figure_in_other_colours_is_not() -> None:
+@pytest.mark.parametrize(("height", "doubted"), [(165, True), (200, True), (165, False)])
+def test_a_small_figure_is_doubted_in_the_others_colours_only(height: int, doubted: bool) -> None:
     views = [figure(280, (200, 40, 40)) for _ in range(4)]
-    other = figure(165, (40, 160, 60))
-    other[(other < 255).any(axis=2)] = (90, 200, 40)
+    other = figure(height, (200, 40, 40))
+    if not doubted:
+        other[(other < 255).any(axis=2)] = (90, 200, 40)
     sheet = split_picture(sheet_of(*views, other))
     assert len(sheet.views) == 4
-    assert sheet.warnings == ()
+    assert all("left out: if it is a view" in line for line in sheet.warnings)
+    assert bool(sheet.warnings) == doubted
 
 
 @pytest.mark.parametrize("kind", ["heads", "props"])

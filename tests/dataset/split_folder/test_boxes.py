@@ -1,7 +1,5 @@
 """Boxes by hand: every way to write them reads alike, and what is no box is named."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -98,7 +96,4 @@ def test_a_picture_is_no_file_of_boxes(tmp_path: Path):
 def test_boxes_that_the_sheet_does_not_have(boxes, words):
     with pytest.raises(SheetError, match=words):
         check_boxes(boxes, (100, 50), "--boxes")
-
-
-def test_boxes_may_touch_the_sheets_border():
-    check_boxes([(0, 0, 100, 50), (99, 49, 1, 1)], (100, 50), "--boxes")
+    check_boxes([(0, 0, 100, 50), (99, 49, 1, 1)], (100, 50), "--boxes")  # up to its border

@@ -1,7 +1,5 @@
 """corrections.json: what it may say, which view it means, and what it does to a split."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -15,8 +13,6 @@ from PIL import Image, ImageDraw
 from toonset.dataset.split_folder.corrected import Given, match_boxes, overlap
 from toonset.dataset.split_folder.corrections import (
     Corrections,
-    SheetName,
-    ViewCorrection,
     corrections_json,
     parse_corrections,
     read_corrections,
@@ -138,8 +134,6 @@ def test_a_file_that_is_none(data, words, tmp_path: Path):
     assert words in str(refused.value)
 
 
-# ---- which view is meant
-
 BOX = st.tuples(*[st.integers(0, 60)] * 2, *[st.integers(1, 60)] * 2)
 
 
@@ -163,8 +157,6 @@ def test_each_box_is_matched_once_to_at_least_half(found, wanted):
 def test_the_best_pair_comes_first():
     assert match_boxes([[(0, 0, 10, 10)], [(2, 0, 10, 10)]], [(2, 0, 10, 10)]) == {1: 0}
 
-
-# ---- what it does to a split
 
 SIZE, PITCH, COUNT = (360, 200), 115, 3
 
@@ -278,5 +270,3 @@ def test_a_placed_camera_goes_before_words():
     entry = {"box": [1, 2, 3, 4], "label": "side", "camera": {**CAMERA, "yaw": -90}}
     found = parse_corrections(json.dumps({"version": 1, "views": [entry]}).encode(), "file")
     np.testing.assert_allclose(np.degrees(found.views[0].yaws), [270])
-    assert ViewCorrection((1, 2, 3, 4)).yaws == ()
-    assert SheetName().size is None

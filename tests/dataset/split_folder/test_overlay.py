@@ -1,7 +1,5 @@
 """The picture of a split: it shows every view, and its tags hide nobody's face."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -124,19 +122,15 @@ def test_the_picture_is_never_huge_nor_tiny(size):
     width, height = size
     one = view(0, 2, 2, min(width, 20 * height) - 4, height - 4)
     picture = draw_split([panel([one], size, (255, 255, 255))], ["a note"])
-    assert picture.shape[1] <= WIDEST + 2 * MARGIN
+    assert 150 <= picture.shape[1] <= WIDEST + 2 * MARGIN
     assert picture.shape[0] <= 3600
-    assert picture.shape[1] >= 150
 
 
-def test_many_files_stand_side_by_side():
+def test_many_files_stand_side_by_side_and_one_without_views_is_still_shown():
     panels = [panel([view(i, 0, 0, 60, 100)], (60, 100), (255, 255, 255)) for i in range(40)]
     picture = draw_split(panels, ())
     assert picture.shape[1] <= WIDEST
     assert picture.shape[0] < 4000
-
-
-def test_a_sheet_of_which_every_view_was_dropped_is_still_shown():
     picture = draw_split([panel([], (300, 200), (255, 255, 255))], ["word " * 400])
     assert picture.shape[1] == 8 * 300 + 2 * MARGIN
 

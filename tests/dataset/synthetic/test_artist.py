@@ -1,8 +1,5 @@
 """Sheets as artists draw them: each habit alone, all of them together, and their truth."""
 
-from __future__ import annotations
-
-import hashlib
 import json
 import math
 from dataclasses import replace
@@ -52,9 +49,6 @@ def made(body: Mesh) -> Turnaround:
 def alone(**habits: object) -> SynthOptions:
     """Return the small sheet's options with these habits and no others."""
     return replace(SMALL, artist=replace(ArtistOptions(), **habits))
-
-
-# ---- bodies
 
 
 def moved(body: Mesh, errors: BodyErrors, yaw: float = 0.0, seed: int = 0) -> np.ndarray:
@@ -121,9 +115,6 @@ def test_face_is_pulled_to_the_viewer(mannequin: Mannequin) -> None:
     assert sides[1] > 0.01 * body.height
     assert sides[3] == pytest.approx(-sides[1], abs=1e-3 * body.height)
     np.testing.assert_allclose([sides[0], sides[2]], body.vertices[nose, 0], atol=1e-9)
-
-
-# ---- sheets
 
 
 def test_no_strength_is_the_plain_drawing(body: Mesh) -> None:
@@ -214,23 +205,10 @@ def test_impossible_habits_are_refused() -> None:
         BodyErrors(field_height_fraction=math.nan)
 
 
-# ---- files
-
-
-def digest(folder: Path) -> dict[str, str]:
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in files
-    }
-
-
-def test_same_seed_same_bytes_and_the_truth_is_written(
-    made: Turnaround, body: Mesh, tmp_path: Path
-) -> None:
+def test_same_seed_same_bytes_and_the_truth_is_written(made, body, tmp_path, snapshot):
     write_turnaround(made, tmp_path / "a")
     write_turnaround(make_turnaround(body, SMALL, 1), tmp_path / "b")
-    assert digest(tmp_path / "a") == digest(tmp_path / "b")
+    assert snapshot(tmp_path / "a") == snapshot(tmp_path / "b")
     assert (make_turnaround(body, SMALL, 2).sheet != made.sheet).any()
     assert not (tmp_path / "a" / "sheet.png").exists()
     truth = json.loads((tmp_path / "a" / "truth.json").read_text())
@@ -248,22 +226,14 @@ def test_same_seed_same_bytes_and_the_truth_is_written(
     assert "color_factor" not in truth["views"][0]
 
 
-def test_command_takes_a_condition_and_what_is_typed(
-    mannequin: Mannequin, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import typer
-    from typer.testing import CliRunner
-
-    from toonset.cli import synth
-
-    app = typer.Typer()
-    app.command()(synth.synth)
-    monkeypatch.setattr(synth, "TEST_VIEWS", 3)
+def test_command_takes_a_condition_and_what_is_typed(mannequin, tmp_path, monkeypatch, toonset):
+    monkeypatch.setattr("toonset.cli.synth.TEST_VIEWS", 3)
     monkeypatch.chdir(tmp_path)
     unnamed = replace(mannequin.mesh, face_parts=None, part_names=("body",))
     Path("m.obj").write_bytes(save_obj(unnamed))
-    asked = ["m.obj", "-q", "--condition", "artist", "--views", "3", "--cell", "64", "--warp", "0"]
-    assert CliRunner().invoke(app, [*asked, "-o", "out"]).exception is None
+    size = ("--views", 3, "--cell", 64, "--warp", 0)
+    asked = ("synth", "m.obj", "-q", "--condition", "artist", *size)
+    assert toonset(*asked, "-o", "out").code == 0
     options = json.loads(Path("out/truth.json").read_text())["options"]
     assert (options["warp_percent"], options["yaw_jitter_deg"]) == (0, 5)
     assert options["artist"]["jpeg_quality"] == 88
@@ -271,7 +241,6 @@ def test_command_takes_a_condition_and_what_is_typed(
     points = {name: point.tolist() for name, point in mannequin.landmarks.items()}
     marks = {"schema": "toonset-landmarks/1", "units": "world", "points": points}
     Path("m.landmarks.json").write_text(json.dumps(marks))
-    assert CliRunner().invoke(app, [*asked, "-o", "marked"]).exception is None
+    assert toonset(*asked, "-o", "marked").code == 0
     assert Path("out/sheet.jpg").read_bytes() != Path("marked/sheet.jpg").read_bytes()
-    wrong = CliRunner().invoke(app, ["m.obj", "-o", "x", "--condition", "artsy"])
-    assert wrong.exit_code == 2
+    assert toonset("synth", "m.obj", "-o", "x", "--condition", "artsy").code == 2

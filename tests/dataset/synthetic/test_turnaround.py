@@ -1,7 +1,5 @@
 """Synthetic turnarounds: the truth they carry is true."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess
@@ -9,15 +7,17 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from tests.figures import boxes
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import load_indexed_png, load_rgba
-from toonset.dataset.mesh.load import load_mesh
+from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.dataset.synthetic import gl_render
 from toonset.dataset.synthetic.files import write_turnaround
 from toonset.dataset.synthetic.gl_render import render_labels
@@ -28,33 +28,15 @@ from toonset.errors import CameraError, MeshError, SetupError, SheetError
 from toonset.mesh import Mesh
 from toonset.palette.pixels.labels import UNLABELLED
 
-CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-SIDES = np.array(
-    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-)
-SIDES = SIDES[:, [0, 1, 2, 0, 2, 3]].reshape(12, 3)
 RED, BLUE, GREEN = (220, 40, 30), (30, 60, 200), (20, 160, 60)
 SMALL = SynthOptions(views=4, cell_px=96, outline_px=2.0)
 
 
-def boxes(*placed: tuple[tuple[float, ...], tuple[float, ...], tuple[int, ...], str]) -> Mesh:
-    """A mesh of boxes (centre, half sizes, colour, part name)."""
-    n = len(placed)
-    return Mesh(
-        np.concatenate([CUBE * half + np.array(centre) for centre, half, _, _ in placed]),
-        np.concatenate([SIDES + 8 * i for i in range(n)]),
-        np.repeat(np.array([color for _, _, color, _ in placed], np.uint8), 12, axis=0),
-        np.repeat(np.arange(n), 12),
-        tuple(name for _, _, _, name in placed),
-    )
-
-
 def figure() -> Mesh:
-    return boxes(
-        ((0.0, 1.0, 0.0), (0.5, 1.0, 0.3), RED, "body"),
-        ((0.8, 1.4, 0.1), (0.3, 0.15, 0.15), BLUE, "bag"),
-        ((0.0, 2.2, 0.0), (0.35, 0.2, 0.05), GREEN, "ear"),
-    )
+    body = ((1.0, 2.0, 0.6), (0.0, 1.0, 0.0))
+    bag, ear = ((0.6, 0.3, 0.3), (0.8, 1.4, 0.1)), ((0.7, 0.4, 0.1), (0.0, 2.2, 0.0))
+    made = boxes(body, bag, ear, colors=(RED, BLUE, GREEN))
+    return replace(made, face_parts=np.repeat(range(3), 12), part_names=("body", "bag", "ear"))
 
 
 @pytest.mark.parametrize("k", [0.0, 0.25])
@@ -79,7 +61,7 @@ def test_pixels_lie_where_the_camera_projects(k: float) -> None:
 @pytest.mark.parametrize("k", [0.0, 0.25])
 def test_depth_unprojects_onto_the_surface(k: float) -> None:
     camera = Camera.looking_at(np.zeros(3), 0.5, 0.2, 20.0, (80, 80), k=k)
-    cube = boxes(((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), RED, "cube"))
+    cube = boxes(((2.0, 2.0, 2.0), (0.0, 0.0, 0.0)))
     seen = render_labels(cube, np.zeros(12, dtype=int), camera)
     inside = seen.labels == 0
     points = camera.unproject(camera.pixel_grid()[inside], seen.depth[inside])
@@ -87,13 +69,12 @@ def test_depth_unprojects_onto_the_surface(k: float) -> None:
     assert np.isinf(seen.depth[~inside]).all()
 
 
-def test_both_sides_of_a_face_are_drawn() -> None:
+@pytest.mark.parametrize("yaw", [0.0, math.pi])
+def test_both_sides_of_a_face_are_drawn(yaw: float) -> None:
     vertices = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], dtype=float)
-    sheet = Mesh(vertices, np.array([[0, 1, 2]]))
-    for yaw in (0.0, math.pi):
-        camera = Camera.looking_at(np.zeros(3), yaw, 0.0, 20.0, (64, 64))
-        seen = render_labels(sheet, np.zeros(1, dtype=int), camera)
-        assert (seen.labels == 0).sum() == pytest.approx(2 * 20 * 20, rel=0.05)
+    camera = Camera.looking_at(np.zeros(3), yaw, 0.0, 20.0, (64, 64))
+    seen = render_labels(Mesh(vertices, np.array([[0, 1, 2]])), np.zeros(1, dtype=int), camera)
+    assert (seen.labels == 0).sum() == pytest.approx(2 * 20 * 20, rel=0.05)
 
 
 def test_camera_that_stands_in_the_mesh_is_refused() -> None:
@@ -122,10 +103,7 @@ def test_figures_stay_in_their_cells_and_boxes_hold_them() -> None:
     drawn = (made.sheet[..., :3] != 255).any(axis=-1)
     for view, (x, y, w, h) in zip(made.views, made.figure_boxes, strict=True):
         left, top, side, _ = view.box
-        assert left < x
-        assert top < y
-        assert x + w < left + side
-        assert y + h < top + side
+        assert (left < x, top < y, x + w < left + side, y + h < top + side) == (True,) * 4
         drawn[y : y + h, x : x + w] = False
     assert not drawn.any()
 
@@ -246,52 +224,33 @@ def test_files_hold_the_truth(tmp_path: Path) -> None:
         np.testing.assert_array_equal(labels, made.labels[i])
 
 
-def test_command_writes_and_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from toonset.dataset.mesh.load import save_obj
-
+def test_command_writes_and_refuses(tmp_path: Path, toonset) -> None:
     (tmp_path / "m.obj").write_bytes(save_obj(figure()))
-    monkeypatch.chdir(tmp_path)
-    command = ["m.obj", "-o", "out", "--views", "3", "--cell", "64", "--following", "ear", "-q"]
-    assert run_synth(command) is None
+    size = ("--views", 3, "--cell", 64, "--following", "ear", "-q")
+    command = ("synth", tmp_path / "m.obj", "-o", tmp_path / "out", *size)
+    assert toonset(*command).code == 0
     assert load_rgba(tmp_path / "out" / "sheet.png").shape == (64, 192, 4)
-    assert "exists already" in str(run_synth(command))
-    assert run_synth([*command, "--force"]) is None
+    assert "exists already" in toonset(*command).reason
+    assert toonset(*command, "--force").code == 0
 
 
-def run_synth(arguments: list[str]) -> BaseException | None:
-    """Run the verb alone (the program loads every other verb) and return what it raised."""
-    import typer
-    from typer.testing import CliRunner
-
-    from toonset.cli.synth import synth
-
-    app = typer.Typer()
-    app.command()(synth)
-    return CliRunner().invoke(app, arguments).exception
-
-
-MISSING = {
-    "no Mesa vendor": ValueError("Invalid device ID (0)"),
-    "no driver": type("EGLError", (Exception,), {})("eglInitialize failed\nlong story"),
-}
+MISSING = [
+    ValueError("Invalid device ID (0)"),  # no Mesa vendor
+    type("EGLError", (Exception,), {})("eglInitialize failed\nlong story"),  # no driver
+]
 INSTALL = "apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
 
 
 def test_missing_library_at_import_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(name: str) -> object:
-        raise ImportError("Unable to load EGL library")
-
-    monkeypatch.setattr("importlib.import_module", fail)
+    monkeypatch.setattr("importlib.import_module", Mock(side_effect=ImportError("no EGL")))
     with pytest.raises(SetupError, match=INSTALL):
         gl_render._pyrender.__wrapped__()
 
 
-@pytest.mark.parametrize("case", MISSING)
-def test_missing_driver_is_named(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(width: int, height: int) -> object:
-        raise MISSING[case]
-
-    monkeypatch.setattr(gl_render, "_pyrender", lambda: SimpleNamespace(OffscreenRenderer=fail))
+@pytest.mark.parametrize("error", MISSING)
+def test_missing_driver_is_named(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = SimpleNamespace(OffscreenRenderer=Mock(side_effect=error))
+    monkeypatch.setattr(gl_render, "_pyrender", lambda: program)
     with pytest.raises(SetupError, match=INSTALL):
         gl_render._renderer.__wrapped__()
 
