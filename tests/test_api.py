@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import toonset as ts
 from toonset.nerf.run.monitor import MonitorOptions
-from toonset.nerf.surface.texture import textured_surface_of
+from toonset.nerf.surface.texture import texture_surface
 
 FEW = {"steps": 20, "device": "cpu"}
 TIMINGS = {"seconds", "versions", "threads"}  # keys of JSON files that differ from run to run

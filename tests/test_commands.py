@@ -4,6 +4,7 @@ A document has a folder of its own with the drawings that it speaks of, and noth
 commands must not stand in each other's way. Exit code 3 is fine: written, but look.
 """
 
+import importlib
 import json
 import re
 import shlex
@@ -16,9 +17,12 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+import typer
 from PIL import Image
+from typer.testing import CliRunner
 
 from bench.cases.bodies import random_body
+from tests.bench.stand_ins import measure_nothing
 from tests.conftest import calibration_report
 from tests.test_documents import DOCUMENTS, text_of
 from toonset.camera import Camera

@@ -12,7 +12,7 @@ from toonset.palette.extract import PaintMap, extract_palette, paint_maps
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
-from toonset.palette.recolor import recolor_drawing
+from toonset.palette.recolor import change_colors, recolor_drawing
 
 GREEN = (40, 140, 70)
 
@@ -115,4 +115,4 @@ def test_a_shadow_of_a_new_colour_stays_within_8_bits() -> None:
 )
 def test_a_change_that_means_nothing_is_refused(changes: list[str], words: str) -> None:
     with pytest.raises(PaletteError, match=words):
-        changed_colors(np.array(PAINTS, dtype=np.uint8), changes)
+        change_colors(np.array(PAINTS, dtype=np.uint8), changes)

@@ -30,20 +30,21 @@ def test_integrating_out_equals_generalised_least_squares(seed):
     drawing, noise = circle(), Noise(0.01, 0.004)
     off = problem(np.random.default_rng(seed), drawing)
     modes = error_modes(drawing)
-    given = (modes, noise, drawing.height, index, rows, residuals, shares, robust)
-    found = marginalise(*given, width=0.02, samples=80.0)
-    white = (noise.white * drawing.height) ** 2 / (shares * robust * 80.0)
-    covariance = noise.smooth**2 * modes[index] @ modes[index].T + np.diag(white)
-    np.testing.assert_allclose(found.normal, rows.T @ np.linalg.solve(covariance, rows), rtol=1e-6)
-    np.testing.assert_allclose(
-        found.gradient, rows.T @ np.linalg.solve(covariance, residuals), rtol=1e-6, atol=1e-9
-    )
+    found = marginalise(modes, noise, drawing.height, off, width=0.02, samples=80.0)
+    white = (noise.white * drawing.height) ** 2 / (off.shares * off.robust * 80.0)
+    spread = modes[off.target_index]
+    covariance = noise.smooth**2 * spread @ spread.T + np.diag(white)
+    normal = off.slopes.T @ np.linalg.solve(covariance, off.slopes)
+    gradient = off.slopes.T @ np.linalg.solve(covariance, off.px)
+    np.testing.assert_allclose(found.normal, normal, rtol=1e-6)
+    np.testing.assert_allclose(found.gradient, gradient, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(("smooth", "white"), [(0.01, 0.002), (0.005, 0.003)])
 def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
     drawing = circle()
     modes, count = error_modes(drawing), len(circle().points)
+    rng = np.random.default_rng(3)
     index, shares = np.arange(count), np.full(count, 1 / count)
     estimate = Noise()
     for _ in range(20):
@@ -53,8 +54,8 @@ def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
             residuals = modes @ rng.normal(0, smooth, modes.shape[1])
             residuals += rng.normal(0, white * drawing.height, count)
             rows = np.zeros((count, 0))
-            given = (modes, estimate, drawing.height, index, rows, residuals, shares)
-            views.append(marginalise(*given, np.ones(count), 1.0, 80.0))
+            off = Residuals(residuals, rows, index, shares, np.ones(count))
+            views.append(marginalise(modes, estimate, drawing.height, off, 1.0, 80.0))
         estimate = next_noise(views, 0.0, 1.0)
     assert estimate.smooth == pytest.approx(smooth, rel=0.25)
     assert estimate.white == pytest.approx(white, rel=0.5)
@@ -62,9 +63,9 @@ def test_the_noise_is_read_from_residuals_that_have_it(smooth, white):
 
 def test_a_bent_drawing_costs_information():
     drawing = circle()
-    modes, drawn = error_modes(drawing), problem(np.random.default_rng(5), drawing)
+    off, modes = problem(np.random.default_rng(5), drawing), error_modes(drawing)
     rigid, bent = (
-        marginalise(modes, Noise(smooth, 0.004), drawing.height, *drawn, 0.02, 80.0).normal
-        for smooth in (1e-5, 0.02)
+        marginalise(modes, Noise(s, 0.004), drawing.height, off, 0.02, 80.0).normal
+        for s in (1e-5, 0.02)
     )
     assert (np.linalg.eigvalsh(rigid - bent) > -1e-9).all()

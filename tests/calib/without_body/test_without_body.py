@@ -171,7 +171,7 @@ def test_drawings_that_are_no_turn_are_never_ok() -> None:
 def test_a_bundle_without_a_body_has_no_mannequin(tmp_path: Path) -> None:
     ring = RING[::2]
     found = calibrate(sheet(ring), "none", Hints(labels="front,?,?,?"))
-    assert found.views[0].p_flip < 1 - SURE
+    assert found.views[0].p_flip < 1 - VerdictThresholds().sure
     bundle = write_bundle(tmp_path / "bundle", found)
     assert bundle.mannequin is None
     names = sorted(path.name for path in (tmp_path / "bundle").iterdir())

@@ -99,7 +99,7 @@ def test_views_without_a_common_lens_are_refused() -> None:
 def test_a_principal_point_far_outside_is_refused() -> None:
     view = views_all_round(1, k=0.2)[0]
     with pytest.raises(BundleError, match="at most 80 megapixels"):
-        centred(replace(view, camera=replace(view.camera, center=np.array([6e5, 6e5]))))
+        centre_view(replace(view, camera=replace(view.camera, center=np.array([6e5, 6e5]))))
 
 
 def test_square_pixels_enlarge_the_shorter_direction() -> None:
@@ -266,5 +266,5 @@ def test_centre_is_offered_where_it_matters(toonset, tmp_path: Path) -> None:
     bundle = bundle_of(views_all_round(3), tmp_path / "bundle", egg())
     plain = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "plain")
     assert "principal points up to 3.7 px off" in plain.err
-    done = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "centred", "--centre")
+    done = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "centre_view", "--centre")
     assert "principal points" not in done.err

@@ -258,10 +258,10 @@ def test_odd_files_are_named():
     copy = odd_files(join_splits([*views, single("copy.png", 100, "1")]))
     assert copy == ("copy.png is a copy of 1.png: is one of them another view?",)
     for height in (160, 50):
-        (line,) = odd_files(joined([*views, single("h.png", height, "h")]))
+        (line,) = odd_files(join_splits([*views, single("h.png", height, "h")]))
         said = f"{height} px high, most views are 100: is it drawn at another scale?"
         assert line == f"h.png: {said}"
-    sheet = odd_files(joined([*views, cut()]))
+    sheet = odd_files(join_splits([*views, cut()]))
     assert sheet == ("sheet.png shows 4 figures, the others one: is it a sheet of the same views?",)
     assert (
         odd_files(join_splits([cut(), replace(cut(), sources=single("b", 9, "b").sources)])) == ()

@@ -18,6 +18,7 @@ from toonset.nerf.options import USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.prepare import Prepared
 from toonset.nerf.prepare.registration import Registration
 from toonset.nerf.prepare.symmetry import Symmetry
+from toonset.nerf.prepare.unwarp import Unwarping
 from toonset.nerf.score import verdict
 from toonset.nerf.score.left_out import LeftOut
 from toonset.nerf.score.verdict import MOST_OFF, OK, WEAK, Verdict, blended, judged, verdict_of
@@ -148,5 +149,5 @@ def test_drawings_agree_as_they_are_or_once_cameras_follow_them(
     apart_px: float, applied: bool, agree: bool
 ) -> None:
     assert moved(training(scene(*TURN)), apart_px, applied=applied).prepared.agree is agree
-    bends = Unbending(True, 5.0, 1.0, (9.0, 0.01), ())
+    bends = Unwarping(True, 5.0, 1.0, (9.0, 0.01), ())
     assert not Prepared(scene(*TURN), scene(*TURN), None, bends).agree
