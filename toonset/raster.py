@@ -26,11 +26,15 @@ def is_uniform(values: Shaped[np.ndarray, "height width"]) -> Mask:
 
 
 def distance_to(marked: Mask) -> Float[np.ndarray, "height width"]:
-    """Return every pixel's distance to the nearest marked one, inf without any."""
+    """Return every pixel's distance to the nearest marked one, inf without any.
+
+    OpenCV's last digits depend on where an array lies in memory; squares of distances are whole.
+    """
     if not marked.any():
         return np.full(marked.shape, np.inf)
     apart = (~marked).astype(np.uint8)
-    return np.asarray(cv2.distanceTransform(apart, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
+    found = cv2.distanceTransform(apart, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.sqrt(np.rint(np.square(found, dtype=np.float64)))
 
 
 def depth_inside(mask: Mask) -> Float[np.ndarray, "height width"]:

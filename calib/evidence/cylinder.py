@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from toonset.palette.colors import oklab_from_rgb
+from toonset.raster import depth_inside
 from toonset.view import View
 
 THIN = 1 / 40  # of the figure's height: what an opening with this radius removes is not a body
@@ -61,10 +62,7 @@ def read_sections(view: View, factor: float, rim_px: float, height: float) -> Se
     in_run = (columns >= left[:, None]) & (columns < right[:, None])
     widths = right - left
     middle, half = (left + right)[:, None] / 2, np.maximum(widths, 1)[:, None] / 2
-    depth = cv2.distanceTransform(
-        np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-    )[1:-1, 1:-1]
-    deep = depth > view.line_width_px * factor + rim_px
+    deep = depth_inside(mask) > view.line_width_px * factor + rim_px - 0.5
     return Sections(lab, (columns + 0.5 - middle) / half, in_run & deep, widths)
 
 

@@ -9,9 +9,10 @@ Source: T. Porter, T. Duff, "Compositing digital images" (1984).
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+
+from toonset.raster import distance_to
 
 SOFTEST_EDGE_PX = 3
 PURE = 0.95  # of the contrast: a layer of pixels that has it is no longer mixed
@@ -90,8 +91,7 @@ def cut_out(
 
 def _depth(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
     """Return each pixel's distance in pixels to the background; the picture's rim is none."""
-    padded = np.pad(mask, 1, mode="edge").astype(np.uint8)
-    return cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    return distance_to(~np.pad(mask, 1, mode="edge"))[1:-1, 1:-1]
 
 
 def _pixels(mask: Bool[np.ndarray, "height width"]) -> Pixels:

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.synthetic.gl_render import LabelPicture
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.raster import distance_to
 
 INNER_LINE = 0.6  # of the silhouette line's width: inner lines are drawn thinner
 
@@ -134,8 +135,7 @@ def _distance(marked: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "he
     """Return the distance to the line that runs between the marked pixels of its two sides."""
     if not marked.any():
         return np.full(marked.shape, np.float32(max(marked.shape)))
-    blank = (~marked).astype(np.uint8)
-    return cv2.distanceTransform(blank, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) + np.float32(0.5)
+    return distance_to(marked).astype(np.float32) + np.float32(0.5)
 
 
 def _shrink(picture: np.ndarray, factor: int) -> np.ndarray:

@@ -19,10 +19,12 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.palette.pixels.shadow import border_votes, find_shadow, find_tones, lit_pictures
+from toonset.palette.pixels.shadow import border_votes, find_shadow, find_tones
+from toonset.raster import dilate, nearest
 
 ACCURATE = 0.68  # of a left-out drawing's sides must be told
 RIDGE, NEWTON = 1e-4, 12
+MIXED_PX, MIXED = 2, 0.06  # beside a border between tones; colours off a mixture of both
 SOFT = 0.012  # of the figure's height: sigma by which normals are smoothed
 
 Paint = UInt8[np.ndarray, "height width 3"]
@@ -95,10 +97,24 @@ def learn_shade(
     if not len(y) or _left_out_accuracy(x, y, drawing) < ACCURATE:
         return None, list(paints)
     a, b, c, level = _logistic(x, y).tolist()
-    dark = find_tones(pictures, beside, shadow)
-    lines = [np.zeros(own.shape, np.uint8) for own in clear]
-    lit = lit_pictures(pictures, lines, dark, shadow)
-    return Shade((a, b, c), level, shadow.factor), [picture[..., :3] for picture in lit]
+    shade = Shade((a, b, c), level, shadow.factor)
+    tones = find_tones(pictures, beside, shadow)
+    return shade, [_lit(*each, shade) for each in zip(paints, clear, tones, strict=True)]
+
+
+def _lit(paint: Paint, clear: Mask, dark: Mask, shade: Shade) -> Paint:
+    """Return a drawing's paint in light; what mixes both tones at their border is the paint's."""
+    color, factor = paint / np.float32(255), np.array(shade.factor, dtype=np.float32)
+    light = np.where(dark[..., None], np.minimum(color / factor, 1), color)
+    edge = dilate(dark, MIXED_PX) & dilate(~dark, MIXED_PX)
+    pure = clear & ~edge
+    if pure.any():
+        base = light[nearest(pure)]
+        low, way = base * factor, base * (1 - factor)
+        share = ((color - low) * way).sum(axis=-1) / np.maximum((way**2).sum(axis=-1), 1e-6)
+        off = np.abs(color - low - share.clip(0, 1)[..., None] * way).max(axis=-1)
+        light = np.where((edge & (off < MIXED))[..., None], base, light)
+    return np.rint(light * 255).astype(np.uint8)
 
 
 def _left_out_accuracy(
