@@ -22,8 +22,8 @@ def import_(
         Path,
         typer.Argument(
             metavar="FOLDER",
-            help="A nerfstudio, instant-ngp, Blender-synthetic or COLMAP folder, an OpenCV "
-            "cameras.yml, or any folder of `toonset export`.",
+            help="A nerfstudio, instant-ngp, Blender-synthetic or COLMAP folder, or any folder of "
+            "`toonset export`.",
         ),
     ],
     out: Annotated[

@@ -4,7 +4,6 @@ Inside toonset: OpenCV camera axes (x right, y down, z forward), first pixel's c
 
 | format                          | pose                    | camera axes | first pixel's centre |
 |---------------------------------|-------------------------|-------------|----------------------|
-| OpenCV (`cv2.solvePnP`)         | camera_from_world       | OpenCV      | (0, 0)               |
 | nerfstudio, instant-ngp, Blender| world_from_camera       | OpenGL      | (0.5, 0.5)           |
 | COLMAP                          | camera_from_world, wxyz | OpenCV      | (0.5, 0.5)           |
 """
@@ -16,7 +15,6 @@ from jaxtyping import Float
 
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])  # camera axes; its own inverse
 OPENGL_FROM_OPENCV.setflags(write=False)
-OPENCV_PIXEL_OFFSET = 0.5  # ours = OpenCV's + 0.5
 
 
 def opencv_pose_from_opengl(transform_matrix: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
@@ -29,13 +27,3 @@ def opengl_pose_from_opencv(
 ) -> Float[np.ndarray, "4 4"]:
     """Return the NeRF `transform_matrix` (OpenGL axes) of a pose with OpenCV axes."""
     return np.asarray(world_from_camera, dtype=np.float64) @ OPENGL_FROM_OPENCV
-
-
-def pixels_from_opencv(pixels_opencv: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-    """Return pixels with (0.5, 0.5) centres from OpenCV's integer centres."""
-    return np.asarray(pixels_opencv, dtype=np.float64) + OPENCV_PIXEL_OFFSET
-
-
-def opencv_from_pixels(pixels: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-    """Return OpenCV's integer-centred pixels from ours."""
-    return np.asarray(pixels, dtype=np.float64) - OPENCV_PIXEL_OFFSET

@@ -26,7 +26,6 @@ class Format(StrEnum):
     blender_synthetic = "blender-synthetic"
     blender = "blender"
     gltf = "gltf"
-    opencv = "opencv"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,5 +103,4 @@ TARGETS = {
         hint="run it: blender --python {out}/import_cameras.py",
     ),
     Format.gltf: Target("gltf:write_gltf", (*BESIDE, "scene.glb"), is_exact=True),
-    Format.opencv: Target("opencv:write_opencv", (*BESIDE, "cameras.yml")),
 }

@@ -2,7 +2,6 @@
 
 transforms.json, transforms_train.json ...    nerfstudio, instant-ngp, NeRF's synthetic scenes
 sparse/0, sparse, or a model's own folder     COLMAP (.bin or .txt, old or new layout)
-cameras.yml                                   OpenCV
 toonset.json                                  any export of toonset; its cameras are exact
 """
 
@@ -22,7 +21,6 @@ from toonset.dataset.exporters.common import NATIVE
 from toonset.dataset.importers.colmap import read_colmap
 from toonset.dataset.importers.native import NativeExport, read_native
 from toonset.dataset.importers.nerfstudio import read_transforms, transforms_files
-from toonset.dataset.importers.opencv import opencv_file, read_opencv
 from toonset.dataset.importers.paths import ImportView, find_mask, find_picture
 from toonset.errors import BundleError, CameraError
 
@@ -83,9 +81,6 @@ def _reader(
     files = transforms_files(path)
     if files:
         return "transforms.json", lambda: read_transforms(files)
-    opencv = opencv_file(path)
-    if opencv is not None:
-        return "OpenCV", lambda: read_opencv(opencv)
     if _holds_colmap(path):
         return "COLMAP", lambda: _colmap_views(path, images)
     if native is not None:
@@ -93,8 +88,8 @@ def _reader(
     if not path.exists():
         raise BundleError(f"{path}: does not exist; give a folder of cameras and pictures")
     raise BundleError(
-        f"{path}: holds no cameras that are known; transforms.json, transforms_train.json, "
-        "cameras.yml (OpenCV) or a COLMAP model (sparse/0) is needed; name that folder"
+        f"{path}: holds no cameras that are known; transforms.json, transforms_train.json "
+        "or a COLMAP model (sparse/0) is needed; name that folder"
     )
 
 

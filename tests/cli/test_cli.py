@@ -96,7 +96,7 @@ def test_help_is_also_a_word(asked, shown, toonset):
         (["render", "run", "-o", "x", "--turntable", "2", "--layer", "z"], ["'z'", "palette"]),
         (["render", "run", "-o", "x", "--turntable", "2", "--format", "gfi"], ["mean 'gif'?"]),
         (["evaluate", "run"], ["Missing option '--test'"]),
-        (["export", "b", "-o", "x"], ["Missing option '--to'. Choose from: colmap", "opencv"]),
+        (["export", "b", "-o", "x"], ["Missing option '--to'. Choose from: colmap", "gltf"]),
         (["export", "b", "-o", "x", "--to", "blendr"], ["Did you mean 'blender'?"]),
         (["render", "r", "-o", "x", "--turntable", "2", "--layer", "palete"], ["mean 'palette'?"]),
         (["train", "--preset", "papre"], ["mean 'paper'?"]),

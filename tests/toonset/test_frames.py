@@ -1,6 +1,5 @@
 """Conventions: each conversion against the library that owns the convention."""
 
-import cv2
 import numpy as np
 import pytest
 import torch
@@ -23,18 +22,6 @@ def test_opengl_conversion_is_its_own_inverse_and_flips_y_and_z():
     np.testing.assert_allclose(frames.opencv_pose_from_opengl(there), pose)
     np.testing.assert_allclose(there[:3, 2], -pose[:3, 2])  # OpenGL looks along -z
     np.testing.assert_allclose(there[:3, 3], pose[:3, 3])
-
-
-def test_opencv_projects_the_same_pixels():
-    view = camera()
-    rotation = view.camera_from_world[:3, :3]
-    rvec, tvec = cv2.Rodrigues(rotation)[0], view.camera_from_world[:3, 3]
-    K = view.K.copy()
-    K[:2, 2] = frames.opencv_from_pixels(K[:2, 2])
-    projected = cv2.projectPoints(POINTS, rvec, tvec, K, None)[0][:, 0]
-    np.testing.assert_allclose(
-        frames.pixels_from_opencv(projected), view.project(POINTS)[0], atol=1e-6
-    )
 
 
 def cameras():

@@ -6,7 +6,6 @@ import shlex
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -25,7 +24,6 @@ from tests.dataset.exporters.exported_views import (
 from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
 from toonset.dataset.exporters.common import read_views
 from toonset.dataset.exporters.nerfstudio import write_transforms
-from toonset.dataset.exporters.opencv import write_opencv
 from toonset.dataset.exporters.pinhole import centre_view, common_lens, square_pixels
 from toonset.dataset.exporters.points import TrackedPoints, encode_ply
 from toonset.dataset.images.picture import load_rgba
@@ -174,26 +172,6 @@ def test_synthetic_scene_follows_from_one_angle(tmp_path: Path, k: float) -> Non
         assert off_px(pixels, view.camera) <= view.error_px + 0.01
 
 
-@MODELS
-def test_opencv_projects_to_the_same_pixels(tmp_path: Path, k: float) -> None:
-    views = views_all_round(k=k)
-    write_opencv(tmp_path / "out", views)
-    file = tmp_path / "out" / "cameras.yml"
-    storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
-    listed = storage.getNode("views")
-    assert listed.size() == len(views)
-    points = around(TARGET)
-    for i, view in enumerate(views):
-        node = listed.at(i)
-        names = ("rvec", "tvec", "camera_matrix", "distortion_coefficients")
-        rvec, tvec, K, bent = (node.getNode(name).mat() for name in names)
-        np.testing.assert_allclose(cv2.Rodrigues(rvec)[0], node.getNode("R").mat(), atol=1e-12)
-        pixels, _ = cv2.projectPoints(points, rvec, tvec, K, bent)
-        assert off_px(pixels[:, 0] + 0.5, view.pinhole) < 1e-6
-        assert node.getNode("image_width").real() == view.camera.size_wh[0]
-        assert node.getNode("name").string() == view.name
-
-
 def test_ply_is_read_back_by_trimesh() -> None:
     rng = np.random.default_rng(3)
     xyz, rgb = rng.normal(size=(50, 3)), rng.integers(0, 256, (50, 3)).astype(np.uint8)
@@ -205,10 +183,7 @@ def test_ply_is_read_back_by_trimesh() -> None:
     np.testing.assert_array_equal(np.asarray(cloud.colors)[:, :3], rgb)
 
 
-FORMATS = [
-    *("colmap", "nerfstudio", "instant-ngp", "blender-synthetic"),
-    *("blender", "gltf", "opencv"),
-]
+FORMATS = ["colmap", "nerfstudio", "instant-ngp", "blender-synthetic", "blender", "gltf"]
 
 
 @MODELS

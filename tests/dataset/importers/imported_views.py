@@ -14,7 +14,6 @@ from toonset.dataset.exporters.colmap import write_colmap
 from toonset.dataset.exporters.common import ExportView
 from toonset.dataset.exporters.gltf import write_gltf
 from toonset.dataset.exporters.nerfstudio import write_transforms
-from toonset.dataset.exporters.opencv import write_opencv
 from toonset.mesh import Mesh
 from toonset.write import write_json
 
@@ -30,7 +29,6 @@ WRITERS: dict[str, Writer] = {
     "blender-synthetic": lambda out, views, mesh: write_blender_synthetic(out, views, None, mesh),
     "blender": write_blender_script,
     "gltf": write_gltf,
-    "opencv": write_opencv,
 }
 OWN_CAMERAS = [name for name in WRITERS if name not in ("blender", "gltf")]
 

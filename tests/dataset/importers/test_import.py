@@ -22,7 +22,6 @@ from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
 from toonset.dataset.exporters.colmap import write_colmap
 from toonset.dataset.exporters.nerfstudio import write_transforms
-from toonset.dataset.exporters.opencv import write_opencv
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.importers.detect import read_import, turned
 from toonset.dataset.importers.to_bundle import write_imported
@@ -76,7 +75,7 @@ def test_pinholes_return_within_a_hundredth_pixel(tmp_path: Path, kind: str, k: 
 
 def test_far_pinholes_of_a_round_trip_stand_where_they_stood(tmp_path: Path) -> None:
     views = views_all_round()
-    write_opencv(tmp_path / "out", views)
+    write_transforms(tmp_path / "out", views)
     write_imported(tmp_path / "back", read_import(tmp_path / "out"), None)
     frames = json.loads((tmp_path / "back" / "transforms.json").read_text())["frames"]
     for frame, view in zip(frames, views, strict=True):
@@ -164,7 +163,7 @@ def test_z_up_worlds_are_turned(tmp_path: Path) -> None:
 
 
 def test_the_mannequin_turns_with_its_world(toonset, tmp_path: Path) -> None:
-    write_opencv(tmp_path / "out", views_all_round(2, k=0.2), tetrahedron())
+    write_transforms(tmp_path / "out", views_all_round(2, k=0.2), None, tetrahedron())
     own = toonset("import", tmp_path / "out", "-o", tmp_path / "back", "--up", "z")
     assert "leave out --up z" in own.reason
     (tmp_path / "out" / "toonset.json").unlink()
@@ -173,20 +172,6 @@ def test_the_mannequin_turns_with_its_world(toonset, tmp_path: Path) -> None:
     vertices = load_mesh(tmp_path / "back" / "mannequin.obj").vertices
     expected = tetrahedron().vertices[:, [0, 2, 1]] * [1, 1, -1]
     np.testing.assert_allclose(np.sort(vertices, axis=0), np.sort(expected, axis=0))
-
-
-def test_opencv_lists_and_shared_lenses_are_read(tmp_path: Path) -> None:
-    """What others write: plain lists, one lens for all views, rvec alone."""
-    view = views_all_round(1, k=0.2)[0]
-    write_bytes(tmp_path / "a.png", encode_png(view.rgba))
-    K, pose = view.camera.K, view.camera.camera_from_world
-    rows = [K[0, 0], 0, K[0, 2] - 0.5, 0, K[1, 1], K[1, 2] - 0.5, 0, 0, 1]
-    text = f"%YAML:1.0\n---\ncamera_matrix: [ {', '.join(map(str, rows))} ]\nviews:\n"
-    text += f"  - {{ image: a.png, R: [ {', '.join(map(str, pose[:3, :3].ravel()))} ],"
-    text += f" tvec: [ {', '.join(map(str, pose[:3, 3]))} ] }}\n"
-    write_bytes(tmp_path / "rig.yaml", text.encode())
-    (read,) = read_import(tmp_path / "rig.yaml").views
-    assert off_px(read.camera, view.camera) < 1e-6
 
 
 @pytest.fixture
