@@ -35,6 +35,11 @@ VIEWS, CELL, SEED = 5, 120, 11
 MAINS = {"toonset": "toonset.cli.main", "bench": "bench.__main__"}
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with whole commands, which take longest, so that all workers end together."""
+    items.sort(key=lambda item: len(item.path.parts))
+
+
 @pytest.fixture(autouse=True, scope="session")
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Keep the tests' cached template banks out of the user's folder."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
@@ -191,12 +191,6 @@ def parse_corrections(data: bytes, where: str) -> Corrections:
         raise SheetError(f"{where}: {_problem(error)}") from error
     _check(found, where)
     return found
-
-
-def corrections_json(corrections: Corrections) -> dict[str, Any]:
-    """Return the content of a corrections.json; empty entries are left out."""
-    said = _SCHEMA.dump_python(corrections, mode="json", exclude_defaults=True)
-    return {"version": VERSION, **said}
 
 
 def _check(found: Corrections, where: str) -> None:

@@ -10,30 +10,13 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 
-def composite(
-    density: Float[Tensor, "*rays samples"],
-    color: Float[Tensor, "*rays samples colors"],
-    edges: Float[Tensor, "*rays samples+1"],
-) -> tuple[Float[Tensor, "*rays colors"], Float[Tensor, " *rays"]]:
-    """Composite samples front to back; return premultiplied color and opacity.
-
-    Stable for any density >= 0: products of transmittances are sums of optical depths.
-
-    Args:
-        density: per world unit, >= 0.
-        color: of every sample.
-        edges: where samples begin and end along the ray, world units, ascending.
-
-    Source: NeRF (Mildenhall et al. 2020), equation 3.
-    """
-    weights = compositing_weights(density * edges.diff(dim=-1))
-    return (weights[..., None] * color).sum(dim=-2), weights.sum(dim=-1)
-
-
 def compositing_weights(
     optical_depth: Float[Tensor, "*rays samples"],
 ) -> Float[Tensor, "*rays samples"]:
-    """Return how much each sample contributes to its ray, given density times length."""
+    """Return how much each sample contributes to its ray, given density times length.
+
+    Source: NeRF (Mildenhall et al. 2020), equation 3.
+    """
     before = optical_depth.cumsum(dim=-1) - optical_depth  # between the viewer and the sample
     return torch.exp(-before) * -torch.expm1(-optical_depth)
 
@@ -64,9 +47,8 @@ def composite_packed(
 ) -> tuple[Float[Tensor, "rays colors"], Float[Tensor, " rays"]]:
     """Composite packed samples front to back; return premultiplied colour and opacity.
 
-    The same as `composite`, without a padded table and with the gradient written down: a tenth of
-    the passes over memory. Sums run over all rays at once, in double precision, and a ray's part is
-    a difference of two of them.
+    Without a padded table and with the gradient written down: a tenth of the passes over memory.
+    Sums run over all rays at once, in double precision, and a ray's part is a difference of two.
 
     Args:
         optical_depth: density times length of every sample, >= 0.
