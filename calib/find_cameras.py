@@ -27,7 +27,7 @@ from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.pipeline import Problem, SheetFit
 from toonset.calib.result import Calibration, CutOff
-from toonset.calib.search.hypotheses import Candidates
+from toonset.calib.search.candidates import Candidates
 from toonset.calib.search.templates import turns_visibly
 from toonset.calib.verdict.checks import JudgedSheet, apply_checks
 from toonset.calib.verdict.judge import judge_sheet, judge_view

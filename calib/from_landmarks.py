@@ -21,7 +21,7 @@ from toonset.calib.options import VerdictThresholds
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
-from toonset.calib.search.hypotheses import is_twin
+from toonset.calib.search.candidates import is_twin
 from toonset.calib.verdict.judge import angle_sigmas, judge_sheet, outlines_apart
 from toonset.camera import angles_from_rotation
 from toonset.dataset.mannequin.landmark_file import Landmarks

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from toonset.calib.fit.align import tilt
 from toonset.calib.outline.pose import Pose, project
-from toonset.calib.search.hypotheses import Candidates
+from toonset.calib.search.candidates import Candidates
 from toonset.camera import Camera, angles_from_rotation, rotation_from_angles
 from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.dataset.split_folder.view_labels import Label

@@ -42,7 +42,7 @@ from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import CutOff
 from toonset.calib.search.alternatives import refine_alternatives
-from toonset.calib.search.hypotheses import (
+from toonset.calib.search.candidates import (
     Candidates,
     add_twins,
     level_twins,

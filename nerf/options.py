@@ -56,7 +56,7 @@ class TrainOptions:
         palette_weight: weight of the classifier's cross-entropy.
         missing_views: views that may call a point of the hull background; None: by evidence.
         field: what is fitted: "auto", planes with a small decoder, as coarse as predicts left-out
-            drawings well (`resolution_search`); "triplane", one cell per pixel.
+            drawings well (`plane_search`); "triplane", one cell per pixel.
         mannequin: take the mannequin's shape where it predicts drawings better than they predict
             each other (off: --no-mannequin).
         carve: sample inside the drawings' visual hull; False: along the whole rays through the

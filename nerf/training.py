@@ -27,9 +27,9 @@ from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.folder import WRITTEN
 from toonset.nerf.run.monitor import Monitor, MonitorOptions
 from toonset.nerf.run.report import preview, write_run
+from toonset.nerf.train.fit_field import device_of, fit_field
 from toonset.nerf.train.labelling import drop_palette, label_scene
 from toonset.nerf.train.result import HeldOut, Training
-from toonset.nerf.train.train import device_of, fit_field
 from toonset.palette.names import hex_of
 from toonset.view import small_png
 from toonset.write import check_output, new_folder

@@ -28,6 +28,7 @@ from toonset.calib.options import CalibrationOptions
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import SEVERITY
 from toonset.calib.search.template_cache import load_bank
+from toonset.calib.verdict.checks import CHECKS
 from toonset.camera import Camera, angles_from_rotation
 from toonset.dataset.split_folder.view_labels import Label
 
@@ -77,6 +78,7 @@ METHODS: dict[str, Method] = {
     "coarse 64, fine 120": Method(CalibrationOptions(coarse_height_px=64, fine_height_px=120)),
     "fine 500 px": Method(CalibrationOptions(fine_height_px=500)),
     "no cached templates": Method(cached=False),
+    **{f"without {name}": Method(CalibrationOptions(without=(name,))) for name in CHECKS},
 }
 QUICK = ("default", "labels", "no cached templates")
 

@@ -30,8 +30,8 @@ from toonset.nerf.render.views import render
 from toonset.nerf.score.evaluate import label_figures
 from toonset.nerf.score.metrics import Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of, load_judges
+from toonset.nerf.train.fit_field import fit_field
 from toonset.nerf.train.labelling import label_scene
-from toonset.nerf.train.train import fit_field
 from toonset.nerf.training import add_drawings
 from toonset.view import over_white
 

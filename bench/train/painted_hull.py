@@ -21,7 +21,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.hull.hull import LEVEL, Hull
 from toonset.nerf.hull.march import march, rays_of
 from toonset.nerf.hull.support import project
-from toonset.nerf.train.train import finest_cells
+from toonset.nerf.train.fit_field import finest_cells
 
 DENSITY_SLOPE = 16.0  # of the grid's values over the hull's support: about 0 outside, 8 inside
 REACH = 2.0  # cells behind the first surface that still count as seen

@@ -12,7 +12,7 @@ from bench.train.mlp import network
 from bench.train.painted_hull import painted
 from bench.train.voxel import voxels
 from toonset.nerf.options import TrainOptions, paper
-from toonset.nerf.train.train import FieldOf
+from toonset.nerf.train.fit_field import FieldOf
 
 NEAREST = "nearest drawing"
 PaletteChoice = Literal["no palette", "automatic palette", "hand-picked palette"]

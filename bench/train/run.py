@@ -22,8 +22,8 @@ from toonset.nerf.run.folder import model_of
 from toonset.nerf.score.evaluate import LAYERS, ScoredView, score_views
 from toonset.nerf.score.metrics import Figures, means
 from toonset.nerf.score.metrics_view import Judges, figures_of
+from toonset.nerf.train.fit_field import finest_cells, fit_field
 from toonset.nerf.train.labelling import drop_palette, label_scene, relabel_scene
-from toonset.nerf.train.train import finest_cells, fit_field
 
 Look = Callable[[Job, TrainedField, Sequence[ScoredView]], None]
 Picture = UInt8[np.ndarray, "height width 4"]

@@ -16,7 +16,7 @@ from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, Places, sh
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.interpolation import Operator
-from toonset.nerf.train.train import finest_cells
+from toonset.nerf.train.fit_field import finest_cells
 
 
 class VoxelField(Field):

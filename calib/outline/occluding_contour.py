@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.calib.outline.coverage import covered
+from toonset.calib.outline.covered_pixels import covered
 from toonset.calib.outline.mesh_edges import Surface as Surface
 from toonset.calib.outline.mesh_edges import prepare_surface as prepare_surface
 from toonset.calib.outline.pose import Pose, project

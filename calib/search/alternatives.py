@@ -13,7 +13,7 @@ import numpy as np
 from toonset.calib.fit.align import measure
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
 from toonset.calib.outline.correspondences import Drawing
-from toonset.calib.search.hypotheses import OTHER, Candidates, is_twin
+from toonset.calib.search.candidates import OTHER, Candidates, is_twin
 from toonset.camera import rotation_distance
 
 WIDTHS = np.full(5, 0.01)  # robust ones over the figure's height: alternatives are near an optimum

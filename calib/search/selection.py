@@ -20,7 +20,7 @@ from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetMode
 from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
-from toonset.calib.search.hypotheses import SAME_POSE, Candidates, add_twins, refine
+from toonset.calib.search.candidates import SAME_POSE, Candidates, add_twins, refine
 from toonset.calib.search.sheet_posterior import SheetPosterior
 from toonset.calib.search.turntable_starts import TurnStart
 from toonset.camera import rotation_distance

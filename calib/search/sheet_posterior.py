@@ -25,7 +25,7 @@ from toonset.calib.evidence.texture import BROKEN, Paint, paint_log_likelihood
 from toonset.calib.fit.align import ElevationPrior, tilt
 from toonset.calib.fit.sheet_prior import Turn
 from toonset.calib.outline.pose import Pose
-from toonset.calib.search.hypotheses import Candidates
+from toonset.calib.search.candidates import Candidates
 from toonset.camera import angles_from_rotation
 from toonset.dataset.split_folder.view_labels import Label, label_rows
 

@@ -14,7 +14,7 @@ from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
-from toonset.calib.search.hypotheses import OTHER, is_twin
+from toonset.calib.search.candidates import OTHER, is_twin
 from toonset.camera import angles_from_rotation, rotation_distance
 from toonset.view import View
 

@@ -14,7 +14,7 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.hull.mannequin_fit import MannequinFit
 from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.paint import Depths, PaintAgreement, with_paint_agreed
+from toonset.nerf.prepare.paint_agreement import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.registration import Registration, register_drawings
 from toonset.nerf.prepare.to_mannequin import Posed, posed
 from toonset.nerf.prepare.unwarp import Unwarping, unwarp_drawings

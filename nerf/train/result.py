@@ -9,7 +9,7 @@ from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import Prepared
 from toonset.nerf.prepare.symmetry import Symmetry
-from toonset.nerf.train.resolution_choice import FieldChoice
+from toonset.nerf.train.plane_choice import FieldChoice
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ def _look_case(body: int, *, calibrated: bool, px: int) -> SimpleNamespace:
 
 
 def _looks(cases: Any, seed: int, **_: Any) -> list[LookResult]:
-    scores = dict.fromkeys((name for name, *_ in METRICS), 0.5)
+    scores: dict[str, float | None] = {name: 0.5 for name, *_ in METRICS}
     shown = (FRAME.rgba,) * len(SCENE.frames)
     return [LookResult(case, "default", seed, scores, 1.0, shown) for case in cases]
 

@@ -18,7 +18,7 @@ from toonset.calib.outline.occluding_contour import (
     silhouette_mask,
 )
 from toonset.calib.outline.pose import Pose, project, project_with_jacobian
-from toonset.calib.search.hypotheses import Candidates
+from toonset.calib.search.candidates import Candidates
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.templates import build_templates, find_hypotheses
 from toonset.camera import rotation_distance, rotation_from_angles

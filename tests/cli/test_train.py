@@ -127,7 +127,7 @@ def test_running_out_of_memory_is_one_line(bundle, toonset, monkeypatch, snapsho
     def full(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("toonset.nerf.train.train.make_batches", full)
+    monkeypatch.setattr("toonset.nerf.train.fit_field.make_batches", full)
     done = toonset("train", bundle, *FAST, "-q")
     assert done.reason.startswith(f"out of memory (training asked for more than {said} has)")
     assert snapshot(bundle) == before

@@ -7,9 +7,9 @@ import pytest
 from tests.nerf.ellipsoids import QUICK, train_scene
 from tests.nerf.look.painted import drawings
 from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.train.fit_field import fit_field
 from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.result import Training
-from toonset.nerf.train.train import fit_field
 
 
 @pytest.fixture(scope="session")

@@ -44,7 +44,7 @@ def pose_at(seed: int, k: float = 0.0) -> Pose:
 
 
 def covered_by_folds(surface: Surface, pixels: np.ndarray) -> np.ndarray:
-    from toonset.calib.outline.coverage import covered
+    from toonset.calib.outline.covered_pixels import covered
     from toonset.calib.outline.occluding_contour import _folds
 
     a, b, c = (pixels[surface.faces[:, i]] for i in range(3))

@@ -12,7 +12,7 @@ from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import Pose
 from toonset.calib.result import Calibration
 from toonset.calib.search.alternatives import WORTH, refine_alternatives
-from toonset.calib.search.hypotheses import MIRROR, OTHER, SAME_POSE, Candidates
+from toonset.calib.search.candidates import MIRROR, OTHER, SAME_POSE, Candidates
 from toonset.camera import rotation_distance
 
 

@@ -200,8 +200,8 @@ def test_the_files_hold_the_body(toonset, tmp_path):
     expected, mesh = make_mannequin(MannequinOptions(3.0, "A")), load_mesh(out)
     assert done.json["faces"] == len(mesh.faces) == len(expected.mesh.faces)
     assert set(mesh.part_names) == PARTS
-    there = (np.unique(one.vertices, axis=0) for one in (mesh, expected.mesh))
-    np.testing.assert_array_equal(*there)
+    read, made = (np.unique(one.vertices, axis=0) for one in (mesh, expected.mesh))
+    np.testing.assert_array_equal(read, made)
     edges_of(mesh)
     points = read_known_points(out)
     assert points.keys() == expected.landmarks.keys()

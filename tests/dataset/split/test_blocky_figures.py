@@ -9,7 +9,7 @@ from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.align import Fit
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose
-from toonset.calib.search.hypotheses import (
+from toonset.calib.search.candidates import (
     Candidates,
     level_twins,
     looks_alike_from_behind,

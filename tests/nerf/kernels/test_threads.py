@@ -11,8 +11,8 @@ import torch
 from bench.cases.cases import train_cases
 from toonset.nerf.kernels.threads import side_by_side, threads_in_use, working_threads
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.train.fit_field import fit_field
 from toonset.nerf.train.labelling import label_scene
-from toonset.nerf.train.train import fit_field
 
 
 def test_results_come_in_the_order_of_the_tasks_from_two_threads() -> None:

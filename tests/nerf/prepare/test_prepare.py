@@ -10,7 +10,7 @@ from tests.nerf.prepare import balls
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import aligned
-from toonset.nerf.train.train import fit_field
+from toonset.nerf.train.fit_field import fit_field
 
 
 def asked(drawn, **switches: bool) -> tuple[Any, Any, Any]:

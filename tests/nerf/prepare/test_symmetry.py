@@ -14,7 +14,7 @@ from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.symmetry import ALIKE, add_mirrored_views, likeness, mirrored
-from toonset.nerf.train.train import fit_field
+from toonset.nerf.train.fit_field import fit_field
 
 FLAT = SynthOptions(cell_px=80, outline_px=0, elevation_deg=8)
 FRONT_SIDE_BACK = (0, 2, 4)

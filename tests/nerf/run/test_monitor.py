@@ -15,9 +15,9 @@ from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.monitor import Monitor, MonitorOptions, held_out_psnr, sample_of
 from toonset.nerf.train import loop
 from toonset.nerf.train.carved_rays import PRUNE_AFTER
+from toonset.nerf.train.fit_field import fit_field
 from toonset.nerf.train.progress import Status
 from toonset.nerf.train.result import Training
-from toonset.nerf.train.train import fit_field
 
 SIDE = 24
 PALETTE = np.array([[220, 40, 30], [30, 60, 200]], dtype=np.uint8)

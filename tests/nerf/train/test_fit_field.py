@@ -23,14 +23,14 @@ from toonset.nerf.run.folder import read_field
 from toonset.nerf.run.report import write_run
 from toonset.nerf.score.evaluate import evaluate
 from toonset.nerf.score.metrics import compare
+from toonset.nerf.train import fit_field as train_module
 from toonset.nerf.train import gradients
 from toonset.nerf.train import loss as loss_module
-from toonset.nerf.train import train as train_module
 from toonset.nerf.train.batches import Batch
+from toonset.nerf.train.fit_field import FieldOf, fit_field
 from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.train.loop import LEAST_STEPS
 from toonset.nerf.train.result import Training
-from toonset.nerf.train.train import FieldOf, fit_field
 
 
 def mean_psnr(field: TrainedField, test: Scene | None = None) -> float:

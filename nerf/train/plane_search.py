@@ -2,7 +2,7 @@
 
 For every candidate a field is fitted for a few steps to all drawings but one or two, inside the
 hull of all of them, and compared with what was left out (see
-`toonset.nerf.train.resolution_choice`).
+`toonset.nerf.train.plane_choice`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from toonset.nerf.train.batches import Batch, make_batches
 from toonset.nerf.train.carved_rays import FixedRays
 from toonset.nerf.train.loop import fit
 from toonset.nerf.train.loss import Model, Weights, render_batch
-from toonset.nerf.train.resolution_choice import (
+from toonset.nerf.train.plane_choice import (
     FEWEST_VIEWS,
     USUAL,
     Candidate,

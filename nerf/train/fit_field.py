@@ -31,7 +31,7 @@ from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import losses
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
-from toonset.nerf.prepare.paint import Depths
+from toonset.nerf.prepare.paint_agreement import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
 from toonset.nerf.prepare.symmetry import add_mirrored_views, mirror_found
 from toonset.nerf.train.batches import make_batches
@@ -46,8 +46,8 @@ from toonset.nerf.train.box_rays import (
 from toonset.nerf.train.carved_rays import FixedRays, TrainingRays
 from toonset.nerf.train.loop import Progress, Watch, fit
 from toonset.nerf.train.loss import Model, Weights
-from toonset.nerf.train.resolution_choice import FieldChoice
-from toonset.nerf.train.resolution_search import Ground, choose_cells
+from toonset.nerf.train.plane_choice import FieldChoice
+from toonset.nerf.train.plane_search import Ground, choose_cells
 from toonset.nerf.train.result import Training
 
 CHANNELS, HIDDEN = 16, 32

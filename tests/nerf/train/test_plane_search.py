@@ -17,11 +17,11 @@ from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.run.report import write_run
-from toonset.nerf.train import resolution_search
+from toonset.nerf.train import plane_search
+from toonset.nerf.train.fit_field import finest_cells, fit_field
 from toonset.nerf.train.labelling import drop_palette
-from toonset.nerf.train.resolution_choice import Candidate, FieldChoice, chosen, shares_for
-from toonset.nerf.train.resolution_search import left_out
-from toonset.nerf.train.train import finest_cells, fit_field
+from toonset.nerf.train.plane_choice import Candidate, FieldChoice, chosen, shares_for
+from toonset.nerf.train.plane_search import left_out
 
 FEW = 4  # steps of a trial
 SHORT = TrainOptions(steps=2 * FEW, device="cpu", missing_views=0)
@@ -42,7 +42,7 @@ def few(scene: Scene) -> Scene:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let trials take a few steps only."""
-    monkeypatch.setattr(resolution_search, "STEPS", FEW)
+    monkeypatch.setattr(plane_search, "STEPS", FEW)
 
 
 def candidates(*psnr: float) -> list[Candidate]:
@@ -96,13 +96,13 @@ def test_trials_see_the_other_drawings_only(
     few: Scene, quick: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[set[str]] = []
-    real = resolution_search.make_batches
+    real = plane_search.make_batches
 
     def noted(part: Scene, *rest: object) -> object:
         seen.append({frame.name for frame in part.frames})
         return real(part, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(resolution_search, "make_batches", noted)
+    monkeypatch.setattr(plane_search, "make_batches", noted)
     choice = fit_field(few, SHORT).choice
     assert choice is not None
     every, left = {frame.name for frame in few.frames}, set(choice.left_out)

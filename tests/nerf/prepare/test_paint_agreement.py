@@ -15,7 +15,7 @@ from toonset.dataset.silhouettes.outlines import Square
 from toonset.nerf.hull.hull import carve
 from toonset.nerf.hull.march import surface_depth
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.paint import Depths, with_paint_agreed
+from toonset.nerf.prepare.paint_agreement import Depths, with_paint_agreed
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
 from toonset.nerf.prepare.unwarp import Warp
 
