@@ -20,10 +20,10 @@ def rank_correlation(sheets: Sequence[Judged]) -> float:
     """Return Spearman's, of what the verdict rests on and the worst held-out view's look."""
     from scipy.stats import rankdata
 
-    values = [(sheet.off, sheet.worst_look) for sheet in sheets if sheet.off]
-    if len(values) < FEWEST:
+    values = np.array([(sheet.off, sheet.worst_look) for sheet in sheets if sheet.off])
+    if len(values) < FEWEST or not np.ptp(values, axis=0).all():  # all alike: there is no order
         return float("nan")
-    ranks = np.asarray(rankdata(np.array(values), axis=0))
+    ranks = np.asarray(rankdata(values, axis=0))
     return float(np.corrcoef(ranks, rowvar=False)[0, 1])
 
 
