@@ -186,7 +186,7 @@ def test_a_second_call_waits_for_the_one_that_sets_up(checkout: Path) -> None:
     assert log_of(checkout)[-1] == "[palette]"
 
 
-EVERY_CORE = "[-n][auto][--dist][loadfile]"
+EVERY_CORE = "[-n][auto][--dist][loadfile][--no-loadscope-reorder]"
 
 
 @pytest.mark.parametrize(
