@@ -54,7 +54,7 @@ METHODS: dict[str, Method] = {
     "without smoothing": Method(TrainOptions(smoothness=0.0)),
     "without fairing": Method(TrainOptions(fairing=False)),
     "without registration": Method(TrainOptions(register=False)),
-    "without unbending": Method(TrainOptions(unwarp=False)),
+    "without unwarping": Method(TrainOptions(unwarp=False)),
     "without both": Method(TrainOptions(register=False, unwarp=False)),
     "without symmetry": Method(TrainOptions(symmetry=False)),
     "without hull": Method(TrainOptions(carve=False), fewer=False, slow=True),

@@ -80,12 +80,12 @@ def _percent(share: float) -> str:
 def _drawings(found: dict[str, Any], *, verbose: bool) -> list[str]:
     """Return what was done to the drawings; if verbose, on what evidence, and what was not."""
     lines = []
-    for name, done in (("registration", "moved and sized"), ("unbending", "bent back")):
+    for name, done in (("registration", "moved and sized"), ("unwarping", "bent back")):
         step = found[name]
         if step is None or not (verbose or step["applied"]):
             continue
         before, after = step["apart_px"]
-        if name == "unbending" and _chosen(found["mannequin"]):
+        if name == "unwarping" and _chosen(found["mannequin"]):
             done = "bent to the mannequin"
         moved = f"drawings {done}: outlines {before:.2f} px apart, {after:.2f} px after"
         kept = f"drawings not {done}: outlines {before:.2f} px apart"
@@ -111,7 +111,7 @@ def _planes(found: dict[str, Any] | None) -> list[str]:
 
 def _set_right(found: dict[str, Any]) -> str:
     """Return which drawings the fit is judged by, if not by those that were given."""
-    steps = [found[name] for name in ("registration", "unbending")]
+    steps = [found[name] for name in ("registration", "unwarping")]
     return " as set right" if any(step and step["applied"] for step in steps) else ""
 
 

@@ -70,7 +70,7 @@ class Prepared:
         return {
             "mannequin": None if self.mannequin is None else self.mannequin.to_json(),
             "registration": None if registration is None else registration.to_json(),
-            "unbending": None if unwarping is None else unwarping.to_json(),
+            "unwarping": None if unwarping is None else unwarping.to_json(),
             "paint": None if self.paint is None else self.paint.to_json(),
         }
 

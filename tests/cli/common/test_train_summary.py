@@ -25,7 +25,7 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
                 "views": {"a.png": 0.01, "b.png": 0.027},
             },
         },
-        "drawings": dict.fromkeys(("mannequin", "registration", "unbending")) | drawings,
+        "drawings": dict.fromkeys(("mannequin", "registration", "unwarping")) | drawings,
     }
 
 
@@ -36,7 +36,7 @@ def step(gain_nats: float, *, applied: bool) -> dict[str, Any]:
 def test_evidence_that_was_not_acted_on_is_called_so() -> None:
     found = summary(
         Path("run"),
-        metrics(registration=step(70, applied=False), unbending=step(90, applied=True)),
+        metrics(registration=step(70, applied=False), unwarping=step(90, applied=True)),
         verbose=True,
     ).splitlines()
     apart = "drawings not moved and sized: outlines 1.00 px apart"
@@ -60,7 +60,7 @@ def test_drawings_that_agree_are_fitted_as_they_are() -> None:
 
 
 def test_evidence_is_for_those_who_ask() -> None:
-    drawn = metrics(registration=step(-5, applied=False), unbending=step(90, applied=True))
+    drawn = metrics(registration=step(-5, applied=False), unwarping=step(90, applied=True))
     assert summary(Path("run"), drawn).splitlines() == [
         "8 views; 3 steps in 1.0 s",
         "drawings bent back: outlines 1.00 px apart, 0.50 px after",
@@ -72,7 +72,7 @@ def test_evidence_is_for_those_who_ask() -> None:
 
 def test_it_says_whether_the_mannequin_gives_the_shape() -> None:
     fit = {"mannequin_off": 0.006, "drawings_off": 0.011, "parts_left": 0.0}
-    body = metrics(mannequin=fit | {"chosen": True}, unbending=step(90, applied=True))
+    body = metrics(mannequin=fit | {"chosen": True}, unwarping=step(90, applied=True))
     lines = summary(Path("run"), body).splitlines()
     assert lines[1] == "shape: the mannequin's"
     assert lines[2] == "drawings bent to the mannequin: outlines 1.00 px apart, 0.50 px after"

@@ -20,9 +20,9 @@ def asked(drawn, **switches: bool) -> tuple[Any, Any, Any]:
 
 def test_bends_alone_where_they_explain_more() -> None:
     drawn, _ = balls.bent_sheet()
-    scene, registration, unbending = asked(drawn)
-    assert unbending.applied
-    assert unbending.gain_nats > registration.gain_nats > 0
+    scene, registration, unwarping = asked(drawn)
+    assert unwarping.applied
+    assert unwarping.gain_nats > registration.gain_nats > 0
     assert not registration.applied
     for before, after in zip(drawn.frames, scene.frames, strict=True):
         assert after.camera is before.camera
@@ -37,14 +37,14 @@ def test_cameras_follow_where_places_explain_enough() -> None:
 
 
 def test_switches_are_heard_and_drawings_that_agree_stay() -> None:
-    scene, registration, unbending = asked(balls.sheet())
+    scene, registration, unwarping = asked(balls.sheet())
     assert scene is balls.sheet()
-    assert registration.applied is unbending.applied is False
+    assert registration.applied is unwarping.applied is False
     drawn, _ = balls.bent_sheet()
     assert asked(drawn, register=False, unwarp=False) == (drawn, None, None)
-    scene, registration, unbending = asked(drawn, unwarp=False)
+    scene, registration, unwarping = asked(drawn, unwarp=False)
     assert registration.applied
-    assert unbending is None
+    assert unwarping is None
     assert np.any(scene.frames[0].camera.center != drawn.frames[0].camera.center)
 
 
