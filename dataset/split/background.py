@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth, sampled
 from toonset.dataset.split.jpeg_noise import halo_levels, has_jpeg_grid
 from toonset.errors import SheetError
-from toonset.view import Box
+from toonset.view import Box, over_white
 
 BINS = 16  # levels per bin of the coarse histogram that finds the dominant colour
 CLUSTER_RADIUS = 32  # levels: border pixels this near to the background are background + noise
@@ -120,8 +120,7 @@ def flatten(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "hei
     """Return an opaque picture: what is see-through shows white paper."""
     if (rgba[..., 3] == 255).all():
         return rgba
-    alpha = rgba[..., 3:] / 255.0
-    rgb = np.rint(rgba[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
+    rgb = np.rint(255 * over_white(rgba)).astype(np.uint8)
     return np.dstack([rgb, np.full(rgb.shape[:2], 255, dtype=np.uint8)])
 
 

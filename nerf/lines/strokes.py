@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 from skimage.morphology import skeletonize
 
-from toonset.palette.pixels.ink_lines import find_contour, outline_line_px
+from toonset.palette.pixels.ink_lines import find_contour, lightness_of, outline_line_px
 from toonset.raster import depth_inside, nearest, parts
 
 FEWEST_OUTLINED = 0.5  # of a sheet's views must have an outline, for the sheet to have one
@@ -43,10 +43,7 @@ class Lines:
 
 def outline_width(rgba: UInt8[np.ndarray, "height width 4"]) -> float:
     """Return the width in pixels of the dark line round the figure, 0 without one."""
-    alpha = rgba[..., 3:].astype(np.float32) / 255
-    over_white = (rgba[..., :3] * alpha + 255 * (1 - alpha) + 0.5).astype(np.uint8)
-    light = cv2.cvtColor(over_white, cv2.COLOR_RGB2GRAY)
-    return outline_line_px(light, rgba[..., 3] >= FIGURE)
+    return outline_line_px(lightness_of(rgba), rgba[..., 3] >= FIGURE)
 
 
 def ink_color(rims: Iterable[UInt8[np.ndarray, "n 3"]]) -> tuple[int, int, int]:

@@ -53,7 +53,7 @@ def find_contour(
         rgba: sRGB with straight alpha; what is transparent counts as white paper.
         line_width_px: of the outline, 0 = there is none; None measures it along the figure's rim.
     """
-    light = _lightness(rgba)
+    light = lightness_of(rgba)
     mask = rgba[..., 3] >= 128
     none = np.zeros(mask.shape, dtype=np.uint8)
     width = outline_line_px(light, mask) if line_width_px is None else line_width_px
@@ -127,7 +127,7 @@ def _dark_rims(light: np.ndarray, mask: np.ndarray, deepest: int) -> list[np.nda
     return [layers[i] for i in sorted(dark, key=lambda i: shares[i] < SURE)]
 
 
-def _lightness(rgba: np.ndarray) -> UInt8[np.ndarray, "height width"]:
+def lightness_of(rgba: np.ndarray) -> UInt8[np.ndarray, "height width"]:
     """Return luma over white paper."""
     light = cv2.cvtColor(np.ascontiguousarray(rgba), cv2.COLOR_RGBA2GRAY)
     for rows in _bands(light):
