@@ -15,7 +15,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from toonset import __version__
+from toonset import __version__, lock
 from toonset.cli.common.help import Verb, Verbs
 from toonset.errors import ToonsetError, one_line
 
@@ -86,7 +86,8 @@ def run(program: typer.Typer, name: str) -> None:
     # NumPy's matrices are small here, and torch has threads of its own; must precede numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        code = program(prog_name=name, standalone_mode=False)
+        with lock.command():
+            code = program(prog_name=name, standalone_mode=False)
     except ToonsetError as error:
         _refuse(name, one_line(error))
     except UsageError as error:

@@ -1,9 +1,10 @@
-"""Write files without half-written results: temporary name, flush to disk, rename."""
+"""Write files and folders in one step: under a temporary name, flushed to disk, renamed."""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
 import fnmatch
 import json
 import os
@@ -13,9 +14,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from toonset import lock
 from toonset.errors import OutputError
+from toonset.lock import OLD, TEMPORARY, hold, is_temporary
 
 LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")
+THERE_ALREADY = (errno.ENOTEMPTY, errno.EEXIST)
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -26,7 +30,7 @@ def write_bytes(path: Path, data: bytes) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
     except OSError as error:
         raise _output_error(path, error) from error
     try:
@@ -36,6 +40,8 @@ def write_bytes(path: Path, data: bytes) -> None:
             os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
+        if not is_temporary(path.parent.name):  # a new folder is flushed as a whole
+            _flush(path.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
             os.unlink(name)
@@ -56,23 +62,26 @@ def new_folder(path: Path, *, force: bool = False) -> Iterator[Path]:
         force: replace an existing folder; without it one that is not empty is refused.
 
     Raises:
-        OutputError: `path` exists and `force` is off, or the place cannot be written.
+        OutputError: `path` exists and `force` is off, it is in use by another process, or the
+            place cannot be written.
     """
     path = Path(os.path.abspath(path))
-    check_new_folder(path, force=force)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent))
-        temporary.chmod(0o777 & ~_umask())
-    except OSError as error:
-        raise _output_error(path, error) from error
-    try:
-        yield temporary
-        _swap_in(temporary, path)
-    except OSError as error:
-        raise _output_error(path, error) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    with hold(path):
+        check_new_folder(path, force=force)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            name = tempfile.mkdtemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
+            temporary = Path(name)
+            temporary.chmod(0o777 & ~_umask())
+        except OSError as error:
+            raise _output_error(path, error) from error
+        try:
+            yield temporary
+            _swap_in(temporary, path, force=force)
+        except OSError as error:
+            raise _output_error(path, error) from error
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def check_output(
@@ -98,7 +107,11 @@ def check_output(
         return
     names = (*written, *LEFT_BY_DESKTOPS)
     entries = sorted(entry.name for entry in out.iterdir())
-    foreign = [n for n in entries if not any(fnmatch.fnmatchcase(n, p) for p in names)]
+    foreign = [
+        name
+        for name in entries
+        if not is_temporary(name) and not any(fnmatch.fnmatchcase(name, p) for p in names)
+    ]
     if foreign:
         raise OutputError(
             f"{out}: holds {foreign[0]!r}, which this command does not write, so --force does not "
@@ -125,6 +138,7 @@ def check_new_file(path: Path, *, force: bool = False) -> None:
         )
     if path.parent.exists() and not path.parent.is_dir():
         raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
+    lock.claim(path)
 
 
 def check_new_folder(path: Path, *, force: bool = False) -> None:
@@ -136,7 +150,7 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
     """
     path = Path(os.path.abspath(path))
     try:
-        existing = next(p for p in (path, *path.parents) if p.exists())
+        existing = next(p for p in path.parents if p.exists())
     except OSError as error:  # a name that is too long, a loop of links
         raise _output_error(path, error) from error
     if path.exists() and not path.is_dir():
@@ -148,12 +162,14 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
     if not existing.is_dir():
         raise OutputError(f"{path}: {existing} is a file, not a folder; choose another -o")
     try:  # by trying: permission bits say nothing to root, nor about read-only disks
-        os.rmdir(tempfile.mkdtemp(prefix=f".{path.name[:64]}.", suffix=".tmp", dir=existing))
+        probe = tempfile.mkdtemp(prefix=f".{path.name[:64]}.", suffix=TEMPORARY, dir=existing)
+        os.rmdir(probe)
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(
             f"{path}: {existing} is not writable ({reason}); choose another -o"
         ) from error
+    lock.claim(path)
 
 
 def check_removable(path: Path, written: str) -> None:
@@ -185,13 +201,21 @@ def remove_folder(path: Path) -> None:
         raise _output_error(path, error) from error
 
 
-def _swap_in(temporary: Path, path: Path) -> None:
-    if not path.exists():
-        os.replace(temporary, path)
-        return
-    old = _put_aside(path)
-    os.replace(temporary, path)
-    shutil.rmtree(old, ignore_errors=True)
+def _swap_in(temporary: Path, path: Path, *, force: bool) -> None:
+    """Give a new folder its name; an old one comes to lie under the temporary name."""
+    for folder, _, _ in os.walk(temporary, topdown=False):
+        _flush(Path(folder))
+    try:
+        os.rename(temporary, path)  # not onto a folder with something in it
+    except OSError as error:
+        if error.errno not in THERE_ALREADY:
+            raise
+        if not force:
+            raise OutputError(
+                f"{path}: another program has made it meanwhile; choose another -o"
+            ) from error
+        exchange_folders(temporary, path)
+    _flush(path.parent)
 
 
 def exchange_folders(new: Path, path: Path) -> None:
@@ -229,9 +253,19 @@ def _exchanged(new: Path, path: Path) -> bool:
 
 def _put_aside(path: Path) -> Path:
     """Give a folder a temporary name, and return it."""
-    old = Path(tempfile.mkdtemp(prefix=f".{path.name}.old.", suffix=".tmp", dir=path.parent))
+    old = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=OLD, dir=path.parent))
     os.replace(path, old)
     return old
+
+
+def _flush(folder: Path) -> None:
+    """Write a folder's names to disk, where the system can."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _umask() -> int:

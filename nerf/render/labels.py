@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
 
 from toonset.nerf.fields.classifier import PaletteClassifier
-from toonset.nerf.kernels.losses import OPAQUE_ENOUGH
+from toonset.nerf.kernels.loss_terms import OPAQUE_ENOUGH
 
 LEVELS = 64  # levels of a channel in the table of labels
 COLORS_PER_CHUNK = 1 << 12  # that get labels together

@@ -14,7 +14,7 @@ from toonset.nerf.fields.trained_field import NO_PALETTE, TrainedField
 from toonset.nerf.hull.hull import occupancy
 from toonset.nerf.hull.march import Rays, march
 from toonset.nerf.kernels.compositing import compositing_weights, pad
-from toonset.nerf.kernels.losses import straight
+from toonset.nerf.kernels.loss_terms import straight
 
 STEEPEST = math.radians(30)  # drawings are seen from about level; from above they say nothing
 BEFORE = 1.5  # voxels in front of the surface at which a look begins

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from toonset.nerf.kernels.losses import is_finite
+from toonset.nerf.kernels.loss_terms import is_finite
 
 WINDOW = 20  # steps whose mean loss is judged; also the steps between kept states
 DIVERGED = 10.0  # times the best window's loss

@@ -2,11 +2,14 @@
 
 import errno
 import os
+import subprocess
+import sys
 
 import pytest
 
 from toonset import write
 from toonset.errors import OutputError
+from toonset.lock import claim, command, hold
 from toonset.write import check_new_folder, exchange_folders, new_folder, write_bytes, write_json
 
 
@@ -97,3 +100,113 @@ def test_two_folders_change_places(tmp_path, monkeypatch):
     with pytest.raises(OutputError):
         exchange_folders(tmp_path / "nothing", one)
     assert (one / "one").is_file()
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """Hold tmp_path/out in another process, half of a new folder written, until it is killed."""
+    code = (
+        "import sys, time; from pathlib import Path; from toonset.write import new_folder\n"
+        "with new_folder(Path(sys.argv[1]), force=True) as folder:\n"
+        "    (folder / 'half').write_text('')\n    print('held', flush=True)\n    time.sleep(600)\n"
+    )
+    arguments = [sys.executable, "-P", "-c", code, str(tmp_path / "out")]
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "held\n"
+    yield process
+    process.kill()
+    process.wait()
+    process.stdout.close()
+
+
+def test_a_place_is_written_by_one_process_at_a_time(tmp_path, holder):
+    with (
+        pytest.raises(OutputError, match="in use by another toonset"),
+        new_folder(tmp_path / "out"),
+    ):
+        pass
+    with command(), pytest.raises(OutputError, match="in use by another toonset"):
+        check_new_folder(tmp_path / "out")
+    with new_folder(tmp_path / "other") as folder:
+        (folder / "a").write_text("")
+    holder.kill()
+    holder.wait()
+    assert len(names(tmp_path)) == 3  # its half of a folder and its lock lie there still
+    with new_folder(tmp_path / "out") as folder:
+        (folder / "a").write_text("")
+    assert names(tmp_path) == ["other", "out"]
+
+
+def test_a_claim_lasts_as_long_as_the_command_and_may_be_repeated(tmp_path):
+    claim(tmp_path / "out")
+    assert names(tmp_path) == []
+    with command():
+        check_new_folder(tmp_path / "out")
+        with new_folder(tmp_path / "out") as folder:
+            (folder / "a").write_text("")
+        assert names(tmp_path) == [".out.lock", "out"]
+    assert names(tmp_path) == ["out"]
+
+
+def test_a_folder_that_another_made_meanwhile_stays(tmp_path):
+    def write_late():
+        with new_folder(tmp_path / "out") as folder:
+            (folder / "a").write_text("mine")
+            (tmp_path / "out").mkdir()
+            (tmp_path / "out" / "a").write_text("theirs")
+
+    with pytest.raises(OutputError, match="another program has made it meanwhile"):
+        write_late()
+    assert (tmp_path / "out" / "a").read_text() == "theirs"
+    assert names(tmp_path) == ["out"]
+
+
+@pytest.mark.parametrize("failing", [1, 2])
+def test_where_folders_cannot_be_exchanged_a_failed_rename_keeps_the_old_one(
+    tmp_path, monkeypatch, failing
+):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "old").write_text("")
+    real, calls = os.replace, []
+
+    def replace(*places):
+        calls.append(places)
+        if len(calls) == failing:
+            raise OSError(errno.EIO, "Input/output error")
+        real(*places)
+
+    def write_new():
+        with new_folder(tmp_path / "out", force=True) as folder:
+            (folder / "new").mkdir()
+            monkeypatch.setattr(write, "_exchanged", lambda new, path: False)
+            monkeypatch.setattr(os, "replace", replace)
+
+    with pytest.raises(OutputError, match="Input/output error"):
+        write_new()
+    assert names(tmp_path / "out") == ["old"]
+    assert len(names(tmp_path)) <= 1 + (failing == 1)  # an empty hidden folder, swept next time
+    monkeypatch.undo()
+    with hold(tmp_path / "out"):
+        pass
+    assert names(tmp_path) == ["out"]
+
+
+def test_an_output_that_was_put_aside_comes_back_and_others_are_left_alone(tmp_path):
+    (tmp_path / ".out.abcd1234.old").mkdir()
+    (tmp_path / ".out.abcd1234.old" / "a").write_text("old")
+    for name in (".out.more.abcd1234.tmp", ".out.tmp", ".other.abcd1234.tmp", "out.abcd1234.tmp"):
+        (tmp_path / name).mkdir()
+    (tmp_path / ".out.abcd5678.tmp").write_text("half")
+    before = names(tmp_path)
+    with hold(tmp_path / "out"):
+        assert (tmp_path / "out" / "a").read_text() == "old"
+    gone = {".out.abcd1234.old", ".out.abcd5678.tmp"}
+    assert names(tmp_path) == sorted({*before, "out"} - gone)
+
+
+def test_a_place_without_locks_is_written_all_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr("toonset.lock.fcntl", None)
+    with new_folder(tmp_path / "out") as folder:
+        (folder / "a").write_text("")
+    assert names(tmp_path) == ["out"]

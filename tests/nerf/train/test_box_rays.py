@@ -21,7 +21,7 @@ from toonset.nerf.fields.triplane import PLANES, TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.kernels.compositing import composite_even, composite_packed
 from toonset.nerf.kernels.interpolation import apply_once
-from toonset.nerf.kernels.losses import photometric
+from toonset.nerf.kernels.loss_terms import photometric
 from toonset.nerf.options import PRESETS, TrainOptions, preset
 from toonset.nerf.train.box_rays import (
     BINS,
