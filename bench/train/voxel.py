@@ -14,7 +14,7 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, Places, shape_of
 from toonset.nerf.hull.hull import Hull
-from toonset.nerf.kernels import loss_terms
+from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.interpolation import Operator
 from toonset.nerf.train.fit_field import finest_cells
 
@@ -67,7 +67,7 @@ class VoxelField(Field):
 
     def roughness(self) -> Float[Tensor, ""]:
         """Return the mean absolute step between neighbouring corners, summed over the channels."""
-        return loss_terms.total_variation(self.grid, [self.shape])
+        return terms.total_variation(self.grid, [self.shape])
 
     def corners(self) -> Float[Tensor, "corners 3"]:
         """Return the world positions of the grid's values, in the order of its rows."""

@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.fields.base import DENSITY_SHIFT, Constants, Field, Places, shape_of
-from toonset.nerf.kernels import loss_terms
+from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.decoder import two_layers
 from toonset.nerf.kernels.interpolation import Operator, apply_once
 
@@ -83,7 +83,7 @@ class TriplaneField(Field):
     def roughness(self) -> Float[Tensor, ""]:
         """Return the planes' total variation."""
         sizes = [(self.shape[a], self.shape[b]) for a, b in PLANES]
-        return loss_terms.total_variation(self.planes, sizes)
+        return terms.total_variation(self.planes, sizes)
 
     def decode(
         self, features: Float[Tensor, "n channels"]

@@ -28,7 +28,7 @@ from toonset.nerf.hull.mannequin_volume import hull_of_shape
 from toonset.nerf.hull.march import surface_depth
 from toonset.nerf.hull.scene_hull import VOXELS, VOXELS_PER_PX, as_stored, hull_of, per_px
 from toonset.nerf.hull.tolerance import HullEvidence
-from toonset.nerf.kernels import loss_terms
+from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint_agreement import Depths
@@ -201,7 +201,7 @@ def _rays(
 
 
 def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:
-    smoothness = loss_terms.smoothness_weight(options.smoothness, views, agree=agree)
+    smoothness = terms.smoothness_weight(options.smoothness, views, agree=agree)
     if options.carve:
         return Weights(options.palette_weight, smoothness)
     return any_backdrop(options.palette_weight, smoothness)

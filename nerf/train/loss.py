@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from toonset.nerf.fields.base import Field
 from toonset.nerf.fields.classifier import PaletteClassifier
-from toonset.nerf.kernels import loss_terms
+from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.compositing import composite_even, composite_packed
 from toonset.nerf.train.batches import Batch
 
@@ -40,8 +40,8 @@ class Weights:
 
     palette: float
     smoothness: float
-    backdrop: float = loss_terms.BACKDROP
-    opacity: float = loss_terms.OPACITY_WEIGHT
+    backdrop: float = terms.BACKDROP
+    opacity: float = terms.OPACITY_WEIGHT
 
 
 def loss_terms(
@@ -49,14 +49,14 @@ def loss_terms(
 ) -> tuple[Float[Tensor, ""], Float[Tensor, ""], Float[Tensor, ""]]:
     """Return the weighted photometric, cross-entropy and smoothness terms of a batch."""
     color, opacity = render_batch(model.field, batch)
-    photometric = loss_terms.photometric(
+    photometric = terms.photometric(
         color, opacity, batch.rgb, batch.alpha, weights.backdrop, weights.opacity
     )
     entropy = photometric.new_zeros(())
     if model.classifier is not None:
         few = slice(0, None, CLASSIFIED)
-        logits = model.classifier(loss_terms.straight(color[few], opacity[few]))
-        entropy = weights.palette * loss_terms.cross_entropy(logits, batch.labels[few])
+        logits = model.classifier(terms.straight(color[few], opacity[few]))
+        entropy = weights.palette * terms.cross_entropy(logits, batch.labels[few])
     smooth = photometric.new_zeros(())
     if weights.smoothness:
         smooth = weights.smoothness * model.field.roughness()

@@ -13,7 +13,8 @@ from torch import nn
 
 from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
-from toonset.nerf.kernels import decoder, loss_terms
+from toonset.nerf.kernels import decoder
+from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.compositing import compositing_weights
 from toonset.nerf.kernels.interpolation import Operator
 from toonset.nerf.score.metrics import BEST_PSNR, compare, ssim
@@ -32,12 +33,12 @@ def test_total_variation_is_the_mean_step_and_its_gradient() -> None:
     grids = [g.view(*s, 3) for g, s in zip(table.split([20, 24]), shapes, strict=True)]
     steps = [g.diff(dim=axis).abs().sum() for g in grids for axis in range(g.ndim - 1)]
     slow = torch.stack(steps).sum() / 44
-    fast = loss_terms.total_variation(table, shapes)
+    fast = terms.total_variation(table, shapes)
     torch.testing.assert_close(fast, slow)
     (expected,) = torch.autograd.grad(2 * slow, table)
     (gradient,) = torch.autograd.grad(2 * fast, table)
     torch.testing.assert_close(gradient, expected)
-    assert loss_terms.total_variation(torch.ones(20, 2), [(4, 5)]) == 0
+    assert terms.total_variation(torch.ones(20, 2), [(4, 5)]) == 0
 
 
 @pytest.mark.parametrize("samples", [1, 7, 20])
@@ -100,16 +101,16 @@ def test_operator_backward_is_the_transpose() -> None:
 def test_losses_are_zero_only_where_they_should() -> None:
     drawn = torch.rand(6, 3)
     full, half = torch.ones(6), torch.full((6,), 0.5)
-    assert loss_terms.photometric(drawn, full, drawn, full) == 0
-    assert loss_terms.photometric(drawn * 0.5, half, drawn, half) == 0
-    assert loss_terms.photometric(drawn * 0.5, half, drawn, full) > 0
-    assert loss_terms.photometric(drawn, full, drawn, half) > 0
+    assert terms.photometric(drawn, full, drawn, full) == 0
+    assert terms.photometric(drawn * 0.5, half, drawn, half) == 0
+    assert terms.photometric(drawn * 0.5, half, drawn, full) > 0
+    assert terms.photometric(drawn, full, drawn, half) > 0
     logits = torch.randn(4, 3)
     unlabelled = torch.full((4,), 255)
-    assert loss_terms.cross_entropy(logits, unlabelled) == 0
+    assert terms.cross_entropy(logits, unlabelled) == 0
     some = torch.tensor([0, 255, 255, 255])
     torch.testing.assert_close(
-        loss_terms.cross_entropy(logits, some), F.cross_entropy(logits[:1], some[:1])
+        terms.cross_entropy(logits, some), F.cross_entropy(logits[:1], some[:1])
     )
 
 
