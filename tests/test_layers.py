@@ -141,13 +141,14 @@ def test_table_of_floors_lists_what_is_there(stage: str) -> None:
 
 def test_no_circle_within_a_room() -> None:
     for folder in folders():
-        for module, imported in imports_among(folder).items():
+        imports = imports_among(folder)
+        for module, imported in imports.items():
             seen, left = set(), set(imported)
             while left:
                 name = left.pop()
                 assert name != module, f"{module} imports itself by way of others"
                 seen.add(name)
-                left |= imports_among(folder)[name] - seen
+                left |= imports[name] - seen
 
 
 def imports_among(folder: Path) -> dict[str, set[str]]:
