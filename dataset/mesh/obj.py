@@ -21,6 +21,7 @@ from toonset.read import read_whole
 
 UNKNOWN_COLOR = (204, 204, 204)  # a face whose material is not described; trimesh's and Blender's
 MAX_LIBRARY_BYTES = 4 * 2**20
+MOST_INDEX = 10**9
 LINES_BETWEEN = 100_000  # of two looks at how much it has become
 
 
@@ -129,6 +130,8 @@ def _index(word: str, count: int) -> int:
         index = int(word)
     except ValueError:
         raise ValueError("not a face index") from None
+    if abs(index) > MOST_INDEX:
+        raise ValueError(f"face index {index:.3g}, and no mesh has so many")
     if index == 0:
         raise ValueError("face index 0, but OBJ counts from 1")
     if index < -count:

@@ -77,7 +77,7 @@ class SheetState:
 
 def remove_shadows(state: SheetState) -> SheetState | None:
     """Propose figures without the shadows that they cast."""
-    if not len(state.blobs.areas):
+    if not len(state.main_blobs):  # specks alone cast none
         return None
     seen = state.rgba, state.ground, state.tolerance
     shadow = find_shadows(state.blobs, state.main_blobs, *seen)

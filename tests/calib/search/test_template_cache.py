@@ -42,7 +42,7 @@ def test_cached_equals_fresh_bit_for_bit_and_nothing_is_built_twice(surface, mon
 
 
 @pytest.mark.parametrize(
-    "damage", ["empty", "cut", "flipped", "text", "huge", "other arrays", "pickle"]
+    "damage", ["empty", "cut", "flipped", "head", "text", "huge", "other arrays", "pickle"]
 )
 def test_a_damaged_file_is_built_again(surface, damage):
     fresh = load_bank(surface)
@@ -55,7 +55,9 @@ def test_a_damaged_file_is_built_again(surface, damage):
     else:
         middle = len(data) // 2
         flipped = data[:middle] + bytes([data[middle] ^ 255]) + data[middle + 1 :]
-        wrong = {"empty": b"", "cut": data[:middle], "flipped": flipped, "text": b"hello"}
+        head = bytes([*data[:70], data[70] ^ 64, *data[71:]])  # not even a Python literal
+        wrong = {"empty": b"", "cut": data[:middle], "flipped": flipped, "head": head}
+        wrong["text"] = b"hello"
         path.write_bytes(wrong.get(damage, data + bytes(template_cache.MOST_BYTES)))
     assert_bitwise_equal(load_bank(surface), fresh)
     assert path.read_bytes() == data  # and whole again

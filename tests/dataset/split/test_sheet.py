@@ -191,6 +191,14 @@ def test_two_rows_of_uneven_heights() -> None:
     assert main_colors(split_picture(drawing.rgba)) == [0, 1, 2, 3, 0]
 
 
+@pytest.mark.parametrize("specks", [1, 3])
+def test_dust_on_blank_paper_is_no_figure(specks: int) -> None:
+    paper = np.full((300, 600, 4), 255, np.uint8)
+    paper[150, 100 : 100 + 40 * specks : 40, :3] = 0
+    with pytest.raises(SheetError, match="the largest patch is 1 x 1 px"):
+        split_picture(paper)
+
+
 def test_apart_parts_join_and_captions_and_specks_do_not() -> None:
     drawing = row_of_four(height=150)
     drawing.ellipse(50, 4, 9, 2.5, BLUE)  # a hat that floats above the first figure
