@@ -20,6 +20,7 @@ from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import Calibration
+from toonset.calib.verdict.checks import check_names
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.rival import without_body_if_better
@@ -59,14 +60,16 @@ def calibrate(
         progress: called with the step's name and the share of it that is done.
         cues: what an earlier call has found in the same drawings, and keeps what this one finds;
             those of other drawings are passed over.
-        options: how hard to look and what to doubt; what differs from the default is recorded.
+        options: how hard to look and what to doubt (`toonset.calib.options`); recorded with the
+            result, thresholds and checks where they differ from the default.
 
     Raises:
-        ToonsetError: no view, two of one name, a mannequin that lies, or hints that contradict
-            each other or do not belong to the views or the mannequin.
+        ToonsetError: no view, two of one name, a mannequin that lies, a check that does not exist,
+            or hints that contradict each other or do not belong to the views or the mannequin.
     """
     hints.check()
-    _check_names([view.name for view in views])
+    check_names(options.without)
+    _check_view_names([view.name for view in views])
     if cues is None or not cues.are_of(views):
         cues = Cues(views)
     if isinstance(mesh, str):
@@ -165,7 +168,7 @@ def _check_upright(mesh: Mesh) -> None:
         )
 
 
-def _check_names(names: Sequence[str]) -> None:
+def _check_view_names(names: Sequence[str]) -> None:
     if not names:
         raise UsageError("calibrate: no view; give the views of `split_sheet`")
     double = next((name for name in names if names.count(name) > 1), None)

@@ -10,23 +10,23 @@ Progress = Callable[[str, float], None]  # step, share done
 
 @dataclass(frozen=True)
 class VerdictThresholds:
-    """Where a verdict begins to doubt; evidence for each is in docs/decisions.md.
+    """Where a verdict begins to doubt; evidence is in docs/decisions.md.
 
     Attributes:
         sure: probability of the chosen camera below which it is ambiguous.
         weak_coverage: share of both outlines that lie within 5 % of the height of each other.
         failed_coverage: the same, below which this is not the mannequin.
         weak_sigma_deg: of yaw or elevation; three of them reach another camera.
-        most_faces_contradict: probability that what looks like faces must be none.
-        most_pull_deg: by which outlines turn a view without its locks.
-        far_from_place_deg: off an even turn, with another body's mannequin.
-        far_from_label_deg: three quarters is neither front nor side.
-        far_from_level_deg: four times what the views of a sheet differ in elevation.
-        looking_up_deg: nobody draws a turnaround from so far below.
+        most_faces_contradict: probability that faces are not where the cameras have the front.
+        most_pull_deg: turn of a view, by its outline, once nothing is locked.
+        far_from_place_deg: turn of a view off even steps, with another body's mannequin.
+        far_from_label_deg: turn of a view off its label; three quarters is neither front nor side.
+        far_from_level_deg: a view's elevation off the sheet's; four times what views differ.
+        looking_up_deg: elevation below level; nobody draws a turnaround from so far below.
         most_contradiction: of drawings with each other, over the height.
         confirming_contradiction: below it drawings confirm cameras without the mannequin.
         steep_deg: elevation from which only the mannequin tells how far cameras look down.
-        telling_views: fewer silhouettes cut out a hull that contradicts hardly anything.
+        telling_views: views from which silhouettes contradict wrong cameras at all.
         weak_apart, failed_apart: outlines from being one turning body's, over the height; without
             a mannequin.
         weak_scale, failed_scale: times the other drawings' scale, without a mannequin: another

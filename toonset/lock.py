@@ -19,10 +19,11 @@ try:
 except ImportError:  # Windows: nothing is locked there
     fcntl = None  # type: ignore[assignment]
 
+Lock = tuple[int, Path]  # descriptor and name of a locked file
 TEMPORARY, OLD = ".tmp", ".old"  # ends of hidden names: being written; about to be replaced
 _COMMAND: ContextVar[ExitStack | None] = ContextVar("command", default=None)
 _GUARD = threading.Lock()
-_HELD: dict[Path, tuple[int, int]] = {}  # by output: file descriptor of its lock, how often held
+_HELD: dict[Path, tuple[Lock | None, int]] = {}  # by output: its lock, how often it is held
 
 
 @contextlib.contextmanager
@@ -73,39 +74,38 @@ def is_temporary(name: str) -> bool:
 def _acquire(path: Path) -> None:
     with _GUARD:
         if path in _HELD:
-            descriptor, times = _HELD[path]
-            _HELD[path] = descriptor, times + 1
+            lock, times = _HELD[path]
+            _HELD[path] = lock, times + 1
             return
-        descriptor = _locked(path)
-        _HELD[path] = descriptor, 1
+        _HELD[path] = _locked(path), 1
     _clear(path)
 
 
 def _release(path: Path) -> None:
     with _GUARD:
-        descriptor, times = _HELD.pop(path)
+        lock, times = _HELD.pop(path)
         if times > 1:
-            _HELD[path] = descriptor, times - 1
-        elif descriptor >= 0:
+            _HELD[path] = lock, times - 1
+        elif lock is not None:
             with contextlib.suppress(OSError):
-                os.unlink(_lock_file(path))
-            os.close(descriptor)
+                os.unlink(lock[1])
+            os.close(lock[0])
 
 
-def _locked(path: Path) -> int:
-    """Return the descriptor of the locked file; -1 where the place or the system has no locks."""
-    if fcntl is None:
-        return -1
+def _locked(path: Path) -> Lock | None:
+    """Return the locked file; None where the place or the system has no locks."""
+    if fcntl is None or path.name == "":
+        return None
     while True:
         file = _lock_file(path)
         try:
             descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         except OSError:  # not writable, or a name too long: whoever writes there says so
-            return -1
+            return None
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if os.path.samestat(os.fstat(descriptor), os.stat(file)):
-                return descriptor
+                return descriptor, file
         except BlockingIOError as error:
             os.close(descriptor)
             raise OutputError(
@@ -115,7 +115,7 @@ def _locked(path: Path) -> int:
             pass
         except OSError:  # a file system without locks
             os.close(descriptor)
-            return -1
+            return None
         os.close(descriptor)
 
 

@@ -16,13 +16,14 @@ def dilate(mask: Mask, by: int = 1) -> Mask:
 
 
 def erode(mask: Mask, by: int = 1) -> Mask:
-    """Return the pixels of a mask farther than `by` pixels from its outside, the picture's edge."""
+    """Return a mask's pixels farther than `by` from its outside; beyond the picture is outside."""
     return cv2.erode(mask.astype(np.uint8), _square(by), borderValue=0) > 0
 
 
 def is_uniform(values: Shaped[np.ndarray, "height width"]) -> Mask:
-    """Return where a pixel and its eight neighbours have one value."""
-    return np.asarray(cv2.erode(values, _square(1)) == cv2.dilate(values, _square(1)))
+    """Return where a pixel and its eight neighbours have one value, of 16 bits at most."""
+    small = values.astype(np.int16)
+    return np.asarray(cv2.erode(small, _square(1)) == cv2.dilate(small, _square(1)))
 
 
 def distance_to(marked: Mask) -> Float[np.ndarray, "height width"]:

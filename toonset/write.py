@@ -40,7 +40,7 @@ def write_bytes(path: Path, data: bytes) -> None:
             os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-        if not is_temporary(path.parent.name):  # a new folder is flushed as a whole
+        if not any(map(is_temporary, path.parent.parts)):  # a new folder is flushed as a whole
             _flush(path.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -150,7 +150,7 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
     """
     path = Path(os.path.abspath(path))
     try:
-        existing = next(p for p in path.parents if p.exists())
+        existing = next(p for p in (*path.parents, path) if p.exists())
     except OSError as error:  # a name that is too long, a loop of links
         raise _output_error(path, error) from error
     if path.exists() and not path.is_dir():

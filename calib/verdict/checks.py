@@ -17,6 +17,7 @@ from toonset.calib.verdict.judge import outlines_apart
 from toonset.calib.verdict.one_character import other_character
 from toonset.calib.verdict.repeated import repeated_drawings
 from toonset.dataset.split_folder.view_labels import Label
+from toonset.errors import UsageError
 from toonset.view import View
 
 Views = tuple[ViewCalibration, ...]
@@ -35,7 +36,7 @@ class JudgedSheet:
         off_places: (views,) radians that views are turned off even steps; None where the
             mannequin's outlines are to be believed.
         pulled: (views,) radians that views turn where nothing is locked; None: nothing is.
-        faces_contradict: probability that what looks like faces must be none.
+        faces_contradict: probability that faces are not where the cameras have the front.
         bent: the mannequin was another body, its proportions were fitted.
     """
 
@@ -196,6 +197,18 @@ CHECKS: Mapping[str, Callable[[JudgedSheet], Views | None]] = {
     "sheet": check_sheet,
     **OF_DRAWINGS,
 }
+
+
+def check_names(without: Iterable[str]) -> None:
+    """Refuse names of checks that do not exist.
+
+    Raises:
+        UsageError: there is no such check.
+    """
+    for name in without:
+        if name not in CHECKS:
+            known = ", ".join(CHECKS)
+            raise UsageError(f"calibrate: there is no check {name!r}; choose from {known}")
 
 
 def apply_checks(

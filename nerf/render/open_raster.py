@@ -196,11 +196,7 @@ def _pure(look: _Look, rest: _Rest, lines: Share) -> list[Bool[np.ndarray, "heig
     """Return where every paint is seen alone: amid its own, or thin and in its own colour."""
     color = rest.color / np.maximum(rest.alpha, 1e-6)[..., None]
     off = np.linalg.norm(color - look.paints[look.labels] / 255.0, axis=-1)
-    pure = (
-        (is_uniform(look.labels.astype(np.int16)) | (off < PLAIN))
-        & (rest.alpha > 1 - FAINT)
-        & (lines < PURE)
-    )
+    pure = (is_uniform(look.labels) | (off < PLAIN)) & (rest.alpha > 1 - FAINT) & (lines < PURE)
     return [pure & (look.labels == number) for number in range(len(look.paints))]
 
 
@@ -228,7 +224,7 @@ def _edges(
     """
     upper, lower = np.full(look.labels.shape, -1), look.labels.copy()
     share = np.zeros(look.labels.shape)
-    at = ~is_uniform(look.labels.astype(np.int16)) & (rest.alpha > 0)
+    at = ~is_uniform(look.labels) & (rest.alpha > 0)
     side = (AROUND_PX, AROUND_PX)
     counts = [cv2.boxFilter(one.astype(np.float32), -1, side, normalize=False)[at] for one in pure]
     seen = np.stack(counts)

@@ -10,8 +10,10 @@ import trimesh
 
 from bench.calib.figures import view_error
 from bench.cases.bodies import random_body
+from toonset.calib.calibrate import calibrate
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.known import Known
+from toonset.calib.options import CalibrationOptions, VerdictThresholds
 from toonset.calib.outline.correspondences import Drawing, match
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose
@@ -23,6 +25,7 @@ from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
+from toonset.errors import UsageError
 from toonset.mesh import Mesh
 
 CLEAN = SynthOptions(views=5, cell_px=220, outline_px=0, elevation_deg=8)
@@ -52,6 +55,25 @@ def drawn():
 @pytest.fixture(scope="module")
 def near():
     return solved(dataclasses.replace(CLEAN, distance_heights=2.5), 31)
+
+
+def test_options_reach_the_verdict_and_are_recorded_where_they_differ(clean):
+    views = split_picture(clean[0].sheet).views
+    strict = CalibrationOptions(
+        2, thresholds=VerdictThresholds(weak_sigma_deg=0.01), without=("locks",)
+    )
+    usual, doubting = (
+        calibrate(views, clean[0].mesh, options=o) for o in (CalibrationOptions(2), strict)
+    )
+    assert {view.verdict for view in usual.views} == {"ok"}
+    said = usual.origin["options"]
+    assert said["starts"] == 2
+    assert not {"thresholds", "without"} & said.keys()
+    assert {view.verdict for view in doubting.views} == {"weak"}
+    more = {"thresholds": {"weak_sigma_deg": 0.01}, "without": ["locks"]}
+    assert doubting.origin["options"] == said | more
+    with pytest.raises(UsageError, match="there is no check 'lock'; choose from even steps"):
+        calibrate(views, clean[0].mesh, options=CalibrationOptions(without=("lock",)))
 
 
 def test_drawn_sheets_are_solved_within_the_drawing_error(drawn):

@@ -4,6 +4,7 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -40,8 +41,6 @@ def test_full_disk_keeps_the_old_file(tmp_path, monkeypatch):
 
 
 def test_a_full_device_is_one_clear_error():
-    from pathlib import Path
-
     with pytest.raises(OutputError, match="cannot be written"):
         write_bytes(Path("/dev/full/x"), b"data")
 
@@ -147,6 +146,21 @@ def test_a_claim_lasts_as_long_as_the_command_and_may_be_repeated(tmp_path):
             (folder / "a").write_text("")
         assert names(tmp_path) == [".out.lock", "out"]
     assert names(tmp_path) == ["out"]
+
+
+def test_a_new_place_deeper_down_leaves_no_lock_above(tmp_path):
+    with command():
+        check_new_folder(tmp_path / "a" / "b" / "out")
+        assert names(tmp_path) == [".a~b~out.lock"]
+        with new_folder(tmp_path / "a" / "b" / "out") as folder:
+            (folder / "a").write_text("")
+    assert names(tmp_path) == ["a"]
+    assert names(tmp_path / "a" / "b") == ["out"]
+
+
+def test_the_root_of_all_folders_is_refused_as_any_other():
+    with pytest.raises(OutputError, match="exists already"):
+        check_new_folder(Path("/"))
 
 
 def test_a_folder_that_another_made_meanwhile_stays(tmp_path):
