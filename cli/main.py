@@ -1,16 +1,21 @@
 """Run the `toonset` program: load a verb when it is called, turn errors into exit codes.
 
 Exit codes: 0 fine; 1 our bug; 2 bad input or usage; 3 done, but a person should look (a view or a
-run is not ok, a cut is doubtful, a drawing contradicts the others); 130 interrupted.
+run is not ok, a cut is doubtful, a drawing contradicts the others); 128 + n ended by signal n, as
+130 is Ctrl-C.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import importlib
+import io
 import keyword
 import os
+import signal
 import sys
+from types import FrameType
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -27,7 +32,8 @@ VERBS = (  # in the order in which they are used
 # Where a verb shares another one's module:
 MODULES = {"consistency": "evaluate", "info": "check", "recolor": "palette"}
 
-INTERRUPTED, REFUSED = 130, 2
+BY_SIGNAL = 128  # plus the signal's number, as shells have it
+INTERRUPTED, REFUSED = BY_SIGNAL + signal.SIGINT, 2
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name
 RENAMED = {  # switches of before
     "--as-bent": "--no-unwarp",
@@ -79,33 +85,84 @@ def main() -> None:
     run(app, "toonset")
 
 
+class Ended(SystemExit):
+    """The program is ended by a signal: whatever is being written is cleared away first."""
+
+
 def run(program: typer.Typer, name: str) -> None:
     """Run a program of verbs and leave with its exit code; mistakes are one line on stderr."""
+    _open_streams()
+    _end_by_signals()
     # Waiting threads that spin cost a loaded machine an order of magnitude; must precede torch.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     # NumPy's matrices are small here, and torch has threads of its own; must precede numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
+        _check_current_folder()
         with lock.command():
             code = program(prog_name=name, standalone_mode=False)
+        sys.stdout.flush()
+    except Ended as ended:
+        _say(name, f"ended by {signal.Signals(int(str(ended)) - BY_SIGNAL).name}")
+        raise
+    except KeyboardInterrupt:  # outside of typer, which catches it within
+        code = INTERRUPTED
     except ToonsetError as error:
         _refuse(name, one_line(error))
     except UsageError as error:
         _refuse(name, one_line(_usage(error)))
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_stdout()
         sys.exit(1)
     except OSError as error:
-        if error.errno not in PLACES_AT_FAULT or not isinstance(error.filename, str):
+        if error.errno not in PLACES_AT_FAULT or not isinstance(error.filename, str | None):
             raise
-        place, reason = one_line(error.filename), error.strerror
+        place, reason = one_line(error.filename or "standard output"), error.strerror
+        if error.filename is None:
+            _close_stdout()
         _refuse(name, f"{place}: {reason}; free or choose another place")
     except MemoryError as error:
         _refuse(name, f"out of memory ({one_line(error)}); use smaller input")
-    if code == INTERRUPTED:  # typer has caught Ctrl-C
+    if code == INTERRUPTED:
         _say(name, "interrupted")
     if code:
         sys.exit(code)
+
+
+def _open_streams() -> None:
+    """Let closed streams lead nowhere, and print any name on streams that have not all letters."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass  # else the next file that is opened would take its number
+    os.close(descriptor)
+    sys.stdout = sys.stdout or open(1, "w", closefd=False)
+    sys.stderr = sys.stderr or open(2, "w", closefd=False)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _close_stdout() -> None:
+    """Let what is not printed yet lead nowhere: Python would try again at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _end_by_signals() -> None:
+    """Let signals that end a program end it as Ctrl-C does: what is half-written goes."""
+
+    def end(number: int, _: FrameType | None) -> None:
+        raise Ended(BY_SIGNAL + number)
+
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        with contextlib.suppress(ValueError):  # not in the main thread
+            if signal.getsignal(number) == signal.SIG_DFL:  # not of `nohup`
+                signal.signal(number, end)
+
+
+def _check_current_folder() -> None:
+    try:
+        os.getcwd()
+    except FileNotFoundError as error:
+        raise ToonsetError("the current folder has been deleted; change to another one") from error
 
 
 def _usage(error: Any) -> str:
@@ -123,4 +180,5 @@ def _refuse(name: str, text: str) -> NoReturn:
 
 def _say(name: str, text: str) -> None:
     over_progress = "\r\x1b[K" if sys.stderr.isatty() else ""
-    print(f"{over_progress}{name}: {text}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # nowhere to say it: the exit code does
+        print(f"{over_progress}{name}: {text}", file=sys.stderr, flush=True)

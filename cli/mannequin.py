@@ -50,7 +50,7 @@ def mannequin(
     from toonset.dataset.mannequin.make import make_mannequin
 
     made = make_mannequin(options)
-    write_mannequin(made, out)
+    write_mannequin(made, out, force=force)
     faces, beside = len(made.mesh.faces), landmarks_path(out)
     printer = Printer(as_json, quiet)
     printer.say(f"{faces} faces; {len(made.landmarks)} landmarks in {beside}")

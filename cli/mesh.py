@@ -104,7 +104,7 @@ def mesh(
     else:
         surface = surface_of(trained, faces, progress, variants=others)
         files = mesh_files(surface, out)
-    write_mesh_files(files, out)
+    write_mesh_files(files, out, force=force)
     if others:
         values["variants"] = [ORIGINAL, *(name for name, _ in others)]
     values |= {"faces": len(surface.faces), "vertices": len(surface.vertices)}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from toonset import lock
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -147,6 +148,8 @@ def palette(
     if target != bundle:
         read = places if corrections is None else [*places, corrections]
         check_output(target, read, (*WRITTEN, *FOLDERS), force=force)
+    else:
+        lock.claim(lock.set_of(target / WRITTEN[0]))
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     drawn = load_pictures(places)
     for note in drawn.notes:

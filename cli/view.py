@@ -40,7 +40,7 @@ def view(
     check_new_file(out, force=force)
     printer.progress("reading the field, drawing a turn")
     data = view_html(folder).encode("utf-8")
-    write_bytes(out, data)
+    write_bytes(out, data, force=force)
     printer.result(
         {"out": out, "bytes": len(data)},
         f"{out}: {len(data) / 1e6:.1f} MB; open it in a browser, or send it",

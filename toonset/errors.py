@@ -68,6 +68,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
+def as_text(name: str) -> str:
+    """Return a file's name with U+FFFD for the bytes that are no text."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
 def one_line(message: object) -> str:
     """Return a message on one printable line, runs of white space as one space."""
     return printable(" ".join(str(message).split()))

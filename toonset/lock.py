@@ -6,7 +6,9 @@ import contextlib
 import os
 import re
 import shutil
+import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from contextvars import ContextVar
@@ -21,6 +23,10 @@ except ImportError:  # Windows: nothing is locked there
 
 Lock = tuple[int, Path]  # descriptor and name of a locked file
 TEMPORARY, OLD = ".tmp", ".old"  # ends of hidden names: being written; about to be replaced
+NEW = ".new"  # of a hidden folder: files that are decided to come to lie beside it
+GONE, BEFORE = ".gone", ".before"  # in it: names that are to go; what has been replaced
+FOLDERS = ("contours", "coverage", "labels", "tones")  # that may be replaced so, with files
+PATIENCE_S, NAP_S = 10.0, 0.02  # to wait for a process that is moving files into place
 _COMMAND: ContextVar[ExitStack | None] = ContextVar("command", default=None)
 _GUARD = threading.Lock()
 _HELD: dict[Path, tuple[Lock | None, int]] = {}  # by output: its lock, how often it is held
@@ -49,36 +55,122 @@ def claim(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def hold(path: Path) -> Iterator[None]:
+def hold(path: Path, patience_s: float = 0) -> Iterator[None]:
     """Hold an output; who holds it may hold it again.
 
     The lock is the system's on a hidden file beside the output, so that it ends with the process,
-    however that ends. What killed processes left of this output is removed.
+    however that ends. What killed processes left of this output is finished or removed.
+
+    Args:
+        path: the output.
+        patience_s: how long to wait for another process.
 
     Raises:
-        OutputError: another process holds it.
+        OutputError: another process holds it, or what one left cannot be finished.
     """
     path = Path(os.path.abspath(path))
-    _acquire(path)
+    _acquire(path, patience_s)
     try:
         yield
     finally:
         _release(path)
 
 
+def set_of(path: Path) -> Path:
+    """Return what files that are replaced together are held by: their name up to its first dot.
+
+    White space counts as "_", since the files that belong to an OBJ have none in their names.
+    """
+    path = Path(os.path.abspath(path))
+    start = path.name[:1] + path.name[1:].split(".")[0]
+    return path.with_name("_".join(start.split()) or "_") if path.name else path
+
+
+def settle(path: Path) -> None:
+    """Finish what a killed process had decided to write at `path` and beside it; before reading.
+
+    Raises:
+        OutputError: the place cannot be written.
+    """
+    held = set_of(path)
+    try:
+        decided = decided_folder(held)
+        is_left = decided.is_dir() and not decided.is_symlink()
+    except (OSError, ValueError):  # whoever reads there says so
+        return
+    if is_left:
+        with hold(held, PATIENCE_S):
+            pass
+
+
+def decided_folder(held: Path) -> Path:
+    """Return the hidden folder of files that are decided to be replaced together."""
+    return held.with_name(f".{held.name}{NEW}")
+
+
+def move_into_place(decided: Path) -> None:
+    """Let decided files and folders take their places beside `decided`, which is removed.
+
+    Whoever is killed here is followed by somebody who does what is left. A bundle from elsewhere
+    may bring such a folder: no more than files of the one name and `FOLDERS` are moved.
+
+    Raises:
+        OutputError: the folder holds what no toonset puts there.
+        OSError: the place cannot be written.
+    """
+    before, gone, beside = decided / BEFORE, decided / GONE, decided.parent
+    new = [entry for entry in decided.iterdir() if entry not in (before, gone)]
+    old = gone.read_text("utf-8", "replace").splitlines() if gone.exists() else []
+    held = decided.name.removeprefix(".").removesuffix(NEW)
+    for path in (*new, *(decided / name for name in old)):
+        known = path.name in FOLDERS or set_of(path).name == held
+        if path.parent != decided or path.is_symlink() or before.is_symlink() or not known:
+            raise OutputError(f"{decided}: holds {path.name!r}, which no toonset wrote; remove it")
+    before.mkdir(exist_ok=True)
+    for name in old:
+        _put_into(before, beside / name)
+    for entry in sorted(new, key=lambda entry: (entry.is_file(), entry.name)):
+        if entry.is_dir():
+            _put_into(before, beside / entry.name)
+        os.replace(entry, beside / entry.name)
+    flush(beside)
+    shutil.rmtree(decided)
+
+
+def flush(folder: Path) -> None:
+    """Write a folder's names to disk, where the system can."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
 def is_temporary(name: str) -> bool:
     """Return whether a name is one of those that writing leaves if it is killed."""
-    return re.fullmatch(rf"\..+\.[a-z0-9_]{{8}}({TEMPORARY}|{OLD})", name) is not None
+    return named(name) != name
 
 
-def _acquire(path: Path) -> None:
+def named(name: str) -> str:
+    """Return what is written under a temporary name; other names as they are."""
+    found = re.fullmatch(rf"\.(.+)\.[a-z0-9_]{{8}}({TEMPORARY}|{OLD})", name)
+    return found[1] if found else name
+
+
+def _acquire(path: Path, patience_s: float) -> None:
     with _GUARD:
         if path in _HELD:
             lock, times = _HELD[path]
             _HELD[path] = lock, times + 1
             return
-        _HELD[path] = _locked(path), 1
-    _clear(path)
+        _HELD[path] = _locked(path, patience_s), 1
+    try:
+        _finish(path)
+    except OutputError:
+        _release(path)
+        raise
+    _sweep(path)
 
 
 def _release(path: Path) -> None:
@@ -92,10 +184,11 @@ def _release(path: Path) -> None:
             os.close(lock[0])
 
 
-def _locked(path: Path) -> Lock | None:
+def _locked(path: Path, patience_s: float) -> Lock | None:
     """Return the locked file; None where the place or the system has no locks."""
     if fcntl is None or path.name == "":
         return None
+    until = time.monotonic() + patience_s
     while True:
         file = _lock_file(path)
         try:
@@ -108,6 +201,9 @@ def _locked(path: Path) -> Lock | None:
                 return descriptor, file
         except BlockingIOError as error:
             os.close(descriptor)
+            if time.monotonic() < until:
+                time.sleep(NAP_S)
+                continue
             raise OutputError(
                 f"{path}: is in use by another toonset; wait for it, or choose another -o"
             ) from error
@@ -125,7 +221,21 @@ def _lock_file(path: Path) -> Path:
     return parent / f".{'~'.join(path.relative_to(parent).parts)}.lock"
 
 
-def _clear(path: Path) -> None:
+def _finish(path: Path) -> None:
+    """Go on with moving files into place where another process was killed."""
+    decided = decided_folder(path)
+    try:
+        if decided.is_dir() and not decided.is_symlink():
+            move_into_place(decided)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(
+            f"{decided}: holds results that cannot be put in place ({reason}); make the folder "
+            "writable"
+        ) from error
+
+
+def _sweep(path: Path) -> None:
     """Remove what killed processes left; an old output that was put aside comes back."""
     pattern = re.compile(rf"\.{re.escape(path.name)}\.[a-z0-9_]{{8}}({TEMPORARY}|{OLD})")
     with contextlib.suppress(OSError):
@@ -137,3 +247,9 @@ def _clear(path: Path) -> None:
                 shutil.rmtree(entry, ignore_errors=True)
             else:
                 entry.unlink()
+
+
+def _put_into(folder: Path, path: Path) -> None:
+    """Move a file or folder away, if it is there."""
+    if os.path.lexists(path):
+        os.replace(path, Path(tempfile.mkdtemp(dir=folder)) / path.name)

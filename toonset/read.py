@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from toonset.errors import ToonsetError, printable
+from toonset.lock import settle
 
 FOREIGN_FORMATS = (
     (b"PK\x03\x04", "a zip archive (or a Krita, OpenRaster or Office file)"),
@@ -56,9 +57,10 @@ def check_there(paths: Iterable[Path | None], thing: str, error_type: type[Toons
     Raises:
         ToonsetError: as `error_type`: a file is not there.
     """
-    for path in paths:
+    for path in filter(None, paths):
+        settle(path)
         try:
-            _ = path and path.stat()
+            path.stat()
         except FileNotFoundError as error:
             raise error_type(_missing(path, thing)) from error
         except (OSError, ValueError):
@@ -79,6 +81,7 @@ def read_whole(
     Raises:
         ToonsetError: as `error_type`: missing, a folder, a device, unreadable, empty, too long.
     """
+    settle(path)
     try:
         size = path.stat().st_size
         if path.is_dir():

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.errors import SheetError
+from toonset.errors import SheetError, as_text
 
 SHOWN_PX, SHOWN_BYTES = 480, 200_000  # of a picture in a notebook, at most
 SHEET = "sheet"  # the role of a file that holds drawings, side by side or one
@@ -150,6 +150,10 @@ class InputFile:
     role: str
     name: str
     sha256: str
+
+    def __post_init__(self) -> None:
+        """Keep a name that any file can hold."""
+        object.__setattr__(self, "name", as_text(self.name))
 
     @classmethod
     def of(cls, role: str, path: Path) -> InputFile:

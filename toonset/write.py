@@ -16,17 +16,23 @@ from typing import Any
 
 from toonset import lock
 from toonset.errors import OutputError
-from toonset.lock import OLD, TEMPORARY, hold, is_temporary
+from toonset.lock import GONE, OLD, TEMPORARY, flush, hold, is_temporary
 
 LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")
 THERE_ALREADY = (errno.ENOTEMPTY, errno.EEXIST)
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: Path, data: bytes, *, force: bool = True) -> None:
     """Write `data` to `path` so that `path` holds either its old content or all of the new.
 
+    Args:
+        path: the file.
+        data: its content.
+        force: replace a file that is there.
+
     Raises:
-        OutputError: the place cannot be written (missing permission, full disk, a folder there).
+        OutputError: the place cannot be written (missing permission, full disk, a folder there),
+            or `force` is off and the file is there.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -39,13 +45,54 @@ def write_bytes(path: Path, data: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
+        _give_name(Path(name), path, force=force)
         if not any(map(is_temporary, path.parent.parts)):  # a new folder is flushed as a whole
-            _flush(path.parent)
+            flush(path.parent)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
         raise _output_error(path, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            os.unlink(name)  # where it has not become the file
+
+
+@contextlib.contextmanager
+def new_files(path: Path, gone: Iterable[str] = (), *, force: bool) -> Iterator[Path]:
+    """Yield an empty temporary folder whose files and folders come to lie beside each other.
+
+    All or none of them, with one rename of the temporary folder: killed before it, nothing has
+    changed; killed after it, `toonset.lock.settle` does what is left, for whoever reads or writes
+    there next. Only files of `path`'s name up to the first dot, and `toonset.lock.FOLDERS`, can be
+    replaced so.
+
+    Args:
+        path: the file that names the others; they lie in its folder.
+        gone: names that are to go if they are there.
+        force: replace what is there.
+
+    Raises:
+        OutputError: something is there and `force` is off, it is in use by another process, or the
+            place cannot be written.
+    """
+    path = Path(os.path.abspath(path))
+    held = lock.set_of(path)
+    with hold(held):
+        temporary = _temporary_folder(held)
+        try:
+            yield temporary
+            names = [entry.name for entry in temporary.iterdir()]
+            for name in names:
+                if not force and os.path.lexists(path.with_name(name)):
+                    raise OutputError(_made_meanwhile(path.with_name(name)))
+            write_bytes(temporary / GONE, "\n".join(gone).encode())
+            _flush_whole(temporary)
+            decided = lock.decided_folder(held)
+            os.rename(temporary, decided)
+            flush(path.parent)
+            lock.move_into_place(decided)
+        except OSError as error:
+            raise _output_error(path, error) from error
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -68,13 +115,7 @@ def new_folder(path: Path, *, force: bool = False) -> Iterator[Path]:
     path = Path(os.path.abspath(path))
     with hold(path):
         check_new_folder(path, force=force)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            name = tempfile.mkdtemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
-            temporary = Path(name)
-            temporary.chmod(0o777 & ~_umask())
-        except OSError as error:
-            raise _output_error(path, error) from error
+        temporary = _temporary_folder(path)
         try:
             yield temporary
             _swap_in(temporary, path, force=force)
@@ -187,35 +228,18 @@ def check_removable(path: Path, written: str) -> None:
             raise OutputError(f"{path}: holds {name!r}, which this command does not write; move it")
 
 
-def remove_folder(path: Path) -> None:
-    """Take a folder away, whole or not at all; one that is not there is left so.
-
-    Raises:
-        OutputError: its parent cannot be written.
-    """
-    if not path.exists():
-        return
-    try:
-        shutil.rmtree(_put_aside(path), ignore_errors=True)
-    except OSError as error:
-        raise _output_error(path, error) from error
-
-
 def _swap_in(temporary: Path, path: Path, *, force: bool) -> None:
     """Give a new folder its name; an old one comes to lie under the temporary name."""
-    for folder, _, _ in os.walk(temporary, topdown=False):
-        _flush(Path(folder))
+    _flush_whole(temporary)
     try:
         os.rename(temporary, path)  # not onto a folder with something in it
     except OSError as error:
         if error.errno not in THERE_ALREADY:
             raise
         if not force:
-            raise OutputError(
-                f"{path}: another program has made it meanwhile; choose another -o"
-            ) from error
+            raise OutputError(_made_meanwhile(path)) from error
         exchange_folders(temporary, path)
-    _flush(path.parent)
+    flush(path.parent)
 
 
 def exchange_folders(new: Path, path: Path) -> None:
@@ -258,14 +282,39 @@ def _put_aside(path: Path) -> Path:
     return old
 
 
-def _flush(folder: Path) -> None:
-    """Write a folder's names to disk, where the system can."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
+def _temporary_folder(path: Path) -> Path:
+    """Make an empty hidden folder beside `path`, named after it."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        name = tempfile.mkdtemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
+        os.chmod(name, 0o777 & ~_umask())
+    except OSError as error:
+        raise _output_error(path, error) from error
+    return Path(name)
+
+
+def _give_name(temporary: Path, path: Path, *, force: bool) -> None:
+    """Give a new file its name; without `force` never another's, where the system has links."""
+    if not force:
         try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+            os.link(temporary, path)
+        except FileExistsError as error:
+            raise OutputError(_made_meanwhile(path)) from error
+        except OSError:
+            if path.exists():
+                raise
+        else:
+            return
+    os.replace(temporary, path)
+
+
+def _flush_whole(root: Path) -> None:
+    for folder, _, _ in os.walk(root, topdown=False):
+        flush(Path(folder))
+
+
+def _made_meanwhile(path: Path) -> str:
+    return f"{path}: another program has made it meanwhile; choose another -o"
 
 
 def _umask() -> int:
@@ -276,4 +325,5 @@ def _umask() -> int:
 
 def _output_error(path: Path, error: OSError) -> OutputError:
     reason = error.strerror or str(error)
+    path = Path(*map(lock.named, path.parts))
     return OutputError(f"{path}: cannot be written ({reason}); free space or choose another -o")

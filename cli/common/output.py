@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 import time
@@ -10,6 +11,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from toonset.errors import printable
 
 OUTPUT_PANEL = "Output"  # of the help
 JsonFlag = Annotated[
@@ -34,6 +37,7 @@ ForceFlag = Annotated[
 ]
 
 SECONDS_BETWEEN_LOG_LINES = 5.0
+ERASE_LINE = "\r\x1b[K"
 
 
 @dataclass
@@ -58,16 +62,17 @@ class Printer:
     def doubt(self, text: str) -> None:
         """Print on stderr what to look at, quiet or not: why the exit code is 3, or a run weak."""
         self._clear()
-        print(text, file=sys.stderr, flush=True)
+        _write(f"{_shown(text)}\n")
 
     def progress(self, text: str) -> None:
         """Show where the work stands: one live line on a terminal, a line every 5 s in a log."""
         if self.quiet:
             return
         if sys.stderr.isatty():
-            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+            self._clear()
+            _write(_shown(text))
         elif time.monotonic() - self._last > SECONDS_BETWEEN_LOG_LINES:
-            print(text, file=sys.stderr, flush=True)
+            _write(f"{_shown(text)}\n")
             self._last = time.monotonic()
 
     def result(self, values: dict[str, Any], text: str) -> None:
@@ -76,11 +81,21 @@ class Printer:
         if self.as_json:
             print(json.dumps(values, default=_plain))
         elif text:
-            print(text)
+            print(_shown(text))
 
     def _clear(self) -> None:
         if not self.quiet and sys.stderr.isatty():
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            _write(ERASE_LINE)
+
+
+def _write(text: str) -> None:
+    with contextlib.suppress(OSError):  # a log on a full disk; the work goes on
+        print(text, end="", file=sys.stderr, flush=True)
+
+
+def _shown(text: str) -> str:
+    """Return lines that a terminal shows as they are: they may hold names of files."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def _plain(value: Any) -> Any:

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from toonset.cli.common.output import Printer
 
@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from toonset.nerf.train.progress import Status
 
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
 EXIT_CODE = 128  # plus the signal's number, as shells have it
 LIVE_S = 0.1  # between changes of the live line
 LOG_S = 10.0  # between lines of a log at most
@@ -39,6 +41,7 @@ class Stopper:
         """Say through `printer` that a wish was heard."""
         self.signal = 0
         self._printer, self._running = printer, False
+        self._kept: dict[int, Any] = {}  # handlers of before
 
     @property
     def exit_code(self) -> int:
@@ -53,7 +56,7 @@ class Stopper:
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
         """Listen within the block."""
-        kept = {}
+        kept = self._kept
         with contextlib.suppress(ValueError):  # not in the main thread: nothing to listen to
             for number in SIGNALS:
                 if signal.getsignal(number) is not signal.SIG_IGN:  # a background job's
@@ -64,9 +67,12 @@ class Stopper:
             for number, handler in kept.items():
                 signal.signal(number, handler)
 
-    def _hear(self, number: int, _: FrameType | None) -> None:
+    def _hear(self, number: int, frame: FrameType | None) -> None:
         if self.signal or not self._running:
-            raise KeyboardInterrupt
+            before = self._kept[number]
+            if not callable(before):
+                raise KeyboardInterrupt
+            before(number, frame)  # ends the program
         self.signal = number
         self._printer.say(
             "stopping after this step, to write the run as it stands; once more to leave at once"

@@ -11,9 +11,7 @@ contours/000.png ..  per picture: grey PNG, how far drawn lines cover each pixel
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +25,7 @@ from toonset.palette.names import clean_name
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
 from toonset.palette.swatch_image import draw_swatches
-from toonset.write import check_removable, new_folder, remove_folder, write_bytes
+from toonset.write import check_removable, new_files, write_bytes
 
 PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
 COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs
@@ -85,9 +83,7 @@ def write_palette(
     They replace older ones. Without contours, older ones stay: they depend on the pictures alone;
     without tones or coverage, older ones go: a flat sheet has no tones.
 
-    Everything is written beside the old files first and renamed at the end, palette.json last: a
-    full disk leaves the older palette as it was, and whenever palette.json is there, the other
-    maps fit it.
+    All of them change at once or none does: see `toonset.write.new_files`.
 
     Args:
         folder: a bundle, or a new folder.
@@ -100,30 +96,25 @@ def write_palette(
     Raises:
         OutputError: the folder cannot be written, or a map folder holds what no palette wrote.
     """
-    beside: dict[str, Maps | Coverages] = {"tones": tones, "coverage": coverage}
-    for name in (name for name, maps in beside.items() if not maps):
+    folders: dict[str, Maps | Coverages] = {
+        "labels": labels,
+        "contours": contours,
+        "tones": tones,
+        "coverage": coverage,
+    }
+    gone = [name for name in ("tones", "coverage") if not folders[name]]
+    for name in gone:
         check_removable(folder / name, "*.png")
-    files = {f"palette{end}": encode_palette(palette, end) for end in COPIES}
-    files[SWATCHES] = encode_png(draw_swatches(palette))
-    files[PALETTE_JSON] = encode_palette(palette, ".json")
-    if contours:
-        with new_folder(folder / "contours", force=True) as temporary:
-            for name, values in contours:
-                write_bytes(temporary / name, encode_grey_png(values))
-    placed = folder / "labels"
-    with ExitStack() as whole:
-        temporary = whole.enter_context(new_folder(placed, force=True))
-        for place, maps in ((folder / name, maps) for name, maps in beside.items() if maps):
-            new = whole.enter_context(new_folder(place, force=True))
+    with new_files(folder / PALETTE_JSON, gone, force=True) as new:
+        for place, maps in folders.items():
             for name, values in maps:
-                encode = encode_grey_png if values.ndim == 2 else encode_png
-                write_bytes(new / name, encode(values))
-        for name, values in labels:
-            write_bytes(temporary / name, encode_indexed_png(values, palette.rgb))
-        for name, data in files.items():
-            write_bytes(temporary / name, data)
-        (folder / PALETTE_JSON).unlink(missing_ok=True)
-        for name in (name for name, maps in beside.items() if not maps):
-            remove_folder(folder / name)
-    for name in files:
-        os.replace(placed / name, folder / name)
+                write_bytes(new / place / name, _encode_map(place, values, palette))
+        for end in (*COPIES, ".json"):
+            write_bytes(new / f"palette{end}", encode_palette(palette, end))
+        write_bytes(new / SWATCHES, encode_png(draw_swatches(palette)))
+
+
+def _encode_map(place: str, values: np.ndarray, palette: Palette) -> bytes:
+    if place == "labels":
+        return encode_indexed_png(values, palette.rgb)
+    return encode_grey_png(values) if values.ndim == 2 else encode_png(values)

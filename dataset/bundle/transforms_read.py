@@ -9,6 +9,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.transforms_camera import camera_of
 from toonset.dataset.bundle.transforms_schema import FrameRecord, TransformsFile, read_records
 from toonset.errors import BundleError, CameraError
+from toonset.lock import settle
 
 NAMES = ("transforms.json", "transforms_train.json")
 MAX_SCENE_PIXELS = 2_000_000_000  # of all pictures together: 8 GB in memory
@@ -55,11 +56,12 @@ def transforms_file(path: Path) -> Path:
                 raise BundleError(
                     f"{path}: holds no transforms.json; run `toonset calibrate` first"
                 )
-            return found
+            path = found
         if not path.exists():
             raise BundleError(f"{path}: does not exist; give a bundle folder or a transforms.json")
     except (OSError, ValueError) as error:  # too long, a loop of links, a NUL
         raise BundleError(f"{str(path)[:80]}: is no file name; correct it") from error
+    settle(path.with_name("palette.json"))  # and its maps
     return path
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 from toonset.dataset.mannequin.landmark_formats import SCHEMA
 from toonset.dataset.mannequin.make import Mannequin
 from toonset.dataset.mesh.load import save_obj
 from toonset.errors import OutputError
-from toonset.write import check_new_file, write_bytes, write_json
+from toonset.write import check_new_file, new_files, write_bytes, write_json
 
 
 def landmarks_path(mesh_path: Path) -> Path:
@@ -35,25 +33,14 @@ def check_files(mesh_path: Path, *, force: bool) -> None:
         check_new_file(path, force=force)
 
 
-def write_mannequin(mannequin: Mannequin, mesh_path: Path) -> None:
-    """Write both files; where one cannot be written, both stay as they were.
+def write_mannequin(mannequin: Mannequin, mesh_path: Path, *, force: bool) -> None:
+    """Write both files, or none.
 
     Raises:
-        OutputError: the place cannot be written.
+        OutputError: the place cannot be written, or `force` is off and a file is there.
     """
     points = {name: point.tolist() for name, point in mannequin.landmarks.items()}
     landmarks = {"schema": SCHEMA, "units": "world", "points": points}
-    targets = (mesh_path, landmarks_path(mesh_path))
-    try:
-        mesh_path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".mannequin.", dir=mesh_path.parent) as folder:
-            mesh_file, landmarks_file = (Path(folder) / target.name for target in targets)
-            write_bytes(mesh_file, save_obj(mannequin.mesh))
-            write_json(landmarks_file, landmarks)
-            os.replace(mesh_file, targets[0])
-            os.replace(landmarks_file, targets[1])
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(
-            f"{mesh_path}: cannot be written ({reason}); free space or choose another -o"
-        ) from error
+    with new_files(mesh_path, force=force) as folder:
+        write_bytes(folder / mesh_path.name, save_obj(mannequin.mesh))
+        write_json(folder / landmarks_path(mesh_path).name, landmarks)

@@ -25,7 +25,7 @@ from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.split_folder.views import Split, join_splits, split_of_sheet, without
-from toonset.errors import PictureError, SheetError, UsageError
+from toonset.errors import PictureError, SheetError, UsageError, as_text
 from toonset.palette.names import rgb_of_hex
 from toonset.read import read_whole
 from toonset.view import SHEET, InputFile, Origin, View
@@ -233,7 +233,7 @@ def _of_sheet(path: Path, options: SheetOptions, where: str) -> Sheet:
         found = split_picture(picture, options)
     except SheetError as error:
         raise SheetError(f"{path}: {error}") from error
-    split = split_of_sheet(path.name, data, (width, height), found)
+    split = split_of_sheet(as_text(path.name), data, (width, height), found)
     files = (InputFile(SHEET, path.name, split.sources[0].sha256),)
     notes = _uneven_cells(path, (width, height), options.grid)
     return Sheet(split, len(split.views), (picture,), files, notes=notes)

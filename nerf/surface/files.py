@@ -24,7 +24,7 @@ from toonset.errors import OutputError
 from toonset.mesh import split_by_face
 from toonset.nerf.options import ORIGINAL
 from toonset.palette.names import hex_of
-from toonset.write import check_new_file, write_bytes
+from toonset.write import check_new_file, new_files, write_bytes
 
 KINDS = (".glb", ".obj", ".ply")
 CELL_PX = 8  # of the palette's texture: neighbours do not bleed into a colour's middle
@@ -72,7 +72,7 @@ class Surface:
         path = Path(path)
         check_mesh_files(path, force=force, variants=bool(self.variants))
         files = mesh_files(self, path)
-        write_mesh_files(files, path)
+        write_mesh_files(files, path, force=force)
         return {name: len(data) for name, data in files.items()}
 
 
@@ -113,14 +113,15 @@ def check_mesh_files(path: Path, *, force: bool, variants: bool = False) -> None
         check_new_file(file, force=force)
 
 
-def write_mesh_files(files: dict[str, bytes], path: Path) -> None:
-    """Write what `mesh_files` returned beside each other, the mesh last: it names the others.
+def write_mesh_files(files: dict[str, bytes], path: Path, *, force: bool) -> None:
+    """Write what `mesh_files` returned beside each other, all of it or nothing.
 
     Raises:
-        OutputError: the place cannot be written.
+        OutputError: the place cannot be written, or `force` is off and a file is there.
     """
-    for name in reversed(files):
-        write_bytes(path.with_name(name), files[name])
+    with new_files(path, force=force) as folder:
+        for name, data in files.items():
+            write_bytes(folder / name, data)
 
 
 def encode_glb(surface: Surface) -> bytes:

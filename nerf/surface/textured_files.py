@@ -85,7 +85,7 @@ class TexturedSurface:
         shown = {"outline": self.pen is not None, "variants": bool(self.others)}
         check_textured_files(path, **shown, force=force)
         files = encode_textured_files(self, path)
-        write_mesh_files(files, path)
+        write_mesh_files(files, path, force=force)
         return {name: len(data) for name, data in files.items()}
 
 

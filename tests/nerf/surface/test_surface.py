@@ -189,7 +189,7 @@ def test_cuts_are_shared_and_keep_every_area() -> None:
 def test_files_hold_the_same_surface(tmp_path: Path, surface: Surface, name: str) -> None:
     files = mesh_files(surface, tmp_path / name)
     assert next(iter(files)) == name
-    write_mesh_files(files, tmp_path / name)
+    write_mesh_files(files, tmp_path / name, force=False)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(files)
     mesh = load_mesh(tmp_path / name)
     assert len(mesh.faces) == len(surface.faces)
