@@ -34,13 +34,14 @@ def view(
     from toonset.errors import BundleError
     from toonset.nerf.viewer.build import view_html
     from toonset.read import check_there
-    from toonset.write import check_new_file, write_bytes
+    from toonset.write import check_new_file, new_files, write_bytes
 
     check_there([folder], "run or bundle", BundleError)
     check_new_file(out, force=force)
     printer.progress("reading the field, drawing a turn")
     data = view_html(folder).encode("utf-8")
-    write_bytes(out, data, force=force)
+    with new_files(out, force=force) as new:
+        write_bytes(new / out.name, data)
     printer.result(
         {"out": out, "bytes": len(data)},
         f"{out}: {len(data) / 1e6:.1f} MB; open it in a browser, or send it",

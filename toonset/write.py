@@ -22,17 +22,11 @@ LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")
 THERE_ALREADY = (errno.ENOTEMPTY, errno.EEXIST)
 
 
-def write_bytes(path: Path, data: bytes, *, force: bool = True) -> None:
+def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` to `path` so that `path` holds either its old content or all of the new.
 
-    Args:
-        path: the file.
-        data: its content.
-        force: replace a file that is there.
-
     Raises:
-        OutputError: the place cannot be written (missing permission, full disk, a folder there),
-            or `force` is off and the file is there.
+        OutputError: the place cannot be written (missing permission, full disk, a folder there).
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -45,7 +39,7 @@ def write_bytes(path: Path, data: bytes, *, force: bool = True) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
-        _give_name(Path(name), path, force=force)
+        os.replace(name, path)
         if not any(map(is_temporary, path.parent.parts)):  # a new folder is flushed as a whole
             flush(path.parent)
     except OSError as error:
@@ -179,7 +173,7 @@ def check_new_file(path: Path, *, force: bool = False) -> None:
         )
     if path.parent.exists() and not path.parent.is_dir():
         raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
-    lock.claim(path)
+    lock.claim(lock.set_of(path))
 
 
 def check_new_folder(path: Path, *, force: bool = False) -> None:
@@ -291,21 +285,6 @@ def _temporary_folder(path: Path) -> Path:
     except OSError as error:
         raise _output_error(path, error) from error
     return Path(name)
-
-
-def _give_name(temporary: Path, path: Path, *, force: bool) -> None:
-    """Give a new file its name; without `force` never another's, where the system has links."""
-    if not force:
-        try:
-            os.link(temporary, path)
-        except FileExistsError as error:
-            raise OutputError(_made_meanwhile(path)) from error
-        except OSError:
-            if path.exists():
-                raise
-        else:
-            return
-    os.replace(temporary, path)
 
 
 def _flush_whole(root: Path) -> None:

@@ -10,8 +10,16 @@ import pytest
 
 from toonset import write
 from toonset.errors import OutputError
-from toonset.lock import claim, command, hold
-from toonset.write import check_new_folder, exchange_folders, new_folder, write_bytes, write_json
+from toonset.lock import claim, command, hold, settle
+from toonset.read import read_whole
+from toonset.write import (
+    check_new_folder,
+    exchange_folders,
+    new_files,
+    new_folder,
+    write_bytes,
+    write_json,
+)
 
 
 def names(folder):
@@ -224,3 +232,71 @@ def test_a_place_without_locks_is_written_all_the_same(tmp_path, monkeypatch):
     with new_folder(tmp_path / "out") as folder:
         (folder / "a").write_text("")
     assert names(tmp_path) == ["out"]
+
+
+def test_files_come_together_and_those_of_before_go(tmp_path):
+    (tmp_path / "labels").mkdir()
+    (tmp_path / "labels" / "old.png").write_text("")
+    for name in ("palette.json", "other.json"):
+        (tmp_path / name).write_text("old")
+    (tmp_path / "tones").mkdir()
+    with new_files(tmp_path / "palette.json", ["tones", "coverage"], force=True) as folder:
+        write_bytes(folder / "labels" / "new.png", b"")
+        write_bytes(folder / "palette.json", b"new")
+    assert names(tmp_path) == ["labels", "other.json", "palette.json"]
+    assert names(tmp_path / "labels") == ["new.png"]
+    assert (tmp_path / "palette.json").read_text() == "new"
+
+
+def test_without_force_files_come_only_where_all_names_are_free(tmp_path):
+    (tmp_path / "a.mtl").write_text("theirs")
+
+    def write_both():
+        with new_files(tmp_path / "a.obj", force=False) as folder:
+            write_bytes(folder / "a.obj", b"mine")
+            write_bytes(folder / "a.mtl", b"mine")
+
+    with pytest.raises(OutputError, match=r"a\.mtl: another program has made it meanwhile"):
+        write_both()
+    assert names(tmp_path) == ["a.mtl"]
+    assert (tmp_path / "a.mtl").read_text() == "theirs"
+
+
+@pytest.fixture
+def decided(tmp_path, monkeypatch):
+    """Return the folder of files that a process was killed over before it moved any of them."""
+    monkeypatch.setattr("toonset.lock.move_into_place", lambda folder: None)
+    (tmp_path / "tones").mkdir()
+    with new_files(tmp_path / "palette.json", ["tones"], force=True) as folder:
+        write_bytes(folder / "palette.json", b"{}")
+    monkeypatch.undo()
+    return tmp_path / ".palette.new"
+
+
+def test_who_reads_a_place_finishes_what_was_decided_there(decided):
+    assert read_whole(decided.parent / "palette.json", "palette", OutputError) == b"{}"
+    assert names(decided.parent) == ["palette.json"]
+
+
+@pytest.mark.parametrize("name", ["transforms.json", "images", "..", "palette.link", ".gone"])
+def test_a_folder_from_elsewhere_moves_nothing_else(decided, name):
+    if name == "..":  # what is to go: a place above
+        (decided / ".gone").write_text("../" * 3)
+    elif name == ".gone":
+        (decided / ".gone").write_text("transforms.json")
+    elif name == "palette.link":
+        (decided / name).symlink_to("/")
+    else:
+        (decided / name).write_text("foreign")
+    with pytest.raises(OutputError, match="which no toonset wrote; remove it"):
+        settle(decided.parent / "palette.json")
+    assert names(decided.parent) == [".palette.new", "tones"]
+
+
+def test_what_cannot_be_finished_is_told(decided, monkeypatch):
+    def fail(*_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(OutputError, match="cannot be put in place"):
+        settle(decided.parent / "palette.json")

@@ -1,0 +1,96 @@
+"""Streams that are closed or full, names that are no text, signals: no traceback, nothing left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SPLIT = f"{sys.executable} -m toonset split sheet.png -o out"
+ESCAPE = "\x1b"
+
+
+def in_shell(command, folder, **environment):
+    return subprocess.run(
+        ["sh", "-c", command],
+        cwd=folder,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        errors="surrogateescape",
+        timeout=120,
+    )
+
+
+@pytest.fixture
+def folder(drawn, tmp_path):
+    (tmp_path / "sheet.png").write_bytes((drawn / "single.png").read_bytes())
+    return tmp_path
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+@pytest.mark.parametrize(
+    ("command", "code", "err"),
+    [
+        (
+            f"{SPLIT} > /dev/full",
+            2,
+            "toonset: standard output: No space left on device; free or choose another place\n",
+        ),
+        (f"{SPLIT} 2> /dev/full", 0, ""),
+        (f"{SPLIT} >&- -q", 0, ""),
+        (f"{SPLIT} 2>&-", 0, ""),
+        (f"{SPLIT} -q 2>&1 | true", 0, ""),
+        (
+            f"mkdir gone && cd gone && rmdir ../gone && {SPLIT}",
+            2,
+            "toonset: the current folder has been deleted; change to another one\n",
+        ),
+    ],
+)
+def test_streams_and_folders_that_are_not_there(folder, command, code, err):
+    done = in_shell(command, folder)
+    assert done.returncode == code, done
+    assert err == "" or done.stderr.endswith(err)
+    assert "Traceback" not in done.stderr
+
+
+def test_a_name_that_the_output_cannot_show(folder):
+    done = in_shell(f"{SPLIT}-$(printf '\\377é')", folder, PYTHONIOENCODING="ascii:strict")
+    assert (done.returncode, done.stdout) == (0, "out-?\\xe9\n")
+    assert [path for path in os.listdir(os.fsencode(folder)) if path.startswith(b"out-\xff")]
+
+
+@pytest.mark.parametrize("name", [b"n\xff.png", b"a\x1b[31mb.png"])
+@pytest.mark.parametrize("verb", ["split", "palette", "calibrate"])
+def test_any_file_name_is_read_and_none_reaches_the_terminal_raw(
+    verb, name, drawn, toonset, tmp_path
+):
+    sheet, out = tmp_path / os.fsdecode(name), tmp_path / os.fsdecode(b"to " + name)
+    sheet.write_bytes((drawn / "sheet.png").read_bytes())
+    more = ["--mesh", drawn / "mannequin.obj"] if verb == "calibrate" else []
+    found = [toonset(verb, sheet, *more, "-o", out), toonset("info", out)]
+    if verb != "palette":
+        found.append(toonset("check", out))
+    for done in found:
+        assert done.code in (0, 2, 3), done
+        assert "Traceback" not in done.err
+        assert all(line.isprintable() for line in (done.out + done.err).splitlines()), done
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_a_verb_with_its_code_and_leaves_nothing(number, folder, run):
+    command = ["render", str(run), "--turntable", "500", "-o", "turn"]
+    program = [sys.executable, "-m", "toonset", *command]
+    with subprocess.Popen(program, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline()  # it has begun to draw
+        process.send_signal(number)
+        err = process.stderr.read()
+    assert process.returncode == 128 + number
+    assert err.endswith(f"toonset: ended by {number.name}\n")
+    assert sorted(path.name for path in folder.iterdir()) == ["run", "sheet.png"]
