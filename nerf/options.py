@@ -47,7 +47,7 @@ class TrainOptions:
         steps: optimiser steps; None: 600, or 300 on the mannequin's shape, where more gain nothing.
         budget_s: stop after this many seconds, drawings and hull included, but not before 30 steps;
             results then depend on the machine.
-        seed: of initial weights and ray order. Same seed, same result, bit for bit, on a CPU.
+        seed: of initial weights and ray order. Same seed, same result, bit for bit, on one CPU.
         device: "auto" (a GPU where there is one), "cpu" or "cuda".
         resolution: cells of the planes along the character's longest side; None: one cell per
             pixel of the tallest figure, 48 to 256, or fewer (see `field`).

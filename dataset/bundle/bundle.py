@@ -15,8 +15,8 @@
     corrections.json   what a person corrected with `toonset edit`; edit.html is its page
 
 The folder appears whole or not at all. It holds no path and no name of a machine and, but for the
-seconds in run/, no time: the same input, options, seed and versions give the same bytes, wherever
-it is made or moved to.
+seconds in run/, no time: on one kind of processor the same input, options, seed and versions give
+the same bytes, wherever it is made or moved to.
 """
 
 from __future__ import annotations
