@@ -117,6 +117,7 @@ def covariance(row: int, column: int, value: float) -> Edit:
         (lambda c: c["views"][2]["camera"].update(yaw_deg=12.0), "not those of its rotation"),
         (lambda c: c["views"][2]["twin"].update(model="orthographic"), "but k is 0.1"),
         (lambda c: c["views"][2]["twin"].update(scale_px_per_unit=1e-12), "at most 1e+09"),
+        (lambda c: c["views"][2]["twin"].update(k=1e-300), "at most 1e+09"),
         (covariance(0, 1, 0.5), "covariance is not symmetric"),
         (covariance(3, 3, -0.5), "covariance has a negative variance"),
     ],
