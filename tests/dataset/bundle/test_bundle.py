@@ -220,3 +220,20 @@ def test_links_out_of_the_bundle_are_refused(name, place: Path, tmp_path: Path):
     if not name.startswith("contours"):  # which no stage but editing reads
         with pytest.raises(ToonsetError, match="out"):
             read_scene(place)
+
+
+@pytest.mark.parametrize("name", ["transforms.json", "calibration.json", "mannequin.obj"])
+def test_no_verb_follows_a_link_out_of_the_bundle(name, place: Path, tmp_path: Path, toonset):
+    (place / name).rename(tmp_path / name)
+    (place / name).symlink_to(tmp_path / name)
+    checked = toonset("check", place)
+    assert "a link out of the folder" in checked.out + checked.err
+    verb = ("view",) if name == "calibration.json" else ("export", "--to", "nerfstudio")
+    reason = toonset(*verb, place, "--quiet", "-o", tmp_path / "new.html").reason
+    assert f"{name}: is a link out of the folder" in reason
+
+
+def test_a_link_inside_the_bundle_is_followed(place: Path):
+    (place / "transforms.json").rename(place / "cameras.json")
+    (place / "transforms.json").symlink_to("cameras.json")
+    assert problems(place) == []
