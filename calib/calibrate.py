@@ -49,7 +49,8 @@ def calibrate(
 ) -> Calibration:
     """Return one camera per drawing, with how sure it is.
 
-    BLAS works on one thread meanwhile; the same input gives the same numbers on any host.
+    BLAS works on one thread meanwhile; the same input gives the same numbers on any
+    number of cores.
 
     Args:
         views: the drawings, at least one, as `split_sheet` cuts them out.

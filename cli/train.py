@@ -17,7 +17,7 @@ from toonset.cli.common.output import (
     VerboseFlag,
 )
 from toonset.cli.common.train_run import Request, run
-from toonset.nerf.options import DeviceName, FieldName, PresetName
+from toonset.nerf.options import MOST_STEPS, DeviceName, FieldName, PresetName
 from toonset.nerf.options import preset as preset_options
 
 WHILE_PANEL = "While it runs"
@@ -39,6 +39,7 @@ def train(
         typer.Option(
             "--steps",
             min=1,
+            max=MOST_STEPS,
             help="Optimiser steps (default: 600, or 300 on the mannequin's shape).",
         ),
     ] = None,

@@ -33,6 +33,7 @@ PRESETS: tuple[PresetName, ...] = get_args(PresetName)
 FORMATS = ("gif", "webp", "mp4", "sprites", "ora")  # of all views of a turn together
 LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
 LEAST |= {"smoothness": 0, "palette_weight": 0}
+MOST_STEPS = 10_000_000  # days
 ORIGINAL = "original"  # of a mesh's variants: the run's own colours
 FACES = 8000  # of a mesh at most: docs/decisions.md
 USUAL_STEPS, STEPS_ON_SHAPE = 600, 300  # by default: without the mannequin's shape, and with it
@@ -47,7 +48,7 @@ class TrainOptions:
         steps: optimiser steps; None: 600, or 300 on the mannequin's shape, where more gain nothing.
         budget_s: stop after this many seconds, drawings and hull included, but not before 30 steps;
             results then depend on the machine.
-        seed: of initial weights and ray order. Same seed, same result, bit for bit, on a CPU.
+        seed: of initial weights and ray order. Same seed, same result, bit for bit, on one CPU.
         device: "auto" (a GPU where there is one), "cpu" or "cuda".
         resolution: cells of the planes along the character's longest side; None: one cell per
             pixel of the tallest figure, 48 to 256, or fewer (see `field`).
@@ -98,8 +99,10 @@ class TrainOptions:
                 raise UsageError(f"{name}: {value!r} is neither True nor False")
             if name in LEAST and value is not None:
                 number = isinstance(value, int if "int" in kind else int | float)
-                if not number or not LEAST[name] <= value < 2**63:
-                    raise UsageError(f"{name}: {value} is out of range; {LEAST[name]} is the least")
+                most = MOST_STEPS if name == "steps" else 2**63 - 1
+                if not number or not LEAST[name] <= value <= most:
+                    allowed = f"{LEAST[name]} is the least, {most:.15g} the most"
+                    raise UsageError(f"{name}: {value} is out of range; {allowed}")
         for name, choices in {"field": FIELDS, "device": DEVICES}.items():
             if getattr(self, name) not in choices:
                 known = ", ".join(choices)

@@ -315,6 +315,7 @@ NO_OPTIONS = [
     ({"budget_s": float("nan")}, "budget_s: nan"),
     ({"resolution": 0}, "resolution: 0"),
     ({"field": "bogus"}, "field: 'bogus' is none of auto, triplane"),
+    ({"steps": 10**30}, "1 is the least, 10000000 the most"),
     ({"steps": 1.5}, "steps: 1.5 is out of range"),
     ({"fairing": "no"}, "fairing: 'no' is neither True nor False"),
     ({"device": "tpu"}, "device: 'tpu' is none of auto, cpu, cuda"),

@@ -10,7 +10,7 @@ import typer.main
 from tests.test_layers import FLOORS, folders
 
 ROOT = Path(__file__).resolve().parents[1]
-RUN_COMMANDS = {"demo", "test", "lint"}  # what ./run knows beyond toonset's verbs
+RUN_COMMANDS = {"demo", "test", "lint", "wheel"}  # what ./run knows beyond toonset's verbs
 DOCUMENTS = [
     "README.md",
     "CONTRIBUTING.md",

@@ -140,6 +140,31 @@ def test_an_unsuitable_python_is_refused_by_name(checkout: Path, tmp_path: Path)
     assert not (checkout / "log").exists()
 
 
+@pytest.mark.parametrize("system", ["MINGW64_NT-10.0-26100", "MSYS_NT-10.0", "CYGWIN_NT-10.0"])
+def test_shells_on_windows_are_told_in_one_line(checkout: Path, tmp_path: Path, system: str):
+    program(tmp_path / "tools" / "uname", f"echo {system}")
+    path = f"{tmp_path / 'tools'}{os.pathsep}{os.environ['PATH']}"
+    done = run(checkout, "calibrate", "x", PATH=path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"run: does not work in {system}; use Linux, or WSL on Windows\n"
+    assert not (checkout / "log").exists()
+
+
+def test_the_wheel_is_built_installed_and_tried_outside_of_the_tree(checkout: Path) -> None:
+    make = 'case "$*" in *wheel.py*) mkdir -p "$3/env/bin" && cp "$0/../toonset" "$3/env/bin"'
+    python_that(checkout, make.replace("$0/..", str(checkout / ".venv/bin")) + "; exit ;; esac")
+    done = run(checkout, "wheel")
+    assert done.returncode == 0, done.stderr
+    places = set(log_of(checkout)[::2])
+    assert len(places) == 1
+    assert not Path(places.pop()).exists()  # a temporary one
+    assert [line.split("]")[0] for line in log_of(checkout)[1::2]] == [
+        *("[calibrate", "[palette", "[train", "[render")
+    ]
+    python_that(checkout, 'case "$*" in *wheel.py*) exit 4 ;; esac')
+    assert run(checkout, "wheel").returncode == 4
+
+
 def test_a_changed_lock_is_installed_and_a_failure_is_shown(checkout: Path) -> None:
     with (checkout / "requirements.lock").open("a", encoding="utf-8") as lock:
         lock.write("# changed\n")

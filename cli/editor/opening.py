@@ -26,6 +26,7 @@ from toonset.cli.editor.session import Session
 from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile, InputFile
+from toonset.dataset.bundle.transforms_read import member, place_in
 from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
@@ -81,7 +82,7 @@ def open_session(
         os.replace(new, folder)
         shutil.rmtree(subject.workshop, ignore_errors=True)
         return Session(subject, drawn, NOTHING, NOTHING, tell)
-    found = read_calibration(folder / CALIBRATION)
+    found = read_calibration(place_in(folder, CALIBRATION))
     subject = _subject(place, folder, mesh, found)
     data = _corrections_file(folder, found, place)
     if data is None and _has_body(found, subject):
@@ -171,8 +172,8 @@ def _recorded(found: CalibrationFile, role: str, data: bytes) -> bool:
 
 def _corrections_file(folder: Path, found: CalibrationFile, place: Path) -> bytes | None:
     """Return the bundle's corrections, else those that `calibrate --corrections` was given."""
-    file = folder / CORRECTIONS
-    if not file.is_file():
+    file = member(folder, CORRECTIONS)
+    if file is None:
         record = next((one for one in found.inputs if one.role == BY_HAND), None)
         if record is None:
             return None

@@ -14,12 +14,11 @@ import numpy as np
 from jaxtyping import Bool
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, LABELS
+from toonset.dataset.bundle.bundle import CALIBRATION, LABELS, mannequin_of
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import ViewRecord
-from toonset.dataset.bundle.read_scene import MANNEQUIN
+from toonset.dataset.bundle.transforms_read import member, place_in
 from toonset.dataset.images.picture import decode_rgba, encode_grey_png
-from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.split_folder.load import Sheet
 from toonset.errors import PictureError
 from toonset.html_page import base64_text, data_url, html_page, json_text
@@ -56,10 +55,10 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
     Raises:
         ToonsetError: a file of the bundle is missing or damaged.
     """
-    found = read_calibration(folder / CALIBRATION)
+    found = read_calibration(place_in(folder, CALIBRATION))
     source = sheet.split.sources[0]
     ground = source.background
-    mesh = load_mesh(folder / MANNEQUIN) if (folder / MANNEQUIN).is_file() else None
+    mesh = mannequin_of(folder)
     return {
         "schema": "toonset-edit/1",
         "title": folder.resolve().name,
@@ -76,7 +75,7 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
             _view(folder, view, said) for view, said in zip(sheet.views, found.views, strict=True)
         ],
         "mannequin": None if mesh is None else _mannequin(mesh),
-        "palette": _palette(folder / PALETTE),
+        "palette": _palette(member(folder, PALETTE)),
     }
 
 
@@ -103,7 +102,7 @@ def sheet_url(path: Path) -> str:
 
 def _view(folder: Path, view: View, said: ViewRecord) -> dict[str, Any]:
     camera = said.camera.camera()
-    labels = folder / LABELS / said.name
+    labels = member(folder, f"{LABELS}/{said.name}")
     yaw, elevation, roll = (math.degrees(angle) for angle in camera.angles)
     return {
         "name": said.name,
@@ -117,7 +116,7 @@ def _view(folder: Path, view: View, said: ViewRecord) -> dict[str, Any]:
         "roll": roll,
         "camera": _camera(camera, view),
         "mask": data_url(_mask(view.mask), "image/png"),
-        "labels": data_url(labels.read_bytes(), "image/png") if labels.is_file() else None,
+        "labels": data_url(labels.read_bytes(), "image/png") if labels else None,
     }
 
 
@@ -166,8 +165,8 @@ def _few_faces(vertices: bytes, faces: bytes) -> tuple[bytes, bytes]:
     return places.astype("<f4").tobytes(), corners.astype("<u4").tobytes()
 
 
-def _palette(file: Path) -> dict[str, Any]:
-    if not file.is_file():
+def _palette(file: Path | None) -> dict[str, Any]:
+    if file is None:
         return {"colors": [], "dropped": []}
     found = read_palette_json(file)
 

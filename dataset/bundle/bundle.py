@@ -15,8 +15,8 @@
     corrections.json   what a person corrected with `toonset edit`; edit.html is its page
 
 The folder appears whole or not at all. It holds no path and no name of a machine and, but for the
-seconds in run/, no time: the same input, options, seed and versions give the same bytes, wherever
-it is made or moved to.
+seconds in run/, no time: on one kind of processor the same input, options, seed and versions give
+the same bytes, wherever it is made or moved to.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from jaxtyping import UInt8
 from toonset.camera import Camera
 from toonset.dataset.bundle.calibration_file import calibration_content, read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile
-from toonset.dataset.bundle.read_scene import MANNEQUIN, member, read_scene
+from toonset.dataset.bundle.read_scene import MANNEQUIN, read_scene
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.bundle.transforms import transforms_dict
-from toonset.dataset.bundle.transforms_read import transforms_file
+from toonset.dataset.bundle.transforms_read import member, place_in, transforms_file
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.errors import BundleError, ToonsetError
@@ -63,10 +63,10 @@ def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:
     """Return the mesh of a file that was given, else the folder's own, else None.
 
     Raises:
+        BundleError: the folder's own is a link out of it.
         MeshError: the file is not a mesh.
     """
-    own = folder / MANNEQUIN
-    file = given or (own if own.is_file() else None)
+    file = given or member(folder, MANNEQUIN)
     return None if file is None else load_mesh(file)
 
 
@@ -108,7 +108,7 @@ class Bundle:
 def _calibration_of(folder: Path) -> CalibrationFile | None:
     """Return the calibration; None if the bundle has none."""
     try:
-        return read_calibration(transforms_file(folder).parent / CALIBRATION)
+        return read_calibration(place_in(transforms_file(folder).parent, CALIBRATION))
     except ToonsetError:
         return None
 

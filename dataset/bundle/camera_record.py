@@ -87,10 +87,11 @@ def check_range(camera: Camera) -> None:
     """Refuse a camera that cannot be computed with.
 
     Raises:
-        BundleError: a number beyond 1e9 (or a scale below 1e-9), or more pixels than are drawn.
+        BundleError: a number beyond 1e9 (or a scale or k below 1e-9), or more pixels than are
+            drawn.
     """
-    scales = [camera.scale, 1 / camera.scale, camera.pixel_aspect, 1 / camera.pixel_aspect]
-    check_numbers([*camera.target, *camera.center, camera.k, *scales])
+    scales = [camera.scale, camera.pixel_aspect, *([camera.k] if camera.k else [])]
+    check_numbers([*camera.target, *camera.center, *scales, *(1 / scale for scale in scales)])
     width, height = camera.size_wh
     if width * height > MAX_PIXELS:
         raise BundleError(

@@ -31,7 +31,6 @@ from toonset.dataset.bundle.read_scene import (
     MANNEQUIN,
     check_label_names,
     label_name,
-    member,
     read_contour,
     read_coverage,
     read_labels,
@@ -43,6 +42,7 @@ from toonset.dataset.bundle.transforms_read import (
     PosedPicture,
     check_total,
     frame_of,
+    member,
     transforms_file,
 )
 from toonset.dataset.bundle.transforms_schema import read_records

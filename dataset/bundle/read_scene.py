@@ -12,7 +12,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.bundle.transforms_read import (
     PosedPicture,
-    is_inside,
+    member,
     read_frames,
     transforms_file,
 )
@@ -196,20 +196,3 @@ def check_size(path: Path, pixels: np.ndarray, camera: Camera, said_by: str) -> 
             f"{path}: is {width} x {height} px, {said_by} says {camera.size_wh[0]} x "
             f"{camera.size_wh[1]}; make them equal"
         )
-
-
-def member(root: Path, name: str) -> Path | None:
-    """Return a file of a folder by its name, None where it is not there.
-
-    Raises:
-        BundleError: it is a link that leads out of the folder, or nowhere.
-    """
-    path = root / name
-    try:
-        if not path.exists() and not path.is_symlink():
-            return None
-        if is_inside(root, path) and path.exists():
-            return path
-    except (OSError, RuntimeError) as error:  # a loop of links
-        raise BundleError(f"{path}: is a link to itself; put the file there") from error
-    raise BundleError(f"{path}: is a link out of the folder or to nothing; put the file there")

@@ -14,8 +14,13 @@ from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, COVERAGE, LABEL
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecord
 from toonset.dataset.bundle.problem_log import ProblemLog
-from toonset.dataset.bundle.read_scene import MANNEQUIN, label_name, member
-from toonset.dataset.bundle.transforms_read import PosedPicture, read_frames, transforms_file
+from toonset.dataset.bundle.read_scene import MANNEQUIN, label_name
+from toonset.dataset.bundle.transforms_read import (
+    PosedPicture,
+    member,
+    read_frames,
+    transforms_file,
+)
 from toonset.dataset.mesh.load import load_mesh
 from toonset.palette.formats.json import read_palette_json, to_json
 

@@ -47,11 +47,11 @@ def transforms_file(path: Path) -> Path:
     """Return the transforms.json that a path names: itself, or the one in the folder.
 
     Raises:
-        BundleError: there is none.
+        BundleError: there is none, or it is a link out of the folder.
     """
     try:
         if path.is_dir():
-            found = next((path / name for name in NAMES if (path / name).is_file()), None)
+            found = next(filter(None, (member(path, name) for name in NAMES)), None)
             if found is None:
                 raise BundleError(
                     f"{path}: holds no transforms.json; run `toonset calibrate` first"
@@ -121,6 +121,31 @@ def is_inside(root: Path, path: Path) -> bool:
         OSError, ValueError: the path is not a file name (too long, a loop of links, a NUL).
     """
     return path.resolve().is_relative_to(root.resolve())
+
+
+def member(root: Path, name: str) -> Path | None:
+    """Return a file of a folder by its name, None where it is not there.
+
+    Raises:
+        BundleError: it is a link that leads out of the folder, or nowhere.
+    """
+    path = place_in(root, name)
+    return path if path.exists() else None
+
+
+def place_in(root: Path, name: str) -> Path:
+    """Return where a folder's file is, or would be.
+
+    Raises:
+        BundleError: it is a link that leads out of the folder, or nowhere.
+    """
+    path = root / name
+    try:
+        if is_inside(root, path) and (path.exists() or not path.is_symlink()):
+            return path
+    except (OSError, RuntimeError) as error:  # a loop of links
+        raise BundleError(f"{path}: is a link to itself; put the file there") from error
+    raise BundleError(f"{path}: is a link out of the folder or to nothing; put the file there")
 
 
 def _picture_path(root: Path, frame: FrameRecord, where: str) -> Path | None:

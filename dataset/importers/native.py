@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.bundle.transforms_camera import shows_same_view
+from toonset.dataset.bundle.transforms_read import place_in
 from toonset.dataset.bundle.transforms_schema import MAX_FRAMES
 from toonset.dataset.exporters.common import NATIVE
 from toonset.dataset.importers.paths import ImportView, find_picture
@@ -74,7 +75,7 @@ def read_native(root: Path) -> NativeExport:
     Raises:
         BundleError: it is damaged, of a newer toonset, or names a picture that is not there.
     """
-    file = root / NATIVE
+    file = place_in(root, NATIVE)
     content = read_json(file)
     schema_version(content, NAME, VERSION, str(file), BundleError)
     records = validate(_ExportRecord, content, file).views

@@ -6,7 +6,7 @@ from pathlib import Path
 from statistics import median
 
 from toonset.dataset.bundle.problem_log import Problem, ProblemLog
-from toonset.dataset.bundle.read_scene import member
+from toonset.dataset.bundle.transforms_read import member
 from toonset.dataset.images.folder import picture_files
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.split_folder.places import IMAGES, OVERLAY, SPLIT_FILE

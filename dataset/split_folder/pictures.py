@@ -13,7 +13,7 @@ from toonset.dataset.bundle.bundle import CALIBRATION
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecord
 from toonset.dataset.bundle.palette_files import palette_title
-from toonset.dataset.bundle.transforms_read import NAMES, picture_paths, transforms_file
+from toonset.dataset.bundle.transforms_read import NAMES, picture_paths, place_in, transforms_file
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.places import is_split_folder, sheet_places
@@ -135,7 +135,7 @@ def _of_bundle(place: Path) -> Pictures:
 
 def _calibration(place: Path) -> CalibrationFile | None:
     try:
-        return read_calibration(transforms_file(place).parent / CALIBRATION)
+        return read_calibration(place_in(transforms_file(place).parent, CALIBRATION))
     except BundleError:  # of other programs there is none; `toonset check` tells of a broken one
         return None
 

@@ -19,6 +19,7 @@ from jaxtyping import UInt8
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from toonset import __version__
+from toonset.dataset.bundle.transforms_read import place_in
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split.sheet import InSheet
 from toonset.dataset.split_folder.places import IMAGES, OVERLAY, SPLIT_FILE
@@ -123,8 +124,9 @@ def read_records(folder: Path) -> tuple[tuple[Source, ...], tuple[ViewRecord, ..
     Raises:
         SheetError: the file is missing, of another version, broken, or speaks of a sheet that it
             does not have.
+        BundleError: it is a link out of the folder.
     """
-    file = folder / SPLIT_FILE
+    file = place_in(folder, SPLIT_FILE)
     data = read_whole(file, "split", SheetError, MAX_JSON_BYTES)
     content = parse_json(data, str(file), SheetError)
     if schema_version(content, NAME, VERSION, str(file), SheetError) is None:

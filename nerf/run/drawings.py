@@ -45,6 +45,7 @@ Byte = Annotated[int, Field(ge=0, le=255)]
 Color = tuple[Byte, Byte, Byte]
 Width = Annotated[float, Field(ge=0, le=LONGEST_PX)]
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+Size = Annotated[float, Field(ge=1e-9, le=1e9)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0, lt=MOST_VIEWS)]
 
@@ -97,7 +98,7 @@ class ShapeRecord(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     low: tuple[Number, Number, Number]
-    step: float = Field(gt=0, le=1e9)
+    step: Size
     beyond: float = Field(ge=0, le=1e9)
 
 
@@ -109,7 +110,7 @@ class DrawingsRecord(BaseModel):
     pairs: list[PairRecord] = Field(max_length=MOST_VIEWS)
     outline: OutlineRecord | None
     palette: list[Color] = Field(min_length=1, max_length=254)
-    height: float = Field(gt=0, le=1e9)
+    height: Size
     depths: tuple[Number, Number]
     bent: bool
     shape: ShapeRecord | None

@@ -24,6 +24,7 @@ import torch
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors.torch import save
 
+from toonset.dataset.bundle.camera_record import LARGEST
 from toonset.errors import BundleError
 from toonset.json_file import read_json, validation_reason
 from toonset.nerf.fields.classifier import PaletteClassifier
@@ -35,6 +36,8 @@ from toonset.nerf.run.drawings import (
     PICTURES,
     SURFACES,
     DrawingsRecord,
+    Number,
+    Size,
     load_tensors,
     read_drawings,
     write_drawings,
@@ -49,6 +52,7 @@ WRITTEN = (
 )
 FORMAT = 5
 MOST_CELLS = 512  # along one side, of planes and hull alike
+MOST_ALONG = 4096  # samples on a ray, and steps along the hull's longest side
 
 
 class FieldRecord(BaseModel):
@@ -58,11 +62,11 @@ class FieldRecord(BaseModel):
     resolution: int = Field(ge=1, le=MOST_CELLS)
     channels: int = Field(ge=1, le=256)
     hidden: int = Field(ge=1, le=1024)
-    hull_low: tuple[float, float, float]
-    hull_voxel: float = Field(gt=0, le=1e9)
+    hull_low: tuple[Number, Number, Number]
+    hull_voxel: Size
     hull_shape: tuple[int, int, int]
-    step: float = Field(gt=0, le=1e9)
-    samples: int = Field(ge=1, le=4096)
+    step: Size
+    samples: int = Field(ge=1, le=MOST_ALONG)
     palette: list[tuple[int, int, int]] | None = Field(default=None, max_length=255)
     k: float = Field(ge=0, le=1e9)
     size_px: int = Field(ge=1, le=16384)
@@ -154,6 +158,12 @@ def _record(file: Path) -> FieldRecord:
         raise BundleError(f"{file}: {validation_reason(error)}") from error
     if not all(1 <= n <= MOST_CELLS for n in record.hull_shape):
         raise BundleError(f"{file}: hull_shape {record.hull_shape}, 1 to {MOST_CELLS} is needed")
+    if record.step * MOST_ALONG < record.hull_voxel * max(record.hull_shape):
+        raise BundleError(
+            f"{file}: step {record.step:g} cuts the hull into more than {MOST_ALONG}; train again"
+        )
+    if 0 < record.k < 1 / LARGEST:
+        raise BundleError(f"{file}: k {record.k:g}, 0 or {1 / LARGEST:g} is needed; train again")
     if record.palette is not None and not all(0 <= v <= 255 for c in record.palette for v in c):
         raise BundleError(f"{file}: a palette value is not in 0..255; train again")
     return record

@@ -19,6 +19,7 @@ from toonset.dataset.bundle.bundle import CALIBRATION, Bundle, read_bundle
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import ViewRecord
 from toonset.dataset.bundle.read_scene import read_palette_of
+from toonset.dataset.bundle.transforms_read import member
 from toonset.dataset.silhouettes.mask import alpha_of, has_figure
 from toonset.errors import BundleError
 from toonset.json_file import read_json
@@ -189,8 +190,8 @@ def _paints(
 
 def _calibrated(folder: Path, count: int) -> list[ViewRecord | None]:
     """Return what calibration said of every drawing, None where it does not tell."""
-    file = folder / CALIBRATION
-    views = read_calibration(file).views if file.is_file() else []
+    file = member(folder, CALIBRATION)
+    views = read_calibration(file).views if file else []
     return list(views) if len(views) == count else [None] * count
 
 

@@ -86,6 +86,8 @@ def test_help_is_also_a_word(asked, shown, toonset):
         (["calibrate", "a.png", "--mesh", "m.obj", "--forse"], ["--forse", "--force"]),
         (["calibrate", "a.png", "--mesh", "m.obj", "--seed", "x"], ["--seed", "integer"]),
         (["train", "--steps", "0"], ["--steps", "1"]),
+        (["train", "--steps", "9" * 30], ["--steps", "10000000"]),
+        (["render", "--threads", "9" * 30], ["--threads", "1024"]),
         (["train", "--budget", "inf"], ["--budget", "less than"]),
         (["train", "--budget", "nan"], ["--budget", "less than"]),
         (["train", "--seed", "9" * 20], ["--seed", "less than"]),

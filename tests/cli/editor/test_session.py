@@ -20,10 +20,11 @@ from toonset.cli.editor import session as session_module
 from toonset.cli.editor.lock import locked
 from toonset.cli.editor.opening import folder_of, open_session
 from toonset.cli.editor.refit import CORRECTIONS, Changed, parts_changed
-from toonset.cli.editor.scene import PALETTE, for_page
+from toonset.cli.editor.scene import PALETTE, for_page, scene_of
 from toonset.cli.editor.session import Session, StaleError
 from toonset.dataset.bundle.bundle import read_bundle
 from toonset.dataset.bundle.check import bundle_problems
+from toonset.dataset.split_folder.load import split_sheet
 from toonset.errors import BundleError, SheetError, ToonsetError
 
 Command = Any
@@ -55,6 +56,27 @@ def settled(session: Session) -> dict[str, Any]:
 
 def yaw_of(session: Session, number: int) -> float:
     return session.scene["views"][number]["yaw"]
+
+
+@pytest.mark.parametrize("name", ["calibration.json", CORRECTIONS])
+def test_a_session_follows_no_link_out_of_its_bundle(name: str, bundle: Path) -> None:
+    outside = bundle.parent / name
+    shutil.copy(bundle / "calibration.json", outside)
+    (bundle / name).unlink(missing_ok=True)
+    (bundle / name).symlink_to(outside)
+    with pytest.raises(BundleError, match=f"{name}: is a link out of the folder"):
+        open_session(bundle, bundle, None, lambda text: None)
+
+
+def test_the_page_shows_nothing_from_outside_of_its_bundle(bundle: Path) -> None:
+    sheet = split_sheet(bundle.parent / "sheet.png")
+    (bundle / "labels").mkdir()
+    for name in ("mannequin.obj", "palette.json", "labels/000.png"):
+        (bundle / name).unlink(missing_ok=True)
+        (bundle / name).symlink_to(bundle.parent / "sheet.png")
+        with pytest.raises(BundleError, match=f"{name}: is a link out of the folder"):
+            scene_of(bundle, sheet)
+        (bundle / name).unlink()
 
 
 def test_a_correction_is_kept_at_once_and_fitted_soon(session: Session, bundle: Path) -> None:

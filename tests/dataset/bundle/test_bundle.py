@@ -117,6 +117,7 @@ def covariance(row: int, column: int, value: float) -> Edit:
         (lambda c: c["views"][2]["camera"].update(yaw_deg=12.0), "not those of its rotation"),
         (lambda c: c["views"][2]["twin"].update(model="orthographic"), "but k is 0.1"),
         (lambda c: c["views"][2]["twin"].update(scale_px_per_unit=1e-12), "at most 1e+09"),
+        (lambda c: c["views"][2]["twin"].update(k=1e-300), "at most 1e+09"),
         (covariance(0, 1, 0.5), "covariance is not symmetric"),
         (covariance(3, 3, -0.5), "covariance has a negative variance"),
     ],
@@ -219,3 +220,20 @@ def test_links_out_of_the_bundle_are_refused(name, place: Path, tmp_path: Path):
     if not name.startswith("contours"):  # which no stage but editing reads
         with pytest.raises(ToonsetError, match="out"):
             read_scene(place)
+
+
+@pytest.mark.parametrize("name", ["transforms.json", "calibration.json", "mannequin.obj"])
+def test_no_verb_follows_a_link_out_of_the_bundle(name, place: Path, tmp_path: Path, toonset):
+    (place / name).rename(tmp_path / name)
+    (place / name).symlink_to(tmp_path / name)
+    checked = toonset("check", place)
+    assert "a link out of the folder" in checked.out + checked.err
+    verb = ("view",) if name == "calibration.json" else ("export", "--to", "nerfstudio")
+    reason = toonset(*verb, place, "--quiet", "-o", tmp_path / "new.html").reason
+    assert f"{name}: is a link out of the folder" in reason
+
+
+def test_a_link_inside_the_bundle_is_followed(place: Path):
+    (place / "transforms.json").rename(place / "cameras.json")
+    (place / "transforms.json").symlink_to("cameras.json")
+    assert problems(place) == []

@@ -20,7 +20,7 @@ from toonset.dataset.split_folder.checks import odd_files
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.views import Split, join_splits, split_of_sheet, without
 from toonset.dataset.split_folder.write import read_records, write_split
-from toonset.errors import PictureError, SheetError
+from toonset.errors import BundleError, PictureError, SheetError
 from toonset.view import View
 
 COLORS = ((200, 60, 40), (40, 120, 200), (60, 160, 70), (220, 180, 40))
@@ -164,6 +164,13 @@ def link_out(folder: Path) -> None:
     outside = folder.parent / "secret.png"
     outside.write_bytes(encode_png(figure(COLORS[0])))
     (folder / "images" / "009.png").symlink_to(outside)
+
+
+def test_a_split_json_out_of_the_folder_is_refused(folder: Path):
+    (folder / "split.json").rename(folder.parent / "split.json")
+    (folder / "split.json").symlink_to(folder.parent / "split.json")
+    with pytest.raises(BundleError, match=r"split.json: is a link out of the folder"):
+        read_split(folder)
 
 
 PAIR = np.hstack([figure(color, paper="white") for color in COLORS[:2]])
