@@ -1,0 +1,134 @@
+"""R4: run folders that were cut, flipped, swapped or filled with what no training writes.
+
+A run's files carry no hashes (docs/decisions.md), so a flip that leaves a valid file is a run of
+its own: what is wanted is that it is refused or rendered, never that something breaks or runs. How
+many flips changed a picture unseen is said below the row. What is cut off must be refused.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from tests.audit.case import REFUSED, Case, Ran, Row, Tally, run_forked, try_case
+from tests.audit.documents import ODD, TURN, dotted, leaves, writes
+from tests.audit.material import Material
+
+READ = ("config.json", "model.safetensors", "drawings.safetensors", "drawings.png", "paint.png")
+CUTS, TYPED = 144, 190
+CANARY = "canary"
+PICKLE = b"cposix\nsystem\n(S'touch " + CANARY.encode() + b"'\ntR."
+DRAWN = tuple("drawn" if word == "rgb" else word for word in TURN)
+
+Change = Callable[[Path], Any]
+
+
+def row(material: Material) -> Row:
+    """Render every tampered run, look at some, and compare with the untouched one."""
+    lot = random.Random(material.seed)
+    tally = Tally(material.work / "wrong")
+    untouched = {turn: rendered(material, turn) for turn in (TURN, DRAWN)}
+    unseen = 0
+    for name, change, must_refuse in tampered(material, lot):
+        for turn in (TURN, DRAWN) if must_refuse else (DRAWN,):
+            same: list[bool] = []
+
+            def judge(folder: Path, ran: Ran, turn: tuple[str, ...] = turn) -> Iterable[str]:
+                if (folder / CANARY).exists():
+                    yield "a pickle ran"
+                if ran.code != REFUSED:
+                    same.append(pictures(folder / "o") == untouched[turn])  # noqa: B023
+                if ran.code != REFUSED and must_refuse and not same[0]:  # noqa: B023
+                    yield "rendered a cut file"
+
+            def make(folder: Path, change: Change = change) -> None:
+                change(material.copy("run", folder / "r"))
+
+            try_case(Case(f"{name}: {turn[-3]}", turn, make, judge=judge), material.work, tally)
+            unseen += same == [False]
+        if must_refuse:
+            continue
+        look = ("check", "info")[tally.tried % 2]
+        try_case(Case(f"{name}: {look}", (look, "r"), make), material.work, tally)
+    return tally.row(f"{unseen} runs were rendered, and not as before: valid files of other values")
+
+
+def rendered(material: Material, turn: tuple[str, ...]) -> dict[str, bytes]:
+    """Return the pictures of the untouched run."""
+    folder = material.work / "untouched"
+    folder.mkdir(exist_ok=True)
+    if not (folder / "r").exists():
+        material.copy("run", folder / "r")
+    ran = run_forked(Case("untouched", (*turn, "--force")), folder)
+    assert ran.code == 0, ran
+    return pictures(folder / "o")
+
+
+def pictures(folder: Path) -> dict[str, bytes]:
+    """Return the files of a rendering."""
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.*"))}
+
+
+def tampered(material: Material, lot: random.Random) -> Iterator[tuple[str, Change, bool]]:
+    """Yield names, changes of a run folder, and whether the run must be refused."""
+    wholes = {name: (material.root / "run" / name).read_bytes() for name in READ}
+
+    def put(name: str, data: bytes) -> Change:
+        return lambda run: (run / name).write_bytes(data)
+
+    for i in range(CUTS):
+        name = READ[i % len(READ)]
+        whole = wholes[name]
+        cut = lot.randrange(len(whole.rstrip()))
+        yield f"{name} cut at {cut}", put(name, whole[:cut]), True
+        at, bit = lot.randrange(len(whole)), lot.randrange(8)
+        flipped = whole[:at] + bytes([whole[at] ^ 1 << bit]) + whole[at + 1 :]
+        yield f"{name} flipped at {at}.{bit}", put(name, flipped), False
+    for name in READ:
+        yield f"{name} is a pickle", put(name, PICKLE), True
+        yield f"{name} is a zip", put(name, b"PK\x03\x04" + PICKLE), True
+        yield f"{name} is gone", lambda run, name=name: (run / name).unlink(), True
+        yield f"{name} is empty", put(name, b""), True
+        yield f"{name} is longer", put(name, wholes[name] + PICKLE), False
+        other = READ[(READ.index(name) + 1) % len(READ)]
+        yield f"{name} is {other}", put(name, wholes[other]), True
+        yield f"{name} is /dev/zero", lambda run, name=name: linked(run / name, "/dev/zero"), True
+    for file in ("model.safetensors", "drawings.safetensors"):
+        for name, data in headers(wholes[file], lot):
+            yield f"{file} {name}", put(file, data), False
+    config = wholes["config.json"]
+    places = [path for path in leaves(json.loads(config)["field"])]
+    for i in range(TYPED):
+        path, odd = ("field", *places[i % len(places)]), ODD[i % len(ODD)]
+        if i % 3 == 0:
+            odd = lot.choice((0, -1, 1e-300, 1e9, 1e300, 2**40, 512, 4096))
+        write = writes(config, path, lambda old, odd=odd: odd)
+        change = lambda run, write=write: write(run / "config.json")  # noqa: E731
+        yield f"{dotted(path)}={json.dumps(odd)[:16]}", change, False
+
+
+def linked(path: Path, target: str) -> None:
+    """Replace a file by a link."""
+    path.unlink()
+    path.symlink_to(target)
+
+
+def headers(whole: bytes, lot: random.Random) -> Iterator[tuple[str, bytes]]:
+    """Yield a safetensors file with a header that lies, or with tensors that are not finite."""
+    size = struct.unpack("<Q", whole[:8])[0]
+    header, data = json.loads(whole[8 : 8 + size]), whole[8 + size :]
+    for number in (0, 2**63, size - 1, size + 8):
+        yield f"header of {number}", struct.pack("<Q", number) + whole[8:]
+    for key in [key for key in header if key != "__metadata__"]:
+        one = header[key]
+        for part, value in (("shape", [-1]), ("dtype", "I64"), ("data_offsets", [0, 2**60])):
+            text = json.dumps(header | {key: one | {part: value}}).encode()
+            yield f"{key} {part} {value}", struct.pack("<Q", len(text)) + text + data
+        low, high = one["data_offsets"]
+        if one["dtype"] in ("F16", "F32") and high > low:
+            at = 8 + size + low + 4 * lot.randrange((high - low) // 4)
+            yield f"{key} not finite", whole[:at] + b"\xff" * 4 + whole[at + 4 :]
