@@ -56,10 +56,11 @@ def main() -> None:
         title, run = ROWS[name]
         began = time.monotonic()
         row = run(material)
+        spent = time.monotonic() - began
         wrong += len(row.wrong)
         print(
             f"{name:5} {title:20} {row.tried:6} {row.tried - len(row.wrong):6} {len(row.wrong):6} "
-            f"{row.peak_mb:6.0f} {row.cpu_s:6.1f}  {row.slowest} ({time.monotonic() - began:.0f} s)",
+            f"{row.peak_mb:6.0f} {row.cpu_s:6.1f}  {row.slowest} ({spent:.0f} s)",
             *[f"      {line}" for line in (row.note, *row.wrong) if line],
             sep="\n",
             flush=True,

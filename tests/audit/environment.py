@@ -71,7 +71,8 @@ def surroundings() -> Iterator[Surroundings]:
     for line in (SPLIT, PALETTE):
         yield Surroundings("ASCII streams", line, environment=ascii_only)
         for redirected in (">/dev/full", "2>/dev/full", ">&-", "2>&-", "<&-", ">&- 2>&- <&-"):
-            yield Surroundings(redirected, line, redirected, codes=(1,) * ("/full" in redirected))
+            unheard = (2,) if "2>" in redirected else ()  # nobody reads what to do
+            yield Surroundings(redirected, line, redirected, codes=unheard)
         yield Surroundings(
             "12 file descriptors", line, limit=limited(resource.RLIMIT_NOFILE, FEW_FILES)
         )

@@ -78,7 +78,7 @@ def in_documents(material: Material) -> Row:
                 one = Kind(kind.parts, kind.file, (kind.runs[i % len(kind.runs)],), kind.text)
                 yield from one.cases(
                     material,
-                    f"{dotted(path)} #{i % len(TEXTS)}",
+                    f"{i} {dotted(path)}",
                     writes(content, path, lambda old, text=text: text),
                 )
 

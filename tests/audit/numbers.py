@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
-
-import typer
+from typing import Any, get_args, get_type_hints
 
 from tests.audit.case import Case, Row, run_cases
 from tests.audit.documents import TRAIN
@@ -37,24 +36,22 @@ def row(material: Material) -> Row:
 
 def options(material: Material) -> Iterator[Case]:
     """Yield each option that takes a number with numbers that it should not or just may take."""
-    from toonset.cli.main import app
-
-    verbs: Any = typer.main.get_command(app)
+    make = partial(material_of, material)
     for verb, line in LINES.items():
-        for option in verbs.commands[verb].params:
-            if option.param_type_name != "option" or not is_number(option.type):
-                continue
-            least = getattr(option.type, "min", None)
+        for option, least in numeric_options(verb):
             ends = () if least is None else (str(least - 1), str(least))
             for value in dict.fromkeys((*BEYOND, *ends)):
-                given = (*line, f"{option.opts[-1]}={value}")
-                make = partial(material_of, material)
-                yield Case(f"{verb} {option.opts[-1]}={value}", given, make, outputs=OUTPUTS)
+                given = (*line, f"{option}={value}")
+                yield Case(f"{verb} {option}={value}", given, make, outputs=OUTPUTS)
 
 
-def is_number(kind: Any) -> bool:
-    """Return whether an option takes integers or other numbers."""
-    return any(word in kind.name for word in ("int", "float"))
+def numeric_options(verb: str) -> Iterator[tuple[str, Any]]:
+    """Yield a verb's options that take numbers, and the least number where there is one."""
+    function = getattr(importlib.import_module(f"toonset.cli.{verb}"), verb)
+    for name, hint in get_type_hints(function, include_extras=True).items():
+        kind, option = (*get_args(hint), None, None)[:2]
+        if {int, float} & {kind, *get_args(kind)} and hasattr(option, "param_decls"):
+            yield next(iter(option.param_decls), f"--{name.replace('_', '-')}"), option.min
 
 
 def material_of(material: Material, folder: Any) -> None:

@@ -19,8 +19,9 @@ Make = Callable[[Path], object]
 VERBS = {"split": ("-o", "o"), "palette": ("-o", "o"), "calibrate": ("--mesh", "m.obj", "-o", "o")}
 LARGE = (8900, 8870)  # 79 megapixels; 80 are read at most
 NAMES = (
-    *("n\udcff.png", "a\x1b[31mb.png", "new\nline.png", "-dash.png", '"; import os.png', "'$(x)`.png"),
-    *("u" * 251 + ".png", "日本.png", "%s%n.png", "..png", " .png", "a\u202eb.png", "</script>.png"),
+    *("n\udcff.png", "a\x1b[31mb.png", "new\nline.png", "-dash.png", '"; import os.png'),
+    *("u" * 251 + ".png", "日本.png", "%s%n.png", "..png", " .png", "a\u202eb.png", "<script>.png"),
+    "'$(x)`.png",
 )  # fmt: skip
 
 
@@ -101,7 +102,7 @@ def pictures(sheet: Image.Image, rng: np.random.Generator) -> Iterator[tuple[str
 def containers(sheet: Image.Image) -> Iterator[tuple[str, Make]]:
     """Yield modes, depths and file formats, well-formed ones."""
     for mode in ("1", "L", "LA", "P", "RGBA", "I;16", "I", "CMYK", "F", "YCbCr", "HSV", "LAB"):
-        suffix = "png" if mode in ("1", "L", "LA", "P", "RGBA", "I;16", "I") else "tif"
+        suffix = "png" if mode in ("1", "L", "LA", "P", "RGBA", "I;16") else "tif"
         source = sheet.convert("L") if mode in ("I;16", "I", "F") else sheet
         save = sheet.convert("RGB") if mode == "HSV" else source.convert(mode)
         yield f"mode-{mode.replace(';', '-')}.{suffix}", saved(save)
