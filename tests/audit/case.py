@@ -27,15 +27,15 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 MOST_MB, MOST_CPU_S, KILLED_AFTER_S = 1500.0, 20.0, 70
 FINE, REFUSED, LOOK = 0, 2, 3  # exit codes
-# What a refusal must end with: words after the last ";" that tell to do something.
+# A refusal says what to do: its last part begins with one of these, or has it after a comma.
 DO = (
-    "add buy calibrate check choose clean convert correct crop cut draw drop export free give "
-    "install keep leave limit look lower make move name open pass put raise rebuild remove rename "
-    "repeat run save say see set shrink split take train turn undistort unpack update use wait "
-    "write"
+    "add build calibrate check choose clean close convert correct crop cut draw drop export fix "
+    "free give install join keep leave limit look lower make mean merge move name open pass put raise "
+    "read rebuild reduce remove rename repair repeat rescale run save say scale see set show shrink "
+    "simplify split start take train turn undistort unpack update use wait write"
 ).split()
 WHAT_TO_DO = re.compile(
-    rf"[;:(] (?:first |please )?(?:{'|'.join(DO)})\b[^;]*$|did you mean|`toonset [^`]*`"
+    rf"(?:[;,:(]|\bor) (?:first |did you )?(?:{'|'.join(DO)})\b[^;]*$|`toonset [^`]*`[^;]*$"
 )
 RAW = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]")
 NOT_FINITE = re.compile(rb"(?<![\w.-])-?(?:nan|inf|infinity)(?![\w.-])", re.IGNORECASE)
@@ -259,6 +259,8 @@ def entries(folder: Path) -> set[str]:
 
 def left_behind(folder: Path, before: set[str], case: Case, ran: Ran) -> list[str]:
     """Return what a command has left that it should not, and numbers in it that are none."""
+    if ran.code < 0:  # killed: what stays is swept by the next run
+        return []
     new = sorted(entries(folder) - before)
     faults = [f"left {name!r}" for name in new if Path(name).name.startswith(".")]
     inside = [name for name in new if Path(name).parts[0] not in case.outputs]

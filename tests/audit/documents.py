@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.audit.case import Case, Row, run_cases
+from tests.audit.case import REFUSED, Case, Ran, Row, run_cases
 from tests.audit.material import Material
 
 TRAIN = ("train", "b", "--steps", "2", "--threads", "1", "--device", "cpu", "-o", "o")
 TURN = ("render", "r", "--turntable", "1", "--size", "24", "-o", "o")
 BOXES = [[20, 0, 56, 96], [122, 0, 42, 96], [214, 0, 60, 96]]
 PAIRS = {"head_top": [29, 4], "chin": [29, 30], "nose": [30, 20], "neck": [29, 38]}
+MARKS = {"schema": "toonset-landmarks/1", "points": {"tip": [0, 1, 0]}, "views": {"0": PAIRS}}
 CORRECTIONS: dict[str, Any] = {
     "version": 1,
     "sheet": {"name": "sheet.png", "sha256": "", "size": [288, 96]},
@@ -23,7 +24,19 @@ CORRECTIONS: dict[str, Any] = {
     "views": [{"box": BOXES[0], "label": "front", "lock": True}, {"box": BOXES[1], "label": "90"}],
     "palette": {"keep": [], "names": {}, "strokes": []},
 }
+AS_IT_IS = "as it is"
 PER_MUTATION, ODD_VALUES = 25, 12  # per kind of file
+
+
+def taken(folder: Path, ran: Ran) -> Iterator[str]:
+    """Say that a file was refused that has nothing wrong with it."""
+    if ran.code == REFUSED:
+        yield f"refused as it is: {ran.err.decode()}"
+
+
+def fine(folder: Path, ran: Ran) -> Iterator[str]:
+    """Say nothing."""
+    return iter(())
 
 
 @dataclass(frozen=True)
@@ -60,7 +73,8 @@ class Kind:
             change(self.at(folder))
 
         for run in self.runs:
-            yield Case(f"{self.file} {name}: {run[0]}", run, make, outputs=self.outputs)
+            title, judge = f"{self.file} {name}: {run[0]}", taken if name == AS_IT_IS else fine
+            yield Case(title, run, make, outputs=self.outputs, judge=judge)
 
     def at(self, folder: Path) -> Path:
         """Return where a case has the file."""
@@ -98,9 +112,9 @@ JSON_KINDS = (
         imported("blender-synthetic"),
     ),
     Kind(
-        ("sheet.png", "m.obj"), "marks.json",
+        ("sheet.png", "m.obj", "m.landmarks.json"), "marks.json",
         (("calibrate", "sheet.png", "--mesh", "m.obj", "--landmarks", "marks.json", "-o", "o"),),
-        json.dumps({"views": {"0": PAIRS}, "points": {"tip": [0, 1, 0.5]}}),
+        json.dumps(MARKS),
     ),
     Kind(
         ("m.obj", "m.landmarks.json"), "m.landmarks.json",
@@ -109,7 +123,7 @@ JSON_KINDS = (
     Kind(
         ("sheet.png",), "boxes.json",
         (("split", "sheet.png", "--boxes", "boxes.json", "-o", "o"),),
-        json.dumps([*BOXES[:2], {"x": 214, "y": 0, "width": 60, "height": 96}]),
+        json.dumps({"boxes": [{"x": x, "y": y, "width": w, "height": h} for x, y, w, h in BOXES]}),
     ),
     Kind(
         ("sheet.png", "bundle"), "fix.json",
@@ -167,6 +181,7 @@ def by_hand(material: Material) -> Row:
 
 def changes(content: bytes, lot: random.Random) -> Iterator[tuple[str, Callable[[Path], Any]]]:
     """Yield what a person might do to a JSON file: 12 whole ones, keys gone, odd values, links."""
+    yield AS_IT_IS, lambda at: at.write_bytes(content)
     for name, data in WHOLE.items():
         yield name, lambda at, data=data: at.write_bytes(data)
     yield "utf-16", lambda at: at.write_bytes(content.decode().encode("utf-16"))
