@@ -17,7 +17,18 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.audit import documents, environment, meshes, names, numbers, repeated, runs, sheets, soak
+from tests.audit import (
+    documents,
+    environment,
+    meshes,
+    mutations,
+    names,
+    numbers,
+    repeated,
+    runs,
+    sheets,
+    soak,
+)
 from tests.audit.case import Row, import_everything
 from tests.audit.material import Material, make_material
 
@@ -27,7 +38,7 @@ ROWS: dict[str, tuple[str, Callable[[Material], Row]]] = {
     "R1": ("sheets", sheets.row),
     "R2": ("meshes", meshes.row),
     "R3": ("documents by hand", documents.by_hand),
-    "R3m": ("documents mutated", documents.mutated),
+    "R3m": ("documents mutated", mutations.row),
     "R4": ("run folders", runs.row),
     "R9": ("numbers, options", numbers.row),
     "R12": ("twice the same", repeated.row),

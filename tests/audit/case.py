@@ -18,6 +18,7 @@ import shlex
 import shutil
 import signal
 import sys
+import tempfile
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -29,15 +30,15 @@ MOST_MB, MOST_CPU_S, KILLED_AFTER_S = 1500.0, 20.0, 70
 FINE, REFUSED, LOOK = 0, 2, 3  # exit codes
 # A refusal says what to do: its last part begins with one of these, or has it after a comma.
 DO = (
-    "add build calibrate check choose clean close convert correct crop cut draw drop export fix "
-    "free give install join keep leave limit look lower make mean merge move name open pass put raise "
-    "read rebuild reduce remove rename repair repeat rescale run save say scale see set show shrink "
+    "add build calibrate check choose clean close convert correct crop cut draw drop export fix free "
+    "give install join keep leave limit look lower make merge move name open pass put raise read "
+    "rebuild reduce remove rename repair repeat rescale run save say scale see set show shrink "
     "simplify split start take train turn undistort unpack update use wait write"
-).split()
+).replace(" ", "|")
 WHAT_TO_DO = re.compile(
-    rf"(?:[;,:(]|\bor) (?:first |did you )?(?:{'|'.join(DO)})\b[^;]*$|`toonset [^`]*`[^;]*$"
+    rf"(?:[;,:(]|\bor) (?:first )?(?:{DO}|did you mean)\b[^;]*$|(?:`toonset | must )[^;]*$"
 )
-RAW = re.compile(rb"[\x00-\x08\x0b-\x1f\x7f]")
+RAW = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 NOT_FINITE = re.compile(rb"(?<![\w.-])-?(?:nan|inf|infinity)(?![\w.-])", re.IGNORECASE)
 TEXTS = (".json", ".csv", ".obj", ".txt")
 
@@ -156,8 +157,8 @@ def try_case(case: Case, work: Path, tally: Tally) -> Ran:
 
 def remade(case: Case, tally: Tally) -> str:
     """Make a case's folder again for a person to look at; return how to run it."""
-    folder = tally.kept / f"{len(tally.wrong)}"
-    folder.mkdir(parents=True)
+    tally.kept.mkdir(exist_ok=True)
+    folder = Path(tempfile.mkdtemp(dir=tally.kept))
     case.make(folder)
     return f"cd {folder} && toonset {' '.join(map(quoted, case.arguments))}"
 
@@ -242,7 +243,7 @@ def faults_of(ran: Ran, verb: str) -> list[str]:
         faults.append(f"exit {ran.code}, but: {said[0]}")
     if "Warning: " in ran.err.decode(errors="replace"):
         faults.append(f"a library's warning: {next(x for x in lines if 'Warning: ' in x)[-160:]}")
-    if RAW.search(ran.out + ran.err):
+    if RAW.search((ran.out + ran.err).decode(errors="replace")):
         faults.append("prints raw control characters")
     if ran.peak_mb > MOST_MB:
         faults.append(f"{ran.peak_mb:.0f} MB, at most {MOST_MB:.0f}")

@@ -1,11 +1,12 @@
-"""R3: the files that people and programs write by hand, changed by rule and by lot."""
+"""R3: documents that people and other programs write, with everything in them that may be wrong."""
 
 from __future__ import annotations
 
 import json
 import random
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial, reduce
 from pathlib import Path
 from typing import Any
 
@@ -24,19 +25,28 @@ CORRECTIONS: dict[str, Any] = {
     "views": [{"box": BOXES[0], "label": "front", "lock": True}, {"box": BOXES[1], "label": "90"}],
     "palette": {"keep": [], "names": {}, "strokes": []},
 }
-AS_IT_IS = "as it is"
-PER_MUTATION, ODD_VALUES = 25, 12  # per kind of file
+SHORT = {"b": "bundle", "r": "run"}
+ODD_VALUES, KEYS_GONE = 12, 4  # per kind of file
+PASSWD, ZERO = "/etc/passwd", "/dev/zero"
+
+Change = Callable[[Path], Any]
+Judge = Callable[[Path, Ran], Iterable[str]]
+Place = tuple[Any, ...]  # keys and numbers on the way to a value of a document
 
 
-def taken(folder: Path, ran: Ran) -> Iterator[str]:
-    """Say that a file was refused that has nothing wrong with it."""
-    if ran.code == REFUSED:
-        yield f"refused as it is: {ran.err.decode()}"
+def nothing(folder: Path, ran: Ran) -> tuple[str, ...]:
+    """Find no more faults."""
+    return ()
 
 
-def fine(folder: Path, ran: Ran) -> Iterator[str]:
-    """Say nothing."""
-    return iter(())
+def taken(folder: Path, ran: Ran) -> tuple[str, ...]:
+    """Find fault with a refusal: nothing is wrong with the file."""
+    return (f"refused as it is: {ran.err.decode()}",) if ran.code == REFUSED else ()
+
+
+def refused(folder: Path, ran: Ran) -> tuple[str, ...]:
+    """Find fault with what is not refused."""
+    return () if ran.code == REFUSED else ("followed a link out of the folder",)
 
 
 @dataclass(frozen=True)
@@ -48,50 +58,55 @@ class Kind:
         file: which of them is changed.
         runs: the command lines that read it.
         text: its content; None: as the material has it.
-        outputs: names that the commands write.
     """
 
     parts: tuple[str, ...]
     file: str
     runs: tuple[tuple[str, ...], ...]
     text: str | None = None
-    outputs: tuple[str, ...] = ("o", "b")
 
     def content(self, material: Material) -> bytes:
         """Return the file as it should be."""
         at = material.root / self.file
         return at.read_bytes() if self.text is None else self.text.encode()
 
-    def cases(self, material: Material, name: str, change: Callable[[Path], Any]) -> Iterator[Case]:
+    def cases(
+        self, material: Material, name: str, change: Change, judge: Judge = nothing
+    ) -> Iterator[Case]:
         """Yield every command with the file changed."""
 
         def make(folder: Path) -> None:
             material.link_all(folder, *self.parts)
-            for link, part in (("b", "bundle"), ("r", "run")):
+            for short, part in SHORT.items():
                 if part in self.parts:
-                    (folder / part).rename(folder / link)
-            change(self.at(folder))
+                    (folder / part).rename(folder / short)
+            change(folder / self.there)
 
         for run in self.runs:
-            title, judge = f"{self.file} {name}: {run[0]}", taken if name == AS_IT_IS else fine
-            yield Case(title, run, make, outputs=self.outputs, judge=judge)
+            title = f"{self.file} {name}: {run[0]}"
+            yield Case(title, run, make, outputs=("o", "b"), judge=judge)
 
-    def at(self, folder: Path) -> Path:
+    @property
+    def there(self) -> str:
         """Return where a case has the file."""
-        short = {"bundle": "b", "run": "r"}
-        first, *rest = Path(self.file).parts
-        return folder.joinpath(short.get(first, first), *rest)
+        first, *rest = self.file.split("/")
+        return "/".join((first[0] if first in SHORT.values() else first, *rest))
+
+    def only(self, number: int) -> Kind:
+        """Return the kind with one of its commands, in turn."""
+        return replace(self, runs=(self.runs[number % len(self.runs)],))
 
 
 def imported(folder: str) -> tuple[tuple[str, ...], ...]:
     return (("import", folder, "-o", "o"), ("info", folder), ("check", folder))
 
 
+EXPORT = ("export", "b", "--to", "colmap", "-o", "o")
 LOOKS = (("info", "b"), ("check", "b"))
 JSON_KINDS = (
     Kind(
         ("bundle",), "bundle/transforms.json",
-        (*LOOKS, ("palette", "b"), TRAIN, ("export", "b", "--to", "colmap", "-o", "o")),
+        (*LOOKS, ("palette", "b"), TRAIN, EXPORT),
     ),
     Kind(("bundle",), "bundle/calibration.json", (*LOOKS, ("palette", "b"), ("consistency", "b"))),
     Kind(
@@ -134,37 +149,25 @@ JSON_KINDS = (
         json.dumps(CORRECTIONS),
     ),
 )  # fmt: skip
-OTHER_KINDS = (
-    Kind(("bundle",), "bundle/palette.gpl", (("palette", "b", "--colors", "b/palette.gpl"),)),
-    Kind(("bundle",), "bundle/palette.ase", (("palette", "b", "--colors", "b/palette.ase"),)),
-    Kind(("bundle",), "bundle/palette.hex", (("palette", "b", "--colors", "b/palette.hex"),)),
-    Kind(
-        ("sheet.png",), "boxes.csv", (("split", "sheet.png", "--boxes", "boxes.csv", "-o", "o"),),
-        "x,y,width,height\n" + "".join(f"{','.join(map(str, box))}\n" for box in BOXES),
-    ),
-    *[Kind(("colmap",), f"colmap/sparse/0/{name}.bin", imported("colmap")[:1])
-      for name in ("cameras", "images", "points3D", "rigs", "frames")],
-    *[Kind(("colmap--text",), f"colmap--text/sparse/0/{name}.txt", imported("colmap--text")[:1])
-      for name in ("cameras", "images")],
-)  # fmt: skip
+INSIDE = {  # files that links must not bring in from elsewhere, and what reads them
+    "bundle/transforms.json": (*LOOKS, ("palette", "b"), TRAIN, EXPORT),
+    "bundle/palette.json": (LOOKS[1], TRAIN),
+    "bundle/calibration.json": (LOOKS[1],),
+    "bundle/images/000.png": (LOOKS[1], ("palette", "b"), TRAIN, EXPORT),
+    "bundle/labels/000.png": (LOOKS[1], TRAIN),
+    "bundle/mannequin.obj": (LOOKS[1], TRAIN, EXPORT),
+    "split/split.json": (("check", "split"), ("palette", "split", "-o", "o")),
+    "split/images/000.png": (("check", "split"), ("palette", "split", "-o", "o")),
+}
 ODD: tuple[Any, ...] = (
     *(None, True, "", "x", "\x1b[31m", "../x", "/etc/passwd", "a\0b", "n" * 70_000, [], {}, [[]]),
     *(0, -1, 0.5, 1e-300, 1e300, -1e308, 2**31, 2**62, 2**70, [0] * 2000, {"x": {"y": 1}}),
 )
-WHOLE = {
-    "empty": b"",
-    "brace": b"{",
-    "list": b"[]",
-    "null": b"null",
-    "string": b'"x"',
-    "nan": b'{"schema": NaN}',
-    "deep": b"[" * 100_000,
-    "deep-closed": b"[" * 70 + b"]" * 70,
-    "digits": b'{"version": ' + b"9" * 5000 + b"}",
-    "twice": b'{"version": 1, "version": 1}',
-    "not-utf-8": b'{"version": "\xff"}',
-    "nul": bytes(1000),
-}
+WHOLE = (
+    *(b"", b"{", b"[]", b"null", b'"x"', b'{"schema": NaN}', b'{"version": 1, "version": 1}'),
+    *(b"[" * 100_000, b"[" * 70 + b"]" * 70, b'{"version": ' + b"9" * 5000 + b"}"),
+    *(b'{"version": "\xff"}', bytes(1000)),
+)
 
 
 def by_hand(material: Material) -> Row:
@@ -173,145 +176,80 @@ def by_hand(material: Material) -> Row:
 
     def cases() -> Iterator[Case]:
         for kind in JSON_KINDS:
-            for name, change in changes(kind.content(material), lot):
+            content = kind.content(material)
+            yield from kind.cases(material, "as it is", put(content), taken)
+            for name, change in changes(content, lot):
                 yield from kind.cases(material, name, change)
+        for file, runs in INSIDE.items():
+            kind = Kind((file.split("/")[0],), file, runs)
+            yield from kind.cases(material, "lies outside", moved_out, refused)
 
     return run_cases(cases(), material.work)
 
 
-def changes(content: bytes, lot: random.Random) -> Iterator[tuple[str, Callable[[Path], Any]]]:
-    """Yield what a person might do to a JSON file: 12 whole ones, keys gone, odd values, links."""
-    yield AS_IT_IS, lambda at: at.write_bytes(content)
-    for name, data in WHOLE.items():
-        yield name, lambda at, data=data: at.write_bytes(data)
-    yield "utf-16", lambda at: at.write_bytes(content.decode().encode("utf-16"))
+def changes(content: bytes, lot: random.Random) -> Iterator[tuple[str, Change]]:
+    """Yield what a person might do to a JSON file: other texts, no file, odd values, keys gone."""
+    for data in (*WHOLE, content.decode().encode("utf-16")):
+        yield f"is {data[:16]!r}", put(data)
     yield "gone", lambda at: at.unlink(missing_ok=True)
     yield "folder", lambda at: (at.unlink(missing_ok=True), at.mkdir())
-    yield "link", lambda at: (at.unlink(missing_ok=True), at.symlink_to("/etc/passwd"))
-    yield "to-zero", lambda at: (at.unlink(missing_ok=True), at.symlink_to("/dev/zero"))
-    places = [*leaves(json.loads(content))]
+    for target in (PASSWD, ZERO):
+        yield target, partial(linked, target=target)
+    places = [*places_of(json.loads(content))]
     for odd in lot.sample(ODD, ODD_VALUES):
-        path = lot.choice(places)
-        yield f"{dotted(path)}={short(odd)}", writes(content, path, lambda old, odd=odd: odd)
-    for path in lot.sample(places, min(4, len(places))):
-        yield f"{dotted(path)} gone", writes(content, path, None)
+        place = lot.choice(places)
+        yield f"{dotted(place)}={json.dumps(odd)[:20]}", writes(content, place, [odd])
+    for place in lot.sample(places, min(KEYS_GONE, len(places))):
+        yield f"{dotted(place)} gone", writes(content, place, [])
 
 
-def writes(
-    content: bytes, path: tuple[Any, ...], new: Callable[[Any], Any] | None
-) -> Callable[[Path], Any]:
-    """Return what writes the document with one value replaced, or taken away."""
-
-    def write(at: Path) -> None:
-        document = json.loads(content)
-        holder = document
-        for key in path[:-1]:
-            holder = holder[key]
-        if new is None:
-            del holder[path[-1]]
-        else:
-            holder[path[-1]] = new(holder[path[-1]])
-        at.write_text(json.dumps(document))
-
-    return write
+def put(data: bytes) -> Change:
+    """Return what writes this content."""
+    return lambda at: at.write_bytes(data)
 
 
-def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yield the path of every value in a document, of lists the first three."""
-    if path:
-        yield path
-    items = value.items() if isinstance(value, dict) else []
-    items = list(enumerate(value))[:3] if isinstance(value, list) else items
-    for key, item in items:
-        yield from leaves(item, (*path, key))
+def linked(at: Path, target: str) -> None:
+    """Put a link in the place of a file."""
+    at.unlink(missing_ok=True)
+    at.symlink_to(target)
 
 
-def dotted(path: tuple[Any, ...]) -> str:
-    return ".".join(map(str, path))
+def moved_out(at: Path) -> None:
+    """Move a file out of its folder; a link stays."""
+    outside = at.parents[1] if at.parent.name in ("b", "split") else at.parents[2]
+    at.rename(outside / "outside")
+    at.symlink_to(outside / "outside")
 
 
-def short(value: Any) -> str:
-    return json.dumps(value)[:20]
+def writes(content: bytes, place: Place, new: list[Any]) -> Change:
+    """Return what writes the document with one value replaced, or taken away if `new` is empty."""
+    document = json.loads(content)
+    set_at(document, place, new)
+    return put(json.dumps(document).encode())
 
 
-def mutated(material: Material) -> Row:
-    """Change bytes and values by lot: 16 kinds of mutations, among them COLMAP's .bin."""
-    lot = random.Random(material.seed + 1)
-
-    def cases() -> Iterator[Case]:
-        for kind in (*JSON_KINDS, *OTHER_KINDS):
-            content = kind.content(material)
-            json_too = kind in JSON_KINDS
-            for i in range(2 * PER_MUTATION if json_too or "colmap" in kind.file else PER_MUTATION):
-                name, data = mutation(content, lot, json_too and i % 2 == 0)
-                run = kind.runs[i % len(kind.runs)]
-                one = Kind(kind.parts, kind.file, (run,), kind.text)
-                change = lambda at, data=data: at.write_bytes(data)  # noqa: E731
-                yield from one.cases(material, f"{i} {name}", change)
-
-    return run_cases(cases(), material.work)
-
-
-def mutation(content: bytes, lot: random.Random, as_json: bool) -> tuple[str, bytes]:
-    """Return a name and the content with one to three changes, of its values or its bytes."""
-    if as_json:
-        document = json.loads(content)
-        names = [mutate_value(document, lot) for _ in range(lot.randint(1, 3))]
-        return "+".join(names), json.dumps(document).encode()
-    data = bytearray(content)
-    names = [mutate_bytes(data, lot) for _ in range(lot.randint(1, 3))]
-    return "+".join(names), bytes(data)
-
-
-def mutate_value(document: Any, lot: random.Random) -> str:
-    """Change one value of a document in place; return how."""
-    path = lot.choice([*leaves(document)] or [()])
-    if not path:
-        return "nothing"
-    holder = document
-    for key in path[:-1]:
-        holder = holder[key]
-    old = holder[path[-1]]
-    number = old if isinstance(old, int | float) and abs(old) < 1e9 else 1
-    other = lot.choice([*leaves(document)])
-    kinds: dict[str, Callable[[], Any]] = {
-        "odd": lambda: lot.choice(ODD),
-        "negative": lambda: -number,
-        "a thousand": lambda: number * 1000,
-        "a thousandth": lambda: number / 1000,
-        "a bit more": lambda: number + lot.gauss(0, 0.01),
-        "as text": lambda: str(old),
-        "in a list": lambda: [old],
-        "twice": lambda: [old, old],
-        "another": lambda: found(document, other),
-    }
-    kind = lot.choice([*kinds, "gone"])
-    if kind == "gone":
-        del holder[path[-1]]
+def set_at(document: Any, place: Place, new: list[Any]) -> None:
+    """Replace the value at a place, or take it away if `new` is empty."""
+    holder = value_at(document, place[:-1])
+    if new:
+        holder[place[-1]] = new[0]
     else:
-        holder[path[-1]] = json.loads(json.dumps(kinds[kind]()))
-    return kind
+        del holder[place[-1]]
 
 
-def found(document: Any, path: tuple[Any, ...]) -> Any:
-    """Return the value at a path."""
-    for key in path:
-        document = document[key]
-    return document
+def value_at(document: Any, place: Place) -> Any:
+    """Return the value at a place."""
+    return reduce(lambda holder, key: holder[key], place, document)
 
 
-def mutate_bytes(data: bytearray, lot: random.Random) -> str:
-    """Change some bytes in place; return how."""
-    at = lot.randrange(max(1, len(data)))
-    to = min(len(data), at + lot.choice((1, 4, 8, 50)))
-    kinds: dict[str, bytes] = {
-        "flip": bytes([data[at] ^ 1 << lot.randrange(8)]) + data[at + 1 : to] if data else b"x",
-        "cut out": b"",
-        "repeat": bytes(data[at:to]) * 2,
-        "noise": lot.randbytes(to - at),
-        "ones": b"\xff" * (to - at),
-        "insert": lot.randbytes(3) + data[at:to],
-    }
-    kind = lot.choice([*kinds])
-    data[at:to] = kinds[kind]
-    return kind
+def places_of(value: Any, at: Place = ()) -> Iterator[Place]:
+    """Yield the place of every value in a document, of lists the first three."""
+    items = enumerate(value[:3]) if isinstance(value, list) else ()
+    for key, item in value.items() if isinstance(value, dict) else items:
+        yield (*at, key)
+        yield from places_of(item, (*at, key))
+
+
+def dotted(place: Place) -> str:
+    """Return a place on one line."""
+    return ".".join(map(str, place))

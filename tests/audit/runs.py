@@ -10,20 +10,18 @@ from __future__ import annotations
 import json
 import random
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from tests.audit.case import REFUSED, Case, Ran, Row, Tally, run_forked, try_case
-from tests.audit.documents import ODD, TURN, dotted, leaves, writes
+from tests.audit.documents import ODD, TURN, ZERO, Change, dotted, linked, places_of, put, writes
 from tests.audit.material import Material
 
 READ = ("config.json", "model.safetensors", "drawings.safetensors", "drawings.png", "paint.png")
 CUTS, TYPED = 144, 190
 CANARY = "canary"
 PICKLE = b"cposix\nsystem\n(S'touch " + CANARY.encode() + b"'\ntR."
-
-Change = Callable[[Path], Any]
 
 
 def row(material: Material) -> Row:
@@ -73,44 +71,34 @@ def tampered(material: Material, lot: random.Random) -> Iterator[tuple[str, Chan
     """Yield names, changes of a run folder, and whether the run must be refused."""
     wholes = {name: (material.root / "run" / name).read_bytes() for name in READ}
 
-    def put(name: str, data: bytes) -> Change:
-        return lambda run: (run / name).write_bytes(data)
+    def at(name: str, change: Change) -> Change:
+        return lambda run: change(run / name)
 
     for i in range(CUTS):
         name = READ[i % len(READ)]
         whole = wholes[name]
         cut = lot.randrange(len(whole.rstrip()))
-        yield f"{name} cut at {cut}", put(name, whole[:cut]), True
-        at, bit = lot.randrange(len(whole)), lot.randrange(8)
-        flipped = whole[:at] + bytes([whole[at] ^ 1 << bit]) + whole[at + 1 :]
-        yield f"{name} flipped at {at}.{bit}", put(name, flipped), False
-    for name in READ:
-        yield f"{name} is a pickle", put(name, PICKLE), True
-        yield f"{name} is a zip", put(name, b"PK\x03\x04" + PICKLE), True
-        yield f"{name} is gone", lambda run, name=name: (run / name).unlink(), True
-        yield f"{name} is empty", put(name, b""), True
-        yield f"{name} is longer", put(name, wholes[name] + PICKLE), False
-        other = READ[(READ.index(name) + 1) % len(READ)]
-        yield f"{name} is {other}", put(name, wholes[other]), True
-        yield f"{name} is /dev/zero", lambda run, name=name: linked(run / name, "/dev/zero"), True
+        yield f"{name} cut at {cut}", at(name, put(whole[:cut])), True
+        place, bit = lot.randrange(len(whole)), lot.randrange(8)
+        flipped = whole[:place] + bytes([whole[place] ^ 1 << bit]) + whole[place + 1 :]
+        yield f"{name} flipped at {place}.{bit}", at(name, put(flipped)), False
+    for name, other in zip(READ, (*READ[1:], READ[0]), strict=True):
+        for what, data in (("pickle", PICKLE), ("zip", b"PK\x03\x04"), ("nothing", b"")):
+            yield f"{name} is a {what}", at(name, put(data)), True
+        yield f"{name} is {other}", at(name, put(wholes[other])), True
+        yield f"{name} is gone", at(name, Path.unlink), True
+        yield f"{name} is endless", at(name, partial(linked, target=ZERO)), True
+        yield f"{name} is longer", at(name, put(wholes[name] + PICKLE)), False
     for file in ("model.safetensors", "drawings.safetensors"):
         for name, data in headers(wholes[file], lot):
-            yield f"{file} {name}", put(file, data), False
+            yield f"{file} {name}", at(file, put(data)), False
     config = wholes["config.json"]
-    places = [path for path in leaves(json.loads(config)["field"])]
+    places = [*places_of(json.loads(config)["field"])]
     for i in range(TYPED):
-        path, odd = ("field", *places[i % len(places)]), ODD[i % len(ODD)]
-        if i % 3 == 0:
-            odd = lot.choice((0, -1, 1e-300, 1e9, 1e300, 2**40, 512, 4096))
-        write = writes(config, path, lambda old, odd=odd: odd)
-        change = lambda run, write=write: write(run / "config.json")  # noqa: E731
-        yield f"{dotted(path)}={json.dumps(odd)[:16]}", change, False
-
-
-def linked(path: Path, target: str) -> None:
-    """Replace a file by a link."""
-    path.unlink()
-    path.symlink_to(target)
+        place, odd = ("field", *places[i % len(places)]), ODD[i % len(ODD)]
+        odd = lot.choice((0, -1, 1e-300, 1e9, 1e300, 2**40, 512)) if i % 3 == 0 else odd
+        change = at("config.json", writes(config, place, [odd]))
+        yield f"{dotted(place)}={json.dumps(odd)[:16]}", change, False
 
 
 def headers(whole: bytes, lot: random.Random) -> Iterator[tuple[str, bytes]]:
