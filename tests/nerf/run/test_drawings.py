@@ -121,6 +121,7 @@ def smaller(folder: Path) -> None:
         (look(lambda d: d["pairs"][0].update(pair=[0, 77])), "pair"),
         (look(lambda d: d["cameras"].pop()), "config.json asks for"),
         (look(lambda d: d["cameras"][0].update(scale=-1.0)), "scale"),
+        (look(lambda d: d["cameras"][0]["rotation"].reverse()), "config.json: field.drawings: "),
         (look(lambda d: d.update(soup=1)), "soup"),
     ],
 )
