@@ -272,11 +272,14 @@ def load_tensors(file: Path) -> dict[str, Tensor]:
         BundleError: it is too large, cannot be read, or is damaged.
     """
     try:
+        if not file.is_file():  # a device could be read for ever
+            raise BundleError(f"{file}: is not there, or no regular file; train again")
         if file.stat().st_size > MAX_BYTES:
-            raise BundleError(f"{file}: larger than {MAX_BYTES >> 20} MiB; not a toonset run")
+            raise BundleError(f"{file}: larger than {MAX_BYTES >> 20} MiB; train again")
         return load(file.read_bytes())
     except OSError as error:
-        raise BundleError(f"{file}: cannot be read ({error.strerror})") from error
+        reason = f"cannot be read ({error.strerror}); check its permissions"
+        raise BundleError(f"{file}: {reason}") from error
     except (SafetensorError, ValueError, KeyError) as error:
         raise BundleError(f"{file}: is damaged ({error}); train again") from error
 

@@ -27,6 +27,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 MOST_MB, MOST_CPU_S, KILLED_AFTER_S = 1500.0, 20.0, 70
+MOST_ADDRESSES = 10 * 2**30  # bytes; 4 GB of them are torch's libraries
 FINE, REFUSED, LOOK = 0, 2, 3  # exit codes
 # A refusal says what to do: its last part begins with one of these, or has it after a comma.
 DO = (
@@ -202,6 +203,7 @@ def _command(case: Case, folder: Path, streams: tuple[Path, Path]) -> int:
     sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)
     resource.setrlimit(resource.RLIMIT_CPU, (KILLED_AFTER_S, KILLED_AFTER_S + 5))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_ADDRESSES, MOST_ADDRESSES))
     case.within()
     code = call_main(case.arguments)
     sys.stdout.flush()
