@@ -178,7 +178,8 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         if not bool((flow.float().abs() <= LONGEST_PX).all()):
             raise BundleError(f"{file}: flow.{i} holds displacements out of range; train again")
         if max(pair.pair) >= len(cameras) or pair.pair[0] == pair.pair[1]:
-            raise BundleError(f"{file}: pair {pair.pair} is none of {len(cameras)} drawings")
+            what = f"pair {pair.pair} is none of {len(cameras)} drawings"
+            raise BundleError(f"{file}: {what}; train again")
         flows.append(PairFlow(pair.pair, camera, flow.numpy()))
     shape = None if record.shape is None else _shape(record.shape, found, file)
     levels: list[np.ndarray | None] = [None] * len(cameras)

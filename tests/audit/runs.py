@@ -85,7 +85,7 @@ def tampered(material: Material, lot: random.Random) -> Iterator[tuple[str, Chan
     for name, other in zip(READ, (*READ[1:], READ[0]), strict=True):
         for what, data in (("pickle", PICKLE), ("zip", b"PK\x03\x04"), ("nothing", b"")):
             yield f"{name} is a {what}", at(name, put(data)), True
-        yield f"{name} is {other}", at(name, put(wholes[other])), True
+        yield f"{name} is {other}", at(name, put(wholes[other])), False
         yield f"{name} is gone", at(name, Path.unlink), True
         yield f"{name} is endless", at(name, partial(linked, target=ZERO)), True
         yield f"{name} is longer", at(name, put(wholes[name] + PICKLE)), False

@@ -125,7 +125,7 @@ def smaller(folder: Path) -> None:
         (look(lambda d: d.update(height=-1)), "height"),
         (look(lambda d: d.update(palette=[])), "palette"),
         (look(lambda d: d["outline"].update(width_px=1e9)), "width_px"),
-        (look(lambda d: d["pairs"][0].update(pair=[0, 77])), "pair"),
+        (look(lambda d: d["pairs"][0].update(pair=[0, 77])), "drawings; train again"),
         (look(lambda d: d["cameras"].pop()), "config.json asks for"),
         (look(lambda d: d["cameras"][0].update(scale=-1.0)), "scale"),
         (look(lambda d: d["cameras"][0]["rotation"].reverse()), "config.json: field.drawings: "),
