@@ -52,7 +52,8 @@ def mesh(
         bool, typer.Option("--nearest", help="Match --variants by likeness, not by order.")
     ] = False,
     threads: Annotated[
-        int | None, typer.Option("--threads", min=1, help="CPU threads (default: all cores).")
+        int | None,
+        typer.Option("--threads", min=1, max=1024, help="CPU threads (default: all cores)."),
     ] = None,
     force: ForceFlag = False,
     as_json: JsonFlag = False,

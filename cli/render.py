@@ -89,7 +89,8 @@ def render(
         bool | None, typer.Option("--gif/--no-gif", help="turntable.gif (default: turntables).")
     ] = None,
     threads: Annotated[
-        int | None, typer.Option("--threads", min=1, help="CPU threads (default: all cores).")
+        int | None,
+        typer.Option("--threads", min=1, max=1024, help="CPU threads (default: all cores)."),
     ] = None,
     force: ForceFlag = False,
     as_json: JsonFlag = False,

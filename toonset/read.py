@@ -88,7 +88,7 @@ def read_whole(
         if path.is_dir():
             raise error_type(f"{path}: is a folder, a {thing} file is needed; name the file in it")
         if not path.is_file():
-            raise error_type(f"{path}: is no regular file; a {thing} file is needed")
+            raise error_type(f"{path}: is no regular file; give a {thing} file")
         if size == 0:
             raise error_type(f"{path}: is empty (0 bytes); export the {thing} again")
         if size > max_bytes:
