@@ -12,7 +12,7 @@ from tests.audit.case import Case, Row, run_cases
 from tests.audit.documents import TRAIN
 from tests.audit.material import Material
 
-BEYOND = ("0", "-1", "1e400", "nan", "inf", "x", "", str(10**30))
+BEYOND = ("0", "-1", "1e400", "nan", "inf", "x", "", str(10**12), str(10**30))
 # What a verb needs besides; `edit` and `view` serve and draw for long where nothing is refused.
 LINES: dict[str, tuple[str, ...]] = {
     "calibrate": ("calibrate", "sheet.png", "--mesh", "none", "-o", "o"),
