@@ -49,7 +49,8 @@ def numeric_options(verb: str) -> Iterator[tuple[str, Any]]:
     """Yield a verb's options that take numbers, and the least number where there is one."""
     function = getattr(importlib.import_module(f"toonset.cli.{verb}"), verb)
     for name, hint in get_type_hints(function, include_extras=True).items():
-        kind, option = (*get_args(hint), None, None)[:2]
+        parts: list[Any] = [*get_args(hint), None, None]
+        kind, option = parts[:2]
         if {int, float} & {kind, *get_args(kind)} and hasattr(option, "param_decls"):
             yield next(iter(option.param_decls), f"--{name.replace('_', '-')}"), option.min
 
