@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from tests.audit.case import ROOT, Ran, Row, Tally, entries, faults_of, quoted, remove
@@ -22,7 +23,11 @@ RENDER = ("render", "run", "--turntable", "1", "--size", "24", "-o", "o")
 WORK = (PALETTE, CALIBRATE, TRAIN, RENDER)
 EXPORT = ("export", "bundle", "--to", "colmap", "-o", "o")
 NOT_UTF8 = os.fsdecode(b"n\xff")
-SMALL_MB, SMALL_KB, FEW_FILES = 400, 8, 12
+LIMITS = (
+    ("12 file descriptors", resource.RLIMIT_NOFILE, 12),
+    ("files of 8 kB", resource.RLIMIT_FSIZE, 8 * 1024),
+    ("400 MB of address space", resource.RLIMIT_AS, 400 * 2**20),
+)
 CLOSED_PIPE = 1  # exit code, as Unix tools have it, where nobody reads on
 
 
@@ -51,10 +56,6 @@ class Surroundings:
     codes: tuple[int, ...] = ()
 
 
-def limited(what: int, most: int) -> Callable[[], object]:
-    return lambda: resource.setrlimit(what, (most, most))
-
-
 def surroundings() -> Iterator[Surroundings]:
     """Yield all of them."""
     for line in (SPLIT, *WORK):
@@ -73,25 +74,15 @@ def surroundings() -> Iterator[Surroundings]:
         for redirected in (">/dev/full", "2>/dev/full", ">&-", "2>&-", "<&-", ">&- 2>&- <&-"):
             unheard = (2,) if "2>" in redirected else ()  # nobody reads what to do
             yield Surroundings(redirected, line, redirected, codes=unheard)
-        yield Surroundings(
-            "12 file descriptors", line, limit=limited(resource.RLIMIT_NOFILE, FEW_FILES)
-        )
-        yield Surroundings(
-            "files of 8 kB", line, limit=limited(resource.RLIMIT_FSIZE, SMALL_KB * 1024)
-        )
-        yield Surroundings(
-            "an output that is not UTF-8", (*line[:-1], NOT_UTF8), environment=strict
-        )
-        memory = limited(resource.RLIMIT_AS, SMALL_MB * 2**20)
-        yield Surroundings("400 MB of address space", line, limit=memory)
+        odd = (*line[:-1], NOT_UTF8)
+        yield Surroundings("an output that is not UTF-8", odd, environment=strict)
+        for name, what, most in LIMITS:
+            limit = partial(resource.setrlimit, what, (most, most))
+            yield Surroundings(name, line, limit=limit)
     for line in (("info", "bundle"), ("info", "bundle", "--json"), ("--help",)):
         yield Surroundings("a pipe that is closed", line, "| true", codes=(CLOSED_PIPE,))
-    yield Surroundings(
-        "a deleted folder", line=("info",), before="mkdir x && cd x && rmdir ../x &&"
-    )
-    yield Surroundings(
-        "a deleted folder", line=("--help",), before="mkdir x && cd x && rmdir ../x &&"
-    )
+    for line in (("info",), ("--help",)):
+        yield Surroundings("a deleted folder", line, before="mkdir x && cd x && rmdir ../x &&")
     yield Surroundings("no PATH", EXPORT, environment={"PATH": None})
     yield Surroundings("no display, no EGL", RENDER, environment={"PYOPENGL_PLATFORM": "x"})
 
@@ -117,9 +108,7 @@ def row(material: Material) -> Row:
 
 def start(one: Surroundings, folder: Path) -> Ran:
     """Run the command in a new process; streams that the shell does not redirect are caught."""
-    environment = {
-        name: value for name, value in os.environ.items() if name in ("PATH", "TOONSET_CACHE")
-    }
+    environment = {name: os.environ[name] for name in ("PATH", "TOONSET_CACHE")}
     environment |= {"PYTHONPATH": str(ROOT), "HOME": str(folder)}
     for name, value in one.environment.items():
         environment.pop(name, None)

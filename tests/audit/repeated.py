@@ -45,14 +45,10 @@ class World:
     environment: dict[str, str]
 
 
-WORLDS = (
-    World("one", 1, {"PYTHONHASHSEED": "1", "LC_ALL": "C", "TZ": "UTC"}),
-    World(
-        "another place",
-        2,
-        {"PYTHONHASHSEED": "4242", "LC_ALL": "C.UTF-8", "TZ": "Asia/Kathmandu", "HOME": "~"},
-    ),
-)
+KEPT = ("PATH", "TOONSET_CACHE")  # of this process' environment
+HERE = {"PYTHONHASHSEED": "1", "LC_ALL": "C", "TZ": "UTC"}  # and no HOME
+THERE = {"PYTHONHASHSEED": "42", "LC_ALL": "C.UTF-8", "TZ": "Asia/Kathmandu", "HOME": "/nowhere"}
+WORLDS = (World("one", 1, HERE), World("another place", 2, THERE))
 
 
 def row(material: Material) -> Row:
@@ -64,9 +60,7 @@ def row(material: Material) -> Row:
     told: set[str] = set()
     for line in LINES:
         ran = [run_in(world, line, material.work) for world in WORLDS]
-        faults = [
-            f"exit {one.code}: {one.err[-200:].decode()}" for one in ran if one.code not in (0, 3)
-        ]
+        faults = [f"exit {one.code}: {one.err!r}" for one in ran if one.code not in (0, 3)]
         if SECONDS.sub(b"", ran[0].out) != SECONDS.sub(b"", ran[1].out):
             faults.append("prints something else")
         one, other = (contents(material.work / world.folder) for world in WORLDS)
@@ -86,7 +80,9 @@ def run_in(world: World, line: tuple[str, ...], work: Path) -> Ran:
     done = subprocess.run(
         [sys.executable, "-P", "-m", "toonset", *line],
         cwd=work / world.folder,
-        env={"PATH": os.environ["PATH"], "PYTHONPATH": str(ROOT), **world.environment},
+        env={name: os.environ[name] for name in KEPT}
+        | world.environment
+        | {"PYTHONPATH": str(ROOT)},
         capture_output=True,
         preexec_fn=lambda: os.sched_setaffinity(0, cores(world.cores)),
     )
@@ -103,7 +99,7 @@ def contents(folder: Path) -> dict[str, str]:
     return {
         str(path.relative_to(folder)): sha256(compared(path)).hexdigest()
         for path in folder.rglob("*")
-        if path.is_file() and "cache" not in path.parts
+        if path.is_file()
     }
 
 

@@ -77,7 +77,7 @@ def pictures(sheet: Image.Image, rng: np.random.Generator) -> Iterator[tuple[str
     for shape in ((64, 64, 3), (200, 300, 3), (120, 160, 4), (90, 90)):
         noise = Image.fromarray(rng.integers(0, 256, shape, dtype=np.uint8))
         yield f"noise-{'x'.join(map(str, shape))}.png", saved(noise)
-    for count in (1, 2, 12):
+    for count in (1, 2, 8):
         boxes = np.full((120, 60 * count, 3), 255, np.uint8)
         for i in range(count):
             boxes[10:110, 60 * i + 10 : 60 * i + 50] = (200, 30, 20)
