@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.audit.case import Case, Ran, Row, Tally, faults_of, finite, left_behind, quoted
+from tests.audit.case import Row, Tally, quoted
+from tests.audit.judge import Ran, faults_of, finite, left_behind
 
 ROOT = Path(__file__).resolve().parents[1]
 LEAST = {  # runs per row
@@ -73,8 +74,7 @@ def test_what_is_wrong_with_an_end(ran: Ran, fault: str | None) -> None:
 def test_what_is_left_behind(name: str, code: int, fault: str | None, tmp_path: Path) -> None:
     (tmp_path / "o").mkdir()
     (tmp_path / name).touch()
-    case = Case("one", ("split", "s.png"))
-    found = left_behind(tmp_path, {"o"}, case, Ran(code, b"", b""))
+    found = left_behind(tmp_path, {"o"}, ("o",), Ran(code, b"", b""))
     assert fault in found[0] if fault else found == []
 
 

@@ -10,7 +10,8 @@ from functools import partial, reduce
 from pathlib import Path
 from typing import Any
 
-from tests.audit.case import REFUSED, Case, Ran, Row, run_cases
+from tests.audit.case import Case, Row, run_cases
+from tests.audit.judge import REFUSED, Ran
 from tests.audit.material import Material
 
 TRAIN = ("train", "b", "--steps", "2", "--threads", "1", "--device", "cpu", "-o", "o")
@@ -76,7 +77,7 @@ class Kind:
         """Yield every command with the file changed."""
 
         def make(folder: Path) -> None:
-            material.link_all(folder, *self.parts)
+            material.copy_all(folder, *self.parts)
             for short, part in SHORT.items():
                 if part in self.parts:
                     (folder / part).rename(folder / short)

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from tests.audit.case import ROOT, Ran, Row, Tally, entries, faults_of, quoted, remove
+from tests.audit.case import ROOT, Row, Tally, quoted, remove
+from tests.audit.judge import Ran, entries, faults_of
 from tests.audit.material import FEW, Material
 
 SPLIT = ("split", "sheet.png", "-o", "o")
@@ -94,7 +95,7 @@ def row(material: Material) -> Row:
         folder = material.work / "poor"
         inputs = folder / one.cwd
         inputs.mkdir(parents=True)
-        material.link_all(inputs, "sheet.png", "m.obj", "bundle", "run")
+        material.copy_all(inputs, "sheet.png", "m.obj", "bundle", "run")
         before = entries(folder)
         ran = start(one, inputs)
         faults = [] if ran.code in one.codes else faults_of(ran, one.line[0])

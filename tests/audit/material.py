@@ -41,7 +41,7 @@ class Material:
         source = self.root / name
         return Path((shutil.copytree if source.is_dir() else shutil.copy)(source, to))
 
-    def link_all(self, folder: Path, *names: str) -> None:
+    def copy_all(self, folder: Path, *names: str) -> None:
         """Copy parts of it into a folder, under their names."""
         for name in names:
             self.copy(name, folder / name)
@@ -50,8 +50,8 @@ class Material:
 def make_material(work: Path, seed: int) -> Material:
     """Draw a small sheet of a plain body and take it through the verbs, as a person would.
 
-    Makes m.obj, m.landmarks.json, sheet.png, synth/, split/, bundle/, run/ (trained on bundle/),
-    page.json (corrections) and one folder per format of `export`.
+    Makes m.obj, m.landmarks.json, sheet.png, synth/, split/, bundle/, run/ (trained on bundle/) and
+    one folder per format of `export`.
     """
     material = Material(work, seed)
     material.root.mkdir()

@@ -29,7 +29,7 @@ def row(material: Material) -> Row:
         for name, make in made:
 
             def prepare(folder: Path, name: str = name, make: Make = make) -> None:
-                material.link_all(folder, "sheet.png")
+                material.copy_all(folder, "sheet.png")
                 (folder / name).write_bytes(make())
 
             yield Case(name, ("calibrate", "sheet.png", "--mesh", name, "-o", "o"), prepare)

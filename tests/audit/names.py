@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from tests.audit.case import Case, Ran, Row, run_cases
+from tests.audit.case import Case, Row, run_cases
 from tests.audit.documents import JSON_KINDS, dotted, places_of, value_at, writes
+from tests.audit.judge import Ran
 from tests.audit.material import EXPORTS, Material
 
 NAMES = (

@@ -57,7 +57,7 @@ def numeric_options(verb: str) -> Iterator[tuple[str, Any]]:
 
 def material_of(material: Material, folder: Any) -> None:
     """Put what all verbs read into a folder."""
-    material.link_all(folder, "sheet.png", "m.obj")
+    material.copy_all(folder, "sheet.png", "m.obj")
     material.copy("bundle", folder / "b")
     material.copy("run", folder / "r")
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from tests.audit.case import ROOT, Ran, Row, Tally
+from tests.audit.case import ROOT, Row, Tally
+from tests.audit.judge import Ran
 from tests.audit.material import FEW, Material
 
 SECONDS = re.compile(rb" in [\d.]+ s\b")
@@ -56,7 +57,7 @@ def row(material: Material) -> Row:
     tally = Tally(material.work / "wrong")
     for world in WORLDS:
         (material.work / world.folder).mkdir()
-        material.link_all(material.work / world.folder, "m.obj", "m.landmarks.json", "sheet.png")
+        material.copy_all(material.work / world.folder, "m.obj", "m.landmarks.json", "sheet.png")
     told: set[str] = set()
     for line in LINES:
         ran = [run_in(world, line, material.work) for world in WORLDS]

@@ -14,8 +14,9 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
-from tests.audit.case import REFUSED, Case, Ran, Row, Tally, run_forked, try_case
+from tests.audit.case import Case, Row, Tally, run_forked, try_case
 from tests.audit.documents import ODD, TURN, ZERO, Change, dotted, linked, places_of, put, writes
+from tests.audit.judge import REFUSED, Ran
 from tests.audit.material import Material
 
 READ = ("config.json", "model.safetensors", "drawings.safetensors", "drawings.png", "paint.png")

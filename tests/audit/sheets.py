@@ -6,6 +6,7 @@ import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,20 +36,16 @@ def cases(material: Material) -> Iterator[Case]:
     sheet = Image.open(material.root / "sheet.png").convert("RGB")
     rng = np.random.default_rng(material.seed)
     files = [*pictures(sheet, rng), *containers(sheet), *broken(material, rng), *places(material)]
-    files += [(name, material_as(material, name)) for name in NAMES]
+    files += [(name, partial(material.copy, "sheet.png")) for name in NAMES]
     for name, make in files:
         for verb, options in VERBS.items():
 
             def prepare(folder: Path, name: str = name, make: Make = make) -> None:
-                material.link_all(folder, "m.obj")
+                material.copy_all(folder, "m.obj")
                 make(folder / name)
 
             given = f"./{name}" if name.startswith("-") else name
             yield Case(f"{verb} {name}", (verb, given, *options), prepare)
-
-
-def material_as(material: Material, name: str) -> Make:
-    return lambda path: material.copy("sheet.png", path)
 
 
 def saved(picture: Image.Image, **options: Any) -> Make:

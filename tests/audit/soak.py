@@ -7,7 +7,8 @@ import resource
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tests.audit.case import Ran, Row, Tally, call_main, faults_of
+from tests.audit.case import Row, Tally, call_main
+from tests.audit.judge import Ran, faults_of
 from tests.audit.material import FEW, Material
 
 GROWTH, SETTLED = 1.05, 8  # of the last five rounds against the ninth and those that follow
