@@ -11,7 +11,7 @@ from tests.audit.case import Row, Tally, call_main
 from tests.audit.judge import Ran, faults_of
 from tests.audit.material import FEW, Material
 
-GROWTH, SETTLED = 1.05, 8  # of the last five rounds against the ninth and those that follow
+GROWTH, SETTLED, LAST = 1.05, 8, 5  # the last five rounds against those from the ninth on
 
 
 def row(material: Material) -> Row:
@@ -45,8 +45,8 @@ def soaked(rounds: int, lines: Sequence[Sequence[str]], tally: Tally, material: 
     memory = [int(mb) for mb, _ in found]
     faults = [f"round {i}: exit {code}" for i, (_, code) in enumerate(found) if code not in "03"]
     faults += faults_of(Ran(ran.code, b"", ran.err, ran.peak_mb), lines[0][0])
-    if len(memory) == rounds and max(memory[-5:]) > GROWTH * memory[SETTLED]:
-        faults.append(f"grows from {memory[SETTLED]} to {max(memory[-5:])} MB")
+    if len(memory) == rounds and max(memory) > GROWTH * max(memory[SETTLED:-LAST]):
+        faults.append(f"grows from {memory[SETTLED]} to {memory[-1]} MB")
     if len(memory) < rounds:
         faults.append(f"ended after {len(memory)} of {rounds} rounds")
     name = " + ".join(line[0] for line in lines)
