@@ -28,7 +28,7 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
-from toonset.errors import BundleError
+from toonset.errors import BundleError, CameraError
 from toonset.nerf.hull.mannequin_shape import MOST_FACES, MOST_STEPS, Shape
 from toonset.nerf.lines.step_lines import StepLines
 from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
@@ -162,15 +162,19 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
     """Return the drawings of a run folder.
 
     Raises:
-        BundleError: a file is missing or damaged, or does not belong to the record.
-        CameraError: a camera's record is invalid.
+        BundleError: a file is missing or damaged, or does not belong to the record, or the record
+            holds a camera that cannot be.
         PictureError: a picture is invalid.
     """
-    cameras = [camera.camera() for camera in record.cameras]
+    try:
+        cameras = [camera.camera() for camera in record.cameras]
+        places = [pair.camera.camera() for pair in record.pairs]
+    except (BundleError, CameraError) as error:
+        where = f"{folder / 'config.json'}: field.drawings"
+        raise BundleError(f"{where}: {error}; train again") from error
     rgba, paint = (_apart(_picture(folder / name, cameras), cameras) for name in (PICTURES, PAINT))
     file = folder / SURFACES
     found = load_tensors(file)
-    places = [pair.camera.camera() for pair in record.pairs]
     _check_tensors(found, record, cameras, places, file)
     flows = []
     for i, (pair, camera) in enumerate(zip(record.pairs, places, strict=True)):

@@ -24,7 +24,7 @@ import torch
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors.torch import save
 
-from toonset.errors import BundleError, CameraError
+from toonset.errors import BundleError
 from toonset.json_file import read_json, validation_reason
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
@@ -140,10 +140,7 @@ def read_field(folder: str | Path) -> TrainedField:
     unpack(load_tensors(model_file), trained, str(model_file))
     if record.drawings is None:
         return trained
-    try:
-        return replace(trained, drawings=read_drawings(folder, record.drawings))
-    except CameraError as error:
-        raise BundleError(f"{config_file}: field.drawings: {error}; train again") from error
+    return replace(trained, drawings=read_drawings(folder, record.drawings))
 
 
 def _record(file: Path) -> FieldRecord:

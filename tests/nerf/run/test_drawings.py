@@ -128,6 +128,10 @@ def smaller(folder: Path) -> None:
         (look(lambda d: d["pairs"][0].update(pair=[0, 77])), "drawings; train again"),
         (look(lambda d: d["cameras"].pop()), "config.json asks for"),
         (look(lambda d: d["cameras"][0].update(scale=-1.0)), "scale"),
+        (
+            look(lambda d: d["pairs"][0]["camera"].update(scale=1e300)),
+            "config.json: field.drawings: ",
+        ),
         (look(lambda d: d["cameras"][0]["rotation"].reverse()), "config.json: field.drawings: "),
         (look(lambda d: d.update(soup=1)), "soup"),
     ],
