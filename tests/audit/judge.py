@@ -21,10 +21,10 @@ MOST_MB, MOST_CPU_S = 1500.0, 20.0
 FINE, REFUSED, LOOK = 0, 2, 3  # exit codes
 # A refusal says what to do: its last part begins with one of these, or has it after a comma.
 DO = (
-    "add build calibrate check choose clean close convert correct crop cut draw drop export fix "
-    "free give install join keep leave limit look lower make merge move name open pass put raise "
-    "read rebuild reduce remove rename repair repeat rescale run save say scale see set "
-    "show shrink simplify split start take train turn undistort unpack update use wait write"
+    "add build calibrate change check choose clean close convert correct crop cut draw drop export "
+    "fix free give install join keep leave limit look lower make merge move name open pass put "
+    "raise read rebuild reduce remove rename repair repeat rescale run save say scale see "
+    "set show shrink simplify split start take train turn undistort unpack update use wait write"
 ).replace(" ", "|")
 WHAT_TO_DO = re.compile(
     rf"(?:[;,:(?]|\bor) (?:first )?(?:{DO}|did you mean)\b[^;]*$|(?:`toonset | must )[^;]*$"
