@@ -117,7 +117,7 @@ def _training_scene(run: Path, bundle: Path | None) -> tuple[Scene | None, str |
     from toonset.json_file import read_json
     from toonset.nerf.score.evaluate import chosen_frames
 
-    place = bundle or run.resolve().parent
+    place = bundle or run / ".."  # as it was given: evaluation.json names no place of a machine
     if bundle is None and not (place / "transforms.json").is_file():
         return None, f"{place} holds no transforms.json; pass --bundle"
     config = read_json(run / "config.json")

@@ -127,7 +127,7 @@ def levels_of(words: Sequence[str], count: int, where: str) -> list[int]:
     if len(numbers) != count or max(numbers) > 255:
         amount = "four numbers" if count == 4 else "three numbers"
         raise PaletteError(
-            f"{where}: {' '.join(words)[:40]!r} is no colour; {amount} from 0 to 255 are needed"
+            f"{where}: {' '.join(words)[:40]!r} is no colour; write {amount} from 0 to 255"
         )
     return numbers
 

@@ -43,6 +43,7 @@ FOREIGN_FORMATS = (
 MAX_DEPTH = 64  # camera files nest eight deep
 LARGEST_INT = 2**63  # beyond, other programs' integers end
 MAX_DIGITS = 400  # as a float's longest; Python itself refuses 4300
+LONE = re.compile("[\ud800-\udfff]")  # pairs are one character once they are read
 BOM = b"\xef\xbb\xbf"
 
 
@@ -87,7 +88,7 @@ def read_whole(
         if path.is_dir():
             raise error_type(f"{path}: is a folder, a {thing} file is needed; name the file in it")
         if not path.is_file():
-            raise error_type(f"{path}: is no regular file; a {thing} file is needed")
+            raise error_type(f"{path}: is no regular file; give a {thing} file")
         if size == 0:
             raise error_type(f"{path}: is empty (0 bytes); export the {thing} again")
         if size > max_bytes:
@@ -126,8 +127,8 @@ def parse_json(data: bytes, where: str, error_type: type[ToonsetError]) -> Any:
         error_type: the error to raise.
 
     Raises:
-        ToonsetError: as `error_type`: no JSON, no UTF-8, a repeated key, a number that is not
-            finite or has more than 63 bits, or a nesting deeper than 64.
+        ToonsetError: as `error_type`: no JSON, no UTF-8, a repeated key, half a character, a number
+            that is not finite or has more than 63 bits, or a nesting deeper than 64.
     """
     try:
         text = data.removeprefix(BOM).decode("utf-8")
@@ -164,12 +165,14 @@ def _whole(digits: str) -> int:
 
 
 def _check(value: Any) -> None:
-    """Refuse numbers that are not finite or too long, and deep nesting; say where."""
+    """Refuse numbers that are not finite or too long, half characters, deep nesting; say where."""
     pending: list[tuple[tuple[object, ...], Any]] = [((), {"the whole": value})]
     while pending:
         path, holder = pending.pop()
         inner = []
         for key, item in holder.items() if isinstance(holder, dict) else enumerate(holder):
+            if not (_is_text(key) and _is_text(item)):
+                raise ValueError(f"{_place((*path, key))} holds half a character")
             if isinstance(item, dict | list):
                 inner.append(((*path, key), item))
             elif isinstance(item, float) and not math.isfinite(item):
@@ -179,6 +182,11 @@ def _check(value: Any) -> None:
         if inner and len(path) >= MAX_DEPTH:
             raise ValueError(f"nested deeper than {MAX_DEPTH}")
         pending += reversed(inner)
+
+
+def _is_text(value: object) -> bool:
+    """Return False for a text that has no UTF-8: an escaped surrogate without its other half."""
+    return not isinstance(value, str) or value.isascii() or not LONE.search(value)
 
 
 def _place(path: tuple[object, ...]) -> str:

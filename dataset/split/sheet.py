@@ -136,7 +136,7 @@ def _check(found: SheetLayout, ground: Background, options: SheetOptions) -> Non
     color = "transparent" if ground.rgb is None else "#{:02x}{:02x}{:02x}".format(*ground.rgb)
     blobs = found.blobs
     if not len(blobs.areas):
-        raise SheetError(f"the sheet is blank (all {color}); a drawn figure is needed")
+        raise SheetError(f"the sheet is blank (all {color}); draw a figure on it")
     width, height = (int(v) * found.cell_px for v in blobs.boxes[blobs.areas.argmax(), 2:])
     if min(width, height) < LEAST_FIGURE_PX:
         raise SheetError(
@@ -207,7 +207,7 @@ def _softness(rgba: np.ndarray, ground: Background, crops: list[Crop]) -> int:
 
 def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View:
     if not (cut[..., 3] >= 128).any():
-        raise SheetError(f"view {name}: its figure is nearly transparent; an opaque one is needed")
+        raise SheetError(f"view {name}: its figure is nearly transparent; make it opaque")
     return View(cut, box, contour_width_px(cut), name)
 
 

@@ -140,7 +140,7 @@ def _columns(path: Path, header: Sequence[str]) -> list[int]:
     missing = [name for name in COLUMNS if name not in names]
     if missing:
         raise SheetError(
-            f"{path}: the first line has no {', '.join(missing)}; {','.join(COLUMNS)} is needed, "
+            f"{path}: the first line has no {', '.join(missing)}; write {','.join(COLUMNS)}, "
             "or numbers at once"
         )
     return [names.index(name) for name in COLUMNS]
@@ -157,7 +157,7 @@ def _box(where: str, entry: object) -> Box:
     x, y, width, height = numbers
     if width <= 0 or height <= 0:
         raise SheetError(
-            f"{where}: {width:g} x {height:g} px is empty; a width and a height above 0 are needed"
+            f"{where}: {width:g} x {height:g} px is empty; give it a width and a height above 0"
         )
     left, top = math.floor(x), math.floor(y)
     return (left, top, math.ceil(x + width) - left, math.ceil(y + height) - top)

@@ -28,7 +28,7 @@ from torch import Tensor
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
-from toonset.errors import BundleError
+from toonset.errors import BundleError, CameraError
 from toonset.nerf.hull.mannequin_shape import MOST_FACES, MOST_STEPS, Shape
 from toonset.nerf.lines.step_lines import StepLines
 from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
@@ -163,15 +163,19 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
     """Return the drawings of a run folder.
 
     Raises:
-        BundleError: a file is missing or damaged, or does not belong to the record.
-        CameraError: a camera's record is invalid.
+        BundleError: a file is missing or damaged, or does not belong to the record, or the record
+            holds a camera that cannot be.
         PictureError: a picture is invalid.
     """
-    cameras = [camera.camera() for camera in record.cameras]
+    try:
+        cameras = [camera.camera() for camera in record.cameras]
+        places = [pair.camera.camera() for pair in record.pairs]
+    except (BundleError, CameraError) as error:
+        where = f"{folder / 'config.json'}: field.drawings"
+        raise BundleError(f"{where}: {error}; train again") from error
     rgba, paint = (_apart(_picture(folder / name, cameras), cameras) for name in (PICTURES, PAINT))
     file = folder / SURFACES
     found = load_tensors(file)
-    places = [pair.camera.camera() for pair in record.pairs]
     _check_tensors(found, record, cameras, places, file)
     flows = []
     for i, (pair, camera) in enumerate(zip(record.pairs, places, strict=True)):
@@ -179,7 +183,8 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         if not bool((flow.float().abs() <= LONGEST_PX).all()):
             raise BundleError(f"{file}: flow.{i} holds displacements out of range; train again")
         if max(pair.pair) >= len(cameras) or pair.pair[0] == pair.pair[1]:
-            raise BundleError(f"{file}: pair {pair.pair} is none of {len(cameras)} drawings")
+            what = f"pair {pair.pair} is none of {len(cameras)} drawings"
+            raise BundleError(f"{file}: {what}; train again")
         flows.append(PairFlow(pair.pair, camera, flow.numpy()))
     shape = None if record.shape is None else _shape(record.shape, found, file)
     levels: list[np.ndarray | None] = [None] * len(cameras)
@@ -273,11 +278,14 @@ def load_tensors(file: Path) -> dict[str, Tensor]:
         BundleError: it is too large, cannot be read, or is damaged.
     """
     try:
+        if not file.is_file():  # a device could be read for ever
+            raise BundleError(f"{file}: is not there, or no regular file; train again")
         if file.stat().st_size > MAX_BYTES:
-            raise BundleError(f"{file}: larger than {MAX_BYTES >> 20} MiB; not a toonset run")
+            raise BundleError(f"{file}: larger than {MAX_BYTES >> 20} MiB; train again")
         return load(file.read_bytes())
     except OSError as error:
-        raise BundleError(f"{file}: cannot be read ({error.strerror})") from error
+        reason = f"cannot be read ({error.strerror}); check its permissions"
+        raise BundleError(f"{file}: {reason}") from error
     except (SafetensorError, ValueError, KeyError) as error:
         raise BundleError(f"{file}: is damaged ({error}); train again") from error
 

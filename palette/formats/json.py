@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from toonset.errors import PaletteError
 from toonset.json_file import validation_reason
 from toonset.palette.formats.tones import SUFFIX
-from toonset.palette.names import NamedColor, clean_name, rgb_of_hex
+from toonset.palette.names import NamedColor, clean_name, one_line, rgb_of_hex
 from toonset.palette.palette import Palette
 from toonset.read import parse_json, read_whole, schema_version
 
@@ -49,6 +49,7 @@ def json_title(data: bytes) -> str:
 def to_json(palette: Palette) -> dict[str, Any]:
     """Return the content of palette.json."""
     content: dict[str, Any] = PALETTE.dump_python(palette, mode="json", by_alias=True)
+    content["colors"] = [one | {"name": one_line(one["name"])} for one in content["colors"]]
     return {"schema": f"{NAME}/{VERSION}", **content}
 
 

@@ -160,7 +160,7 @@ def encode_palette(palette: Palette, extension: str) -> bytes:
     for kind in FORMATS:
         if extension.lower() in kind.extensions and kind.write is not None:
             return kind.write(palette, palette.title or UNTITLED)
-    raise PaletteError(f"{extension}: is not written; one of {', '.join(WRITTEN)} is needed")
+    raise PaletteError(f"{extension}: is not written; choose one of {', '.join(WRITTEN)}")
 
 
 def _read(path: Path) -> list[NamedColor]:
@@ -179,7 +179,7 @@ def _whole(path: Path) -> tuple[bytes, Format]:
         kinds = [kind for kind in FORMATS if not kind.magic]
     if not kinds:
         raise PaletteError(
-            f"{path}: is {describe(data)}; a palette file ({', '.join(EXTENSIONS)}) is needed"
+            f"{path}: is {describe(data)}; give a palette file ({', '.join(EXTENSIONS)})"
         )
     return data, kinds[0]
 
@@ -196,5 +196,6 @@ def _checked(colors: list[NamedColor], where: str) -> tuple[NamedColor, ...]:
     for color in colors:
         unique.setdefault(color.rgb, color)
     if not 1 <= len(unique) <= MAX_COLORS:
-        raise PaletteError(f"{where}: {len(unique)} colours; 1 to {MAX_COLORS} are needed")
+        found = f"{len(unique)} colours, 1 to {MAX_COLORS} are needed"
+        raise PaletteError(f"{where}: {found}; correct it")
     return tuple(unique.values())

@@ -55,8 +55,8 @@ class PaletteOptions:
             )
         if not 1 <= self.max_colors <= MAX_COLORS:
             raise PaletteError(
-                f"--max-colors: {self.max_colors} colours; 1 to {MAX_COLORS} are possible, as many "
-                "as a label can name"
+                f"--max-colors: {self.max_colors} colours; give 1 to {MAX_COLORS}, as many as a "
+                "label can name"
             )
         if len(self.keep) > self.max_colors:
             raise PaletteError(

@@ -18,7 +18,7 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 BAD_PICTURES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "missing.png": (lambda path: None, "no such file; check the name"),
     "folder.png": (lambda path: path.mkdir(), "is a folder without pictures; name a sheet"),
-    "pipe.png": (lambda path: os.mkfifo(path), "no regular file; a picture file is needed"),
+    "pipe.png": (lambda path: os.mkfifo(path), "no regular file; give a picture file"),
     "text.png": (lambda path: path.write_text("x"), "is text, no picture that can be read; save"),
     "blank.png": (
         lambda path: Image.new("RGB", (300, 120), "white").save(path),

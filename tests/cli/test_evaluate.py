@@ -75,9 +75,7 @@ def test_a_run_apart_from_its_bundle(bundle: Path, run: Path, toonset, snapshot,
     before = snapshot(tmp_path)
     alone = toonset("evaluate", run, "--test", bundle, "--json")
     assert alone.json["training"] is None
-    assert alone.json["absent"]["training"] == (
-        f"{tmp_path} holds no transforms.json; pass --bundle"
-    )
+    assert alone.json["absent"]["training"] == f"{run}/.. holds no transforms.json; pass --bundle"
     told = toonset("evaluate", run, "--test", bundle, "--bundle", bundle, "--json")
     assert told.json["training"]["views"] == alone.json["views"]
     assert "training" not in told.json["absent"]
@@ -88,6 +86,18 @@ def test_a_run_apart_from_its_bundle(bundle: Path, run: Path, toonset, snapshot,
     assert "transforms.json" in broken.json["absent"]["training"]
     missing = toonset("evaluate", run, "--test", bundle, "--bundle", tmp_path / "none")
     assert str(tmp_path / "none") in missing.reason
+
+
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_a_reason_names_no_place_of_this_machine(
+    spoiled, bundle: Path, run: Path, toonset, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if spoiled:
+        (tmp_path / "transforms.json").write_text("{")
+    done = toonset("evaluate", run.name, "--test", bundle.name, "--json")
+    assert "transforms.json" in done.json["absent"]["training"]
+    assert str(tmp_path) not in done.out
 
 
 def test_the_table(bundle: Path, run: Path, toonset) -> None:

@@ -134,8 +134,9 @@ def test_running_out_of_memory_is_one_line(bundle, toonset, monkeypatch, snapsho
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "auto", "1.5", "2000"])
-def test_threads_are_a_number(text: str, toonset, bundle: Path):
-    assert "--threads" in toonset("train", bundle, f"--threads={text}").reason
+@pytest.mark.parametrize("line", [["train"], ["render", "-o", "t"], ["mesh", "-o", "t.glb"]])
+def test_threads_are_a_number(line: list[str], text: str, toonset, bundle: Path):
+    assert "--threads" in toonset(*line, bundle, f"--threads={text}").reason
 
 
 def test_a_log_gets_a_line_now_and_then_and_a_terminal_a_live_one():

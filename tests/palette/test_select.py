@@ -64,7 +64,7 @@ BLACK = PaletteColor((0, 0, 0), 0.0, "black")
         (lambda: find_palette([]), "no picture given"),
         (lambda: find_palette([np.zeros((9, 9, 4), dtype=np.uint8)]), "no opaque pixel"),
         (lambda: PaletteOptions(min_share=5.0), "--min-share: 5 is no share; give 0 to 1"),
-        (lambda: PaletteOptions(max_colors=0), "--max-colors: 0 colours; 1 to 255 are possible"),
+        (lambda: PaletteOptions(max_colors=0), "--max-colors: 0 colours; give 1 to 255"),
         (lambda: Palette((), "none"), "0 colours; 1 to 255 are needed"),
         (lambda: Palette((BLACK,) * 256, "many"), "256 colours; 1 to 255 are needed"),
     ],

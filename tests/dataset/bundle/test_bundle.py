@@ -141,6 +141,8 @@ def test_a_calibration_that_no_calibration_writes_is_refused(change, words, plac
         (b'{"a": 123456789012345678901234567890}', "a has more than 63 bits"),
         (b"[" + b"9" * 10_000 + b"]", "a number of 10000 digits"),
         (b'{"a": "\xff"}', "byte 7 is no UTF-8"),
+        (b'{"a": ["x", "\\ud800"]}', "a.1 holds half a character"),
+        (b'{"\\udc00 y": 1}', "? y holds half a character"),
         ('{"a": 1}'.encode("utf-16"), "is no UTF-8"),
         (b"", "Expecting value"),
     ],
@@ -150,6 +152,10 @@ def test_json_that_two_readers_could_read_differently(text, words):
         parse_json(text, "x.json", BundleError)
     assert words in str(caught.value)
     assert str(caught.value).startswith("x.json: ")
+
+
+def test_an_escaped_pair_is_one_character():
+    assert parse_json(b'{"a": "\\ud83d\\ude00"}', "x.json", BundleError) == {"a": "\U0001f600"}
 
 
 def test_plain_json_is_read_with_and_without_byte_order_mark():

@@ -52,7 +52,7 @@ BAD = {
     "[[NaN, 2, 3, 4]]": "is no valid JSON",
     '{"boxes": [], "boxes": [[1, 2, 3, 4]]}': "is no valid JSON",
     "1,2,nan,4": "four numbers",
-    "[[1, 2, 3, 4], [5, 6, 0, 8]]": "box 1: 0 x 8 px is empty; a width and a height above 0",
+    "[[1, 2, 3, 4], [5, 6, 0, 8]]": "box 1: 0 x 8 px is empty; give it a width",
     "[[1, 2, -3, 4]]": "box 0: -3 x 4 px is empty",
     "[]": "0 boxes, 1 to 1000 are needed",
     "{}": "holds no list of boxes",

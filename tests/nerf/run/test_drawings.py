@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -95,6 +96,11 @@ def surfaces(change: Callable[[dict[str, torch.Tensor]], object]) -> Harm:
     return tensors(SURFACES, change)
 
 
+def special(file: Path) -> None:
+    file.unlink()
+    os.mkfifo(file)  # nobody ever writes into it
+
+
 def smaller(folder: Path) -> None:
     cut = load_rgba(folder / PICTURES)[:, :-1]
     (folder / PICTURES).write_bytes(encode_png(np.ascontiguousarray(cut)))
@@ -104,7 +110,8 @@ def smaller(folder: Path) -> None:
     ("harm", "said"),
     [
         (lambda folder: (folder / PICTURES).unlink(), PICTURES),
-        (lambda folder: (folder / SURFACES).unlink(), SURFACES),
+        (lambda folder: (folder / SURFACES).unlink(), "no regular file; train again"),
+        (lambda folder: special(folder / SURFACES), "no regular file; train again"),
         (lambda folder: (folder / PAINT).unlink(), PAINT),
         (lambda folder: (folder / PAINT).write_bytes(b"no picture"), PAINT),
         (lambda folder: (folder / PICTURES).write_bytes(b"no picture"), PICTURES),
@@ -118,9 +125,14 @@ def smaller(folder: Path) -> None:
         (look(lambda d: d.update(height=-1)), "height"),
         (look(lambda d: d.update(palette=[])), "palette"),
         (look(lambda d: d["outline"].update(width_px=1e9)), "width_px"),
-        (look(lambda d: d["pairs"][0].update(pair=[0, 77])), "pair"),
+        (look(lambda d: d["pairs"][0].update(pair=[0, 77])), "drawings; train again"),
         (look(lambda d: d["cameras"].pop()), "config.json asks for"),
         (look(lambda d: d["cameras"][0].update(scale=-1.0)), "scale"),
+        (
+            look(lambda d: d["pairs"][0]["camera"].update(scale=1e300)),
+            "config.json: field.drawings: ",
+        ),
+        (look(lambda d: d["cameras"][0]["rotation"].reverse()), "config.json: field.drawings: "),
         (look(lambda d: d.update(soup=1)), "soup"),
     ],
 )
