@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import errno
-import importlib
 import itertools
 import json
 import os
@@ -151,7 +150,8 @@ class Calls:
         os.fdopen = lambda fd, mode="r", *rest: (  # type: ignore[assignment]
             _Written(self, fd) if mode == "wb" else real(fd, mode, *rest)
         )
-        write = importlib.import_module("toonset.write")
+        from toonset import write
+
         exchanged = write._exchanged
         write._exchanged = lambda new, path: self._exchange(exchanged, new, path)
 
