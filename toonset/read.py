@@ -135,7 +135,9 @@ def parse_json(data: bytes, where: str, error_type: type[ToonsetError]) -> Any:
         value = json.loads(text, object_pairs_hook=_object, parse_int=_whole)
         _check(value)
     except RecursionError as error:
-        raise error_type(f"{where}: is no valid JSON that is read (nested too deep)") from error
+        raise error_type(
+            f"{where}: is nested deeper than {MAX_DEPTH}; write it flatter, as toonset does"
+        ) from error
     except UnicodeDecodeError as error:
         place = f"byte {error.start} is no UTF-8"
         raise error_type(f"{where}: is no valid JSON ({place}); save it as UTF-8") from error

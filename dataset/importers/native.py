@@ -25,8 +25,8 @@ class _ViewRecord(BaseModel):
     name: str
     picture: str
     camera: NativeCamera
-    pinhole_distance: float = Field(gt=0)
-    radius: float = Field(ge=0)
+    pinhole_distance: float = Field(ge=1e-9, le=1e9)
+    radius: float = Field(ge=0, le=1e9)
 
 
 class _ExportRecord(BaseModel):
@@ -80,12 +80,14 @@ def read_native(root: Path) -> NativeExport:
     schema_version(content, NAME, VERSION, str(file), BundleError)
     records = validate(_ExportRecord, content, file).views
     views = tuple(_view(root, record, file) for record in records)
-    return NativeExport(
-        views,
-        {record.name: record.camera.pinhole_error_px for record in records},
-        min(record.pinhole_distance for record in records),
-        max(record.radius for record in records),
-    )
+    distance = min(record.pinhole_distance for record in records)
+    radius = max(record.radius for record in records)
+    if radius >= distance and any(view.camera.is_orthographic for view in views):
+        raise BundleError(
+            f"{file}: radius {radius:g} reaches the pinholes, {distance:g} away; export it again"
+        )
+    errors = {record.name: record.camera.pinhole_error_px for record in records}
+    return NativeExport(views, errors, distance, radius)
 
 
 def _view(root: Path, record: _ViewRecord, file: Path) -> ImportView:

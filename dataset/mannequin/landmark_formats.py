@@ -135,7 +135,9 @@ def _members(where: str, value: Any) -> list[Pair]:
     if isinstance(value, dict):
         return [Pair(name, _numbers(f"{where}: {name}", p, 2)) for name, p in value.items()]
     if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-        raise LandmarkError(f'{where}: {{"name": [u, v], ...}} or a list of pairs is needed')
+        raise LandmarkError(
+            f'{where}: {{"name": [u, v], ...}} or a list of pairs is needed; write one'
+        )
     return [_listed(where, f"pair {i}", item) for i, item in enumerate(value, 1)]
 
 

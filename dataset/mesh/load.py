@@ -23,7 +23,7 @@ from toonset.mesh import Mesh, split_by_face
 from toonset.read import describe, read_whole
 
 MAX_BYTES = 256 * 2**20
-MAX_FACES = 5_000_000
+MAX_FACES = 1_000_000
 KINDS = ("obj", "ply", "stl", "glb", "gltf", "off")
 
 

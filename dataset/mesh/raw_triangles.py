@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.errors import MeshError
 from toonset.mesh import Mesh
 
 VERTICES_PER_FACE = 3  # a heap of unconnected triangles has no more
+
+LOOSE_FACES = 500  # that do not touch are no surface, and each of their edges would be an outline
+LOOSE_CORNERS = 2.5  # a face: 3 of loose triangles, 2 of loose squares, 1/2 of a closed surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,20 +37,26 @@ class RawTriangles:
 
 
 def weld_mesh(raw: RawTriangles, path: Path) -> Mesh:
-    """Return the checked mesh: vertices at the same place are one, unused ones dropped.
+    """Return the checked mesh: equal vertices and equal faces are one, unused vertices dropped.
 
     Raises:
-        MeshError: what `Mesh` refuses, and faces that are all lines or points.
+        MeshError: what `Mesh` refuses, and faces that are all lines or points, or hardly touch.
     """
     vertices = raw.vertices
     Mesh(vertices, raw.faces, path=path)  # refuses what could not be welded
     welded = _weld(vertices)[raw.faces]
     keep = (welded != np.roll(welded, 1, axis=1)).all(axis=1)  # three different corners
+    keep &= _is_first(welded)
     corners = vertices[welded[keep]]
     edges = corners[:, 1:] - corners[:, :1]
     if not np.cross(edges[:, 0], edges[:, 1]).any():
         raise MeshError(f"{path}: every face is a line or a point; export the mesh's triangles")
     used, compact = np.unique(welded[keep], return_inverse=True)
+    if keep.sum() > LOOSE_FACES and len(used) > LOOSE_CORNERS * keep.sum():
+        raise MeshError(
+            f"{path}: its {keep.sum()} triangles hardly touch each other; export a surface whose "
+            "neighbouring faces share their corners"
+        )
     return Mesh(
         vertices=vertices[used],
         faces=compact.reshape(-1, 3),
@@ -100,6 +109,17 @@ def face_colors_from_texture(
     row = np.minimum(((1 - v) * height).astype(int), height - 1)
     colors[usable] = np.where(finite[:, None], texture[row, column, :3], fallback[usable])
     return colors
+
+
+def _is_first(faces: Int[np.ndarray, "faces 3"]) -> Bool[np.ndarray, " faces"]:
+    """Return which faces show a side that none before them shows."""
+    start = np.argmin(faces, axis=1)[:, None]
+    turned = np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
+    order = np.lexsort(turned.T)
+    repeats = (turned[order[1:]] == turned[order[:-1]]).all(axis=1)
+    first = np.ones(len(faces), dtype=bool)
+    first[order[1:][repeats]] = False  # lexsort keeps the order of equal ones
+    return first
 
 
 def _weld(vertices: Float[np.ndarray, "vertices 3"]) -> Int[np.ndarray, " vertices"]:

@@ -20,7 +20,7 @@ def check_ranges(options: object, limits: Mapping[str, tuple[float, float]]) -> 
     for name, (low, high) in limits.items():
         value = getattr(options, name)
         if not low <= value <= high:  # NaN, too
-            raise SheetError(f"synth: {name} is {value}, {low:g} to {high:g} is needed")
+            raise SheetError(f"synth: {name} is {value}, {low:g} to {high:g} is needed; change it")
 
 
 @dataclass(frozen=True)

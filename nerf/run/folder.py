@@ -157,7 +157,9 @@ def _record(file: Path) -> FieldRecord:
     except ValidationError as error:
         raise BundleError(f"{file}: {validation_reason(error)}") from error
     if not all(1 <= n <= MOST_CELLS for n in record.hull_shape):
-        raise BundleError(f"{file}: hull_shape {record.hull_shape}, 1 to {MOST_CELLS} is needed")
+        raise BundleError(
+            f"{file}: hull_shape {record.hull_shape}, 1 to {MOST_CELLS} is needed; train again"
+        )
     if record.step * MOST_ALONG < record.hull_voxel * max(record.hull_shape):
         raise BundleError(
             f"{file}: step {record.step:g} cuts the hull into more than {MOST_ALONG}; train again"

@@ -101,7 +101,7 @@ def parse_named_colors(text_or_path: str) -> tuple[NamedColor, ...]:
         shown = text_or_path if text_or_path.isprintable() else repr(text_or_path)
         raise PaletteError(
             f"{shown[:SHOWN]}: neither colours such as '#aabbcc,#123,white' nor a palette file "
-            f"({', '.join(EXTENSIONS)})"
+            f"({', '.join(EXTENSIONS)}); correct it"
         )
     return _checked(paints_of(_read(path)), str(path))
 

@@ -136,7 +136,7 @@ def test_a_calibration_that_no_calibration_writes_is_refused(change, words, plac
         (b'{"a": [1, {"b": NaN}]}', "a.1.b is nan, a finite number is needed"),
         (b'{"a": -Infinity}', "a is -inf"),
         (b'{"a": 1e400}', "a is inf"),
-        (b"[" * 100_000, "nested too deep"),
+        (b"[" * 100_000, "is nested deeper than 64; write it flatter"),
         (b"[" * 70 + b"]" * 70, "nested deeper than 64"),
         (b'{"a": 123456789012345678901234567890}', "a has more than 63 bits"),
         (b"[" + b"9" * 10_000 + b"]", "a number of 10000 digits"),

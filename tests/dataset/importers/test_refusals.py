@@ -45,6 +45,8 @@ def test_cameras_that_were_changed_beside_toonset_json_are_refused(tmp_path, kin
         (lambda c: c["views"][0].pop("camera"), "field views.0.camera"),
         (lambda c: c["views"][0]["camera"].update(scale=-1), "must be positive"),
         (lambda c: c["views"][0].update(pinhole_distance=0), "pinhole_distance"),
+        (lambda c: c["views"][0].update(radius=1e6), "reaches the pinholes, .*; export it again"),
+        (lambda c: c["views"][0].update(radius=1e300), "radius"),
         (lambda c: c.update(views=[]), "views"),
     ],
 )

@@ -22,7 +22,8 @@ from tests.dataset.mesh.mesh_files import (
     load,
     one_primitive,
 )
-from toonset.dataset.mesh.load import save_obj
+from toonset.dataset.mesh.load import load_mesh, save_obj
+from toonset.errors import MeshError
 from toonset.mesh import Mesh
 
 
@@ -177,3 +178,21 @@ def test_gltf_skin_is_shown_in_its_rest_pose(tmp_path: Path) -> None:
     document = gltf(skinned, POINTS, FACES, inverse, joints, weights)
     mesh = load(tmp_path, "a.gltf", json.dumps(document))
     np.testing.assert_allclose(corners(mesh), (2 * POINTS + [0, 5, 0])[FACES.reshape(-1, 3)])
+
+
+def test_equal_faces_are_one_and_two_sides_are_two(tmp_path: Path) -> None:
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    faces = "f 1 2 3\nf 2 3 1\nf 1 3 2\nf 1 2 4\nf 3 1 2\n"
+    (tmp_path / "a.obj").write_text(corners + faces)
+    assert load_mesh(tmp_path / "a.obj").faces.tolist() == [[0, 1, 2], [0, 2, 1], [0, 1, 3]]
+
+
+def test_triangles_that_do_not_touch_are_no_surface(tmp_path: Path) -> None:
+    corners = np.random.default_rng(0).random((1503, 3))
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    lines += [f"f {i} {i + 1} {i + 2}" for i in range(1, 1503, 3)]
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    with pytest.raises(MeshError, match="its 501 triangles hardly touch each other; export"):
+        load_mesh(tmp_path / "a.obj")
+    (tmp_path / "a.obj").write_text("\n".join(lines[:-2]))
+    assert len(load_mesh(tmp_path / "a.obj").faces) == 499
