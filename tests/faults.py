@@ -1,6 +1,6 @@
 """Let every system call that touches a verb's outputs fail, or the process be killed there.
 
-    python -m tests.faults [CASE ...] [--kinds KIND,...] [--kills N] [--rounds N] [--signals N]
+    python -m tests.faults [CASE ...] [--quick] [--kills N] [--rounds N] [--signals N]
 
 Whatever happens, the outputs are the old ones or the new ones, whole, once the next run has looked
 at the place; nothing hidden stays; the exit code and the line on stderr fit. A verb runs once to
@@ -38,8 +38,7 @@ Contents = dict[str, str]
 Hook = Callable[[int], None]
 
 ERRORS = {"EIO": errno.EIO, "ENOSPC": errno.ENOSPC, "EACCES": errno.EACCES}
-KINDS = ("kill", *(f"{name}{way}" for name in ERRORS for way in (" once", " from there")))
-QUICK = ("kill", "EIO once", "ENOSPC from there")  # one of every sort
+FAILURES = tuple(f"{name}{way}" for name in ERRORS for way in (" once", " from there"))
 PATCHED = ("open", "fsync", "rename", "replace", "link", "unlink", "rmdir", "mkdir", "chmod")
 VOLATILE = ("metrics.json", "history.csv", "manifest.json")  # of a run: they hold seconds
 FINE = (0, 3)
@@ -290,17 +289,17 @@ class Place:
         return Row(1, tuple(lines))
 
 
-def every_call(place: Place, kinds: Sequence[str]) -> Row:
-    """Let every call of a verb fail in every way."""
+def every_call(place: Place, *, quick: bool) -> Row:
+    """Let every call of a verb fail in every way and be its last; `quick`: in one way, in turn."""
     place.restore(place.first)
     if (server := os.fork()) == 0:
         calls: list[Calls] = []
 
         def serve(number: int) -> None:
             if number == 1:
-                _serve(place, calls[0], kinds, 1, place.middle)
+                _serve(place, calls[0], 1, place.middle, quick=quick)
             elif number == place.middle:
-                _serve(place, calls[0], kinds, place.middle, place.calls + 1)
+                _serve(place, calls[0], place.middle, place.calls + 1, quick=quick)
 
         with _leaving(place.root / "err"):
             calls.append(Calls(place.out, serve))
@@ -311,12 +310,12 @@ def every_call(place: Place, kinds: Sequence[str]) -> Row:
     return Row(sum(row[0] for row in rows), tuple(line for row in rows for line in row[1]))
 
 
-def _serve(place: Place, calls: Calls, kinds: Sequence[str], begin: int, end: int) -> None:
+def _serve(place: Place, calls: Calls, begin: int, end: int, *, quick: bool) -> None:
     """Return in children, each with a fault ahead, and when all have ended in the server, too."""
     on, calls.hook = calls.hook, lambda number: None
     now, row = place.keep(f"call-{begin}"), Row(0)
     for at in range(begin, end):
-        for kind in kinds:
+        for kind in ("kill", *((FAILURES[at % len(FAILURES)],) if quick else FAILURES)):
             place.restore(now)
             if (child := os.fork()) == 0:
                 _errors_into(place.root / "err-child")
@@ -493,14 +492,13 @@ def main() -> None:
     os.environ |= dict.fromkeys(one_thread, "1")  # a fork loses the others
     parser = argparse.ArgumentParser(prog="tests.faults")
     parser.add_argument("cases", nargs="*", help=", ".join(case.name for case in CASES))
-    parser.add_argument("--kinds", default=",".join(KINDS))
+    parser.add_argument("--quick", action="store_true", help="one kind of error a call, in turn")
     parser.add_argument("--kills", type=int, default=0, help="at random moments, of each case")
     parser.add_argument("--rounds", type=int, default=0, help="of two processes, of each case")
     parser.add_argument("--signals", type=int, default=0, help="of each case")
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     draw, total = random.Random(asked.seed), Row(0)
-    kinds = asked.kinds.split(",") if asked.kinds else []
     with tempfile.TemporaryDirectory(prefix="toonset-faults-") as folder:
         inputs = Path(folder)
         if (child := os.fork()) == 0:
@@ -513,7 +511,7 @@ def main() -> None:
                     make_input(inputs, name)
                 place = Place(inputs, case, start)
                 rows = {
-                    "faults": every_call(place, kinds) if kinds else Row(0),
+                    "faults": every_call(place, quick=asked.quick),
                     "kills": kills(place, asked.kills, draw),
                     "signals": signals(place, asked.signals, draw),
                     "pairs": pairs(place, asked.rounds),
