@@ -6,9 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from toonset.errors import MeshError
 from toonset.mesh import Mesh
+
+MOST_FOLDS = 1000  # heights; bodies have up to 31 of them, hair of loose ribbons a few hundred
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +51,14 @@ class Surface:
 
 
 def prepare_surface(mesh: Mesh) -> Surface:
-    """Return the mesh with its edges and their faces."""
+    """Return the mesh with its edges and their faces.
+
+    Raises:
+        MeshError: it is a heap of triangles, whose edges are all outlines.
+    """
     faces = np.ascontiguousarray(mesh.faces, dtype=np.int32)
     edges, edge_faces, edge_senses = _edges(faces)
-    return Surface(
+    surface = Surface(
         mesh.vertices - mesh.middle,
         faces,
         edges,
@@ -61,6 +68,36 @@ def prepare_surface(mesh: Mesh) -> Surface:
         mesh.height,
         mesh.radius,
     )
+    length = max(_fold_length(surface, axis) for axis in (0, 2)) / mesh.height
+    if length > MOST_FOLDS:
+        raise MeshError(
+            f"{mesh.path or mesh.name}: folds {length:.0f} times as long as it is high, at most "
+            f"{MOST_FOLDS}: a heap of triangles; export a surface whose faces join at their edges"
+        )
+    return surface
+
+
+def folds_of(
+    surface: Surface, turned: Bool[np.ndarray, " faces"]
+) -> tuple[Int[np.ndarray, " folds"], Int[np.ndarray, " folds"]]:
+    """Return the edges that are folds or borders in an image, and `covered`'s layers there.
+
+    Args:
+        surface: the mesh.
+        turned: which faces run clockwise in the image.
+    """
+    side = turned.astype(np.int8) * np.int8(2) - np.int8(1)
+    first, second = side[surface.edge_faces] * surface.edge_senses
+    layers = first + second
+    folds = np.flatnonzero(layers)
+    return folds, layers[folds]
+
+
+def _fold_length(surface: Surface, axis: int) -> float:
+    """Return how long all folds are in the picture along an axis, world units."""
+    folds, _ = folds_of(surface, surface.planes[:, axis] > 0)
+    ends = np.delete(surface.vertices[surface.edges[folds]], axis, axis=2)
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 
 def _edges(

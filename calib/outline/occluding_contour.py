@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float, Int
 
 from toonset.calib.outline.covered_pixels import covered
 from toonset.calib.outline.mesh_edges import Surface as Surface
+from toonset.calib.outline.mesh_edges import folds_of
 from toonset.calib.outline.mesh_edges import prepare_surface as prepare_surface
 from toonset.calib.outline.pose import Pose, project
 
@@ -90,7 +91,7 @@ def find_occluding_contour(
     """Return the same for any projection: `pixels` are the projected vertices."""
     a, b, c = (pixels[surface.faces[:, i]] for i in range(3))
     ab, ac = b - a, c - a
-    folds, layers = _folds(surface, ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0)
+    folds, layers = folds_of(surface, ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] > 0)
     edges = surface.edges[folds]
     return _rim(surface.vertices[edges], pixels[edges], layers, size_wh, spacing_px, 1)
 
@@ -103,21 +104,10 @@ def _seen_folds(
     """Return the ends of the folds in space and in the picture, and `covered`'s layers."""
     toward = np.append(pose.rotation[2], pose.k)  # the camera's centre, homogeneous, negated
     turned = surface.planes @ toward > 0  # clockwise on the screen, u right and v down
-    folds, layers = _folds(surface, turned)
+    folds, layers = folds_of(surface, turned)
     edges = surface.edges.take(folds, axis=0)  # several times as fast as an index in brackets
     ends = surface.vertices.take(edges, axis=0)
     return ends, project(pose, ends.reshape(-1, 3)).reshape(-1, 2, 2), layers
-
-
-def _folds(
-    surface: Surface, turned: Bool[np.ndarray, " faces"]
-) -> tuple[Int[np.ndarray, " folds"], Int[np.ndarray, " folds"]]:
-    """Return the edges that are folds or borders in the image, and `covered`'s layers there."""
-    side = turned.astype(np.int8) * np.int8(2) - np.int8(1)
-    first, second = side[surface.edge_faces] * surface.edge_senses
-    layers = first + second
-    folds = np.flatnonzero(layers)
-    return folds, layers[folds]
 
 
 def _rim(

@@ -13,9 +13,6 @@ from toonset.mesh import Mesh
 
 VERTICES_PER_FACE = 3  # a heap of unconnected triangles has no more
 
-LOOSE_FACES = 500  # that do not touch are no surface, and each of their edges would be an outline
-LOOSE_CORNERS = 2.5  # a face: 3 of loose triangles, 2 of loose squares, 1/2 of a closed surface
-
 
 @dataclass(frozen=True, eq=False)
 class RawTriangles:
@@ -40,7 +37,7 @@ def weld_mesh(raw: RawTriangles, path: Path) -> Mesh:
     """Return the checked mesh: equal vertices and equal faces are one, unused vertices dropped.
 
     Raises:
-        MeshError: what `Mesh` refuses, and faces that are all lines or points, or hardly touch.
+        MeshError: what `Mesh` refuses, and faces that are all lines or points.
     """
     vertices = raw.vertices
     Mesh(vertices, raw.faces, path=path)  # refuses what could not be welded
@@ -52,11 +49,6 @@ def weld_mesh(raw: RawTriangles, path: Path) -> Mesh:
     if not np.cross(edges[:, 0], edges[:, 1]).any():
         raise MeshError(f"{path}: every face is a line or a point; export the mesh's triangles")
     used, compact = np.unique(welded[keep], return_inverse=True)
-    if keep.sum() > LOOSE_FACES and len(used) > LOOSE_CORNERS * keep.sum():
-        raise MeshError(
-            f"{path}: its {keep.sum()} triangles hardly touch each other; export a surface whose "
-            "neighbouring faces share their corners"
-        )
     return Mesh(
         vertices=vertices[used],
         faces=compact.reshape(-1, 3),

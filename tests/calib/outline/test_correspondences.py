@@ -19,6 +19,7 @@ from toonset.calib.outline.occluding_contour import (
 from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance, rotation_from_angles
 from toonset.dataset.silhouettes.contour import drawn_contour
+from toonset.errors import MeshError
 from toonset.mesh import Mesh
 from toonset.view import View
 
@@ -45,11 +46,11 @@ def pose_at(seed: int, k: float = 0.0) -> Pose:
 
 def covered_by_folds(surface: Surface, pixels: np.ndarray) -> np.ndarray:
     from toonset.calib.outline.covered_pixels import covered
-    from toonset.calib.outline.occluding_contour import _folds
+    from toonset.calib.outline.mesh_edges import folds_of
 
     a, b, c = (pixels[surface.faces[:, i]] for i in range(3))
     turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] > 0
-    folds, layers = _folds(surface, turned)
+    folds, layers = folds_of(surface, turned)
     edges = surface.edges[folds]
     return covered(pixels[edges[:, 0]], pixels[edges[:, 1]], layers, SIZE)
 
@@ -177,3 +178,10 @@ def test_other_vertices_on_the_same_edges_have_planes_of_their_own():
     flat = replace(surface, vertices=surface.vertices * [1.0, 1.0, 0.1])
     plain = find_occluding_contour(flat, project(pose, flat.vertices), SIZE, 1.0)
     np.testing.assert_allclose(occluding_contour_at(flat, pose, SIZE, 1.0).points, plain.points)
+
+
+def test_a_heap_of_triangles_is_no_surface():
+    corners = np.random.default_rng(0).uniform(-1, 1, (3 * 900, 3))
+    heap = Mesh(corners, np.arange(len(corners)).reshape(-1, 3))
+    with pytest.raises(MeshError, match="a heap of triangles; export a surface"):
+        prepare_surface(heap)

@@ -23,7 +23,6 @@ from tests.dataset.mesh.mesh_files import (
     one_primitive,
 )
 from toonset.dataset.mesh.load import load_mesh, save_obj
-from toonset.errors import MeshError
 from toonset.mesh import Mesh
 
 
@@ -185,14 +184,3 @@ def test_equal_faces_are_one_and_two_sides_are_two(tmp_path: Path) -> None:
     faces = "f 1 2 3\nf 2 3 1\nf 1 3 2\nf 1 2 4\nf 3 1 2\n"
     (tmp_path / "a.obj").write_text(corners + faces)
     assert load_mesh(tmp_path / "a.obj").faces.tolist() == [[0, 1, 2], [0, 2, 1], [0, 1, 3]]
-
-
-def test_triangles_that_do_not_touch_are_no_surface(tmp_path: Path) -> None:
-    corners = np.random.default_rng(0).random((1503, 3))
-    lines = [f"v {x} {y} {z}" for x, y, z in corners]
-    lines += [f"f {i} {i + 1} {i + 2}" for i in range(1, 1503, 3)]
-    (tmp_path / "a.obj").write_text("\n".join(lines))
-    with pytest.raises(MeshError, match="its 501 triangles hardly touch each other; export"):
-        load_mesh(tmp_path / "a.obj")
-    (tmp_path / "a.obj").write_text("\n".join(lines[:-2]))
-    assert len(load_mesh(tmp_path / "a.obj").faces) == 499
