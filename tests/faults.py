@@ -4,9 +4,9 @@
 
 Whatever happens, the outputs are the old ones or the new ones, whole, once the next run has looked
 at the place; nothing hidden stays; the exit code and the line on stderr fit. A verb runs once to
-count its calls (`Calls`). Then a process runs it up to the first call after its longest computation
-and becomes a server there: for every later call and every kind of fault it forks a child that goes
-on from there, and puts the place back as it was. So a fault costs milliseconds, not a training.
+count its calls (`Calls`). Then a process runs it once more and becomes a server at its first call
+and after every computation: for the calls up to the next one, and every kind of fault, it forks a
+child that goes on from there, and puts the place back. So a fault costs milliseconds, no training.
 
 Linux only. Exit code 1 and one line for everything that is wrong.
 """
@@ -42,6 +42,7 @@ FAILURES = tuple(f"{name}{way}" for name in ERRORS for way in (" once", " from t
 PATCHED = ("open", "fsync", "rename", "replace", "link", "unlink", "rmdir", "mkdir", "chmod")
 VOLATILE = ("metrics.json", "history.csv", "manifest.json")  # of a run: they hold seconds
 FINE = (0, 3)
+COMPUTATION_S = 0.05  # between two calls
 SOON_S = 2.0  # from a signal to the end
 
 
@@ -241,7 +242,8 @@ class Place:
         self.seconds, self.after = ended.seconds, contents(self.out)
         assert self.after != self.before, self.name
         gaps = [after - before for before, after in itertools.pairwise(times)]
-        self.calls, self.middle = len(times), 2 + gaps.index(max(gaps))
+        self.calls = len(times)
+        self.stops = [1, *(i for i, gap in enumerate(gaps, start=2) if gap > COMPUTATION_S)]
 
     def _note(self, _: int) -> None:
         self.times.append(time.monotonic())
@@ -296,17 +298,16 @@ def every_call(place: Place, *, quick: bool) -> Row:
         calls: list[Calls] = []
 
         def serve(number: int) -> None:
-            if number == 1:
-                _serve(place, calls[0], 1, place.middle, quick=quick)
-            elif number == place.middle:
-                _serve(place, calls[0], place.middle, place.calls + 1, quick=quick)
+            if number in place.stops:
+                after = (stop for stop in place.stops if stop > number)
+                _serve(place, calls[0], number, next(after, place.calls + 1), quick=quick)
 
         with _leaving(place.root / "err"):
             calls.append(Calls(place.out, serve))
             _main(place.arguments)
     os.waitpid(server, 0)
     rows = [json.loads(file.read_text()) for file in place.root.glob("served-*")]
-    assert len(rows) == 2, (place.root / "err").read_text()
+    assert len(rows) == len(place.stops), (place.root / "err").read_text()
     return Row(sum(row[0] for row in rows), tuple(line for row in rows for line in row[1]))
 
 
