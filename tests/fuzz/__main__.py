@@ -107,23 +107,32 @@ def inputs_of(name: str, seed: int) -> Callable[[int], bytes]:
 
 
 def fuzz(
-    take: Target, make: Callable[[int], bytes], seconds: float, bars: Bars | None = None
+    take: Target,
+    make: Callable[[int], bytes],
+    seconds: float,
+    bars: Bars | None = None,
+    most: int = sys.maxsize,
 ) -> Tried:
-    """Give a target the inputs 0, 1, 2, ... until time is over.
+    """Give a target the inputs 0, 1, 2, ... until time is over, or there were so many.
 
     Args:
         take: the target.
         make: the input of a number.
         seconds: how long.
         bars: what an input may cost.
+        most: the number of inputs.
     """
     until, shared = time.monotonic() + seconds, Shared()
+
+    def goes_on() -> bool:
+        return shared.number < most and time.monotonic() < until
+
     found: dict[str, Finding] = {}
-    while time.monotonic() < until and len(found) < MOST_FINDINGS:
+    while goes_on() and len(found) < MOST_FINDINGS:
         with tempfile.TemporaryDirectory() as folder:
             child = os.fork()
             if child == 0:
-                _take_all(take, make, until, shared, bars or Bars(), Path(folder))
+                _take_all(take, make, goes_on, shared, bars or Bars(), Path(folder))
             _, status = os.waitpid(child, 0)
         if code := os.waitstatus_to_exitcode(status):
             how = shared.said or f"died of {signal.Signals(-code).name}"
@@ -135,16 +144,16 @@ def fuzz(
 def _take_all(
     take: Target,
     make: Callable[[int], bytes],
-    until: float,
+    goes_on: Callable[[], bool],
     shared: Shared,
     bars: Bars,
     folder: Path,
 ) -> NoReturn:
-    """Take inputs in the child until time is over or one ends badly."""
+    """Take inputs in the child while it goes on, or until one ends badly."""
     code = 1
     try:
         _limit(bars)
-        while time.monotonic() < until:
+        while goes_on():
             data = make(shared.number)
             with _watched(bars):
                 take(data, folder)
