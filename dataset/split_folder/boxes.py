@@ -127,7 +127,7 @@ def _from_csv(path: Path, data: bytes) -> tuple[Box, ...]:
 
 def _check_count(path: Path, count: int) -> None:
     if not 0 < count <= MOST_BOXES:
-        found = "too many" if count else "no"
+        found = "too many" if count else "0"
         raise SheetError(f"{path}: {found} boxes, 1 to {MOST_BOXES} are needed; correct the file")
 
 

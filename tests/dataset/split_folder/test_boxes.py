@@ -54,7 +54,7 @@ BAD = {
     "1,2,nan,4": "four numbers",
     "[[1, 2, 3, 4], [5, 6, 0, 8]]": "box 1: 0 x 8 px is empty; give it a width",
     "[[1, 2, -3, 4]]": "box 0: -3 x 4 px is empty",
-    "[]": "no boxes, 1 to 1000 are needed",
+    "[]": "0 boxes, 1 to 1000 are needed",
     "{}": "holds no list of boxes",
     '{"boxes": 3}': "holds no list of boxes",
     '{"views": [{"box": [1, 2, 3, 4], "sheet": 1}], "sheets": [{}]}': "belongs to no sheet",
