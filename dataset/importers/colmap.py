@@ -38,7 +38,7 @@ def read_colmap(folder: Path) -> tuple[tuple[str, Camera], ...]:
     posed = [image for _, image in sorted(model.images.items()) if image.has_pose]
     if not posed:
         raise BundleError(f"{folder}: no image has a pose; give a finished reconstruction")
-    return tuple((image.name, _camera_of(image, model, folder)) for image in posed)
+    return tuple((_name_of(image, folder), _camera_of(image, model, folder)) for image in posed)
 
 
 def _model_folder(folder: Path) -> Path:
@@ -62,6 +62,15 @@ def _load(folder: Path) -> Any:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise BundleError(
             f"{folder}: is no complete COLMAP model ({reason}); export it again"
+        ) from error
+
+
+def _name_of(image: Any, folder: Path) -> str:
+    try:
+        return str(image.name)
+    except UnicodeDecodeError as error:
+        raise BundleError(
+            f"{folder}: the name of image {image.image_id} is no UTF-8; rename the picture"
         ) from error
 
 

@@ -113,6 +113,8 @@ def _colmap_views(path: Path, images: Path | None) -> list[ImportView]:
 
 def _named(views: Sequence[ImportView], path: Path) -> list[ImportView]:
     """Return the views named STEM.png, or FOLDER_STEM.png where two stems are equal."""
+    if not all(Path(view.name).name for view in views):
+        raise BundleError(f"{path}: a view has no name; name it as its picture")
     stems = Counter(Path(view.name).stem for view in views)
     named = []
     for view in views:

@@ -14,6 +14,7 @@ a pixel are rounded outwards.
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -43,9 +44,6 @@ def read_boxes(path: Path) -> tuple[tuple[Box, ...], ...]:
         sheets = _from_json(path, parse_json(data, str(path), SheetError))
     else:
         sheets = (_from_csv(path, data),)
-    count = sum(len(boxes) for boxes in sheets)
-    if not 0 < count <= MOST_BOXES:
-        raise SheetError(f"{path}: {count} boxes, 1 to {MOST_BOXES} are needed; correct the file")
     return sheets
 
 
@@ -80,6 +78,7 @@ def _from_json(path: Path, content: Any) -> tuple[tuple[Box, ...], ...]:
     entries = content.get("boxes") if isinstance(content, dict) else content
     if not isinstance(entries, list):
         raise SheetError(f"{path}: holds no list of boxes; write [[x, y, width, height], ...]")
+    _check_count(path, len(entries))
     return (tuple(_box(f"{path}: box {i}", entry) for i, entry in enumerate(entries)),)
 
 
@@ -88,6 +87,7 @@ def _of_split(path: Path, content: Mapping[str, Any]) -> tuple[tuple[Box, ...], 
     views, sheets = content["views"], content.get("sheets")
     if not isinstance(views, list) or not isinstance(sheets, list):
         raise SheetError(f'{path}: "views" and "sheets" must be lists, as `toonset split` writes')
+    _check_count(path, len(views))
     found: list[list[Box]] = [[] for _ in sheets]
     for number, view in enumerate(views):
         where = f"{path}: box {number}"
@@ -101,21 +101,20 @@ def _of_split(path: Path, content: Mapping[str, Any]) -> tuple[tuple[Box, ...], 
 def _from_csv(path: Path, data: bytes) -> tuple[Box, ...]:
     try:
         text = data.decode("utf-8-sig")
-        rows = list(enumerate(csv.reader(text.splitlines(), _dialect(text)), 1))
+        rows = enumerate(csv.reader(text.splitlines(), _dialect(text)), 1)
+        filled = ((number, [cell.strip() for cell in row]) for number, row in rows if any(row))
+        drawn = ((number, row) for number, row in filled if any(row) and row[0][:1] != "#")
+        lines = list(itertools.islice(drawn, MOST_BOXES + 2))  # with a head one too many
     except UnicodeDecodeError as error:
         raise SheetError(
             f"{path}: is {describe(data)}, no file of boxes; write JSON or CSV"
         ) from error
     except csv.Error as error:
         raise SheetError(f"{path}: is no valid CSV ({error}); correct it") from error
-    lines = [
-        (number, [cell.strip() for cell in row])
-        for number, row in rows
-        if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
-    ]
     order = list(range(len(COLUMNS)))
     if lines and not _is_number(lines[0][1][0]):
         order = _columns(path, lines.pop(0)[1])
+    _check_count(path, len(lines))
     boxes = []
     for number, row in lines:
         if len(row) <= max(order):
@@ -124,6 +123,12 @@ def _from_csv(path: Path, data: bytes) -> tuple[Box, ...]:
             )
         boxes.append(_box(f"{path}:{number}", [row[i] for i in order]))
     return tuple(boxes)
+
+
+def _check_count(path: Path, count: int) -> None:
+    if not 0 < count <= MOST_BOXES:
+        found = "too many" if count else "0"
+        raise SheetError(f"{path}: {found} boxes, 1 to {MOST_BOXES} are needed; correct the file")
 
 
 def _dialect(text: str) -> type[csv.Dialect]:
@@ -149,7 +154,7 @@ def _columns(path: Path, header: Sequence[str]) -> list[int]:
 def _box(where: str, entry: object) -> Box:
     """Return a box of whole pixels, rounded outwards."""
     numbers = _numbers(entry)
-    if len(numbers) != len(COLUMNS) or not all(math.isfinite(n) for n in numbers):
+    if len(numbers) != len(COLUMNS) or not math.isfinite(sum(map(abs, numbers))):
         shown = json.dumps(entry)[:60]
         raise SheetError(
             f"{where}: found {shown}, four numbers x, y, width, height are needed; correct it"

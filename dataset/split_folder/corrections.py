@@ -27,6 +27,7 @@ from toonset.errors import SheetError, one_line
 from toonset.json_file import STRICT
 from toonset.palette.corrections import FigureBox, Number, PaletteCorrections, Pixel, hex_word
 from toonset.read import BOM, parse_json, read_whole
+from toonset.view import Box
 
 VERSION: Literal[1] = 1
 MAX_BYTES = 8 * 2**20
@@ -195,11 +196,11 @@ def parse_corrections(data: bytes, where: str) -> Corrections:
 
 def _check(found: Corrections, where: str) -> None:
     """Refuse what contradicts itself."""
-    boxes = [view.box for view in found.views]
+    first: dict[Box, int] = {}
     for number, view in enumerate(found.views):
         key = f"{where}: views.{number}"
-        if view.box in boxes[:number]:
-            raise SheetError(f"{key}.box: is that of views.{boxes.index(view.box)}; merge them")
+        if first.setdefault(view.box, number) != number:
+            raise SheetError(f"{key}.box: is that of views.{first[view.box]}; merge them")
         if view.lock and len(view.yaws) != 1:
             raise SheetError(
                 f"{key}.lock: there is no one yaw to keep; give a camera, or a label such as left"

@@ -55,19 +55,16 @@ def read_ase(data: bytes, where: str) -> list[NamedColor]:
         raise PaletteError(
             f"{where}: is an Aseprite picture, not a palette; in Aseprite save its palette as .gpl"
         )
-    if not data.startswith(MAGIC) or len(data) < 12:
-        raise PaletteError(f"{where}: is no Adobe swatch exchange file; export the swatches again")
-    major, minor = struct.unpack_from(">HH", data, 4)
-    if major != 1:
-        raise PaletteError(
-            f"{where}: is of version {major}.{minor}, 1.0 is needed; export it again"
-        )
     colors = [content for kind, content in _blocks(data, where) if kind == COLOR]
     return [_color(content, f"{where}: swatch {i}") for i, content in enumerate(colors, start=1)]
 
 
 def ase_title(data: bytes) -> str:
-    """Return the name of an .ase's first group; "" if it has none."""
+    """Return the name of an .ase's first group; "" if it has none.
+
+    Raises:
+        PaletteError: not an .ase, or cut off.
+    """
     groups = (content for kind, content in _blocks(data, "palette") if kind == GROUP)
     return next((_name(content, 2)[0] for content in groups), "")
 
@@ -99,15 +96,17 @@ def read_aco(data: bytes, where: str) -> list[NamedColor]:
     if version not in (1, 2):
         raise PaletteError(f"{where}: is of version {version}, 1 or 2 is needed; export it again")
     found: list[NamedColor] = []
-    rest = data[4:]
+    at = 4
     for number in range(1, max(count, 1) + 1):
-        swatch, words, rest = f"{where}: swatch {number}", rest[:10], rest[10:]
-        length = 4 + 2 * int.from_bytes(rest[:4], "big") if version == 2 else 0
-        if len(words) < 10 or length > len(rest):
+        swatch, words = f"{where}: swatch {number}", data[at : at + 10]
+        at += 10
+        length = 4 + 2 * int.from_bytes(data[at : at + 4], "big") if version == 2 else 0
+        if len(words) < 10 or at + length > len(data):
             raise PaletteError(f"{swatch}: is cut off; export it again")
         name = ""
         if version == 2:
-            name, rest = _name(rest, 4)
+            name, _ = _name(data[at : at + length], 4)
+            at += length
             swatch = f"{swatch} {name!r}"
         found.append(NamedColor(_aco_rgb(struct.unpack(">5H", words), swatch), name))
     return found
@@ -125,7 +124,13 @@ def rgb_from_lab(lightness: float, a: float, b: float) -> RGB:
 
 def _blocks(data: bytes, where: str) -> Iterator[tuple[int, bytes]]:
     """Yield kind and content of all blocks; some programs announce the colours only."""
-    (announced,) = struct.unpack_from(">I", data, 8)
+    if not data.startswith(MAGIC) or len(data) < 12:
+        raise PaletteError(f"{where}: is no Adobe swatch exchange file; export the swatches again")
+    major, minor, announced = struct.unpack_from(">HHI", data, 4)
+    if major != 1:
+        raise PaletteError(
+            f"{where}: is of version {major}.{minor}, 1.0 is needed; export it again"
+        )
     offset, count = 12, 0
     while count < announced or data[offset : offset + 2] in (b"\x00\x01", b"\xc0\x01", b"\xc0\x02"):
         head = data[offset : offset + 6]
