@@ -178,7 +178,8 @@ def _local_matrix(node: dict[str, Any]) -> Matrix:
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-    turned = quaternion_matrix((w, x, y, z)) @ np.diag([*node.get("scale", (1, 1, 1)), 1.0])
+    wide, high, deep = node.get("scale", (1, 1, 1))
+    turned = quaternion_matrix((w, x, y, z)) @ np.diag([wide, high, deep, 1.0])
     return np.asarray(translation_matrix(node.get("translation", (0, 0, 0))) @ turned)
 
 

@@ -199,6 +199,8 @@ def _read_materials(
 
 def _beside(mesh_path: Path, name: str) -> Path | None:
     """Return the file `name` in the mesh's own folder; None if it is elsewhere or missing."""
+    if "\0" in name:  # no file is called so
+        return None
     folder = os.path.realpath(mesh_path.parent)
     file = os.path.realpath(os.path.join(folder, name.replace("\\", "/")))
     inside = os.path.commonpath([folder, file]) == folder
