@@ -182,7 +182,7 @@ def _check(value: Any) -> None:
             elif isinstance(item, int) and abs(item) >= LARGEST_INT:
                 raise ValueError(f"{_place((*path, key))} has more than 63 bits")
         if inner and len(path) >= MAX_DEPTH:
-            raise ValueError(f"nested deeper than {MAX_DEPTH}")
+            raise RecursionError
         pending += reversed(inner)
 
 

@@ -137,7 +137,7 @@ def test_a_calibration_that_no_calibration_writes_is_refused(change, words, plac
         (b'{"a": -Infinity}', "a is -inf"),
         (b'{"a": 1e400}', "a is inf"),
         (b"[" * 100_000, "is nested deeper than 64; write it flatter"),
-        (b"[" * 70 + b"]" * 70, "nested deeper than 64"),
+        (b"[" * 70 + b"]" * 70, "is nested deeper than 64; write it flatter"),
         (b'{"a": 123456789012345678901234567890}', "a has more than 63 bits"),
         (b"[" + b"9" * 10_000 + b"]", "a number of 10000 digits"),
         (b'{"a": "\xff"}', "byte 7 is no UTF-8"),

@@ -64,7 +64,7 @@ BAD = {
     "x,y,w,h\n": "0 boxes",
     "1,2,3,4\n5,6,7\n": ":2: 3 cells, x,y,width,height are needed",
     "1,2,3,4\n5,6,7,eight\n": ':2: found ["5", "6", "7", "eight"], four numbers',
-    "[" * 100_000: "is no valid JSON",
+    "[" * 100_000: "is nested deeper than 64; write it flatter",
 }
 
 

@@ -176,7 +176,7 @@ def test_a_split_json_out_of_the_folder_is_refused(folder: Path):
 PAIR = np.hstack([figure(color, paper="white") for color in COLORS[:2]])
 BROKEN: dict[str, tuple[Callable[[Path], object], str]] = {
     "no json": (lambda f: (f / "split.json").write_text("{"), "is no valid JSON"),
-    "deep json": (lambda f: (f / "split.json").write_text("[" * 10**5), "is no valid JSON"),
+    "deep json": (lambda f: (f / "split.json").write_text("[" * 10**5), "is nested deeper than 64"),
     "bytes": (lambda f: (f / "split.json").write_bytes(b"\xff\xfe\xff"), "is no valid JSON"),
     "empty": (lambda f: (f / "split.json").write_text(""), "is empty"),
     "list": (lambda f: (f / "split.json").write_text("[]"), "split.json: "),
