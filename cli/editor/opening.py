@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
@@ -16,6 +15,7 @@ from toonset.cli.editor.refit import (
     Changed,
     DrawnSheet,
     Subject,
+    clear_workshop,
     cut_sheet,
     find_palette,
     make_bundle,
@@ -80,10 +80,11 @@ def open_session(
         if folder.is_dir():
             folder.rmdir()  # it is empty
         os.replace(new, folder)
-        shutil.rmtree(subject.workshop, ignore_errors=True)
+        clear_workshop(subject)
         return Session(subject, drawn, NOTHING, NOTHING, tell)
     found = read_calibration(place_in(folder, CALIBRATION))
     subject = _subject(place, folder, mesh, found)
+    clear_workshop(subject)
     data = _corrections_file(folder, found, place)
     if data is None and _has_body(found, subject):
         sheet, corrections = _as_it_was_cut(subject, found)
@@ -91,7 +92,7 @@ def open_session(
     corrections = NOTHING if data is None else parse_json(data, CORRECTIONS, SheetError)
     if data is not None and _recorded(found, BY_HAND, data) and _has_body(found, subject):
         sheet, _ = cut_sheet(subject.sheet, corrections, subject.workshop)
-        shutil.rmtree(subject.workshop, ignore_errors=True)
+        clear_workshop(subject)
         return _session(subject, sheet, corrections, tell)
     fitted = corrections
     try:

@@ -155,7 +155,7 @@ def make_bundle(
         ToonsetError: the corrections do not fit the sheet, or nothing can be found in it.
     """
     new, old = subject.workshop / subject.folder.name, subject.folder
-    shutil.rmtree(subject.workshop, ignore_errors=True)
+    clear_workshop(subject)
     if before is None or before.sheet.options or changed.cut:
         sheet, file = cut_sheet(subject.sheet, corrections, subject.workshop)
         drawn = DrawnSheet.of(sheet)
@@ -176,11 +176,19 @@ def make_bundle(
 
 def put_in_place(new: Path, subject: Subject, corrections: dict[str, Any]) -> None:
     """Let a new bundle take the old one's place, with the newest corrections."""
-    old = subject.folder
     write_bytes(new / CORRECTIONS, file_of(corrections))
-    exchange_folders(new, old)
-    if (new / RUN).is_dir():
-        os.replace(new / RUN, old / RUN)
+    exchange_folders(new, subject.folder)
+    clear_workshop(subject)
+
+
+def clear_workshop(subject: Subject) -> None:
+    """Take the workshop away, but for an old bundle's run, which goes into the new one.
+
+    Once more at every start: a process that is killed between the two leaves the run there.
+    """
+    run, place = subject.workshop / subject.folder.name / RUN, subject.folder / RUN
+    if run.is_dir() and (subject.folder / CALIBRATION).is_file() and not place.exists():
+        os.replace(run, place)
     shutil.rmtree(subject.workshop, ignore_errors=True)
 
 

@@ -15,11 +15,11 @@ from typing import Any
 import pytest
 
 from toonset.calib.without_body.judge import ASK
-from toonset.cli.editor import opening
+from toonset.cli.editor import opening, refit
 from toonset.cli.editor import session as session_module
 from toonset.cli.editor.lock import locked
 from toonset.cli.editor.opening import folder_of, open_session
-from toonset.cli.editor.refit import CORRECTIONS, Changed, parts_changed
+from toonset.cli.editor.refit import CORRECTIONS, Changed, Subject, parts_changed
 from toonset.cli.editor.scene import PALETTE, for_page, scene_of
 from toonset.cli.editor.session import Session, StaleError
 from toonset.dataset.bundle.bundle import read_bundle
@@ -102,6 +102,23 @@ def test_a_correction_is_kept_at_once_and_fitted_soon(session: Session, bundle: 
     ]
     page = (bundle / "edit.html").read_text(encoding="utf-8")
     assert "exclude" in page
+
+
+def test_a_run_is_there_again_after_a_kill_while_bundles_changed_places(
+    bundle: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (bundle / "run").mkdir()
+    (bundle / "run" / "config.json").write_text("{}")
+    with monkeypatch.context() as killed:
+        killed.setattr(refit, "clear_workshop", lambda subject: None)
+        subject = Subject(bundle.parent / "sheet.png", None, bundle)
+        new = Path(shutil.copytree(bundle, subject.workshop / "bundle"))
+        shutil.rmtree(new / "run")
+        refit.put_in_place(new, subject, {"version": 1})
+    assert not (bundle / "run").exists()
+    open_session(bundle, bundle, None, lambda text: None).stop()
+    assert (bundle / "run" / "config.json").read_text() == "{}"
+    assert not subject.workshop.exists()
 
 
 def test_the_command_line_makes_the_same_of_it(session, bundle, toonset):
