@@ -235,19 +235,28 @@ class Place:
             assert ended.code in FINE, ended
         self.first = self.keep("first")
         self.before = contents(self.out)
-        self.times: list[float] = []
-        ended = self.run(hook=self._note)
+        ended = self.run(hook=self.noting("times"))
         assert ended.code in FINE, ended
-        times = json.loads((self.root / "times").read_text())
+        times = self.noted("times")
         self.seconds, self.after = ended.seconds, contents(self.out)
         assert self.after != self.before, self.name
         gaps = [after - before for before, after in itertools.pairwise(times)]
         self.calls = len(times)
         self.stops = [1, *(i for i, gap in enumerate(gaps, start=2) if gap > COMPUTATION_S)]
 
-    def _note(self, _: int) -> None:
-        self.times.append(time.monotonic())
-        (self.root / "times").write_text(json.dumps(self.times))
+    def noting(self, name: str) -> Hook:
+        """Return what writes down when a child makes its calls."""
+        times: list[float] = []
+
+        def note(_: int) -> None:
+            times.append(time.monotonic())
+            (self.root / name).write_text(json.dumps(times))
+
+        return note
+
+    def noted(self, name: str) -> list[float]:
+        """Return when a child made its calls."""
+        return list(json.loads((self.root / name).read_text()))
 
     def keep(self, name: str) -> Path:
         """Keep the outputs as they are, under a name."""
@@ -364,16 +373,24 @@ def signals(place: Place, count: int, draw: random.Random) -> Row:
 
 
 def pairs(place: Place, rounds: int) -> Row:
-    """Let two processes write to one place at the same time: one does, one is refused."""
-    row = Row(0)
-    for i in range(rounds):
+    """Let two processes write to one place at the same time: one does, one is refused.
+
+    A round in which one had ended before the other began to write is none.
+    """
+    row, names = Row(0), ("-0", "-1")
+    while row.tried < rounds:
         place.restore(place.first)
-        children = [place.begin(name=f"-{one}") for one in range(2)]
-        ended = [place.wait(child, f"-{one}") for one, child in enumerate(children)]
-        done = [one for one in ended if one.code in FINE]
-        row += place.judge(f"round {i}", done[0] if done else ended[0])
+        children = [place.begin(hook=place.noting(f"times{n}"), name=n) for n in names]
+        ended = [place.wait(child, n) for child, n in zip(children, names, strict=True)]
+        done = [end for end in ended if end.code in FINE]
+        if len(done) == 2:
+            one, other = (place.noted(f"times{n}") for n in names)
+            if one[-1] < other[0] or other[-1] < one[0]:
+                continue
+        what = f"round {row.tried}"
+        row += place.judge(what, done[0] if done else ended[0])
         if len(done) != 1:
-            row += Row(0, (f"{place.name}, round {i}: exit codes {[e.code for e in ended]}",))
+            row += Row(0, (f"{place.name}, {what}: exit codes {[e.code for e in ended]}",))
     return row
 
 
