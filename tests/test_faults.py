@@ -22,11 +22,8 @@ def tried(*arguments: str) -> int:
     return int(found[1])
 
 
-@pytest.mark.parametrize(
-    ("case", "at_least"), [("split", 200), ("palette-again", 200), ("train", 200)]
-)
-def test_every_call_of_a_verb_may_fail(case: str, at_least: int) -> None:
-    assert tried(case, "--quick") > at_least
+def test_every_call_of_a_verb_may_fail() -> None:
+    assert tried("split", "palette-again", "train", "--quick") > 600
 
 
 @pytest.mark.slow
