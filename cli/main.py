@@ -22,6 +22,7 @@ import typer
 
 from toonset import __version__, lock
 from toonset.cli.common.help import Verb, Verbs
+from toonset.cli.common.output import lead_nowhere, say
 from toonset.errors import ToonsetError, one_line
 
 VERBS = (  # in the order in which they are used
@@ -45,6 +46,10 @@ PLACES_AT_FAULT = (  # what the system says of a place that the user has named, 
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP),
     *(errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ESTALE),
 )
+
+UNMAPPED = "failed to map segment"  # what the system says of a library that finds no space
+LEAST_SPACE = 800_000_000  # bytes
+MORE_SPACE = "raise the limit: ulimit -v"
 
 app = typer.Typer(
     name="toonset",
@@ -99,6 +104,7 @@ def run(program: typer.Typer, name: str) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         _check_current_folder()
+        _check_address_space()
         with lock.command():
             code = program(prog_name=name, standalone_mode=False)
         sys.stdout.flush()
@@ -112,15 +118,19 @@ def run(program: typer.Typer, name: str) -> None:
     except UsageError as error:
         _refuse(name, one_line(_usage(error)))
     except BrokenPipeError:
-        _close_stdout()
+        lead_nowhere(sys.stdout)
         sys.exit(1)
     except OSError as error:
         if error.errno not in PLACES_AT_FAULT or not isinstance(error.filename, str | None):
             raise
         place, reason = one_line(error.filename or "standard output"), error.strerror
         if error.filename is None:
-            _close_stdout()
+            lead_nowhere(sys.stdout)
         _refuse(name, f"{place}: {reason}; free or choose another place")
+    except ImportError as error:
+        if UNMAPPED not in str(error):
+            raise
+        _refuse(name, f"out of address space ({one_line(error)}); {MORE_SPACE}")
     except MemoryError as error:
         _refuse(name, f"out of memory ({one_line(error)}); use smaller input")
     if code == INTERRUPTED:
@@ -139,11 +149,6 @@ def _open_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _close_stdout() -> None:
-    """Let what is not printed yet lead nowhere: Python would try again at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _end_by_signals() -> None:
@@ -165,6 +170,17 @@ def _check_current_folder() -> None:
         raise ToonsetError("the current folder has been deleted; change to another one") from error
 
 
+def _check_address_space() -> None:
+    """Refuse what OpenBLAS ends the process under, or waits for ever, before anything is said."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if 0 <= most < LEAST_SPACE:
+        raise ToonsetError(f"{most // 10**6} MB of address space are too few; {MORE_SPACE}")
+
+
 def _usage(error: Any) -> str:
     """Return what is wrong with the command line, and where its help is."""
     said = error.format_message().replace("Value error, ", "").rstrip(". ")
@@ -180,5 +196,4 @@ def _refuse(name: str, text: str) -> NoReturn:
 
 def _say(name: str, text: str) -> None:
     over_progress = "\r\x1b[K" if sys.stderr.isatty() else ""
-    with contextlib.suppress(OSError):  # nowhere to say it: the exit code does
-        print(f"{over_progress}{name}: {text}", file=sys.stderr, flush=True)
+    say(f"{over_progress}{name}: {text}\n")

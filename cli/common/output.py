@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
+import os
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 
@@ -62,7 +62,7 @@ class Printer:
     def doubt(self, text: str) -> None:
         """Print on stderr what to look at, quiet or not: why the exit code is 3, or a run weak."""
         self._clear()
-        _write(f"{_shown(text)}\n")
+        say(f"{_shown(text)}\n")
 
     def progress(self, text: str) -> None:
         """Show where the work stands: one live line on a terminal, a line every 5 s in a log."""
@@ -70,9 +70,9 @@ class Printer:
             return
         if sys.stderr.isatty():
             self._clear()
-            _write(_shown(text))
+            say(_shown(text))
         elif time.monotonic() - self._last > SECONDS_BETWEEN_LOG_LINES:
-            _write(f"{_shown(text)}\n")
+            say(f"{_shown(text)}\n")
             self._last = time.monotonic()
 
     def result(self, values: dict[str, Any], text: str) -> None:
@@ -85,12 +85,20 @@ class Printer:
 
     def _clear(self) -> None:
         if not self.quiet and sys.stderr.isatty():
-            _write(ERASE_LINE)
+            say(ERASE_LINE)
 
 
-def _write(text: str) -> None:
-    with contextlib.suppress(OSError):  # a log on a full disk; the work goes on
+def lead_nowhere(stream: TextIO) -> None:
+    """Let what is printed, and what could not be printed yet, go nowhere: its end would fail."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def say(text: str) -> None:
+    """Print to stderr, if it can be; the work goes on without a log on a full disk."""
+    try:
         print(text, end="", file=sys.stderr, flush=True)
+    except OSError:
+        lead_nowhere(sys.stderr)
 
 
 def _shown(text: str) -> str:

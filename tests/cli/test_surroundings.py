@@ -18,7 +18,7 @@ def in_shell(command, folder, **environment):
     return subprocess.run(
         ["sh", "-c", command],
         cwd=folder,
-        env=os.environ | environment,
+        env=os.environ | {"PYTHONUNBUFFERED": ""} | environment,  # "": what is printed is kept
         capture_output=True,
         text=True,
         errors="surrogateescape",
@@ -45,6 +45,16 @@ def folder(drawn, tmp_path):
         (f"{SPLIT} >&- -q", 0, ""),
         (f"{SPLIT} 2>&-", 0, ""),
         (f"{SPLIT} -q 2>&1 | true", 0, ""),
+        (
+            f"ulimit -v 400000; {SPLIT}",
+            2,
+            "toonset: 409 MB of address space are too few; raise the limit: ulimit -v\n",
+        ),
+        (
+            f"ulimit -v 1500000; {sys.executable} -m toonset train bundle",
+            2,
+            "failed to map segment from shared object); raise the limit: ulimit -v\n",
+        ),
         (
             f"mkdir gone && cd gone && rmdir ../gone && {SPLIT}",
             2,
