@@ -51,7 +51,8 @@ def coverage_map(
     second = np.where((second == first) | (level == 255), UNLABELLED, second)
     result = np.full((*tones.shape, 3), UNLABELLED, np.uint8)
     result[..., 2] = 0
-    result[pure, 0], result[pure, 2] = paint.labels[pure], 255
+    np.copyto(result[..., 0], paint.labels, where=pure)
+    np.copyto(result[..., 2], 255, where=pure)
     result[mixed] = np.stack([first, second, level], axis=1)
     return result
 

@@ -12,18 +12,30 @@ Places = Int[np.ndarray, "height width"]
 
 def dilate(mask: Mask, by: int = 1) -> Mask:
     """Return the pixels within `by` pixels of a mask, diagonals included."""
-    return cv2.dilate(mask.astype(np.uint8), _square(by)) > 0
+    return cv2.dilate(mask.view(np.uint8), _square(by)).view(np.bool_)
 
 
 def erode(mask: Mask, by: int = 1) -> Mask:
     """Return a mask's pixels farther than `by` from its outside; beyond the picture is outside."""
-    return cv2.erode(mask.astype(np.uint8), _square(by), borderValue=0) > 0
+    return cv2.erode(mask.view(np.uint8), _square(by), borderValue=0).view(np.bool_)
 
 
 def is_uniform(values: Shaped[np.ndarray, "height width"]) -> Mask:
     """Return where a pixel and its eight neighbours have one value, of 16 bits at most."""
     small = values.astype(np.int16)
     return np.asarray(cv2.erode(small, _square(1)) == cv2.dilate(small, _square(1)))
+
+
+def median_inside(levels: Shaped[np.ndarray, "height width"], mask: Mask) -> float:
+    """Return the median of a mask's values, whole numbers of 16 bits at most from 0 up.
+
+    They are counted, not sorted: no copy of a large picture is made.
+    """
+    kinds = int(levels.max()) + 1
+    counts = cv2.calcHist([levels], [0], mask.view(np.uint8), [kinds], [0, kinds])
+    up_to = np.cumsum(counts, dtype=np.float64)
+    middle = [np.floor((up_to[-1] - 1) / 2), np.floor(up_to[-1] / 2)]
+    return float(np.searchsorted(up_to, middle, side="right").mean())
 
 
 def distance_to(marked: Mask) -> Float[np.ndarray, "height width"]:

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.palette.pixels.antialias import OPAQUE
-from toonset.raster import erode
+from toonset.raster import erode, median_inside
 
 LEAST_LEVELS = 2.0  # of 255: finer grain does labels no harm
 LAPLACIANS = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)  # nothing on slopes
@@ -56,8 +56,8 @@ def noise_levels(pictures: Sequence[Picture]) -> float:
         light = cv2.cvtColor(np.ascontiguousarray(picture[..., :3]), cv2.COLOR_RGB2GRAY)
         inside = erode(picture[..., 3] >= OPAQUE, 2)
         if inside.any():
-            rough = np.abs(cv2.filter2D(light.astype(np.float32), -1, LAPLACIANS))
-            found.append(float(np.median(rough[inside])))
+            rough = np.abs(cv2.filter2D(light, cv2.CV_16S, LAPLACIANS)).view(np.uint16)
+            found.append(median_inside(rough, inside))
     return SIGMA_FROM_MEDIAN * float(np.median(found)) if found else 0.0
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16, UInt8
 
 from toonset.palette.pixels.antialias import YCC_FROM_RGB, noise_beside_edges
-from toonset.raster import dilate, is_uniform
+from toonset.raster import dilate, is_uniform, median_inside
 
 NONE = -1  # of a pixel without a tone
 LINE = 32  # of 255: a line that covers so much of a pixel may be in its neighbours, too
@@ -76,7 +76,7 @@ def colors_as_drawn(
         where = tones == kind
         where &= inside | (kind == len(colors))
         if where.sum() >= FEW:
-            drawn[kind] = np.median(picture[where][:, :3], axis=0)
+            drawn[kind] = [median_inside(picture[..., n], where) for n in range(3)]
     return drawn
 
 
@@ -123,7 +123,7 @@ def _around(
 ) -> Float[np.ndarray, "tones n"]:
     """Return how much of some pixels' surroundings every tone covers; mixtures count if given."""
     shares = np.full((kinds, int(at.sum())), FAINT, np.float32)
-    for kind in range(kinds):
+    for kind in range(kinds if at.any() else 0):
         is_line = kind == kinds - 1
         field = ((contour >= LINE) if is_line else (tones == kind)).astype(np.float32)
         if mixtures is not None:
