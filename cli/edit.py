@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag
+from toonset.lock import hold
 
 if TYPE_CHECKING:
     from toonset.cli.editor.session import Session
@@ -62,14 +63,13 @@ def edit(
     and palette follow within seconds. The bundle's edit.html is the same page without a server.
     Stop with Ctrl-C.
     """
-    from toonset.cli.editor.lock import locked
     from toonset.cli.editor.opening import folder_of, open_session
     from toonset.cli.editor.server import Server
 
     printer = Printer(as_json, quiet)
     folder = folder_of(place, out)
     body: Any = NO_BODY if str(mesh) == NO_BODY else mesh
-    with Server(folder.resolve().name) as server, locked(folder, server.server_port):
+    with Server(folder.resolve().name) as server, hold(folder):
         session = open_session(place, folder, body, printer.progress)
         ended = _ended()
         server.tell_address = lambda address: printer.say(f"for another tab: {address}")

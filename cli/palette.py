@@ -19,6 +19,7 @@ from toonset.cli.common.output import (
     QuietFlag,
     VerboseFlag,
 )
+from toonset.lock import FOLDERS
 from toonset.write import check_output
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from toonset.palette.palette import Palette
 
 WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette.png")
-FOLDERS = ("labels", "tones", "coverage", "contours")
 BUNDLE, OUT, RECOLORED = Path("bundle"), Path("palette"), Path("recolored")
 CHOICE_PANEL = "Choice of colours"
 
@@ -129,7 +129,7 @@ def palette(
     folders, or with -o, into a folder of their own.
     """
     from toonset.cli.common.label_drawings import label_drawings
-    from toonset.dataset.bundle.palette_files import write_labelled
+    from toonset.dataset.bundle.palette_files import check_map_folders, write_labelled
     from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
     from toonset.palette.extract import options_of
@@ -150,6 +150,7 @@ def palette(
         check_output(target, read, (*WRITTEN, *FOLDERS), force=force)
     else:
         lock.claim(lock.set_of(target / WRITTEN[0]))
+        check_map_folders(target)
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     drawn = load_pictures(places)
     for note in drawn.notes:

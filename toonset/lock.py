@@ -25,11 +25,13 @@ Lock = tuple[int, Path]  # descriptor and name of a locked file
 TEMPORARY, OLD = ".tmp", ".old"  # ends of hidden names: being written; about to be replaced
 NEW = ".new"  # of a hidden folder: files that are decided to come to lie beside it
 GONE, BEFORE = ".gone", ".before"  # in it: names that are to go; what has been replaced
-FOLDERS = ("contours", "coverage", "labels", "tones")  # that may be replaced so, with files
+PALETTE = "palette"  # the one set of files that has folders, too
+FOLDERS = ("contours", "coverage", "labels", "tones")
+MOST_GONE = 4096  # bytes of names that are to go
 PATIENCE_S, NAP_S = 10.0, 0.02  # to wait for a process that is moving files into place
 _COMMAND: ContextVar[ExitStack | None] = ContextVar("command", default=None)
 _GUARD = threading.Lock()
-_HELD: dict[Path, tuple[Lock | None, int]] = {}  # by output: its lock, how often it is held
+_HELD: dict[Path, tuple[tuple[Lock, ...], int]] = {}  # by output: locks, how often it is held
 
 
 @contextlib.contextmanager
@@ -82,8 +84,21 @@ def set_of(path: Path) -> Path:
     White space counts as "_", since the files that belong to an OBJ have none in their names.
     """
     path = Path(os.path.abspath(path))
-    start = path.name[:1] + path.name[1:].split(".")[0]
-    return path.with_name("_".join(start.split()) or "_") if path.name else path
+    name = "_".join(path.name.split())
+    start = name[:1] + name[1:].split(".")[0]
+    return path.with_name(start if start.strip(".") else "_") if path.name else path
+
+
+def is_of_set(path: Path, held: Path) -> bool:
+    """Return whether a file or folder may be replaced together with a set's others.
+
+    Folders of the palette only: a bundle from elsewhere may bring a hidden folder of any name.
+    """
+    if path.is_symlink():
+        return False
+    if path.name in FOLDERS and held.name == PALETTE:
+        return path.is_dir() or not path.exists()
+    return set_of(path).name == held.name and not path.is_dir()
 
 
 def settle(path: Path) -> None:
@@ -111,20 +126,19 @@ def decided_folder(held: Path) -> Path:
 def move_into_place(decided: Path) -> None:
     """Let decided files and folders take their places beside `decided`, which is removed.
 
-    Whoever is killed here is followed by somebody who does what is left. A bundle from elsewhere
-    may bring such a folder: no more than files of the one name and `FOLDERS` are moved.
+    Whoever is killed here is followed by somebody who does what is left.
 
     Raises:
         OutputError: the folder holds what no toonset puts there.
         OSError: the place cannot be written.
     """
     before, gone, beside = decided / BEFORE, decided / GONE, decided.parent
+    held = beside / decided.name.removeprefix(".").removesuffix(NEW)
     new = [entry for entry in decided.iterdir() if entry not in (before, gone)]
-    old = gone.read_text("utf-8", "replace").splitlines() if gone.exists() else []
-    held = decided.name.removeprefix(".").removesuffix(NEW)
-    for path in (*new, *(decided / name for name in old)):
-        known = path.name in FOLDERS or set_of(path).name == held
-        if path.parent != decided or path.is_symlink() or before.is_symlink() or not known:
+    old = _names_in(gone)
+    moved = [*new, *(beside / name for name in (*old, *(entry.name for entry in new)))]
+    for path in (before, *moved):
+        if path.parent not in (decided, beside) or not (path == before or is_of_set(path, held)):
             raise OutputError(f"{decided}: holds {path.name!r}, which no toonset wrote; remove it")
     before.mkdir(exist_ok=True)
     for name in old:
@@ -135,6 +149,15 @@ def move_into_place(decided: Path) -> None:
         os.replace(entry, beside / entry.name)
     flush(beside)
     shutil.rmtree(decided)
+
+
+def _names_in(gone: Path) -> list[str]:
+    """Return the names that are to go."""
+    if not os.path.lexists(gone):
+        return []
+    if gone.is_symlink() or not gone.is_file() or gone.stat().st_size > MOST_GONE:
+        raise OutputError(f"{gone}: was written by no toonset; remove its folder")
+    return gone.read_text("utf-8", "replace").splitlines()
 
 
 def flush(folder: Path) -> None:
@@ -160,28 +183,33 @@ def named(name: str) -> str:
 
 def _acquire(path: Path, patience_s: float) -> None:
     with _GUARD:
-        if path in _HELD:
-            lock, times = _HELD[path]
-            _HELD[path] = lock, times + 1
-            return
-        _HELD[path] = _locked(path, patience_s), 1
+        locks, times = _HELD.get(path, ((), 0))
+        if _lock_file(path) not in [file for _, file in locks]:  # its folder may have come since
+            new = _locked(path, patience_s)
+            locks = locks if new is None else (*locks, new)
+        _HELD[path] = locks, times + 1
+    if times:
+        return
     try:
         _finish(path)
     except OutputError:
         _release(path)
         raise
-    _sweep(path)
+    if locks:  # else it may be another's who writes
+        _sweep(path)
 
 
 def _release(path: Path) -> None:
     with _GUARD:
-        lock, times = _HELD.pop(path)
+        locks, times = _HELD.pop(path)
         if times > 1:
-            _HELD[path] = lock, times - 1
-        elif lock is not None:
+            _HELD[path] = locks, times - 1
+            return
+        for descriptor, file in reversed(locks):
             with contextlib.suppress(OSError):
-                os.unlink(lock[1])
-            os.close(lock[0])
+                if os.path.samestat(os.fstat(descriptor), os.stat(file)):
+                    os.unlink(file)
+            os.close(descriptor)
 
 
 def _locked(path: Path, patience_s: float) -> Lock | None:
@@ -240,7 +268,7 @@ def _sweep(path: Path) -> None:
     pattern = re.compile(rf"\.{re.escape(path.name)}\.[a-z0-9_]{{8}}({TEMPORARY}|{OLD})")
     with contextlib.suppress(OSError):
         left = [entry for entry in path.parent.iterdir() if pattern.fullmatch(entry.name)]
-        for entry in sorted(left, key=lambda entry: entry.stat().st_mtime, reverse=True):
+        for entry in sorted(left, key=lambda entry: entry.lstat().st_mtime, reverse=True):
             if entry.suffix == OLD and not path.exists():
                 os.replace(entry, path)
             elif entry.is_dir() and not entry.is_symlink():

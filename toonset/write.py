@@ -8,18 +8,22 @@ import errno
 import fnmatch
 import json
 import os
+import re
 import shutil
+import signal
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from toonset import lock
 from toonset.errors import OutputError
-from toonset.lock import GONE, OLD, TEMPORARY, flush, hold, is_temporary
+from toonset.lock import GONE, OLD, TEMPORARY, flush, hold, is_of_set, is_temporary
 
 LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")
 THERE_ALREADY = (errno.ENOTEMPTY, errno.EEXIST)
+ENDINGS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 
 
 def write_bytes(path: Path, data: bytes) -> None:
@@ -28,7 +32,10 @@ def write_bytes(path: Path, data: bytes) -> None:
     Raises:
         OutputError: the place cannot be written (missing permission, full disk, a folder there).
     """
+    new = next((folder for folder in path.parents if is_temporary(folder.name)), None)
     try:
+        if new is not None and not new.is_dir():  # another program took it away, with its files
+            raise FileNotFoundError(errno.ENOENT, "another program has removed it meanwhile")
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
     except OSError as error:
@@ -40,7 +47,7 @@ def write_bytes(path: Path, data: bytes) -> None:
             os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-        if not any(map(is_temporary, path.parent.parts)):  # a new folder is flushed as a whole
+        if new is None:  # a new folder is flushed as a whole
             flush(path.parent)
     except OSError as error:
         raise _output_error(path, error) from error
@@ -55,8 +62,7 @@ def new_files(path: Path, gone: Iterable[str] = (), *, force: bool) -> Iterator[
 
     All or none of them, with one rename of the temporary folder: killed before it, nothing has
     changed; killed after it, `toonset.lock.settle` does what is left, for whoever reads or writes
-    there next. Only files of `path`'s name up to the first dot, and `toonset.lock.FOLDERS`, can be
-    replaced so.
+    there next. Only what `toonset.lock.is_of_set` knows can be replaced so.
 
     Args:
         path: the file that names the others; they lie in its folder.
@@ -69,20 +75,25 @@ def new_files(path: Path, gone: Iterable[str] = (), *, force: bool) -> Iterator[
     """
     path = Path(os.path.abspath(path))
     held = lock.set_of(path)
+    _make_parents(path)
     with hold(held):
         temporary = _temporary_folder(held)
         try:
             yield temporary
             names = [entry.name for entry in temporary.iterdir()]
             for name in names:
-                if not force and os.path.lexists(path.with_name(name)):
-                    raise OutputError(_made_meanwhile(path.with_name(name)))
+                there = path.with_name(name)
+                if not (is_of_set(temporary / name, held) and is_of_set(there, held)):
+                    raise OutputError(f"{there}: cannot be replaced; choose another -o")
+                if not force and os.path.lexists(there):
+                    raise OutputError(_made_meanwhile(there))
             write_bytes(temporary / GONE, "\n".join(gone).encode())
             _flush_whole(temporary)
             decided = lock.decided_folder(held)
-            os.rename(temporary, decided)
-            flush(path.parent)
-            lock.move_into_place(decided)
+            with _undisturbed():
+                os.rename(temporary, decided)
+                flush(path.parent)
+                lock.move_into_place(decided)
         except OSError as error:
             raise _output_error(path, error) from error
         finally:
@@ -107,6 +118,7 @@ def new_folder(path: Path, *, force: bool = False) -> Iterator[Path]:
             place cannot be written.
     """
     path = Path(os.path.abspath(path))
+    _make_parents(path)
     with hold(path):
         check_new_folder(path, force=force)
         temporary = _temporary_folder(path)
@@ -140,6 +152,7 @@ def check_output(
     check_new_folder(out, force=force)
     if not out.is_dir():
         return
+    _finish_inside(out)
     names = (*written, *LEFT_BY_DESKTOPS)
     entries = sorted(entry.name for entry in out.iterdir())
     foreign = [
@@ -154,9 +167,17 @@ def check_output(
         )
     kept = [Path(), *(path for path in inputs if path is not None and path.exists())]
     for path in kept:
-        if entries and path.resolve().is_relative_to(out.resolve()):
+        if (entries or path == Path()) and path.resolve().is_relative_to(out.resolve()):
             what = "the current folder" if path == Path() else str(path)
             raise OutputError(f"{out}: holds {what}, --force would delete it; choose another -o")
+
+
+def _finish_inside(folder: Path) -> None:
+    """Finish or remove what killed processes left in a folder; refuse one that others write to."""
+    for name in [entry.name for entry in folder.iterdir()]:
+        if found := re.fullmatch(r"\.(.+)\.(lock|new)", name):
+            with hold(folder / found[1]):
+                pass
 
 
 def check_new_file(path: Path, *, force: bool = False) -> None:
@@ -190,6 +211,8 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
         raise _output_error(path, error) from error
     if path.exists() and not path.is_dir():
         raise OutputError(f"{path}: is a file, a folder is needed; choose another -o")
+    if path.is_symlink():
+        raise OutputError(f"{path}: is a link, a folder is needed; name the folder itself")
     if path.is_dir() and any(path.iterdir()) and not force:
         raise OutputError(
             f"{path}: exists already; pass --force to replace it, or choose another -o"
@@ -276,15 +299,40 @@ def _put_aside(path: Path) -> Path:
     return old
 
 
+def _make_parents(path: Path) -> None:
+    """Make the folders above an output: its lock lies in the last of them."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _output_error(path, error) from error
+
+
 def _temporary_folder(path: Path) -> Path:
     """Make an empty hidden folder beside `path`, named after it."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         name = tempfile.mkdtemp(prefix=f".{path.name}.", suffix=TEMPORARY, dir=path.parent)
         os.chmod(name, 0o777 & ~_umask())
     except OSError as error:
         raise _output_error(path, error) from error
     return Path(name)
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Put off signals that end the program until a few renames are done."""
+    heard: list[int] = []
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in ENDINGS:
+            if signal.getsignal(number) is not None:  # not from outside of Python
+                before[number] = signal.signal(number, lambda n, _: heard.append(n))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for one in heard:
+            signal.raise_signal(one)
 
 
 def _flush_whole(root: Path) -> None:

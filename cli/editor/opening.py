@@ -50,14 +50,17 @@ def folder_of(place: Path, out: Path) -> Path:
     """Return the bundle that is meant: the place itself, or what a sheet becomes.
 
     Raises:
-        ToonsetError: there is nothing, or several pictures.
+        ToonsetError: there is nothing, or several pictures, or it cannot be replaced.
     """
     check_there([place], "sheet or bundle", SheetError)
-    if not place.is_dir():
-        return out
-    if not (place / CALIBRATION).is_file():
+    folder = place if place.is_dir() else out
+    if place.is_dir() and not (place / CALIBRATION).is_file():
         raise BundleError(f"{place}: is no bundle; name one, or the sheet, a single picture")
-    return place
+    if folder.is_symlink():
+        raise BundleError(f"{folder}: is a link; name the bundle itself, which is replaced")
+    if Path.cwd().is_relative_to(folder.resolve()):
+        raise BundleError(f"{folder}: holds the current folder; change to the one it lies in")
+    return folder
 
 
 def open_session(
@@ -85,14 +88,27 @@ def open_session(
     found = read_calibration(place_in(folder, CALIBRATION))
     subject = _subject(place, folder, mesh, found)
     clear_workshop(subject)
-    data = _corrections_file(folder, found, place)
+    try:
+        return _reopen(subject, found, place, tell, progress)
+    finally:
+        clear_workshop(subject)
+
+
+def _reopen(
+    subject: Subject,
+    found: CalibrationFile,
+    place: Path,
+    tell: Callable[[str], None],
+    progress: Callable[[str, float], None],
+) -> Session:
+    """Return the session of a bundle, fitted anew where corrections ask for it."""
+    data = _corrections_file(subject.folder, found, place)
     if data is None and _has_body(found, subject):
         sheet, corrections = _as_it_was_cut(subject, found)
         return _session(subject, sheet, corrections, tell)
     corrections = NOTHING if data is None else parse_json(data, CORRECTIONS, SheetError)
     if data is not None and _recorded(found, BY_HAND, data) and _has_body(found, subject):
         sheet, _ = cut_sheet(subject.sheet, corrections, subject.workshop)
-        clear_workshop(subject)
         return _session(subject, sheet, corrections, tell)
     fitted = corrections
     try:

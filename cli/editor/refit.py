@@ -7,6 +7,7 @@ import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
@@ -16,13 +17,14 @@ from toonset.calib.hints import Hints
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.write_bundle import write_bundle
 from toonset.cli.common.label_drawings import label_drawings
-from toonset.dataset.bundle.bundle import CALIBRATION, CONTOURS, COVERAGE, LABELS, TONES
+from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
 from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
 from toonset.dataset.split_folder.pictures import load_pictures
 from toonset.json_file import read_json
+from toonset.lock import FOLDERS, hold, set_of
 from toonset.mesh import Mesh
 from toonset.palette.extract import options_of
 from toonset.palette.palette import MAX_COLORS
@@ -175,20 +177,29 @@ def make_bundle(
 
 
 def put_in_place(new: Path, subject: Subject, corrections: dict[str, Any]) -> None:
-    """Let a new bundle take the old one's place, with the newest corrections."""
+    """Let a new bundle take the old one's place, with the newest corrections.
+
+    Raises:
+        OutputError: a palette or a run is being written into the old one.
+    """
+    folder = subject.folder
     write_bytes(new / CORRECTIONS, file_of(corrections))
-    exchange_folders(new, subject.folder)
-    clear_workshop(subject)
+    with hold(folder / RUN), hold(set_of(folder / PALETTE)):
+        exchange_folders(new, folder)
+        clear_workshop(subject)
 
 
 def clear_workshop(subject: Subject) -> None:
-    """Take the workshop away, but for an old bundle's run, which goes into the new one.
+    """Take the workshop away, but for what an old bundle holds of others: it goes into the new one.
 
-    Once more at every start: a process that is killed between the two leaves the run there.
+    Once more at every start: a process that is killed between the two leaves it there.
     """
-    run, place = subject.workshop / subject.folder.name / RUN, subject.folder / RUN
-    if run.is_dir() and (subject.folder / CALIBRATION).is_file() and not place.exists():
-        os.replace(run, place)
+    old, new = subject.workshop / subject.folder.name, subject.folder
+    if (old / CALIBRATION).is_file() and (new / CALIBRATION).is_file():
+        for entry in old.iterdir():
+            own = any(fnmatchcase(entry.name, one) for one in WRITTEN if one != RUN)
+            if not own and not entry.name.startswith(".") and not os.path.lexists(new / entry.name):
+                os.replace(entry, new / entry.name)
     shutil.rmtree(subject.workshop, ignore_errors=True)
 
 
@@ -223,9 +234,9 @@ def note_corrections(folder: Path, corrections: dict[str, Any]) -> None:
 def _take_along(old: Path, new: Path) -> None:
     for entry in old.iterdir():
         target = new / entry.name
-        if entry.name in (RUN, CALIBRATION) or target.exists():
+        if entry.name == CALIBRATION or target.exists():
             continue
-        if entry.is_dir() and entry.name in (LABELS, TONES, COVERAGE, CONTOURS):
+        if entry.is_dir() and entry.name in FOLDERS:
             shutil.copytree(entry, target)
-        elif entry.is_file():
+        elif entry.is_file() and not entry.name.startswith("."):
             shutil.copy2(entry, target)

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
+from toonset.lock import FOLDERS
 from toonset.palette.coverage import coverage_map
 from toonset.palette.extract import PaintMap, paint_maps
 from toonset.palette.formats.registry import encode_palette
@@ -70,6 +71,16 @@ def write_labelled(
     write_palette(folder, palette, labels, inked, tones, coverage)
 
 
+def check_map_folders(folder: Path) -> None:
+    """Refuse a folder whose folders of maps hold what no palette wrote: they are replaced.
+
+    Raises:
+        OutputError: they do, or are files or links.
+    """
+    for name in FOLDERS:
+        check_removable(folder / name, "*.png")
+
+
 def write_palette(
     folder: Path,
     palette: Palette,
@@ -103,8 +114,7 @@ def write_palette(
         "coverage": coverage,
     }
     gone = [name for name in ("tones", "coverage") if not folders[name]]
-    for name in gone:
-        check_removable(folder / name, "*.png")
+    check_map_folders(folder)
     with new_files(folder / PALETTE_JSON, gone, force=True) as new:
         for place, maps in folders.items():
             for name, values in maps:

@@ -1,7 +1,6 @@
 """A bundle that is corrected: what is kept, what is fitted, what is left when all ends at once."""
 
 import json
-import os
 import shutil
 import signal
 import subprocess
@@ -17,7 +16,6 @@ import pytest
 from toonset.calib.without_body.judge import ASK
 from toonset.cli.editor import opening, refit
 from toonset.cli.editor import session as session_module
-from toonset.cli.editor.lock import locked
 from toonset.cli.editor.opening import folder_of, open_session
 from toonset.cli.editor.refit import CORRECTIONS, Changed, Subject, parts_changed
 from toonset.cli.editor.scene import PALETTE, for_page, scene_of
@@ -83,8 +81,9 @@ def test_a_correction_is_kept_at_once_and_fitted_soon(session: Session, bundle: 
     before = settled(session)
     assert len(before["scene"]["views"]) == 5
     assert before["scene"]["palette"]["colors"]
-    (bundle / "run").mkdir()
-    (bundle / "run" / "config.json").write_text("{}")
+    for name in ("run", "test"):
+        (bundle / name).mkdir()
+        (bundle / name / "config.json").write_text("{}")
     box = session.scene["views"][1]["box"]
     said = {"version": 1, "views": [{"box": box, "exclude": True}]}
     assert session.save(said, 0) == 1
@@ -93,7 +92,8 @@ def test_a_correction_is_kept_at_once_and_fitted_soon(session: Session, bundle: 
     assert state["error"] == ""
     assert len(state["scene"]["views"]) == 4
     assert len(read_bundle(bundle).scene.frames) == 4
-    assert (bundle / "run" / "config.json").read_text() == "{}"  # a trained field stays
+    for name in ("run", "test"):  # a trained field stays, and what others put there
+        assert (bundle / name / "config.json").read_text() == "{}"
     assert json.loads((bundle / CORRECTIONS).read_bytes()) == said
     assert sorted(place.name for place in bundle.parent.iterdir()) == [
         "bundle",
@@ -104,20 +104,23 @@ def test_a_correction_is_kept_at_once_and_fitted_soon(session: Session, bundle: 
     assert "exclude" in page
 
 
-def test_a_run_is_there_again_after_a_kill_while_bundles_changed_places(
+def test_folders_of_others_are_there_again_after_a_kill_while_bundles_changed_places(
     bundle: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (bundle / "run").mkdir()
-    (bundle / "run" / "config.json").write_text("{}")
+    for name in ("run", "test"):
+        (bundle / name).mkdir()
+        (bundle / name / "config.json").write_text("{}")
     with monkeypatch.context() as killed:
         killed.setattr(refit, "clear_workshop", lambda subject: None)
         subject = Subject(bundle.parent / "sheet.png", None, bundle)
         new = Path(shutil.copytree(bundle, subject.workshop / "bundle"))
         shutil.rmtree(new / "run")
+        shutil.rmtree(new / "test")
         refit.put_in_place(new, subject, {"version": 1})
     assert not (bundle / "run").exists()
     open_session(bundle, bundle, None, lambda text: None).stop()
-    assert (bundle / "run" / "config.json").read_text() == "{}"
+    for name in ("run", "test"):
+        assert (bundle / name / "config.json").read_text() == "{}"
     assert not subject.workshop.exists()
 
 
@@ -261,15 +264,6 @@ def test_corrections_that_calibrate_was_given_are_taken_over(bundle, toonset):
         open_session(other, other, None, lambda text: None)
 
 
-def test_a_lock_that_was_left_behind_is_taken(tmp_path: Path) -> None:
-    file = tmp_path / ".bundle.edit.lock"
-    for left in ('{"pid": 999999999, "port": 1}', f'{{"pid": {os.getpid()}, "port": 1}}', "?"):
-        file.write_text(left)
-        with locked(tmp_path / "bundle", 5):
-            assert json.loads(file.read_text())["port"] == 5
-        assert not file.exists()
-
-
 class Editing:
     """`toonset edit` as a process, and what asks its server."""
 
@@ -312,7 +306,9 @@ class Editing:
 def test_a_kill_loses_nothing_that_was_answered(bundle: Path, shell: Command) -> None:
     editing = Editing(bundle)
     refused = shell("edit", bundle, "--no-browser")
-    assert f"is being edited by process {editing.process.pid}" in refused.reason
+    assert "is in use by another toonset" in refused.reason
+    refused = shell("calibrate", bundle.parent / "sheet.png", "-o", bundle, "--force")
+    assert "is in use by another toonset" in refused.reason
     box = editing.settled()["scene"]["views"][0]["box"]
     said = {"version": 1, "views": [{"box": box, "exclude": True}]}
     editing.ask("/api/corrections", {"revision": 0, "corrections": said})
@@ -324,7 +320,7 @@ def test_a_kill_loses_nothing_that_was_answered(bundle: Path, shell: Command) ->
     assert state["corrections"] == said
     assert len(state["scene"]["views"]) == 4
     assert again.end(signal.SIGINT) == 0
-    left = {".bundle.edit", ".bundle.edit.lock"} & {one.name for one in bundle.parent.iterdir()}
+    left = {".bundle.edit", ".bundle.lock"} & {one.name for one in bundle.parent.iterdir()}
     assert not left
 
 
