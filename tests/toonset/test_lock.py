@@ -67,7 +67,9 @@ def test_a_folder_that_another_took_away_does_not_come_as_half_of_it(tmp_path: P
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_locks_what_another_may_be_writing_stays(tmp_path, monkeypatch) -> None:
+def test_without_locks_what_another_may_be_writing_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(lock, "fcntl", None)
     (tmp_path / ".out.abcd1234.tmp").mkdir()
     with hold(tmp_path / "out"):
@@ -115,7 +117,9 @@ def test_a_planted_list_of_names_is_not_read(kind: str, tmp_path: Path) -> None:
         settle(tmp_path / "sheet.png")
 
 
-def test_a_signal_waits_until_files_have_moved(tmp_path, monkeypatch) -> None:
+def test_a_signal_waits_until_files_have_moved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     real = lock.move_into_place
 
     def hit(folder: Path) -> None:
@@ -161,7 +165,9 @@ def test_a_folder_that_is_written_into_is_not_replaced(tmp_path: Path) -> None:
     check_output(out, [], ["run"], force=True)
 
 
-def test_a_link_and_the_current_folder_are_refused_at_once(tmp_path, monkeypatch) -> None:
+def test_a_link_and_the_current_folder_are_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "real")
     with pytest.raises(OutputError, match="link: is a link, a folder is needed"):
         check_new_folder(tmp_path / "link")
