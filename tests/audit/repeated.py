@@ -28,13 +28,14 @@ LINES: tuple[tuple[str, ...], ...] = (
     ("train", "bundle2", *FEW, "-o", "run2"),
     ("render", "run2", *TURN, "-o", "turn"),
     ("mesh", "run2", "--faces", "300", "--threads", "1", "-o", "figure.glb"),
+    ("mesh", "run2", "--faces", "300", "--threads", "1", "-o", "figure.obj"),
     ("view", "run2", "-o", "figure.html"),
     ("evaluate", "run2", "--test", "bundle2", "-o", "evaluation"),
     ("consistency", "bundle2", "-o", "consistency"),
     ("export", "bundle2", "--to", "colmap", "-o", "colmap2"),
     *(
         ("export", "bundle2", "--to", to, "-o", to)
-        for to in ("nerfstudio", "instant-ngp", "blender-synthetic", "blender", "gltf")
+        for to in ("nerfstudio", "blender-synthetic", "blender", "gltf")
     ),
     ("import", "colmap2", "-o", "imported"),
     ("info", "bundle2", "--json"),
