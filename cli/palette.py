@@ -149,7 +149,7 @@ def palette(
         read = places if corrections is None else [*places, corrections]
         check_output(target, read, (*WRITTEN, *FOLDERS), force=force)
     else:
-        lock.claim(lock.set_of(target / WRITTEN[0]))
+        lock.claim(lock.set_of(target / WRITTEN[0]), target)
         check_map_folders(target)
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     drawn = load_pictures(places)

@@ -45,19 +45,23 @@ def command() -> Iterator[None]:
             _COMMAND.reset(token)
 
 
-def claim(path: Path) -> None:
+def claim(path: Path, name: Path | None = None) -> None:
     """Hold an output until the command ends; nothing outside of a command.
+
+    Args:
+        path: the output.
+        name: what a message calls it, if it is another one's of its set.
 
     Raises:
         OutputError: another process holds it.
     """
     stack = _COMMAND.get()
     if stack is not None:
-        stack.enter_context(hold(path))
+        stack.enter_context(hold(path, name))
 
 
 @contextlib.contextmanager
-def hold(path: Path, patience_s: float = 0) -> Iterator[None]:
+def hold(path: Path, name: Path | None = None, patience_s: float = 0) -> Iterator[None]:
     """Hold an output; who holds it may hold it again.
 
     The lock is the system's on a hidden file beside the output, so that it ends with the process,
@@ -65,13 +69,14 @@ def hold(path: Path, patience_s: float = 0) -> Iterator[None]:
 
     Args:
         path: the output.
+        name: what a message calls it, if it is another one's of its set.
         patience_s: how long to wait for another process.
 
     Raises:
         OutputError: another process holds it, or what one left cannot be finished.
     """
     path = Path(os.path.abspath(path))
-    _acquire(path, patience_s)
+    _acquire(path, name or path, patience_s)
     try:
         yield
     finally:
@@ -114,7 +119,7 @@ def settle(path: Path) -> None:
     except (OSError, ValueError):  # whoever reads there says so
         return
     if is_left:
-        with hold(held, PATIENCE_S):
+        with hold(held, path, PATIENCE_S):
             pass
 
 
@@ -181,11 +186,11 @@ def named(name: str) -> str:
     return found[1] if found else name
 
 
-def _acquire(path: Path, patience_s: float) -> None:
+def _acquire(path: Path, name: Path, patience_s: float) -> None:
     with _GUARD:
         locks, times = _HELD.get(path, ((), 0))
         if _lock_file(path) not in [file for _, file in locks]:  # its folder may have come since
-            new = _locked(path, patience_s)
+            new = _locked(path, name, patience_s)
             locks = locks if new is None else (*locks, new)
         _HELD[path] = locks, times + 1
     if times:
@@ -212,7 +217,7 @@ def _release(path: Path) -> None:
             os.close(descriptor)
 
 
-def _locked(path: Path, patience_s: float) -> Lock | None:
+def _locked(path: Path, name: Path, patience_s: float) -> Lock | None:
     """Return the locked file; None where the place or the system has no locks."""
     if fcntl is None or path.name == "":
         return None
@@ -233,7 +238,7 @@ def _locked(path: Path, patience_s: float) -> Lock | None:
                 time.sleep(NAP_S)
                 continue
             raise OutputError(
-                f"{path}: is in use by another toonset; wait for it, or choose another -o"
+                f"{name}: is in use by another toonset; wait for it, or choose another -o"
             ) from error
         except FileNotFoundError:  # its last owner has just taken it away: once more
             pass

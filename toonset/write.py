@@ -76,7 +76,7 @@ def new_files(path: Path, gone: Iterable[str] = (), *, force: bool) -> Iterator[
     path = Path(os.path.abspath(path))
     held = lock.set_of(path)
     _make_parents(path)
-    with hold(held):
+    with hold(held, path):
         temporary = _temporary_folder(held)
         try:
             yield temporary
@@ -194,7 +194,7 @@ def check_new_file(path: Path, *, force: bool = False) -> None:
         )
     if path.parent.exists() and not path.parent.is_dir():
         raise OutputError(f"{path}: {path.parent} is a file; choose another -o")
-    lock.claim(lock.set_of(path))
+    lock.claim(lock.set_of(path), path)
 
 
 def check_new_folder(path: Path, *, force: bool = False) -> None:

@@ -19,6 +19,7 @@ from toonset.dataset.bundle.transforms_read import (
 from toonset.dataset.images.picture import load_indexed_png, load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError
+from toonset.lock import settle
 from toonset.palette.extract import IN_LIGHT, IN_SHADOW
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
@@ -64,6 +65,7 @@ def read_palette_of(root: Path) -> Palette | None:
     Raises:
         BundleError, PaletteError: it lies elsewhere, or is broken.
     """
+    settle(root / "palette.json")
     file = member(root, "palette.json")
     return None if file is None else read_palette_json(file)
 

@@ -13,7 +13,7 @@ from toonset.cli.split import split
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png, load_rgba
-from toonset.errors import ToonsetError, UsageError
+from toonset.errors import OutputError, ToonsetError, UsageError
 from toonset.palette.palette import Evidence, Palette, PaletteColor
 from toonset.write import write_bytes, write_json
 
@@ -77,6 +77,17 @@ def test_a_second_run_replaces_the_first_by_the_same_bytes(tmp_path: Path, snaps
     content = json.loads((bundle / "palette.json").read_text())
     assert [color["hex"] for color in content["colors"]] == ["#00ff00"]
     assert set(np.unique(load_indexed_png(bundle / "labels" / "000.png"))) == {0, 255}
+
+
+@pytest.mark.parametrize("name", ["labels", "contours", "tones", "coverage"])
+def test_what_others_put_among_maps_is_never_taken_away(tmp_path: Path, name: str, snapshot):
+    bundle = make_bundle(tmp_path / "b")
+    (bundle / name).mkdir()
+    (bundle / name / "person_seg.json").write_text("mine")
+    before = snapshot(bundle)
+    with pytest.raises(OutputError, match=r"holds 'person_seg\.json', which this command does not"):
+        palette([bundle])
+    assert snapshot(bundle) == before
 
 
 def test_pictures_go_into_a_folder_of_their_own(tmp_path, capsys):

@@ -14,7 +14,14 @@ import pytest
 from toonset import lock
 from toonset.errors import OutputError
 from toonset.lock import command, hold, set_of, settle
-from toonset.write import check_new_folder, check_output, new_files, new_folder, write_bytes
+from toonset.write import (
+    check_new_file,
+    check_new_folder,
+    check_output,
+    new_files,
+    new_folder,
+    write_bytes,
+)
 
 HOLD = "import sys; from pathlib import Path; from toonset.lock import hold\n"
 HOLD += "with hold(Path(sys.argv[1])):\n    print('held', flush=True)\n    sys.stdin.read()\n"
@@ -53,6 +60,15 @@ def test_who_claimed_a_place_is_refused_if_another_was_faster_below(tmp_path: Pa
             new_folder(out),
         ):
             pass
+
+
+def test_who_is_refused_reads_the_name_that_was_given(tmp_path: Path) -> None:
+    with (
+        held_by_another(tmp_path / "hero"),
+        command(),
+        pytest.raises(OutputError, match=r"hero\.v2\.obj: is in use by another toonset"),
+    ):
+        check_new_file(tmp_path / "hero.v2.obj")
 
 
 def test_a_folder_that_another_took_away_does_not_come_as_half_of_it(tmp_path: Path) -> None:
