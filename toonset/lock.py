@@ -143,7 +143,8 @@ def move_into_place(decided: Path) -> None:
     old = _names_in(gone)
     moved = [*new, *(beside / name for name in (*old, *(entry.name for entry in new)))]
     for path in (before, *moved):
-        if path.parent not in (decided, beside) or not (path == before or is_of_set(path, held)):
+        known = not path.is_symlink() if path == before else is_of_set(path, held)
+        if path.parent not in (decided, beside) or not known:
             raise OutputError(f"{decided}: holds {path.name!r}, which no toonset wrote; remove it")
     before.mkdir(exist_ok=True)
     for name in old:

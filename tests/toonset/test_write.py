@@ -278,13 +278,15 @@ def test_who_reads_a_place_finishes_what_was_decided_there(decided):
     assert names(decided.parent) == ["palette.json"]
 
 
-@pytest.mark.parametrize("name", ["transforms.json", "images", "..", "palette.link", ".gone"])
+@pytest.mark.parametrize(
+    "name", ["transforms.json", "images", "..", "palette.link", ".gone", ".before"]
+)
 def test_a_folder_from_elsewhere_moves_nothing_else(decided, name):
     if name == "..":  # what is to go: a place above
         (decided / ".gone").write_text("../" * 3)
     elif name == ".gone":
         (decided / ".gone").write_text("transforms.json")
-    elif name == "palette.link":
+    elif name in ("palette.link", ".before"):
         (decided / name).symlink_to("/")
     else:
         (decided / name).write_text("foreign")
