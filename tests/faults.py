@@ -80,8 +80,8 @@ CASES = (
     Case("palette-again", "palette {o}/bundle --max-colors 2", before="bundle"),
     Case(
         "recolor",
-        "recolor {i}/bundle --recolor black=#010203 -o {o}/a",
-        "recolor {i}/bundle --recolor black=#040506 -o {o}/a",
+        "recolor {i}/bundle --recolor red=#010203 -o {o}/a",
+        "recolor {i}/bundle --recolor red=#040506 -o {o}/a",
     ),
     Case(
         "train",
@@ -324,16 +324,26 @@ def _serve(place: Place, calls: Calls, begin: int, end: int, *, quick: bool) -> 
     """Return in children, each with a fault ahead, and when all have ended in the server, too."""
     on, calls.hook = calls.hook, lambda number: None
     now, row = place.keep(f"call-{begin}"), Row(0)
+    held = {file: place.root / f"held-{begin}-{file.name}" for file in place.out.rglob(".*.lock")}
+    for file, aside in held.items():
+        os.link(file, aside)
+
+    def begin_again() -> None:
+        place.restore(now)
+        for file, aside in held.items():  # no copy: the one that this process has locked
+            file.unlink()
+            os.link(aside, file)
+
     for at in range(begin, end):
         for kind in ("kill", *((FAILURES[at % len(FAILURES)],) if quick else FAILURES)):
-            place.restore(now)
+            begin_again()
             if (child := os.fork()) == 0:
                 _errors_into(place.root / "err-child")
                 calls.hook, calls.count = fault(kind, at), begin
                 calls.hook(begin)
                 return
             row += place.judge(f"{kind}, call {at}", place.wait(child, "-child"))
-    place.restore(now)
+    begin_again()
     (place.root / f"served-{begin}").write_text(json.dumps([row.tried, row.wrong]))
     calls.hook, calls.count = on, begin
 
@@ -481,6 +491,9 @@ def _look_again(out: Path) -> None:
     """Do what the next run does before it writes or reads."""
     from toonset import lock
 
+    for file in out.rglob(".*.lock"):  # the server has it still, the system had let it go
+        file.unlink()
+        file.touch()
     own = lock._HELD, lock._GUARD  # a server's, perhaps taken
     lock._HELD, lock._GUARD = {}, threading.Lock()
     in_bundles = [folder / "palette.json" for folder in out.iterdir() if folder.is_dir()]

@@ -15,6 +15,8 @@ lost. Read back by `toonset.dataset.importers.colmap`.
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -87,8 +89,18 @@ def _write_model(model: Any, sparse: Path, *, text: bool, old_layout: bool) -> N
             (sparse / f"{name}.{'txt' if text else 'bin'}").unlink()
 
 
-def _reconstruction(views: Sequence[ExportView], points: TrackedPoints | None) -> Any:
+def load_pycolmap() -> Any:
+    """Import pycolmap; SIGTERM does what it did before, not what its log library makes of it."""
+    before = signal.getsignal(signal.SIGTERM)
     import pycolmap
+
+    if before is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, before)
+    return pycolmap
+
+
+def _reconstruction(views: Sequence[ExportView], points: TrackedPoints | None) -> Any:
+    pycolmap = load_pycolmap()
 
     model = pycolmap.Reconstruction()
     for number, view in enumerate(views):
@@ -109,7 +121,7 @@ def _reconstruction(views: Sequence[ExportView], points: TrackedPoints | None) -
 
 
 def _lens(camera: Camera, number: int) -> Any:
-    import pycolmap
+    pycolmap = load_pycolmap()
 
     K = camera.K
     width, height = camera.size_wh
@@ -125,7 +137,7 @@ def _lens(camera: Camera, number: int) -> Any:
 
 
 def _add_points(model: Any, points: TrackedPoints) -> None:
-    import pycolmap
+    pycolmap = load_pycolmap()
 
     index = np.cumsum(points.seen, axis=1) - 1  # of a point among those that a view sees
     for i, (xyz, rgb) in enumerate(zip(points.xyz, points.rgb, strict=True)):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from toonset.camera import Camera
+from toonset.dataset.exporters.colmap import load_pycolmap
 from toonset.errors import BundleError, CameraError
 from toonset.read import read_whole
 
@@ -52,8 +53,7 @@ def _model_folder(folder: Path) -> Path:
 
 
 def _load(folder: Path) -> Any:
-    import pycolmap
-
+    pycolmap = load_pycolmap()
     pycolmap.logging.minloglevel = ONLY_FATAL
     check_lengths(folder)
     try:

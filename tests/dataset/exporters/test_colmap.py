@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -214,3 +216,15 @@ def test_export_refuses_a_mannequin_that_is_not_there(toonset, tmp_path: Path) -
     outcome = toonset(*export, "-o", tmp_path / "out", "--mesh", tmp_path / "m.obj", "-q")
     assert "give the mannequin of the calibration" in outcome.reason
     assert not (tmp_path / "out").exists()
+
+
+def test_pycolmap_leaves_sigterm_to_the_program_that_imports_it() -> None:
+    code = (
+        "import os, signal, sys\n"
+        "from toonset.dataset.exporters.colmap import load_pycolmap\n"
+        "signal.signal(signal.SIGTERM, lambda *_: sys.exit(7))\n"
+        "load_pycolmap()\n"
+        "os.kill(os.getpid(), signal.SIGTERM)\n"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (7, b"")
