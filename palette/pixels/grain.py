@@ -56,8 +56,8 @@ def noise_levels(pictures: Sequence[Picture]) -> float:
         light = cv2.cvtColor(np.ascontiguousarray(picture[..., :3]), cv2.COLOR_RGB2GRAY)
         inside = erode(picture[..., 3] >= OPAQUE, 2)
         if inside.any():
-            rough = np.abs(cv2.filter2D(light, cv2.CV_16S, LAPLACIANS)).view(np.uint16)
-            found.append(median_inside(rough, inside))
+            rough = cv2.filter2D(light, cv2.CV_16S, LAPLACIANS)
+            found.append(median_inside(np.abs(rough, out=rough).view(np.uint16), inside))
     return SIGMA_FROM_MEDIAN * float(np.median(found)) if found else 0.0
 
 
