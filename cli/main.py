@@ -48,7 +48,7 @@ PLACES_AT_FAULT = (  # what the system says of a place that the user has named, 
 )
 
 UNMAPPED = "failed to map segment"  # what the system says of a library that finds no space
-LEAST_SPACE = 800_000_000  # bytes
+LEAST_SPACE = 800_000_000  # bytes; `palette` never ended with 600 MB
 MORE_SPACE = "raise the limit: ulimit -v"
 
 app = typer.Typer(

@@ -27,9 +27,10 @@ def is_uniform(values: Shaped[np.ndarray, "height width"]) -> Mask:
 
 
 def median_inside(levels: Shaped[np.ndarray, "height width"], mask: Mask) -> float:
-    """Return the median of a mask's values, whole numbers of 16 bits at most from 0 up.
+    """Return the median of the values in a mask, bytes or unsigned 16-bit numbers; it is not empty.
 
-    They are counted, not sorted: no copy of a large picture is made.
+    They are counted, not sorted: no copy of a large picture is made. Of more than 2**24 equal
+    values the count is rounded, as OpenCV keeps it in 32-bit floats.
     """
     kinds = int(levels.max()) + 1
     counts = cv2.calcHist([levels], [0], mask.view(np.uint8), [kinds], [0, kinds])

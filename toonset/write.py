@@ -23,7 +23,7 @@ from toonset.lock import GONE, OLD, TEMPORARY, flush, hold, is_of_set, is_tempor
 
 LEFT_BY_DESKTOPS = (".DS_Store", "Thumbs.db", "desktop.ini")
 THERE_ALREADY = (errno.ENOTEMPTY, errno.EEXIST)
-ENDINGS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
+ENDINGS = {signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}
 
 
 def write_bytes(path: Path, data: bytes) -> None:
