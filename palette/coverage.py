@@ -12,8 +12,9 @@ from jaxtyping import UInt8
 from toonset.palette.extract import IN_SHADOW, PaintMap
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import UNLABELLED
-from toonset.palette.pixels.mixtures import LINE, NONE, alone, colors_as_drawn, find_mixtures
+from toonset.palette.pixels.mixtures import LINE, NONE, colors_as_drawn, find_mixtures
 from toonset.palette.pixels.recolor import tone_map, tones_of
+from toonset.raster import is_uniform
 
 Map = UInt8[np.ndarray, "height width"]
 
@@ -36,11 +37,11 @@ def coverage_map(
     count = len(palette.colors)
     dark = None if paint.tones is None else paint.tones == IN_SHADOW
     tones = tone_map(paint.labels, dark, contour, count)
-    seen = picture[..., 3] > 0
-    pure = (tones != NONE) & alone(tones) & (contour < LINE)
-    mixed = seen & ~pure
-    drawn = colors_as_drawn(picture, tones, tones_of(palette.rgb, palette.shadow))
-    found = find_mixtures(picture, tones, contour, drawn, mixed)
+    inside = is_uniform(tones)
+    drawn = colors_as_drawn(picture, tones, inside, tones_of(palette.rgb, palette.shadow))
+    pure = (tones != NONE) & inside & (contour < LINE)
+    mixed = (picture[..., 3] > 0) & ~pure
+    found = find_mixtures(picture, tones, inside, contour, drawn, mixed)
     paints = np.append(np.arange(2 * count) % count, _paint_of_lines(palette)).astype(np.uint8)
     first, second = paints[found.first], paints[found.second]
     share = np.where(first == second, 1, 1 - found.part)

@@ -22,7 +22,7 @@ def erode(mask: Mask, by: int = 1) -> Mask:
 
 def is_uniform(values: Shaped[np.ndarray, "height width"]) -> Mask:
     """Return where a pixel and its eight neighbours have one value, of 16 bits at most."""
-    small = values.astype(np.int16)
+    small = values.astype(np.int16, copy=False)
     return np.asarray(cv2.erode(small, _square(1)) == cv2.dilate(small, _square(1)))
 
 

@@ -92,7 +92,11 @@ class Marginal:
 
 
 def error_modes(drawing: Drawing) -> Float[np.ndarray, "points modes"]:
-    """Return the displacement in px across the outline of every mode (unit: figure's height)."""
+    """Return the displacement in px across the outline of every mode (unit: figure's height).
+
+    Where bumps outnumber points, as on a figure far wider than it is tall, as many modes as points
+    make the same covariance.
+    """
     spacing = LENGTH_OF_HEIGHT * drawing.height
     low, high = drawing.points.min(axis=0), drawing.points.max(axis=0)
     u, v = (np.arange(low[i] - spacing / 2, high[i] + spacing, spacing) for i in (0, 1))
@@ -101,7 +105,11 @@ def error_modes(drawing: Drawing) -> Float[np.ndarray, "points modes"]:
     near = squared.min(axis=0) < spacing**2
     bumps = np.exp(-squared[:, near] / (2 * spacing**2))
     bumps *= drawing.height / np.sqrt((bumps**2).sum(axis=1).mean())
-    return np.hstack([bumps * drawing.normals[:, :1], bumps * drawing.normals[:, 1:]])
+    modes = np.hstack([bumps * drawing.normals[:, :1], bumps * drawing.normals[:, 1:]])
+    if modes.shape[1] > len(modes):
+        left, sizes, _ = np.linalg.svd(modes, full_matrices=False)
+        modes = left * sizes
+    return modes
 
 
 def marginalise(

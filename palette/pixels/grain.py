@@ -53,7 +53,7 @@ def noise_levels(pictures: Sequence[Picture]) -> float:
     for picture in pictures:
         if not picture.size:
             continue
-        light = cv2.cvtColor(np.ascontiguousarray(picture[..., :3]), cv2.COLOR_RGB2GRAY)
+        light = cv2.cvtColor(picture, cv2.COLOR_RGBA2GRAY)
         inside = erode(picture[..., 3] >= OPAQUE, 2)
         if inside.any():
             rough = cv2.filter2D(light, cv2.CV_16S, LAPLACIANS)

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int16, UInt8
+from jaxtyping import Float, Int16, UInt8
 
 from toonset.palette.pixels.antialias import YCC_FROM_RGB, noise_beside_edges
-from toonset.raster import dilate, is_uniform, median_inside
+from toonset.raster import Mask, dilate, median_inside
 
 NONE = -1  # of a pixel without a tone
 LINE = 32  # of 255: a line that covers so much of a pixel may be in its neighbours, too
@@ -61,16 +61,20 @@ class Mixtures:
         return first + self.part[:, None] * (second - first)
 
 
-def alone(tones: Tones) -> Bool[np.ndarray, "height width"]:
-    """Return where a pixel and its eight neighbours have one tone."""
-    return is_uniform(tones)
-
-
 def colors_as_drawn(
-    picture: UInt8[np.ndarray, "height width 4"], tones: Tones, colors: UInt8[np.ndarray, "n 3"]
+    picture: UInt8[np.ndarray, "height width 4"],
+    tones: Tones,
+    inside: Mask,
+    colors: UInt8[np.ndarray, "n 3"],
 ) -> Float[np.ndarray, "tones 3"]:
-    """Return the colours of tones, and of lines, in the picture: medians; the palette's of rare."""
-    inside = alone(tones)
+    """Return the colours of tones, and of lines, in the picture: medians; the palette's of rare.
+
+    Args:
+        picture: sRGB with straight alpha.
+        tones: of every pixel; `NONE` for blends and the background; the last one is drawn lines.
+        inside: where a pixel and its eight neighbours have one tone; medians are of these.
+        colors: the palette's of the tones.
+    """
     drawn = np.concatenate([colors.astype(np.float32), np.zeros((1, 3), np.float32)])
     for kind in np.unique(tones[tones != NONE]):
         where = tones == kind
@@ -83,20 +87,22 @@ def colors_as_drawn(
 def find_mixtures(
     picture: UInt8[np.ndarray, "height width 4"],
     tones: Tones,
+    inside: Mask,
     contour: Map,
     drawn: Float[np.ndarray, "tones 3"],
-    at: Bool[np.ndarray, "height width"],
+    at: Mask,
 ) -> Mixtures:
     """Unmix the chosen pixels.
 
     Args:
         picture: sRGB with straight alpha.
-        tones: of every pixel; `NONE` for blends and the background; the last one is drawn lines.
+        tones: see `colors_as_drawn`.
+        inside: the same.
         contour: how far lines cover every pixel.
-        drawn: the tones' colours in the picture; see `colors_as_drawn`.
+        drawn: the tones' colours in the picture.
         at: which pixels; others are taken as their tones say.
     """
-    units = _units(picture, tones, drawn)
+    units = _units(picture, tones, inside, drawn)
     places, colors = drawn @ units, picture[at][:, :3] @ units
     shares = _around(tones, contour, len(drawn), at)
     for _ in range(ROUNDS):
@@ -105,21 +111,17 @@ def find_mixtures(
 
 
 def _units(
-    picture: np.ndarray, tones: Tones, drawn: Float[np.ndarray, "tones 3"]
+    picture: np.ndarray, tones: Tones, inside: Mask, drawn: Float[np.ndarray, "tones 3"]
 ) -> Float[np.ndarray, "3 3"]:
     """Return (3, 3) from 8-bit RGB to units of the noise inside areas that end nearby."""
-    inside = alone(tones) & (tones != NONE)
-    ring = inside & (dilate(~inside, 2))
+    painted = inside & (tones != NONE)
+    ring = painted & dilate(~painted, 2)
     off = (picture[ring][:, :3] - drawn[tones[ring]]) @ YCC_FROM_RGB.T
     return (YCC_FROM_RGB / (UNEVEN * noise_beside_edges(off))[:, None]).T.astype(np.float32)
 
 
 def _around(
-    tones: Tones,
-    contour: Map,
-    kinds: int,
-    at: Bool[np.ndarray, "height width"],
-    mixtures: Mixtures | None = None,
+    tones: Tones, contour: Map, kinds: int, at: Mask, mixtures: Mixtures | None = None
 ) -> Float[np.ndarray, "tones n"]:
     """Return how much of some pixels' surroundings every tone covers; mixtures count if given."""
     shares = np.full((kinds, int(at.sum())), FAINT, np.float32)

@@ -18,9 +18,9 @@ from jaxtyping import Bool, Float, Int16, UInt8
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import UNLABELLED
-from toonset.palette.pixels.mixtures import LINE, NONE, alone, colors_as_drawn, find_mixtures
+from toonset.palette.pixels.mixtures import LINE, NONE, colors_as_drawn, find_mixtures
 from toonset.palette.pixels.shadow import DRAWN, FLOOR, apply_shadow
-from toonset.raster import dilate
+from toonset.raster import dilate, is_uniform
 
 WINDOW = 7  # pixels: a soft edge is three wide, with a tone on either side
 SHADE = 0.06  # in OKLab
@@ -72,13 +72,14 @@ def recolor(picture: Picture, tones: Tones, contour: Map, old: Colors, new: Colo
     if not moved.any():
         return picture
     near = dilate(moved[tones], WINDOW // 2) & (picture[..., 3] > 0)
-    drawn = colors_as_drawn(picture, tones, old)
-    pure = near & (tones != NONE) & alone(tones) & (contour < LINE)
+    inside = is_uniform(tones)
+    drawn = colors_as_drawn(picture, tones, inside, old)
+    pure = near & (tones != NONE) & inside & (contour < LINE)
     result = picture.copy()
     result[pure, :3] = _shifted(picture[pure, :3], drawn[tones[pure]], change[tones[pure]])
     mixed = near & ~pure
     if mixed.any():
-        cover = find_mixtures(picture, tones, contour, drawn, mixed)
+        cover = find_mixtures(picture, tones, inside, contour, drawn, mixed)
         result[mixed, :3] = _shifted(picture[mixed, :3], cover.of(drawn), cover.of(change))
     return result
 

@@ -11,10 +11,19 @@ from toonset.dataset.silhouettes.contour import Contour
 def circle(count: int = 120) -> Drawing:
     turn = np.arange(count) * 2 * np.pi / count
     normals = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    contour = Contour(
-        50 + 40 * normals, normals, (10.0, 10.0, 80.0, 80.0), 80.0, np.ones(count, bool)
+    return drawn(50 + 40 * normals, normals)
+
+
+def row_of_points(count: int) -> Drawing:
+    points = np.stack([np.linspace(0, 4000, count), np.full(count, 50.0)], axis=1)
+    return drawn(points, np.full((count, 2), np.sqrt(0.5)))
+
+
+def drawn(points: np.ndarray, normals: np.ndarray) -> Drawing:
+    whole = np.ones(len(points), bool)
+    return Drawing(
+        Contour(points, normals, (10.0, 10.0, 80.0, 80.0), 80.0, whole), 80.0, len(points)
     )
-    return Drawing(contour, 80.0, count)
 
 
 def problem(rng: np.random.Generator, drawing: Drawing):
@@ -69,3 +78,9 @@ def test_a_bent_drawing_costs_information():
         for s in (1e-5, 0.02)
     )
     assert (np.linalg.eigvalsh(rigid - bent) > -1e-9).all()
+
+
+def test_modes_never_outnumber_the_points_and_keep_their_covariance():
+    wide, dense = error_modes(row_of_points(801)), error_modes(row_of_points(4001))
+    assert wide.shape[1] == len(wide) < dense.shape[1] < len(dense)
+    np.testing.assert_allclose(wide @ wide.T, dense[::5] @ dense[::5].T, rtol=0.02, atol=0.1)
