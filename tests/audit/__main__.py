@@ -33,7 +33,7 @@ from tests.audit.case import Row, import_everything
 from tests.audit.material import Material, make_material
 
 # Of the audit's rows R5 and the checkpoints of R4 (D14, D18, D22) are gone: nothing is resumed any
-# more. Failing calls, kills, signals and neighbours (R6, R7, R8) are in tests/faults.py.
+# more. Failing calls, kills, signals and neighbours (R6, R7, R8) are in tests/faults/.
 ROWS: dict[str, tuple[str, Callable[[Material], Row]]] = {
     "R1": ("sheets", sheets.row),
     "R2": ("meshes", meshes.row),
