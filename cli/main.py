@@ -15,6 +15,7 @@ import keyword
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from types import FrameType
 from typing import Annotated, Any, NoReturn
 
@@ -105,7 +106,7 @@ def run(program: typer.Typer, name: str) -> None:
     try:
         _check_current_folder()
         _check_address_space()
-        with lock.command():
+        with lock.command(), _unwrapped():
             code = program(prog_name=name, standalone_mode=False)
         sys.stdout.flush()
     except Ended as ended:
@@ -161,6 +162,20 @@ def _end_by_signals() -> None:
         with contextlib.suppress(ValueError):  # not in the main thread
             if signal.getsignal(number) == signal.SIG_DFL:  # not of `nohup`
                 signal.signal(number, end)
+    with contextlib.suppress(ValueError):
+        if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:  # see `toonset.__main__`
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextlib.contextmanager
+def _unwrapped() -> Iterator[None]:
+    """Raise what a signal raised; Python 3.11 wraps it while a class is made, as in imports."""
+    try:
+        yield
+    except RuntimeError as error:
+        if isinstance(error.__cause__, Ended | KeyboardInterrupt):
+            raise error.__cause__ from None
+        raise
 
 
 def _check_current_folder() -> None:

@@ -219,6 +219,7 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
         )
     if not existing.is_dir():
         raise OutputError(f"{path}: {existing} is a file, not a folder; choose another -o")
+    lock.claim(path)
     try:  # by trying: permission bits say nothing to root, nor about read-only disks
         probe = tempfile.mkdtemp(prefix=f".{path.name[:64]}.", suffix=TEMPORARY, dir=existing)
         os.rmdir(probe)
@@ -227,7 +228,6 @@ def check_new_folder(path: Path, *, force: bool = False) -> None:
         raise OutputError(
             f"{path}: {existing} is not writable ({reason}); choose another -o"
         ) from error
-    lock.claim(path)
 
 
 def check_removable(path: Path, written: str) -> None:

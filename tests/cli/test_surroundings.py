@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -104,3 +105,33 @@ def test_a_signal_ends_a_verb_with_its_code_and_leaves_nothing(number, folder, r
     assert process.returncode == 128 + number
     assert err.endswith(f"toonset: ended by {number.name}\n")
     assert sorted(path.name for path in folder.iterdir()) == ["run", "sheet.png"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_while_a_class_is_made_ends_a_verb_with_its_code(number, folder):
+    script = f"""
+import signal, typer
+from toonset.cli.main import run
+class Sign:
+    def __set_name__(self, *_):
+        signal.raise_signal({int(number)})
+def verb():
+    type("Holder", (), {{"sign": Sign()}})
+program = typer.Typer()
+program.command()(verb)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+run(program, "toonset")
+"""
+    program = [sys.executable, "-c", script]
+    done = subprocess.run(program, cwd=folder, capture_output=True, text=True)
+    said = {signal.SIGTERM: "ended by SIGTERM", signal.SIGINT: "interrupted"}
+    assert (done.returncode, done.stderr) == (128 + number, f"toonset: {said[number]}\n")
+
+
+def test_a_key_pressed_while_modules_load_ends_without_a_word(folder):
+    (folder / "typer.py").write_text("import signal; signal.raise_signal(signal.SIGINT)")
+    program = [sys.executable, "-c", "from toonset.__main__ import main; main()"]
+    # background jobs of a shell, these tests perhaps, ignore Ctrl-C and hand that down
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    done = subprocess.run(program, cwd=folder, capture_output=True, text=True, preexec_fn=heard)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")

@@ -57,7 +57,7 @@ def errors_into(file: Path) -> None:
 
 def call_main(arguments: Sequence[str]) -> None:
     """Run a verb in this process; it leaves by SystemExit."""
-    from toonset.cli.main import main
+    from toonset.__main__ import main
 
     sys.argv = ["toonset", *arguments]
     main()
