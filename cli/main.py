@@ -15,6 +15,7 @@ import keyword
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from types import FrameType
 from typing import Annotated, Any, NoReturn
@@ -34,6 +35,8 @@ VERBS = (  # in the order in which they are used
 # Where a verb shares another one's module:
 MODULES = {"consistency": "evaluate", "info": "check", "recolor": "palette"}
 
+DEAF = "trimesh"  # the one package here that goes on after any exception
+NAP_S = 0.02  # until a signal is heard again
 BY_SIGNAL = 128  # plus the signal's number, as shells have it
 INTERRUPTED, REFUSED = BY_SIGNAL + signal.SIGINT, 2
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name
@@ -153,18 +156,37 @@ def _open_streams() -> None:
 
 
 def _end_by_signals() -> None:
-    """Let signals that end a program end it as Ctrl-C does: what is half-written goes."""
+    """Let signals that end a program end it as Ctrl-C does: what is half-written goes.
 
-    def end(number: int, _: FrameType | None) -> None:
-        raise Ended(BY_SIGNAL + number)
+    They are put off while trimesh runs: it catches whatever is raised where it loads others.
+    """
 
-    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+    def end(number: int, frame: FrameType | None) -> None:
+        if _is_deaf(frame):
+            threading.Timer(NAP_S, _send, [number]).start()
+        elif number == signal.SIGINT:
+            raise KeyboardInterrupt
+        else:
+            raise Ended(BY_SIGNAL + number)
+
+    for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         with contextlib.suppress(ValueError):  # not in the main thread
-            if signal.getsignal(number) == signal.SIG_DFL:  # not of `nohup`
-                signal.signal(number, end)
-    with contextlib.suppress(ValueError):
-        if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:  # see `toonset.__main__`
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                signal.signal(number, end)  # not of `nohup`
+
+
+def _send(number: int) -> None:
+    """Send a signal to the main thread, which wakes up of it where the system can do that."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        signal.raise_signal(number)
+
+
+def _is_deaf(frame: FrameType | None) -> bool:
+    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] != DEAF:
+        frame = frame.f_back
+    return frame is not None
 
 
 @contextlib.contextmanager

@@ -107,25 +107,36 @@ def test_a_signal_ends_a_verb_with_its_code_and_leaves_nothing(number, folder, r
     assert sorted(path.name for path in folder.iterdir()) == ["run", "sheet.png"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_while_a_class_is_made_ends_a_verb_with_its_code(number, folder):
-    script = f"""
-import signal, typer
-from toonset.cli.main import run
-class Sign:
-    def __set_name__(self, *_):
-        signal.raise_signal({int(number)})
-def verb():
-    type("Holder", (), {{"sign": Sign()}})
-program = typer.Typer()
-program.command()(verb)
-signal.signal(signal.SIGINT, signal.default_int_handler)
-run(program, "toonset")
-"""
-    program = [sys.executable, "-c", script]
-    done = subprocess.run(program, cwd=folder, capture_output=True, text=True)
+def run_verb(verb, number, folder):
+    """Run a verb that a signal ends as a program; return what it printed."""
+    script = (
+        f"import signal, typer\nfrom toonset.cli.main import run\n{verb}"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "program = typer.Typer()\nprogram.command()(verb)\nrun(program, 'toonset')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True
+    )
     said = {signal.SIGTERM: "ended by SIGTERM", signal.SIGINT: "interrupted"}
     assert (done.returncode, done.stderr) == (128 + number, f"toonset: {said[number]}\n")
+    return done.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_trimesh_would_swallow_is_heard_after_it(number, folder):
+    swallow = (
+        f"import signal\ntry: signal.raise_signal({int(number)})\nexcept BaseException: pass\n"
+    )
+    (folder / "trimesh.py").write_text(swallow)
+    verb = "def verb():\n import time, trimesh\n print('loaded', flush=True)\n time.sleep(60)\n"
+    assert run_verb(verb, number, folder) == "loaded\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_while_a_class_is_made_ends_a_verb_with_its_code(number, folder):
+    ends = f"def end(*_): import signal; signal.raise_signal({int(number)})\n"
+    verb = "def verb(): type('Holder', (), {'sign': type('Sign', (), {'__set_name__': end})()})\n"
+    assert run_verb(ends + verb, number, folder) == ""
 
 
 def test_a_key_pressed_while_modules_load_ends_without_a_word(folder):
