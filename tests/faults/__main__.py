@@ -15,6 +15,7 @@ import os
 import random
 import re
 import shutil
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -30,6 +31,7 @@ def main() -> None:
     """Print a table, and what is wrong."""
     one_thread = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
     os.environ |= dict.fromkeys(one_thread, "1")  # a fork loses the others
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # else a fork that has not begun goes on as we do
     parser = argparse.ArgumentParser(prog="tests.faults")
     parser.add_argument("cases", nargs="*", help=", ".join(case.name for case in CASES))
     parser.add_argument("--quick", action="store_true", help="one kind of error a call, in turn")
