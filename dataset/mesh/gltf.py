@@ -92,6 +92,7 @@ def read_gltf(data: bytes, path: Path, max_faces: int) -> RawTriangles:
         TypeError,
         ValueError,
         AttributeError,
+        OverflowError,
         RecursionError,
         struct.error,
     ) as error:
