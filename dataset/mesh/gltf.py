@@ -174,14 +174,16 @@ def _world_matrices(file: GltfFile) -> dict[int, Matrix]:
 
 
 def _local_matrix(node: dict[str, Any]) -> Matrix:
-    from trimesh.transformations import quaternion_matrix, translation_matrix
+    from trimesh.transformations import quaternion_matrix
 
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0, 0, 0, 1))
     wide, high, deep = node.get("scale", (1, 1, 1))
-    turned = quaternion_matrix((w, x, y, z)) @ np.diag([wide, high, deep, 1.0])
-    return np.asarray(translation_matrix(node.get("translation", (0, 0, 0))) @ turned)
+    placed = np.asarray(quaternion_matrix((w, x, y, z)) @ np.diag([wide, high, deep, 1.0]))
+    right, up, back = node.get("translation", (0, 0, 0))
+    placed[:3, 3] = right, up, back
+    return placed
 
 
 def _pieces(file: GltfFile) -> list[RawTriangles]:

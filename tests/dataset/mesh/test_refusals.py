@@ -109,6 +109,12 @@ BAD_FILES: list[tuple[str, bytes | str, str]] = [
     ),
     ("a.gltf", edited({}, count=2_000_000_000), "announces 2,000,000,000 vertices"),
     ("a.gltf", edited({}, count=1000), "damaged or cut off .ValueError"),
+    ("a.gltf", edited({}, count=1).replace('"count": 1,', '"count": 1e999,'), "OverflowError"),
+    (
+        "a.gltf",
+        edited({"nodes": [{"mesh": 0, "translation": [0] * 100_000}]}),  # squared: 80 GB
+        "damaged or cut off .ValueError",
+    ),
     ("a.gltf", edited({}, byteOffset=-8), "damaged or cut off .ValueError"),
     ("a.gltf", edited({}, sparse={}), "sparse or compressed"),
     (
