@@ -191,13 +191,16 @@ def _is_deaf(frame: FrameType | None) -> bool:
 
 @contextlib.contextmanager
 def _unwrapped() -> Iterator[None]:
-    """Raise what a signal raised; Python 3.11 wraps it while a class is made, as in imports."""
+    """Raise what a signal raised; imports wrap it: of C++ modules, in Python 3.11 of classes, too."""
     try:
         yield
-    except RuntimeError as error:
-        if isinstance(error.__cause__, Ended | KeyboardInterrupt):
-            raise error.__cause__ from None
-        raise
+    except Exception as error:
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, Ended | KeyboardInterrupt):
+            cause = cause.__cause__
+        if cause is None:
+            raise
+        raise cause from None
 
 
 def _check_current_folder() -> None:

@@ -131,7 +131,7 @@ def _index(word: str, count: int) -> int:
     except ValueError:
         raise ValueError("not a face index") from None
     if abs(index) > MOST_INDEX:
-        raise ValueError(f"face index {index:.3g}, and no mesh has so many")
+        raise ValueError(f"face index {float(word):.3g}, and no mesh has so many")
     if index == 0:
         raise ValueError("face index 0, but OBJ counts from 1")
     if index < -count:

@@ -139,6 +139,17 @@ def test_a_signal_while_a_class_is_made_ends_a_verb_with_its_code(number, folder
     assert run_verb(ends + verb, number, folder) == ""
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_an_import_wraps_ends_a_verb_with_its_code(number, folder):
+    wraps = (  # as pybind11 does, and pycolmap what pybind11 raises
+        f"import signal\ntry:\n try: signal.raise_signal({int(number)})\n"
+        " except BaseException as error: raise ImportError('cannot load') from error\n"
+        "except ImportError as error: raise RuntimeError('cannot load') from error\n"
+    )
+    (folder / "wrapping.py").write_text(wraps)
+    assert run_verb("def verb(): import wrapping\n", number, folder) == ""
+
+
 def test_a_key_pressed_while_modules_load_ends_without_a_word(folder):
     (folder / "typer.py").write_text("import signal; signal.raise_signal(signal.SIGINT)")
     program = [sys.executable, "-c", "from toonset.__main__ import main; main()"]

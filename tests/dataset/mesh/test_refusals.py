@@ -62,6 +62,7 @@ BAD_FILES: list[tuple[str, bytes | str, str]] = [
     ("a.obj", TRIANGLE + "f 0 1 2\n", "line 4: 'f 0 1 2': face index 0, but OBJ counts"),
     ("a.obj", TRIANGLE + "f 1 2 9\n", "refers to vertex 8 of 3"),
     ("a.obj", TRIANGLE + f"f 1 2 {10**23}\n", "face index 1e.23, and no mesh has so many"),
+    ("a.obj", TRIANGLE + f"f 1 2 {10**400}\n", "face index inf, and no mesh has so many"),
     ("a.obj", TRIANGLE + "f -9 1 2\n", "line 4: .* face index -9, but only 3 came"),
     ("a.obj", TRIANGLE + "f a b c\n", "line 4: 'f a b c': not a face index"),
     ("a.obj", TRIANGLE + "f 1 2\n", "a face with 2 corners"),
