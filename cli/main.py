@@ -191,7 +191,7 @@ def _is_deaf(frame: FrameType | None) -> bool:
 
 @contextlib.contextmanager
 def _unwrapped() -> Iterator[None]:
-    """Raise what a signal raised; imports wrap it: of C++ modules, in Python 3.11 of classes, too."""
+    """Raise what a signal raised where an import wraps it: of C++, in Python 3.11 of a class."""
     try:
         yield
     except Exception as error:
