@@ -184,7 +184,7 @@ def _send(number: int) -> None:
 
 
 def _is_deaf(frame: FrameType | None) -> bool:
-    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] != DEAF:
+    while frame is not None and str(frame.f_globals.get("__name__")).split(".")[0] != DEAF:
         frame = frame.f_back
     return frame is not None
 
