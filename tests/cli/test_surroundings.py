@@ -27,6 +27,11 @@ def in_shell(command, folder, **environment):
     )
 
 
+def heard(number):
+    """Return what a process calls first: `nohup` and background jobs, perhaps we, ignore signals."""
+    return partial(signal.signal, number, signal.SIG_DFL)
+
+
 @pytest.fixture
 def folder(drawn, tmp_path):
     (tmp_path / "sheet.png").write_bytes((drawn / "single.png").read_bytes())
@@ -97,7 +102,8 @@ def test_any_file_name_is_read_and_none_reaches_the_terminal_raw(
 def test_a_signal_ends_a_verb_with_its_code_and_leaves_nothing(number, folder, run):
     command = ["render", str(run), "--turntable", "500", "-o", "turn"]
     program = [sys.executable, "-m", "toonset", *command]
-    with subprocess.Popen(program, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
+    pipes = {"stderr": subprocess.PIPE, "text": True, "preexec_fn": heard(number)}
+    with subprocess.Popen(program, cwd=folder, **pipes) as process:
         assert process.stderr is not None
         assert process.stderr.readline()  # it has begun to draw
         process.send_signal(number)
@@ -153,7 +159,6 @@ def test_a_signal_that_an_import_wraps_ends_a_verb_with_its_code(number, folder)
 def test_a_key_pressed_while_modules_load_ends_without_a_word(folder):
     (folder / "typer.py").write_text("import signal; signal.raise_signal(signal.SIGINT)")
     program = [sys.executable, "-c", "from toonset.__main__ import main; main()"]
-    # background jobs of a shell, these tests perhaps, ignore Ctrl-C and hand that down
-    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    done = subprocess.run(program, cwd=folder, capture_output=True, text=True, preexec_fn=heard)
+    pipes = {"capture_output": True, "text": True, "preexec_fn": heard(signal.SIGINT)}
+    done = subprocess.run(program, cwd=folder, **pipes)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
