@@ -28,7 +28,7 @@ def in_shell(command, folder, **environment):
 
 
 def heard(number):
-    """Return what a process calls first: `nohup` and background jobs, perhaps we, ignore signals."""
+    """Return what a process calls first: `nohup` and background jobs, perhaps we, hear nothing."""
     return partial(signal.signal, number, signal.SIG_DFL)
 
 
