@@ -22,7 +22,7 @@ from toonset.cli.editor.refit import (
     put_in_place,
 )
 from toonset.cli.editor.scene import PALETTE
-from toonset.cli.editor.session import Session
+from toonset.cli.editor.session import PAGE, Session
 from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import CalibrationFile, InputFile
@@ -31,6 +31,7 @@ from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
 from toonset.errors import BundleError, SheetError, ToonsetError
+from toonset.lock import hold
 from toonset.mesh import Mesh
 from toonset.palette.names import hex_of
 from toonset.read import check_there, parse_json, read_whole
@@ -88,6 +89,9 @@ def open_session(
     found = read_calibration(place_in(folder, CALIBRATION))
     subject = _subject(place, folder, mesh, found)
     clear_workshop(subject)
+    for name in (CORRECTIONS, CALIBRATION, PAGE):
+        with hold(folder / name):  # what a write left that was killed goes
+            pass
     try:
         return _reopen(subject, found, place, tell, progress)
     finally:

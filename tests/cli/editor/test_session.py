@@ -304,12 +304,14 @@ class Editing:
 
 
 def test_a_kill_loses_nothing_that_was_answered(bundle: Path, shell: Command) -> None:
+    (bundle / f".{CORRECTIONS}.ab12cd34.tmp").write_bytes(b"{")  # an earlier one, as it wrote
     editing = Editing(bundle)
     refused = shell("edit", bundle, "--no-browser")
     assert "is in use by another toonset" in refused.reason
     refused = shell("calibrate", bundle.parent / "sheet.png", "-o", bundle, "--force")
     assert "is in use by another toonset" in refused.reason
     box = editing.settled()["scene"]["views"][0]["box"]
+    assert not list(bundle.glob(".*"))
     said = {"version": 1, "views": [{"box": box, "exclude": True}]}
     editing.ask("/api/corrections", {"revision": 0, "corrections": said})
     assert editing.end(signal.SIGKILL) == -signal.SIGKILL  # while it fits
