@@ -35,7 +35,7 @@ VERBS = (  # in the order in which they are used
 # Where a verb shares another one's module:
 MODULES = {"consistency": "evaluate", "info": "check", "recolor": "palette"}
 
-DEAF = "trimesh"  # the one package here that goes on after any exception
+CATCHES_ALL = "trimesh"  # the one package here that goes on after any exception
 NAP_S = 0.02  # until a signal is heard again
 BY_SIGNAL = 128  # plus the signal's number, as shells have it
 INTERRUPTED, REFUSED = BY_SIGNAL + signal.SIGINT, 2
@@ -162,7 +162,7 @@ def _end_by_signals() -> None:
     """
 
     def end(number: int, frame: FrameType | None) -> None:
-        if _is_deaf(frame):
+        if _is_within(CATCHES_ALL, frame):
             threading.Timer(NAP_S, _send, [number]).start()
         elif number == signal.SIGINT:
             raise KeyboardInterrupt
@@ -172,19 +172,20 @@ def _end_by_signals() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         with contextlib.suppress(ValueError):  # not in the main thread
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-                signal.signal(number, end)  # not of `nohup`
+                signal.signal(number, end)  # under `nohup` SIGHUP stays ignored
 
 
 def _send(number: int) -> None:
-    """Send a signal to the main thread, which wakes up of it where the system can do that."""
+    """Send a signal to the main thread, which it wakes up where the system can do that."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:
         signal.raise_signal(number)
 
 
-def _is_deaf(frame: FrameType | None) -> bool:
-    while frame is not None and str(frame.f_globals.get("__name__")).split(".")[0] != DEAF:
+def _is_within(package: str, frame: FrameType | None) -> bool:
+    """Return whether a package's code is what runs, or has called it."""
+    while frame is not None and str(frame.f_globals.get("__name__")).split(".")[0] != package:
         frame = frame.f_back
     return frame is not None
 

@@ -28,7 +28,7 @@ def in_shell(command, folder, **environment):
 
 
 def heard(number):
-    """Return what a process calls first: `nohup` and background jobs, perhaps we, hear nothing."""
+    """Return what lets a new process hear a signal that `nohup` or a background job ignores."""
     return partial(signal.signal, number, signal.SIG_DFL)
 
 
@@ -116,13 +116,11 @@ def test_a_signal_ends_a_verb_with_its_code_and_leaves_nothing(number, folder, r
 def run_verb(verb, number, folder):
     """Run a verb that a signal ends as a program; return what it printed."""
     script = (
-        f"import signal, typer\nfrom toonset.cli.main import run\n{verb}"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        f"import typer\nfrom toonset.cli.main import run\n{verb}"
         "program = typer.Typer()\nprogram.command()(verb)\nrun(program, 'toonset')"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True
-    )
+    pipes = {"capture_output": True, "text": True, "preexec_fn": heard(number)}
+    done = subprocess.run([sys.executable, "-c", script], cwd=folder, **pipes)
     said = {signal.SIGTERM: "ended by SIGTERM", signal.SIGINT: "interrupted"}
     assert (done.returncode, done.stderr) == (128 + number, f"toonset: {said[number]}\n")
     return done.stdout
