@@ -8,7 +8,6 @@ run is not ok, a cut is doubtful, a drawing contradicts the others); 128 + n end
 from __future__ import annotations
 
 import contextlib
-import errno
 import importlib
 import io
 import keyword
@@ -18,42 +17,36 @@ import sys
 import threading
 from collections.abc import Iterator
 from types import FrameType
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
 from toonset import __version__, lock
 from toonset.cli.common.help import Verb, Verbs
 from toonset.cli.common.output import lead_nowhere, say
-from toonset.errors import ToonsetError, one_line
+from toonset.cli.common.refusals import MORE_SPACE, refusal
+from toonset.errors import ToonsetError
 
 VERBS = (  # in the order in which they are used
     *("split", "calibrate", "edit", "palette", "recolor", "train", "render", "view", "evaluate"),
     *("mesh", "consistency", "info", "check", "export", "import", "mannequin", "synth"),
+    *("batch", "pack"),
 )
 
 # Where a verb shares another one's module:
-MODULES = {"consistency": "evaluate", "info": "check", "recolor": "palette"}
+MODULES = {
+    "batch": "batch.batch",
+    "consistency": "evaluate",
+    "info": "check",
+    "pack": "batch.pack",
+    "recolor": "palette",
+}
 
 CATCHES_ALL = "trimesh"  # the one package here that goes on after any exception
 NAP_S = 0.02  # until a signal is heard again
 BY_SIGNAL = 128  # plus the signal's number, as shells have it
 INTERRUPTED, REFUSED = BY_SIGNAL + signal.SIGINT, 2
-UsageError: type[Exception] = typer.BadParameter.__mro__[1]  # typer gives it no public name
-RENAMED = {  # switches of before
-    "--as-bent": "--no-unwarp",
-    "--as-carved": "--no-fairing",
-    "--as-placed": "--no-register",
-    "--one-sided": "--no-symmetry",
-}
-PLACES_AT_FAULT = (  # what the system says of a place that the user has named, wherever it is used
-    *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP),
-    *(errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ESTALE),
-)
-
-UNMAPPED = "failed to map segment"  # what the system says of a library that finds no space
-LEAST_SPACE = 800_000_000  # bytes; `palette` never ended with 600 MB
-MORE_SPACE = "raise the limit: ulimit -v"
+LEAST_SPACE = 800_000_000  # bytes of addresses; `palette` never ended with 600 MB
 
 app = typer.Typer(
     name="toonset",
@@ -117,26 +110,16 @@ def run(program: typer.Typer, name: str) -> None:
         raise
     except KeyboardInterrupt:  # outside of typer, which catches it within
         code = INTERRUPTED
-    except ToonsetError as error:
-        _refuse(name, one_line(error))
-    except UsageError as error:
-        _refuse(name, one_line(_usage(error)))
     except BrokenPipeError:
         lead_nowhere(sys.stdout)
         sys.exit(1)
-    except OSError as error:
-        if error.errno not in PLACES_AT_FAULT or not isinstance(error.filename, str | None):
+    except Exception as error:
+        line = refusal(error)
+        if line is None:
             raise
-        place, reason = one_line(error.filename or "standard output"), error.strerror
-        if error.filename is None:
+        if isinstance(error, OSError) and error.filename is None:
             lead_nowhere(sys.stdout)
-        _refuse(name, f"{place}: {reason}; free or choose another place")
-    except ImportError as error:
-        if UNMAPPED not in str(error):
-            raise
-        _refuse(name, f"out of address space ({one_line(error)}); {MORE_SPACE}")
-    except MemoryError as error:
-        _refuse(name, f"out of memory ({one_line(error)}); use smaller input")
+        _refuse(name, line)
     if code == INTERRUPTED:
         _say(name, "interrupted")
     if code:
@@ -220,14 +203,6 @@ def _check_address_space() -> None:
     most, _ = resource.getrlimit(resource.RLIMIT_AS)
     if 0 <= most < LEAST_SPACE:
         raise ToonsetError(f"{most // 10**6} MB of address space are too few; {MORE_SPACE}")
-
-
-def _usage(error: Any) -> str:
-    """Return what is wrong with the command line, and where its help is."""
-    said = error.format_message().replace("Value error, ", "").rstrip(". ")
-    if (now := RENAMED.get(getattr(error, "option_name", ""))) is not None:
-        said = f"No such option: {error.option_name}; did you mean {now}?"
-    return f"{said}; see `{error.ctx.command_path} -h`" if error.ctx is not None else said
 
 
 def _refuse(name: str, text: str) -> NoReturn:

@@ -21,6 +21,7 @@ import typer
 from PIL import Image
 from typer.testing import CliRunner
 
+from bench.batch.sheets import write_sheets
 from bench.cases.bodies import random_body
 from tests.bench.stand_ins import measure_nothing
 from tests.conftest import calibration_report
@@ -108,6 +109,7 @@ def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Too
     for name in ("dark.ase", "my.ase"):
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
     _six_figures(folder)
+    write_sheets(folder / "library", 2)
 
     shutil.copytree(drawn, folder / "small")
     shutil.copy(drawn / "mannequin.obj", folder / "small" / "m.obj")
@@ -175,9 +177,10 @@ def _six_figures(folder: Path) -> None:
 
 
 GIVEN = {  # what lies in a document's folder before its first command
-    "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase",
+    "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase library",
     "docs/architecture.md": "small/sheet.png small/m.obj",
     "docs/formats.md": "bundle sheet.png views",
+    "docs/guide_batch.md": "library",
     "docs/guide_cameras.md": "eight/sheet.png eight/mannequin.obj eight/m.obj eight/points.json"
     " eight/other colmap_folder",
     "docs/guide_corrections.md": "small/sheet.png small/mannequin.obj small/corrections.json",

@@ -48,15 +48,15 @@ FLOORS: dict[str, tuple[str, ...]] = {
     "nerf": (
         "@options kernels",
         "hull",
-        "lines",
-        "prepare look",
+        "look",
+        "prepare",
         "fields",
         "render surface train",
         "score",
         "run",
         "@training viewer",
     ),
-    "cli": ("common", "editor", "@"),  # a verb imports no other verb
+    "cli": ("common", "editor", "@", "batch"),  # a verb imports no other verb; batch runs them
 }
 MOST_FILES, MOST_ROOMS = 16, 42  # in a folder; of the product
 

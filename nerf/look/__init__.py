@@ -1,1 +1,1 @@
-"""Render the drawn look: new views blended from the drawings over the field's geometry."""
+"""Render the drawn look: contour lines, and new views blended from the drawings over the field."""

@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
-from toonset.nerf.lines.step_lines import draw_steps
+from toonset.nerf.look.step_lines import draw_steps
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
-from toonset.nerf.lines.step_lines import (
+from toonset.nerf.look.step_lines import (
     StepLines,
     learn_steps,
     lines_across,

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, UInt8
 from skimage.measure import find_contours
 
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.lines.strokes import FEWEST_OUTLINED, ink_color, mean_width, outline_width
+from toonset.nerf.look.strokes import FEWEST_OUTLINED, ink_color, mean_width, outline_width
 from toonset.raster import depth_inside, nearest
 
 FINER = 3  # samples per pixel and axis

@@ -31,7 +31,7 @@ from toonset.dataset.silhouettes.register import (
     learn_error_size,
     log_volume,
 )
-from toonset.nerf.lines.step_lines import lines_across
+from toonset.nerf.look.step_lines import lines_across
 
 NOISE, NOISE_PX = 0.001, 0.1  # of the square, but at least so many pixels: a known shape's error
 EXPECTED = 0.01  # of the square: a careful hand's error, as a first guess

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import torch
 
+from toonset.cli.common.refusals import RENAMED
 from toonset.cli.common.train_watch import LOG_S, RateLimit, Stopper
-from toonset.cli.main import RENAMED
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
 RUN_FILES = {

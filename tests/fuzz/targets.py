@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+from toonset.cli.batch.sheets import list_sheets
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import decode_rgba, encode_png, picture_size
@@ -143,6 +144,8 @@ def _targets() -> Iterator[tuple[str, Target]]:
         yield f"landmarks.{kind}", file_of(f"a.{kind}", clicked)
         yield f"boxes.{kind}", file_of(f"a.{kind}", read_boxes)
     yield "corrections.json", file_of("a.json", read_corrections)
+    for kind in ("csv", "jsonl"):
+        yield f"manifest.{kind}", file_of(f"a.{kind}", lambda file: list_sheets([str(file)], {}))
 
 
 COLORS: tuple[Reader, ...] = (

@@ -17,7 +17,7 @@ from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map
 from toonset.mesh import Mesh
 from toonset.nerf.hull.mannequin_shape import Shape, shape_of
-from toonset.nerf.lines.step_lines import StepLines, draw_steps
+from toonset.nerf.look.step_lines import StepLines, draw_steps
 
 SIDE, FINE, LINE_PX = 150, 3, 2.0
 SKIN, BELT, ARM = (240, 200, 160), (60, 60, 160), (90, 150, 60)

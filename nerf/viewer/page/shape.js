@@ -1,7 +1,7 @@
 // A mannequin that is the character's own body: its surface takes the place of the field's.
 //
 // As in nerf/hull/mannequin_shape.py: triangles at FINER samples per pixel and axis, their outline a
-// little beyond; lines where one part hides another (nerf/lines/step_lines.py); the sheet's shadow by
+// little beyond; lines where one part hides another (nerf/look/step_lines.py); the sheet's shadow by
 // smoothed normals (nerf/look/shade.py).
 
 import { CAMERA, cameraUniforms } from "./field.js";

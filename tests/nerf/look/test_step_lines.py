@@ -18,7 +18,7 @@ from tests.nerf.bodies import (
     sheet,
 )
 from toonset.nerf.hull.mannequin_shape import FINER
-from toonset.nerf.lines.step_lines import (
+from toonset.nerf.look.step_lines import (
     StepLines,
     draw_steps,
     learn_steps,

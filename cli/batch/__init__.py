@@ -1,0 +1,1 @@
+"""Run many sheets: a table of jobs, workers, what a person sees, and the data set of it."""

@@ -1,0 +1,443 @@
+"""`toonset batch`: run many sheets, from one table."""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+import re
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag
+from toonset.errors import OutputError, UsageError
+
+if TYPE_CHECKING:
+    from toonset.cli.batch.dispatch import Limits, Workers
+    from toonset.cli.batch.stages import Entry
+    from toonset.cli.batch.table import Table
+
+USUAL = "calibrate,palette,train,render"
+WORKERS_PANEL, CHOICE_PANEL = "Workers", "Which sheets"
+TIME_LIMIT_S = 1800.0
+PAGE_S, PAUSE = 30.0, 50  # between pages: at least; times what the last one took
+LOOK_AT = 3  # exit code: sheets have failed
+AUTO = "auto"
+SHARDS = "batch-*of*.sqlite"
+PLANNED_AT_ONCE = 500  # sheets of one transaction
+
+
+def batch(
+    sheets: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="SHEET",
+            help="Sheets: pictures, folders of them, 'patterns*', URLs; or manifests: .csv, "
+            ".jsonl with sheet, name, mesh, views, STAGE_options, character, license, source.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder of the batch.", rich_help_panel=OUTPUT_PANEL),
+    ] = None,
+    stages: Annotated[
+        str,
+        typer.Option("--stages", help="Of calibrate, palette, train, render, view, mesh, export."),
+    ] = USUAL,
+    given: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="'STAGE OPTIONS'",
+            help="Options of a stage, as typed after its verb: 'train --steps 300'; repeatable.",
+        ),
+    ] = None,
+    root: Annotated[
+        Path | None,
+        typer.Option("--root", help="Folder of a manifest's paths (default: the manifest's)."),
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only",
+            metavar="NAME",
+            help="These sheets of them, by name or 'pattern*'; repeatable.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = None,
+    retry_failed: Annotated[
+        bool,
+        typer.Option(
+            "--retry-failed",
+            help="Run what failed or crashed once more, too.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = False,
+    shard: Annotated[
+        str,
+        typer.Option(
+            "--shard",
+            metavar="I/N",
+            help="The I-th of N parts, with a table of its own: for job arrays.",
+            rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = "",
+    workers: Annotated[
+        str,
+        typer.Option(
+            "--workers",
+            metavar="N",
+            help="Sheets at once (auto: as cores and memory allow).",
+            rich_help_panel=WORKERS_PANEL,
+        ),
+    ] = AUTO,
+    time_limit: Annotated[
+        float,
+        typer.Option(
+            "--time-limit",
+            metavar="SECONDS",
+            min=0.1,
+            help="Of one sheet.",
+            rich_help_panel=WORKERS_PANEL,
+        ),
+    ] = TIME_LIMIT_S,
+    memory_limit: Annotated[
+        int | None,
+        typer.Option(
+            "--memory-limit",
+            metavar="MB",
+            min=1,
+            help="Of one sheet (default: its share of what is free).",
+            rich_help_panel=WORKERS_PANEL,
+        ),
+    ] = None,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            "--ray",
+            metavar="ADDRESS",
+            help="Run on a Ray cluster; local: start one here.",
+            rich_help_panel=WORKERS_PANEL,
+        ),
+    ] = None,
+    gpus: Annotated[
+        float,
+        typer.Option(
+            "--gpus", min=0, help="Of one sheet, with --ray.", rich_help_panel=WORKERS_PANEL
+        ),
+    ] = 0.0,
+    store: Annotated[
+        str,
+        typer.Option(
+            "--store",
+            metavar="URL",
+            help="Put results there, not in OUT/sheets: s3://, gs://, file://.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
+    ] = "",
+    status: Annotated[
+        Path | None, typer.Option("--status", metavar="OUT", help="Say where a batch stands.")
+    ] = None,
+    merge: Annotated[
+        Path | None, typer.Option("--merge", metavar="OUT", help="Put the shards' tables together.")
+    ] = None,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Run many sheets: calibrate, palette, train, render, each sheet into a folder of its own.
+
+    The same command continues where it was ended, and does again only what other inputs, options or
+    versions touch. OUT/index.html shows all sheets, OUT/batch.sqlite is the table of what is done.
+    Exit code 3 when sheets have failed; the others are done then.
+    """
+    printer = Printer(as_json, quiet)
+    if (status is not None) + (merge is not None) + bool(sheets or out) > 1:
+        raise UsageError("--status and --merge take the batch's folder, and nothing beside it")
+    if status is not None:
+        return _say_status(status, printer)
+    if merge is not None:
+        return _merge(merge, printer)
+    if not sheets or out is None:
+        raise UsageError("name sheets, and the folder of the batch with -o")
+    from toonset.cli.batch.dispatch import Limits
+    from toonset.cli.batch.stages import check_options, in_order
+
+    chosen = in_order([name.strip() for name in stages.split(",") if name.strip()])
+    if gpus and ray is None:
+        raise UsageError("--gpus belongs to --ray")
+    entries = _listed(sheets, given or [], root, out)
+    check_options(entries, chosen)
+    part, table_name = _shard(shard)
+    names = _chosen(entries, only or [], part)
+    count = _count(workers, memory_limit or 0)
+    share = 0 if ray else _share(count)
+    limits = Limits(time_limit, memory_limit or share)
+    wanted = Wanted(out, chosen, entries, names, retry_failed, limits, store, table_name)
+    start = partial(_ray_workers, ray, gpus, limits) if ray else partial(_local_workers, count)
+    found = _run(wanted, start, printer)
+    _report(wanted, found, printer)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the command line asks for.
+
+    Attributes:
+        out: folder of the batch.
+        stages: in order.
+        entries: all sheets that are named.
+        names: of those that are to run.
+        retry: what failed, too.
+        limits: of a sheet.
+        store: URL of results, or "".
+        table: file name of the table.
+    """
+
+    out: Path
+    stages: tuple[str, ...]
+    entries: Sequence[Entry]
+    names: frozenset[str]
+    retry: bool
+    limits: Limits
+    store: str
+    table: str
+
+    @property
+    def is_shard(self) -> bool:
+        """Return whether others have a part of it."""
+        return fnmatch.fnmatchcase(self.table, SHARDS)
+
+
+def _listed(sheets: list[str], given: list[str], root: Path | None, out: Path) -> list[Entry]:
+    """Return all sheets that are named, with their options."""
+    from toonset.cli.batch.sheets import list_sheets
+    from toonset.cli.batch.stages import STAGES, as_words
+
+    words: dict[str, tuple[str, ...]] = {}
+    for text in given:
+        stage, *said = as_words(text, "--with") or ("",)
+        if stage not in STAGES:
+            raise UsageError(f"--with {text!r}: begins with none of {', '.join(STAGES)}")
+        words[stage] = (*words.get(stage, ()), *said)
+    return list_sheets(sheets, words, root, out)
+
+
+def _shard(text: str) -> tuple[tuple[int, int], str]:
+    """Return which part of how many, from 0, and the name of its table."""
+    from toonset.cli.batch.table import TABLE
+
+    if not text:
+        return (0, 1), TABLE
+    found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+    part, parts = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= part <= parts:
+        raise UsageError(f"--shard {text!r}: is not I/N with I from 1 to N, as 3/8")
+    return (part - 1, parts), f"batch-{part}of{parts}.sqlite"
+
+
+def _chosen(entries: Sequence[Entry], only: list[str], part: tuple[int, int]) -> frozenset[str]:
+    """Return the names of the sheets that are to run."""
+    for pattern in only:
+        if not any(fnmatch.fnmatchcase(entry.name, pattern) for entry in entries):
+            raise UsageError(f"--only {pattern!r}: no sheet is called so; see --status")
+    mine = [entry.name for entry in entries[part[0] :: part[1]]]
+    if only:
+        mine = [n for n in mine if any(fnmatch.fnmatchcase(n, pattern) for pattern in only)]
+    return frozenset(mine)
+
+
+def _count(workers: str, memory_mb: int) -> int:
+    """Return how many sheets run at once on this machine."""
+    from toonset.cli.batch.local import usual_workers
+
+    if workers == AUTO:
+        return usual_workers(memory_mb)
+    if not re.fullmatch("[1-9][0-9]{0,3}", workers):
+        raise UsageError(f"--workers {workers!r}: is neither a number from 1 nor {AUTO}")
+    return int(workers)
+
+
+def _share(count: int) -> int:
+    """Return a sheet's share of the memory that is free, MB."""
+    from toonset.cli.batch.local import free_memory_mb
+
+    return int((free_memory_mb() or 0) / count)
+
+
+def _local_workers(count: int, wanted: Wanted) -> Workers:
+    """Start processes here, when all is imported."""
+    from toonset.cli.batch.local import LocalWorkers
+    from toonset.cli.batch.stages import import_parts
+
+    os.environ["OMP_NUM_THREADS"] = "1"  # a sheet has one core; must precede torch
+    import_parts(wanted.stages)
+    return LocalWorkers(min(count, len(wanted.names)))
+
+
+def _ray_workers(address: str, gpus: float, limits: Limits, wanted: Wanted) -> Workers:
+    from toonset.cli.batch.on_ray import RayWorkers
+
+    return RayWorkers(address, gpus, limits.memory_mb)
+
+
+def _run(
+    wanted: Wanted, start: Callable[[Wanted], Workers], printer: Printer
+) -> Mapping[str, Counter[str]]:
+    """Run what is due; return how many sheets are in which state, for every stage."""
+    from toonset.cli.batch.dispatch import Runner, alive, release_dead
+    from toonset.cli.batch.progress import Progress, count_stages
+    from toonset.cli.batch.table import Table
+
+    _check_out(wanted.out)
+    with ExitStack() as stack:
+        runner = Runner(wanted.out, wanted.limits, wanted.stages, wanted.store)
+        stack.enter_context(alive(wanted.out, runner.ident))
+        table = stack.enter_context(closing(Table(wanted.out / wanted.table, make=True)))
+        release_dead(table, wanted.out, runner.ident)
+        _plan(table, wanted, printer)
+        mine = (row for row in table.rows() if row.name in wanted.names)
+        progress = Progress(printer, count_stages(mine, wanted.stages))
+        if table.is_due():
+            workers = stack.enter_context(closing(start(wanted)))
+            page = _Page(wanted, table)
+
+            def tick() -> None:
+                progress.tick()
+                page.tick()
+
+            runner.run(table, workers, progress.take, tick)
+        progress.close()
+        _write_page(wanted, table)
+        return progress.counts
+
+
+def _check_out(out: Path) -> None:
+    """Make the batch's folder; refuse one that is none."""
+    from toonset.cli.batch.table import TABLE
+    from toonset.write import check_new_folder
+
+    if not any((out / name).is_file() for name in (TABLE, *_shards(out))):
+        if out.is_dir() and any(out.iterdir()):
+            raise OutputError(f"{out}: holds files, but no {TABLE}; choose another -o")
+        check_new_folder(out)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"{out}: cannot be made ({reason}); choose another -o") from error
+
+
+def _shards(out: Path) -> list[str]:
+    """Return the names of the tables of a batch's parts."""
+    return sorted(path.name for path in out.glob(SHARDS)) if out.is_dir() else []
+
+
+def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
+    """Put into the table what is to be done."""
+    from toonset.cli.batch.dispatch import home_of
+    from toonset.cli.batch.job import stages_there
+    from toonset.cli.batch.stages import STAGES, keys_of
+    from toonset.cli.batch.storage import Hashes
+    from toonset.cli.batch.table import Plan
+
+    def there(name: str) -> set[str]:
+        return {*STAGES} if wanted.store else stages_there(home_of(wanted.out, name))
+
+    hashes, plans = Hashes(table), list[Plan]()
+    for position, entry in enumerate(wanted.entries):
+        if entry.name in wanted.names:
+            plans.append(Plan(entry, position, keys_of(entry, wanted.stages, hashes)))
+        if len(plans) == PLANNED_AT_ONCE or position == len(wanted.entries) - 1:
+            table.plan(plans, there)
+            plans.clear()
+            if len(wanted.entries) > PLANNED_AT_ONCE:
+                printer.progress(f"reading sheets {position + 1}/{len(wanted.entries)}")
+    hashes.keep()
+    if wanted.retry:
+        table.retry(wanted.names)
+    table.choose(wanted.names)
+
+
+@dataclass
+class _Page:
+    """The page, written now and then while sheets run."""
+
+    wanted: Wanted
+    table: Table
+    due: float = 0.0
+
+    def tick(self) -> None:
+        """Write it, if that is due: a large one takes seconds."""
+        if (began := time.monotonic()) > self.due:
+            _write_page(self.wanted, self.table)
+            self.due = time.monotonic() + max(PAGE_S, PAUSE * (time.monotonic() - began))
+
+
+def _write_page(wanted: Wanted, table: Table) -> None:
+    """Write the page of the whole batch; parts of one leave it to --merge."""
+    from toonset.cli.batch.page import write_page
+
+    if not wanted.is_shard:
+        write_page(wanted.out, table.rows(), wanted.out.resolve().name, store=wanted.store)
+
+
+def _report(wanted: Wanted, counts: Mapping[str, Counter[str]], printer: Printer) -> None:
+    """Print the result; exit with 3 where sheets failed."""
+    found = {stage: {k: n for k, n in count.items() if n} for stage, count in counts.items()}
+    bad = sum(count[state] for count in counts.values() for state in ("failed", "quarantined"))
+    look = "" if wanted.is_shard else f": look at {wanted.out / 'index.html'}"
+    text = f"{wanted.out}: {len(wanted.names)} sheets, {bad} failed{look}"
+    values = {"out": wanted.out, "sheets": len(wanted.names), "failed": bad, "stages": found}
+    printer.result(values, text)
+    if bad:
+        raise typer.Exit(LOOK_AT)
+
+
+def _tables(out: Path) -> list[Path]:
+    """Return the tables of a batch's folder: its own, and those of its parts."""
+    from toonset.cli.batch.table import TABLE
+
+    names = [name for name in (TABLE, *_shards(out)) if (out / name).is_file()]
+    if not names:
+        raise UsageError(f"{out}: has no {TABLE}; name the -o of a toonset batch")
+    return [out / name for name in names]
+
+
+def _say_status(out: Path, printer: Printer) -> None:
+    from toonset.cli.batch.progress import Status
+    from toonset.cli.batch.table import Table
+
+    status, paths = Status(), _tables(out)
+    with ExitStack() as stack:
+        tables = [stack.enter_context(closing(Table(path))) for path in paths]
+        whole = tables[0]
+        if len(tables) > 1:  # a sheet may be in several
+            whole = stack.enter_context(closing(Table(Path(":memory:"), make=True)))
+            for table in tables:
+                whole.take_in(table)
+        status.add(whole.rows())
+    printer.result({"out": out, **status.values()}, "\n".join(status.lines()))
+
+
+def _merge(out: Path, printer: Printer) -> None:
+    """Put the parts' tables into the batch's own, and write the page."""
+    from toonset.cli.batch.page import write_page
+    from toonset.cli.batch.table import TABLE, Table
+
+    if not (shards := _shards(out)):
+        raise UsageError(f"{out}: has no {SHARDS}; run toonset batch --shard first")
+    count = 0
+    with closing(Table(out / TABLE, make=True)) as table:
+        for name in shards:
+            with closing(Table(out / name)) as part:
+                count += table.take_in(part)
+        write_page(out, table.rows(), out.resolve().name)
+    text = f"{out}: {count} sheets of {len(shards)} parts; look at {out / 'index.html'}"
+    printer.result({"out": out, "sheets": count, "parts": len(shards)}, text)

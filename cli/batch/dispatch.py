@@ -1,0 +1,291 @@
+"""Hand the sheets of a table to workers, and put into the table how they end.
+
+One loop for every kind of worker. What workers have is what the table says is running: nothing
+waits anywhere else.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import os
+import re
+import secrets
+import socket
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Protocol
+
+from toonset.cli.batch.job import Job, Outcome, read_stamp, tidy
+from toonset.cli.batch.table import SheetRow, StageRow, State, Table
+from toonset.errors import OutputError
+
+try:
+    import fcntl
+except ImportError:  # Windows: leases end by time alone
+    fcntl = None  # type: ignore[assignment]
+
+LEASE_S = 120.0  # until others may take a claim of a runner that does not renew it
+RENEW_S = 20.0
+LOOK_S = 1.0  # between looks at sheets that another runner has
+MOST_CRASHES = 3  # of a sheet's worker: then it is left alone
+MOST_KILLS = 20  # of it, from outside: by then it is no accident
+HOLDERS = ".runners"  # folder of locked files, one for each runner
+THUMBS = "thumbs"
+
+
+class Workers(Protocol):
+    """What runs sheets."""
+
+    @property
+    def capacity(self) -> int:
+        """Return how many sheets may run at once, now."""
+        ...
+
+    def submit(self, job: Job) -> None:
+        """Run a sheet; fewer than `capacity` are running."""
+
+    def wait(self, timeout_s: float) -> list[Outcome]:
+        """Return what has ended; wait until something has, or the time is over."""
+        ...
+
+    def kill(self, name: str) -> None:
+        """End the process of a sheet; `wait` tells of it."""
+
+    def close(self) -> None:
+        """End them all; what they were writing is cleared away."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a sheet may take.
+
+    Attributes:
+        seconds: of wall time.
+        memory_mb: of its process; 0: no limit.
+    """
+
+    seconds: float
+    memory_mb: int = 0
+
+
+@dataclass
+class Runner:
+    """One `toonset batch`: the sheets that it has claimed.
+
+    Attributes:
+        out: folder of the batch.
+        limits: of a sheet.
+        stages: that it runs.
+        store: URL for results; "": the folder.
+        ident: of this runner, in the table.
+    """
+
+    out: Path
+    limits: Limits
+    stages: tuple[str, ...]
+    store: str = ""
+    ident: str = field(default_factory=lambda: _ident())
+    _table: Table = field(init=False)
+    _began: dict[str, float] = field(default_factory=dict)  # of sheets that run
+    _due: dict[str, set[str]] = field(default_factory=dict)  # stages of them that are not done
+    _late: set[str] = field(default_factory=set)  # of them, ended for it
+
+    def run(
+        self,
+        table: Table,
+        workers: Workers,
+        ended: Callable[[str, Sequence[StageRow]], object],
+        tick: Callable[[], object],
+    ) -> None:
+        """Run all chosen sheets that are due, and wait for those that other runners have.
+
+        Args:
+            table: of the batch.
+            workers: that run them.
+            ended: is told of every sheet that ended, with the stages that did.
+            tick: is called a few times a second.
+
+        Raises:
+            ToonsetError: the place for results cannot be written.
+        """
+        renewed, self._table = time.monotonic(), table
+        try:
+            while True:
+                idle = not self._fill(workers) and not self._began
+                if idle and not self._table.others_running(self.ident):
+                    return
+                for outcome in workers.wait(LOOK_S) if self._began else _nap():
+                    self._take(outcome, ended)
+                self._end_late(workers)
+                if time.monotonic() - renewed > RENEW_S:
+                    self._table.renew(self.ident, LEASE_S)
+                    renewed = time.monotonic()
+                if idle:
+                    release_dead(self._table, self.out, self.ident)
+                tick()
+        finally:
+            with contextlib.suppress(OutputError):  # its leases end by themselves
+                self._table.release(self.ident)
+
+    def _fill(self, workers: Workers) -> bool:
+        """Give sheets to free workers; return whether there were any."""
+        found = False
+        while len(self._began) < workers.capacity:
+            row = self._table.claim(self.ident, LEASE_S)
+            if row is None:
+                break
+            self._began[row.name] = time.monotonic()
+            self._due[row.name] = {one.stage for one in row.stages if one.state != "done"}
+            workers.submit(self._job(row))
+            found = True
+        return found
+
+    def _job(self, row: SheetRow) -> Job:
+        keys = {stage.stage: stage.key for stage in row.stages if stage.stage in self.stages}
+        home = str(home_of(self.out, row.name))
+        entry = row.entry
+        return Job(
+            *(entry.name, entry.sheets, entry.words, keys, home),
+            store=self.store,
+            memory_mb=self.limits.memory_mb,
+        )
+
+    def _end_late(self, workers: Workers) -> None:
+        """End what takes longer than it may."""
+        now = time.monotonic()
+        for name, began in self._began.items():
+            if now - began > self.limits.seconds and name not in self._late:
+                self._late.add(name)
+                workers.kill(name)
+
+    def _take(self, outcome: Outcome, ended: Callable[[str, Sequence[StageRow]], object]) -> None:
+        """Put into the table how a sheet ended."""
+        name = outcome.name
+        due = self._due.pop(name)
+        del self._began[name]
+        if outcome.kind == "place":
+            raise OutputError(f"{outcome.line}; then run the same command again")
+        if name in self._late:
+            self._late.discard(name)
+            if outcome.kind == "gone":
+                line = f"took longer than {self.limits.seconds:g} s"
+                outcome = replace(outcome, kind="failed", line=line)
+        state = self._state(outcome)
+        if state == "waiting":
+            self._table.release(self.ident, name)
+            return
+        self._keep_pictures(outcome)
+        rows = outcome.rows if state == "done" else self._with_failure(outcome, state)
+        if self._table.record(self.ident, name, rows, state):
+            ended(name, [row for row in rows if row.stage in due])
+
+    def _state(self, outcome: Outcome) -> State:
+        """Return the state that a sheet goes into; waiting: once more."""
+        if outcome.kind in ("done", "failed"):
+            return "done" if outcome.kind == "done" else "failed"
+        if outcome.kind == "busy":
+            return "waiting"
+        count = self._table.count_crash(outcome.name, from_outside=outcome.from_outside)
+        most = MOST_KILLS if outcome.from_outside else MOST_CRASHES
+        return "quarantined" if count >= most else "waiting"
+
+    def _with_failure(self, outcome: Outcome, state: State) -> tuple[StageRow, ...]:
+        """Return the rows of what failed, with its line; of a death the first that is not done."""
+        if outcome.rows:
+            return tuple(
+                row if row.state == "done" else replace(row, log=outcome.log)
+                for row in outcome.rows
+            )
+        sheet, rows = self._table.row(outcome.name), list[StageRow]()
+        assert sheet is not None
+        home = home_of(self.out, outcome.name)
+        tidy(home)
+        for row in sheet.stages:
+            if row.stage not in self.stages:
+                continue
+            found = None if self.store else read_stamp(home, row.stage, row.key)
+            if found is None:
+                times = f", {sheet.crashes} times" if sheet.crashes > 1 else ""
+                error, tried = f"{outcome.line}{times}", max(sheet.crashes, 1)
+                failed = replace(row, state=state, error=error, log=outcome.log, attempts=tried)
+                return (*rows, replace(failed, ended=time.time()))
+            rows.append(found)
+        return tuple(rows)
+
+    def _keep_pictures(self, outcome: Outcome) -> None:
+        from toonset.write import write_bytes
+
+        for end, text in outcome.pictures.items():
+            write_bytes(self.out / THUMBS / f"{outcome.name}{end}", base64.b64decode(text))
+
+
+def _ident() -> str:
+    """Return a new name for a runner, which may name a file."""
+    host = re.sub(r"[^\w.-]", "_", socket.gethostname())
+    return f"{host}-{os.getpid()}-{secrets.token_hex(4)}"
+
+
+def home_of(out: Path, name: str) -> Path:
+    """Return a sheet's folder."""
+    return out / "sheets" / name
+
+
+def _nap() -> list[Outcome]:
+    time.sleep(LOOK_S)
+    return []
+
+
+@contextlib.contextmanager
+def alive(out: Path, ident: str) -> Iterator[None]:
+    """Hold a file within the block; children hold it, too, so that it is free when all are gone."""
+    folder = out / HOLDERS
+    file = folder / ident
+    descriptor = _made(file)
+    try:
+        if fcntl is not None:
+            with contextlib.suppress(OSError):  # a file system without locks
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            file.unlink()
+            folder.rmdir()  # unless another is alive
+        os.close(descriptor)
+
+
+def _made(file: Path) -> int:
+    """Return the descriptor of a new file; another runner may remove its folder meanwhile."""
+    while True:
+        file.parent.mkdir(exist_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            return os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+
+
+def release_dead(table: Table, out: Path, ident: str) -> None:
+    """Give back what runners have claimed that are gone, as their files say."""
+    for other in table.runners():
+        if other != ident and _is_dead(out / HOLDERS / other):
+            table.release(other)
+
+
+def _is_dead(file: Path) -> bool:
+    """Return whether nobody holds a runner's file any more; it is removed then."""
+    if fcntl is None:
+        return False
+    try:
+        descriptor = os.open(file, os.O_RDWR | os.O_CLOEXEC)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        file.unlink(missing_ok=True)
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)

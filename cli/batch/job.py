@@ -1,0 +1,372 @@
+"""Run one sheet's stages in this process: what every worker does, wherever it runs.
+
+A stage's result is the verb's own files, which appear in one step, and a stamp beside them, which
+says of what inputs, options and versions they are. A stage whose stamp says what is wanted is not
+run again, whatever the table has forgotten.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import errno
+import faulthandler
+import hashlib
+import io
+import json
+import os
+import resource
+import sys
+import tempfile
+import threading
+import time
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from toonset import lock
+from toonset.cli.batch.stages import BUNDLE, RANKS, STAGES, run
+from toonset.cli.batch.table import StageRow
+from toonset.cli.common.refusals import refusal
+from toonset.errors import OutputError, ToonsetError, one_line, printable
+from toonset.write import write_json
+
+LOG = "log.txt"
+OVER_MEMORY = "batch: took more than"  # begins the line that says so
+PATIENCE_S = 30.0  # for the worker of a batch that has just been killed
+FATAL = "Fatal Python error"  # begins what faulthandler says of a crash, the last call first
+GUARD_S = 0.1  # between looks at the memory in use
+LINES, CHARACTERS = 12, 2000  # of a log that are kept
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ESTALE)
+FINE = (0, 3)  # exit codes of verbs that have written
+Kind = Literal["done", "failed", "busy", "place", "gone"]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A sheet to run.
+
+    Attributes:
+        name: of the sheet.
+        sheets: its drawings: paths or URLs.
+        words: of the stages' command lines.
+        keys: what each stage's result is to be of, in order.
+        home: the sheet's folder.
+        store: URL that the folder is copied to; "": it stays where it is.
+        memory_mb: most that its process may take; 0: no limit.
+    """
+
+    name: str
+    sheets: tuple[str, ...]
+    words: Mapping[str, tuple[str, ...]]
+    keys: Mapping[str, str]
+    home: str
+    store: str = ""
+    memory_mb: int = 0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a sheet ended.
+
+    Attributes:
+        name: of the sheet.
+        kind: done; failed, by its own fault; busy: another process is at it; place: the place for
+            results cannot be written; gone: its process died.
+        rows: of the stages that ended.
+        line: why, where it is not done.
+        log: last lines of what was printed, where it is not done.
+        from_outside: of what is gone: somebody killed the process.
+        pictures: small ones for the page, by file name, in base64.
+    """
+
+    name: str
+    kind: Kind
+    rows: tuple[StageRow, ...] = ()
+    line: str = ""
+    log: str = ""
+    from_outside: bool = False
+    pictures: Mapping[str, str] = field(default_factory=dict)
+
+
+def run_sheet(job: Job) -> Outcome:
+    """Run the stages of a sheet that are not done yet; whatever happens, say how it ended."""
+    home = Path(job.home)
+    try:
+        home.mkdir(parents=True, exist_ok=True)
+        with lock.hold(home / "batch", home, PATIENCE_S), _logged(home / LOG, job.memory_mb):
+            outcome = _run_stored(job) if job.store else _run_stages(job, home, job.sheets)
+    except OutputError as error:
+        return Outcome(job.name, "busy", line=one_line(error))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        return Outcome(job.name, "place", line=f"{home}: cannot be written ({reason}); make room")
+    if outcome.kind == "done":
+        (home / LOG).unlink(missing_ok=True)
+        return outcome
+    return replace(outcome, log=last_lines(home / LOG))
+
+
+def _run_stored(job: Job) -> Outcome:
+    """Run a sheet whose results lie behind a URL, in a folder that goes afterwards."""
+    from toonset.cli.batch.storage import fetch, is_url, looks, push
+
+    url = f"{job.store.rstrip('/')}/{job.name}"
+    stamps = tuple(f"{stage}.json" for stage in STAGES)
+    with tempfile.TemporaryDirectory(prefix="toonset-") as scratch:
+        home, inputs = Path(scratch, job.name), Path(scratch, "inputs")
+        inputs.mkdir()
+        try:
+            if looks(f"{url}/calibrate.json") is not None:
+                fetch(url, Path(scratch))
+            home.mkdir(exist_ok=True)
+            sheets = [str(fetch(one, inputs)) if is_url(one) else one for one in job.sheets]
+            words = {stage: _fetched(said, inputs) for stage, said in job.words.items()}
+            outcome = _run_stages(replace(job, words=words), home, sheets)
+            if outcome.rows:
+                push(home, url, stamps)
+        except ToonsetError as error:
+            return Outcome(job.name, "place", line=one_line(error))
+    return outcome
+
+
+def _fetched(words: Sequence[str], folder: Path) -> tuple[str, ...]:
+    """Return words with the URLs among them as files here."""
+    from toonset.cli.batch.storage import fetch, is_url
+
+    found = []
+    for word in words:
+        flag, equals, value = word.rpartition("=") if word.startswith("--") else ("", "", word)
+        found.append(f"{flag}{equals}{fetch(value, folder)}" if is_url(value) else word)
+    return tuple(found)
+
+
+def _run_stages(job: Job, home: Path, sheets: Sequence[str]) -> Outcome:
+    """Run what is not done of a sheet's stages, in order, until one fails."""
+    rows: list[StageRow] = []
+    for stage, key in job.keys.items():
+        row = read_stamp(home, stage, key)
+        if row is None:
+            _remove_stamps(home, stage)
+            ended = _run_stage(job, home, sheets, stage, key)
+            if isinstance(ended, Outcome):
+                return replace(ended, rows=(*rows, *ended.rows), pictures=_pictures(home))
+            row = ended
+            _write_stamp(home, row)
+        rows.append(row)
+    return Outcome(job.name, "done", tuple(rows), pictures=_pictures(home))
+
+
+def _run_stage(
+    job: Job, home: Path, sheets: Sequence[str], stage: str, key: str
+) -> StageRow | Outcome:
+    """Run one stage; return its row, or the outcome that it leads to."""
+    row = StageRow(stage, key, attempts=1, worker=f"{os.uname().nodename}:{os.getpid()}")
+    print(f"--- {stage}", file=sys.stderr, flush=True)
+    _forget_peak()
+    began, cpu = time.monotonic(), time.process_time()
+    said, code, line, full = io.StringIO(), 0, "", False
+    try:
+        with lock.command(), contextlib.redirect_stdout(said):
+            code = run(stage, job.words.get(stage, ()), sheets, home)
+    except Exception as error:
+        found = refusal(error)
+        if found is None:
+            traceback.print_exc()
+        line = found or f"this is a bug of toonset: {type(error).__name__}: {one_line(error)}"
+        full = _is_full(error)
+    row = replace(
+        row,
+        ended=time.time(),
+        wall_s=round(time.monotonic() - began, 4),
+        cpu_s=round(time.process_time() - cpu, 4),
+        peak_mb=round(_peak_mb(), 1),
+    )
+    if full:
+        return Outcome(job.name, "place", line=line)
+    if code not in FINE:
+        return Outcome(job.name, "busy", line=f"{stage} was ended")
+    if line:
+        return Outcome(job.name, "failed", (replace(row, state="failed", error=line),), line)
+    verdict, facts = _facts(stage, json.loads(said.getvalue()))
+    output = _hash_output(home, stage)
+    return replace(row, state="done", verdict=verdict, facts=facts, output=output)
+
+
+def _is_full(error: BaseException | None) -> bool:
+    """Return whether the place for results is at fault, not the sheet."""
+    while error is not None:
+        wrote = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
+        if wrote or (isinstance(error, OSError) and error.errno in FULL):
+            return True
+        error = error.__cause__
+    return False
+
+
+def _facts(stage: str, said: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return a stage's verdict, and what the page shows besides."""
+    if stage == "calibrate":
+        return said["verdict"], {"reason": said["reason"], "views": len(said["views"])}
+    if stage == "palette":
+        return "", {"colors": len(said["colors"])}
+    if stage == "train":
+        verdict = said["verdict"]
+        return verdict["verdict"], {
+            "psnr": said["train"]["psnr"],
+            "reasons": list(verdict["reasons"]),
+        }
+    return "", {}
+
+
+# ---- stamps --------------------------------------------------------------------------------------
+
+
+def stages_there(home: Path) -> set[str]:
+    """Return the stages whose stamps and results lie in a sheet's folder."""
+    return {
+        name
+        for name, stage in STAGES.items()
+        if (home / f"{name}.json").is_file() and (home / stage.writes / stage.mark).exists()
+    }
+
+
+def read_stamp(home: Path, stage: str, key: str) -> StageRow | None:
+    """Return the row of a stage that is done with a key; None where it is not."""
+    if stage not in stages_there(home):
+        return None
+    try:
+        row = StageRow(**json.loads((home / f"{stage}.json").read_bytes()))
+    except (OSError, ValueError, TypeError):  # cut short, or of an older toonset
+        return None
+    return row if row.key == key else None
+
+
+def _write_stamp(home: Path, row: StageRow) -> None:
+    write_json(home / f"{row.stage}.json", asdict(row))
+
+
+def _remove_stamps(home: Path, first: str) -> None:
+    """Remove what says that a stage and the later ones are done."""
+    for stage in STAGES:
+        if RANKS[stage] >= RANKS[first]:
+            (home / f"{stage}.json").unlink(missing_ok=True)
+
+
+def tidy(home: Path) -> None:
+    """Clear away what a worker that was killed has left in its sheet's folder."""
+    writes = [home / stage.writes for stage in STAGES.values()]
+    for place in (home / "batch", *writes, lock.set_of(home / BUNDLE / "palette.json")):
+        if place.parent.is_dir():
+            with contextlib.suppress(OutputError), lock.hold(place):
+                pass
+
+
+def _hash_output(home: Path, stage: str) -> str:
+    """Return the hash of what a stage has written: names and bytes, but for files with seconds."""
+    verb = STAGES[stage]
+    root, found = home / verb.writes, hashlib.sha256()
+    inner = home / STAGES["train"].writes  # lies in the bundle, and is another stage's
+    for file in sorted([root] if root.is_file() else root.rglob("*")):
+        is_others = stage != "train" and file.is_relative_to(inner) and not root == inner
+        if file.is_file() and not is_others and file.name not in verb.timed:
+            with open(file, "rb") as opened:
+                digest = hashlib.file_digest(opened, "sha256").hexdigest()
+            found.update(f"{file.relative_to(home).as_posix()}\0{digest}\n".encode())
+    return found.hexdigest()
+
+
+def _pictures(home: Path) -> dict[str, str]:
+    """Return the page's small pictures of a sheet, by the end of their name."""
+    from toonset.dataset.images.thumbnails import thumbnail, turn_thumbnail
+
+    overlay, turn = home / BUNDLE / "overlay.png", home / STAGES["render"].writes
+    found = {}
+    with contextlib.suppress(ToonsetError):
+        found[".webp"] = thumbnail(overlay)
+    with contextlib.suppress(ToonsetError):  # a turn of several layers has no picture of itself
+        found[".turn.webp"] = turn_thumbnail(turn)
+    return {name: base64.b64encode(data).decode() for name, data in found.items()}
+
+
+# ---- the process ---------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def _logged(file: Path, memory_mb: int) -> Iterator[None]:
+    """Let all that is printed go to a file, and end the process when it takes too much memory."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [os.dup(1), os.dup(2)]
+    log = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
+    streams = sys.stdout, sys.stderr
+    done = threading.Event()
+    guard = threading.Thread(target=_guard, args=(memory_mb, done), daemon=True)
+    try:
+        for number in (1, 2):
+            os.dup2(log, number)
+        sys.stdout, sys.stderr = (open(n, "w", closefd=False, errors="replace") for n in (1, 2))
+        faulthandler.enable(2, all_threads=False)
+        if memory_mb:
+            guard.start()
+        yield
+    finally:
+        done.set()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        sys.stdout, sys.stderr = streams
+        for number, descriptor in zip((1, 2), kept, strict=True):
+            os.dup2(descriptor, number)
+            os.close(descriptor)
+        os.close(log)
+
+
+def _guard(memory_mb: int, done: threading.Event) -> None:
+    """End the process when it takes more memory than it may."""
+    while not done.wait(GUARD_S):
+        if _memory_mb() > memory_mb:
+            os.write(2, f"\n{OVER_MEMORY} {memory_mb} MB of memory\n".encode())
+            os._exit(1)
+
+
+def _memory_mb() -> float:
+    """Return the memory in use: on Linux now, elsewhere the most so far."""
+    try:
+        pages = int(Path("/proc/self/statm").read_bytes().split()[1])
+    except OSError:
+        return _peak_mb()
+    return pages * resource.getpagesize() / 2**20
+
+
+def _forget_peak() -> None:
+    """Let the process' peak of memory start anew, where the system can."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_bytes(b"5")
+
+
+def _peak_mb() -> float:
+    try:
+        status = Path("/proc/self/status").read_text()
+        return int(status.split("VmHWM:")[1].split()[0]) / 1024
+    except (OSError, IndexError):
+        unit = 2**20 if sys.platform == "darwin" else 2**10
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+def last_lines(log: Path) -> str:
+    """Return the end of what a sheet's worker has printed."""
+    try:
+        text = log.read_bytes()[-4 * CHARACTERS :].decode("utf-8", "replace")
+    except OSError:
+        return ""
+    lines = [printable(line) for line in text.splitlines() if line.strip()]
+    fatal = next((i for i, line in enumerate(lines) if line.startswith(FATAL)), None)
+    kept = lines[-LINES:] if fatal is None else lines[max(fatal - 2, 0) :][:LINES]
+    return "\n".join(kept)[:CHARACTERS]
+
+
+def over_memory(log: str) -> str:
+    """Return the line by which a worker ended itself for the memory it took, or ""."""
+    found = (line for line in log.splitlines() if line.startswith(OVER_MEMORY))
+    return next(found, "").removeprefix("batch: ")

@@ -1,0 +1,157 @@
+"""Run sheets on a Ray cluster: the same function that the processes of one machine run.
+
+Ray has no more to do than there are cores, and the table knows all of it: what a lost node, or a
+lost cluster, had to do is claimed again. A sheet's process is ended as here, by time and memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+import time
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from toonset.cli.batch.job import FATAL, LOG, Job, Outcome, last_lines, over_memory, run_sheet
+from toonset.errors import SetupError, ToonsetError, one_line
+
+HERE = "local"
+GONE = "the Ray cluster is gone; with another one run the same command again"
+ANSWER_S = 5.0  # for a connection to a cluster
+ASK_S = 5.0  # between questions for how many cores there are
+
+
+def run_told(told: str) -> str:
+    """Run a sheet that is told as JSON, in a process of Ray's."""
+    from toonset.cli.batch.local import job_of, use_one_core
+
+    use_one_core()
+    return json.dumps(asdict(run_sheet(job_of(json.loads(told)))))
+
+
+class RayWorkers:
+    """Processes of a Ray cluster."""
+
+    def __init__(self, address: str, gpus: float = 0.0, memory_mb: int = 0) -> None:
+        """Connect to a cluster.
+
+        Args:
+            address: of its head; "auto": as Ray finds it; "local": start one on this machine.
+            gpus: that a sheet takes, or a share of one.
+            memory_mb: that a sheet may take.
+
+        Raises:
+            SetupError: Ray is not installed.
+            ToonsetError: no cluster is there.
+        """
+        try:
+            import ray
+            import ray.exceptions
+        except ImportError as error:
+            raise SetupError("--ray needs Ray: pip install 'toonset[ray]'") from error
+        self._ray: Any = ray
+        _check_answers(address, f"--ray {address}: no cluster answers there; `ray start --head`")
+        environment = {"env_vars": {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}}
+        try:
+            ray.init(
+                address=None if address == HERE else address,
+                log_to_driver=False,
+                include_dashboard=False if address == HERE else None,
+                runtime_env=environment,
+                configure_logging=False,
+            )
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            raise ToonsetError(f"--ray {address}: no cluster there ({one_line(error)})") from error
+        options: dict[str, Any] = {"num_cpus": 1, "num_gpus": gpus, "max_retries": 0}
+        if memory_mb and address != HERE:
+            options["memory"] = memory_mb * 2**20
+        self._run = ray.remote(**options)(run_told)
+        self._gpus, self._jobs = gpus, dict[Any, Job]()
+        self._capacity, self._asked = 1, 0.0
+        self._head = address if "://" in address else ray.get_runtime_context().gcs_address
+
+    @property
+    def capacity(self) -> int:
+        """Return how many sheets the cluster's nodes can run at once, as of some seconds ago."""
+        if time.monotonic() - self._asked > ASK_S:
+            _check_answers(self._head, GONE)
+            with self._lost():
+                found = self._ray.cluster_resources()
+            by_gpu = found.get("GPU", 0) / self._gpus if self._gpus else float("inf")
+            self._capacity = max(1, int(min(found.get("CPU", 1), by_gpu)))
+            self._asked = time.monotonic()
+        return self._capacity
+
+    def submit(self, job: Job) -> None:
+        """Run a sheet on some node."""
+        with self._lost():
+            self._jobs[self._run.remote(json.dumps(asdict(job)))] = job
+
+    def wait(self, timeout_s: float) -> list[Outcome]:
+        """Return what has ended meanwhile; wait until something has, or the time is over."""
+        with self._lost():
+            ready, _ = self._ray.wait(list(self._jobs), num_returns=1, timeout=timeout_s)
+            if ready:
+                every = len(self._jobs)
+                ready, _ = self._ray.wait(list(self._jobs), num_returns=every, timeout=0)
+        return [self._outcome(reference) for reference in ready]
+
+    def kill(self, name: str) -> None:
+        """End the process of a sheet; `wait` tells of it."""
+        for reference, job in self._jobs.items():
+            if job.name == name:
+                self._ray.cancel(reference, force=True)
+
+    def close(self) -> None:
+        """End what runs, and leave the cluster."""
+        for reference in self._jobs:
+            with contextlib.suppress(Exception):  # the cluster may be what is gone
+                self._ray.cancel(reference, force=True)
+        self._ray.shutdown()
+
+    def _outcome(self, reference: Any) -> Outcome:
+        """Return how a sheet ended, or what became of its process."""
+        from toonset.cli.batch.local import outcome_of
+
+        job, errors = self._jobs.pop(reference), self._ray.exceptions
+        try:
+            return outcome_of(json.loads(self._ray.get(reference)))
+        except (errors.NodeDiedError, errors.LocalRayletDiedError, errors.ObjectLostError) as error:
+            return Outcome(job.name, "gone", line=_first(error), from_outside=True)
+        except errors.OutOfMemoryError as error:
+            return Outcome(job.name, "gone", line=f"its node ran out of memory: {_first(error)}")
+        except (errors.WorkerCrashedError, errors.TaskCancelledError):
+            log = last_lines(Path(job.home, LOG))
+            if over := over_memory(log):
+                return Outcome(job.name, "failed", line=over, log=log)
+            fatal = next((line for line in log.splitlines() if line.startswith(FATAL)), "")
+            line = f"its worker ended: {fatal}" if fatal else "its worker was killed"
+            return Outcome(job.name, "gone", line=line, log=log, from_outside=not fatal)
+
+    @contextlib.contextmanager
+    def _lost(self) -> Iterator[None]:
+        """Say in one line that the cluster is gone."""
+        try:
+            yield
+        except (self._ray.exceptions.RayError, ConnectionError) as error:
+            raise ToonsetError(f"{GONE} ({_first(error)})") from error
+
+
+def _check_answers(address: str, said: str) -> None:
+    """Say so where nobody answers: Ray itself waits a minute, and ends the process."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon or not port.isdecimal():
+        return
+    try:
+        with socket.create_connection((host, int(port)), ANSWER_S):
+            pass
+    except (OSError, OverflowError) as error:
+        raise ToonsetError(f"{said} ({one_line(error)})") from error
+
+
+def _first(error: Exception) -> str:
+    """Return the first line of what Ray says, which says much."""
+    return one_line(str(error).strip().split("\n")[0])

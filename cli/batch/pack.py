@@ -1,0 +1,253 @@
+"""`toonset pack`: a finished batch as a data set."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.errors import OutputError, ToonsetError, UsageError
+from toonset.write import check_output, new_folder, write_bytes
+
+if TYPE_CHECKING:
+    from toonset.cli.batch.card import Tally
+    from toonset.cli.batch.records import SheetRecord
+    from toonset.cli.batch.shards import Shard
+    from toonset.cli.batch.table import Table
+
+Kind = Literal["webdataset", "parquet", "folder"]
+Write = Callable[[Path, str, Iterator["SheetRecord"], int], list["Shard"]]
+SPLITS = ("train", "val", "test")
+CARD = "card.json"
+WRITTEN = (
+    *("README.md", CARD, *SPLITS),
+    *(f"{split}-[0-9]*.{end}" for split in SPLITS for end in ("tar", "parquet")),
+)
+USUAL_MB = 256
+MB = 10**6
+
+
+class Verdict(StrEnum):
+    """A verdict on a sheet's cameras."""
+
+    ok = "ok"
+    weak = "weak"
+    ambiguous = "ambiguous"
+    failed = "failed"
+
+
+def pack(
+    batch: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of a batch.")],
+    to: Annotated[Kind, typer.Option("--to", help="Format.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
+    ] = Path("dataset"),
+    verdict: Annotated[
+        list[Verdict] | None,
+        typer.Option("--verdict", help="Sheets of this verdict only; repeatable."),
+    ] = None,
+    split: Annotated[
+        str,
+        typer.Option(
+            "--split",
+            metavar="TRAIN,VAL,TEST",
+            help="Shares, as 80,10,10; a character's sheets stay together.",
+        ),
+    ] = "100,0,0",
+    shard_size: Annotated[
+        int,
+        typer.Option(
+            "--shard-size",
+            metavar="MB",
+            min=1,
+            help="Most of a shard of webdataset or parquet.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
+    ] = USUAL_MB,
+    force: ForceFlag = False,
+    as_json: JsonFlag = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Write the sheets of a batch that are done as one data set: pictures, cameras, palettes.
+
+    README.md and card.json say what is in it and how it is loaded. The same sheets give the same
+    bytes, and a character stays in its split when sheets are added.
+    """
+    from toonset.cli.batch.shards import check_parquet
+
+    printer, shares = Printer(as_json, quiet), _shares(split)
+    if to == "parquet":
+        check_parquet()
+    _check_out(out, batch, force=force)
+    with closing(_table(batch)) as table:
+        wanted = Wanted(batch, table, tuple(verdict or Verdict), shares)
+        chosen, tally = _choose(wanted, printer)
+        with new_folder(out, force=force) as folder:
+            card = _write(folder, wanted, to, chosen, tally, shard_size * MB, printer)
+    splits = {name: card["splits"][name]["sheets"] for name in card["splits"]}
+    told = ", ".join(f"{name} {count}" for name, count in splits.items())
+    printer.say(f"{card['sheets']} sheets, {card['views']} views: {told}")
+    values = {name: card[name] for name in ("format", "sheets", "views", "characters")}
+    printer.result({"out": out, **values, "splits": splits}, str(out))
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is packed.
+
+    Attributes:
+        batch: folder of the batch.
+        table: of it.
+        verdicts: of sheets to take.
+        shares: of train, val and test.
+    """
+
+    batch: Path
+    table: Table
+    verdicts: tuple[str, ...]
+    shares: tuple[float, ...]
+
+    def record(self, name: str, *, decode: bool) -> SheetRecord | None:
+        """Return a sheet's record; None where it is not wanted, or not done."""
+        from toonset.cli.batch.records import read_sheet
+
+        row = self.table.row(name)
+        if row is None or row.state != "done":
+            return None
+        return read_sheet(self.batch, row, self.verdicts, decode=decode)
+
+
+@dataclass(frozen=True, order=True)
+class Chosen:
+    """A sheet that is packed.
+
+    Attributes:
+        name: of it.
+        split: that it is in.
+        digest: of its record, as it was checked.
+    """
+
+    name: str
+    split: str
+    digest: bytes
+
+
+def split_of(character: str, shares: Sequence[float]) -> str:
+    """Return the split of a character: where the hash of its name falls among the shares.
+
+    Case and forms of Unicode make no difference, and no other character does.
+    """
+    folded = unicodedata.normalize("NFKC", character).casefold()
+    number = int.from_bytes(hashlib.sha256(folded.encode()).digest()[:4], "big") / 2**32
+    ends = [*itertools.accumulate(shares)]
+    return next(name for name, end in zip(SPLITS, ends, strict=True) if number * ends[-1] < end)
+
+
+def _shares(text: str) -> tuple[float, ...]:
+    parts = [part.strip() for part in text.split(",")]
+    is_number = all(re.fullmatch(r"[0-9]{1,9}(\.[0-9]{1,9})?", part) for part in parts)
+    shares = tuple(float(part) for part in parts) if is_number else ()
+    if len(shares) != len(SPLITS) or not sum(shares):
+        raise UsageError(f"--split {text!r}: is not three shares TRAIN,VAL,TEST, as 80,10,10")
+    return shares
+
+
+def _table(batch: Path) -> Table:
+    """Open the table of a batch."""
+    from toonset.cli.batch.batch import SHARDS
+    from toonset.cli.batch.table import TABLE, Table
+
+    if not (batch / TABLE).is_file() and batch.is_dir() and any(batch.glob(SHARDS)):
+        raise UsageError(f"{batch}: is in parts still; run `toonset batch --merge` on it first")
+    return Table(batch / TABLE)
+
+
+def _check_out(out: Path, batch: Path, *, force: bool) -> None:
+    """Refuse, before any work, a place that must not be written.
+
+    Many data sets have a folder "train": only a card says that one is ours.
+    """
+    check_output(out, [batch], WRITTEN, force=force)
+    if out.is_dir() and any(out.iterdir()) and not (out / CARD).is_file():
+        raise OutputError(
+            f"{out}: has no {CARD}, so it is no data set of toonset, and --force does not replace "
+            "it; choose another -o"
+        )
+
+
+def _choose(wanted: Wanted, printer: Printer) -> tuple[list[Chosen], Tally]:
+    """Return the sheets to pack, by name, each read and checked to its last pixel."""
+    from toonset.cli.batch.card import Tally
+
+    states, chosen, tally = Counter[str](), list[Chosen](), Tally()
+    for row in wanted.table.rows():
+        sheet = wanted.record(row.name, decode=True)
+        states["of another verdict" if row.state == "done" else row.state] += sheet is None
+        if sheet is not None:
+            split = split_of(sheet.values["character"], wanted.shares)
+            tally.add(split, sheet)
+            chosen.append(Chosen(sheet.name, split, sheet.digest))
+            printer.progress(f"checking sheets {len(chosen)}")
+    left = ", ".join(f"{count} {state}" for state, count in states.items() if count)
+    if not chosen:
+        raise ToonsetError(
+            f"{wanted.batch}: has no sheet to pack ({left or 'none at all'}); run the batch first, "
+            "or take other verdicts"
+        )
+    if left:
+        printer.say(f"left out: {left}")
+    return sorted(chosen), tally
+
+
+def _write(
+    folder: Path,
+    wanted: Wanted,
+    kind: Kind,
+    chosen: Sequence[Chosen],
+    tally: Tally,
+    most: int,
+    printer: Printer,
+) -> dict[str, Any]:
+    """Write all splits and the card."""
+    from toonset.cli.batch.card import encode_card, make_card
+    from toonset.cli.batch.shards import write_folders, write_parquet, write_webdataset
+
+    writers: dict[Kind, Write] = {
+        "webdataset": write_webdataset,
+        "parquet": write_parquet,
+        "folder": write_folders,
+    }
+    files = {}
+    for split in SPLITS:
+        names = [one for one in chosen if one.split == split]
+        if names:
+            shards = writers[kind](folder, split, _records(wanted, names, printer), most)
+            files[split] = [asdict(shard) for shard in shards]
+    card = make_card(tally, kind, wanted.shares, files)
+    example = next(one.name for one in chosen if one.split == next(iter(files)))
+    for name, data in encode_card(card, example).items():
+        write_bytes(folder / name, data)
+    return card
+
+
+def _records(wanted: Wanted, chosen: Sequence[Chosen], printer: Printer) -> Iterator[SheetRecord]:
+    """Yield the records of sheets, which are as they were when they were checked."""
+    for number, one in enumerate(chosen, 1):
+        sheet = wanted.record(one.name, decode=False)
+        if sheet is None or sheet.digest != one.digest:
+            raise ToonsetError(
+                f"{one.name}: has changed while it was packed; wait for the batch, and pack again"
+            )
+        printer.progress(f"packing {one.split} {number}/{len(chosen)}")
+        yield sheet

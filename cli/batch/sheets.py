@@ -1,0 +1,303 @@
+"""List the sheets of a batch: files, folders, patterns and URLs, or manifests that say more.
+
+A manifest is a CSV table or a JSONL file with one object per sheet. Its columns or keys:
+
+    sheet       the drawing, or a folder of views; several as a list, in CSV with ";" between
+    name        of its folder and in the data set (default: from the file's name)
+    mesh        its mannequin, as of `toonset calibrate --mesh`
+    views       what its views show, as of `--views`
+    calibrate_options, palette_options, ...   of a stage, as typed after its verb
+    character, license, source       for the data set
+
+Paths are relative to the manifest's folder, and must lie in it, or in the folder of --root.
+"""
+
+from __future__ import annotations
+
+import csv
+import glob
+import io
+import os
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from toonset.cli.batch.stages import STAGES, Entry, as_words, files_among, parse
+from toonset.cli.batch.storage import find, is_url
+from toonset.errors import SheetError, one_line, printable
+
+MANIFESTS = (".csv", ".jsonl")
+LONGEST_NAME = 100  # bytes: a folder of toonset's own adds some, 255 is the most
+WILD = re.compile(r"[*?\[]")
+SPLIT = "split.json"  # in a folder that `toonset split` wrote
+PLAIN = ("sheet", "name", "mesh", "views", "character", "license", "source")
+OPTIONS = "_options"  # ends the name of a stage's column
+
+
+@dataclass(frozen=True)
+class Given:
+    """One sheet as somebody named it.
+
+    Attributes:
+        where: that was, for messages.
+        root: what its paths are relative to.
+        inside: whether they must lie in there.
+        name: of the sheet, made from its file's where nobody gave one.
+        values: by column.
+    """
+
+    where: str
+    root: Path
+    inside: bool
+    name: str
+    values: Mapping[str, Any]
+
+
+def list_sheets(
+    places: Sequence[str],
+    words: Mapping[str, Sequence[str]],
+    root: Path | None = None,
+    out: Path | None = None,
+) -> list[Entry]:
+    """Return the sheets of places as a person names them, each checked, by name.
+
+    Args:
+        places: pictures, folders of them, patterns, URLs, manifests.
+        words: of every stage's command line, for all sheets; those of a manifest follow.
+        root: the folder that a manifest's paths are relative to; None: the manifest's own.
+        out: the batch's folder: what a pattern finds in there is no sheet.
+
+    Raises:
+        ToonsetError: nothing is there, a manifest says what cannot be, two have one name.
+    """
+    given = [one for place in places for one in _given(place, root, out)]
+    if not given:
+        raise SheetError(f"{', '.join(map(printable, places))}: no sheets there; name pictures")
+    here = Given("", Path.cwd(), False, "", {})
+    common = {stage: _absolute(stage, said, (), here) for stage, said in words.items()}
+    entries = [_entry(one, common) for one in given]
+    _check_names(entries, given)
+    return sorted(entries, key=lambda entry: entry.name)
+
+
+def _given(place: str, root: Path | None, out: Path | None) -> Iterator[Given]:
+    """Yield the sheets of one place."""
+    from toonset.dataset.images.folder import ENDINGS, picture_files
+    from toonset.read import check_there
+
+    path, here = Path(place), Path.cwd()
+    if is_url(place):
+        found = find(place) if WILD.search(place) else [place]
+        for url in found:
+            yield Given(url, here, False, clean_name(url.rsplit("/", 1)[-1]), {"sheet": url})
+        return
+    if path.suffix.lower() in MANIFESTS and not path.is_dir():
+        yield from _manifest(path, root)
+        return
+    if WILD.search(place) and not path.exists():
+        base = Path(WILD.split(place)[0] + "x").parent  # up to the first wild part
+        files = [Path(name) for name in sorted(glob.glob(place, recursive=True))]
+        files = [file for file in files if file.is_dir() or file.suffix.lower() in ENDINGS]
+        files = [file for file in files if out is None or not _is_within(file, out)]
+    else:
+        check_there([path], "picture", SheetError)
+        base, files = path.parent, [path]
+        if path.is_dir() and not (path / SPLIT).is_file():
+            base, files = path, list(picture_files(path)[0])
+    for file in files:
+        inside = file.relative_to(base)
+        name = clean_name(
+            "-".join(inside.with_name(inside.name if file.is_dir() else inside.stem).parts)
+        )
+        yield Given(str(file), here, False, name, {"sheet": str(file)})
+
+
+def _is_within(file: Path, folder: Path) -> bool:
+    return Path(os.path.abspath(file)).is_relative_to(os.path.abspath(folder))
+
+
+def clean_name(text: str) -> str:
+    """Return a file's name as the name of a sheet: what may stand in no folder's name is "_"."""
+    stem = text.rsplit(".", 1)[0] if "." in text[1:] else text
+    return re.sub(r"[^\w-]+", "_", unicodedata.normalize("NFC", stem)).strip("_").lstrip("-")
+
+
+def _manifest(path: Path, root: Path | None) -> Iterator[Given]:
+    """Yield the sheets of a manifest.
+
+    Raises:
+        SheetError: it cannot be read, or has a column that means nothing.
+    """
+    from toonset.read import read_whole
+
+    data = read_whole(path, "manifest", SheetError)
+    reader = _csv_rows if path.suffix.lower() == ".csv" else _jsonl_rows
+    base = Path(os.path.abspath(root or path.parent))
+    for line, values in reader(path, data):
+        where = f"{path}: line {line}"
+        _check_values(where, values)
+        sheets = _sheets_of(values)
+        if not sheets:
+            raise SheetError(f"{where}: names no sheet; give its picture under 'sheet'")
+        name = values.get("name") or clean_name(sheets[0].replace("\\", "/").rsplit("/", 1)[-1])
+        yield Given(where, base, True, name, {**values, "sheet": sheets})
+
+
+def _csv_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield line and values of a CSV manifest; empty cells are left out."""
+    try:
+        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
+        head = [cell.strip() for cell in next(rows)]
+        if double := next((name for name in head if head.count(name) > 1), None):
+            raise SheetError(f"{path}: has two columns {double!r}; take one out")
+        for row in rows:
+            if len(row) > len(head):
+                raise SheetError(f"{path}: line {rows.line_num}: has more cells than columns")
+            values = {name: cell.strip() for name, cell in zip(head, row, strict=False)}
+            if any(values.values()):
+                yield rows.line_num, {name: cell for name, cell in values.items() if cell}
+    except UnicodeDecodeError as error:
+        raise SheetError(f"{path}: is no UTF-8 text; save it as UTF-8") from error
+    except csv.Error as error:
+        raise SheetError(f"{path}: is no CSV ({one_line(error)}); export it again") from error
+
+
+def _jsonl_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield line and values of a JSONL manifest."""
+    from toonset.read import parse_json
+
+    for number, line in enumerate(data.split(b"\n"), 1):
+        if not line.strip():
+            continue
+        values = parse_json(line, f"{path}: line {number}", SheetError)
+        if not isinstance(values, dict):
+            raise SheetError(f"{path}: line {number}: is no JSON object; write one per sheet")
+        for name, value in values.items():
+            texts = value if isinstance(value, list) and name == "sheet" else [value]
+            if not all(isinstance(text, str) for text in texts):
+                raise SheetError(f"{path}: line {number}: {name!r} is no text; quote it")
+        yield number, {name: value for name, value in values.items() if value}
+
+
+def _check_values(where: str, values: Mapping[str, Any]) -> None:
+    """Refuse a column that means nothing, and text that no file's name can hold."""
+    from toonset.suggest import did_you_mean
+
+    known = [*PLAIN, *(f"{stage}{OPTIONS}" for stage in STAGES)]
+    for name, value in values.items():
+        if "\0" in "".join(value):
+            raise SheetError(f"{where}: {name!r} holds a zero character; take it out")
+        if name not in known:
+            said = did_you_mean(name, known) or f"known are {', '.join(known)}"
+            raise SheetError(f"{where}: {name!r} is no column of a manifest; {said}")
+
+
+def _sheets_of(values: Mapping[str, Any]) -> list[str]:
+    sheets = values.get("sheet", [])
+    parts = sheets if isinstance(sheets, list) else sheets.split(";")
+    return [part.strip() for part in parts if part.strip()]
+
+
+def _entry(given: Given, common: Mapping[str, tuple[str, ...]]) -> Entry:
+    """Return a sheet with its paths found and its options checked."""
+    _check_name(given)
+    values, words = given.values, {}
+    sheets = values["sheet"] if isinstance(values["sheet"], list) else [values["sheet"]]
+    for stage in STAGES:
+        own = [*as_words(values.get(f"{stage}{OPTIONS}", ""), given.where)]
+        if stage == "calibrate":
+            own += [f"--mesh={values['mesh']}"] if "mesh" in values else []
+            own += [f"--views={values['views']}"] if "views" in values else []
+        usual = common.get(stage, ())
+        said = (*usual, *_absolute(stage, own, usual, given))
+        if said:
+            words[stage] = said
+    return Entry(
+        given.name,
+        tuple(_place(sheet, given) for sheet in sheets),
+        words,
+        values.get("character", given.name),
+        values.get("license", ""),
+        values.get("source", ""),
+    )
+
+
+def _check_name(given: Given) -> None:
+    """Refuse a name that could mean something to a shell, a page or another system."""
+    name = given.name
+    if not name or clean_name(name) != name or "." in name:
+        raise SheetError(
+            f"{given.where}: {printable(name)!r} is no name for a sheet; take letters, digits, "
+            "'_' and '-', a letter or digit first"
+        )
+    if len(name.encode()) > LONGEST_NAME:
+        raise SheetError(f"{given.where}: its name is longer than {LONGEST_NAME} bytes; shorten it")
+
+
+def _check_names(entries: Sequence[Entry], given: Sequence[Given]) -> None:
+    """Refuse two sheets whose folders would be one, on some file systems at least."""
+    seen: dict[str, tuple[str, str]] = {}
+    for entry, one in zip(entries, given, strict=True):
+        folded = unicodedata.normalize("NFKC", entry.name).casefold()
+        if folded in seen:
+            name, where = seen[folded]
+            said = "two sheets are called" if name == entry.name else "differs by case only from"
+            first = f"{entry.name!r} " if name != entry.name else ""
+            raise SheetError(
+                f"{one.where}: {first}{said} {name!r}, the other is {where}; name one differently"
+            )
+        seen[folded] = entry.name, one.where
+
+
+def _place(place: str, given: Given) -> str:
+    """Return the absolute path of what a sheet names, which is there, or its URL."""
+    from toonset.read import check_there
+
+    if is_url(place):
+        return place
+    path = _within(place, given)
+    try:
+        check_there([path], "picture", SheetError)
+    except SheetError as error:
+        raise SheetError(f"{given.where}: {error}" if given.inside else str(error)) from error
+    return str(path)
+
+
+def _within(place: str, given: Given) -> Path:
+    """Return an absolute path; one that leads out of its manifest's root is refused."""
+    path = Path(os.path.abspath(given.root / place))
+    if given.inside and not path.resolve().is_relative_to(given.root.resolve()):
+        raise SheetError(
+            f"{given.where}: {printable(place)!r} lies outside of {given.root}; move it there, or "
+            "widen --root"
+        )
+    return path
+
+
+def _absolute(
+    stage: str, words: Sequence[str], common: Sequence[str], given: Given
+) -> tuple[str, ...]:
+    """Return a stage's words, checked behind the common ones; files among them as absolute."""
+    from toonset.read import check_there
+
+    if not words:
+        return ()
+    where = given.where or f"--with {stage}"
+    files = {
+        str(Path(text)) for text in files_among(parse(stage, [*common, *words], where), given.root)
+    }
+    absolute = []
+    for word in words:
+        flag, equals, value = word.rpartition("=") if word.startswith("--") else ("", "", word)
+        if value and not is_url(value) and str(Path(value)) in files:
+            path = _within(value, given)
+            try:
+                check_there([path], "file", SheetError)
+            except SheetError as error:
+                raise SheetError(f"{where}: {error}") from error
+            word = f"{flag}{equals}{path}"
+        absolute.append(word)
+    return tuple(absolute)

@@ -1,0 +1,335 @@
+"""Say what the stages of a batch are: verbs of toonset, their command lines, what they write.
+
+A stage's key is one hash of all that its result depends on: the same key means the same result.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib
+import json
+import pkgutil
+import re
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from toonset.cli.common.refusals import refusal
+from toonset.errors import UsageError
+
+PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless", "torch")
+BUNDLE = "bundle"
+RUN = f"{BUNDLE}/run"
+OWN = ("out", "force", "as_json", "quiet", "verbose", "threads", "preview_every", "strict")
+ONE_SLASH = re.compile(r"^([a-z][a-z0-9+.-]+):/(?!/)")  # what a path makes of a URL
+NO_BODY = "none"  # as of `calibrate --mesh`
+FILE_OR_COLORS = ("colors", "palette", "variants")
+PLACE = Path("place")  # stands for a sheet's own folders while words are checked
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One sheet, and what is known of it.
+
+    Attributes:
+        name: of its folder and in the data set: letters, digits, "_" and "-".
+        sheets: what `toonset calibrate` takes: absolute paths, or URLs.
+        words: of a stage's command line, by stage; paths in them are absolute.
+        character: whom it shows; the name where nobody says.
+        license: of the drawing.
+        source: where it is from.
+    """
+
+    name: str
+    sheets: tuple[str, ...]
+    words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    character: str = ""
+    license: str = ""
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One verb on a sheet's way.
+
+    Attributes:
+        name: of the verb.
+        after: stages whose results it takes: the first of them that the sheet has.
+        argument: its parameter for what it reads.
+        reads: that, in the sheet's folder; "": the sheets.
+        writes: file or folder in the sheet's folder.
+        mark: in it, what is there once it has written.
+        has_out: whether it is told where to write.
+        usual: what it is told where no other words say so, by the options that would.
+        imports: the part of toonset to import before sheets come.
+        timed: files of it that hold seconds, and differ each time.
+    """
+
+    name: str
+    after: tuple[str, ...]
+    argument: str
+    reads: str
+    writes: str
+    mark: str = ""
+    has_out: bool = True
+    usual: Mapping[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
+    imports: str = "nerf"
+    timed: tuple[str, ...] = ()
+
+
+TURNTABLE: dict[tuple[str, ...], tuple[str, ...]] = {
+    ("--turntable", "--cameras"): ("--turntable", "36")
+}
+_LIST = (
+    Stage("calibrate", (), "sheets", "", BUNDLE, "transforms.json", imports="calib"),
+    Stage(
+        *("palette", ("calibrate",), "inputs", BUNDLE, BUNDLE, "palette.json"),
+        has_out=False,
+        imports="palette",
+    ),
+    Stage(
+        *("train", ("palette", "calibrate"), "bundle", BUNDLE, RUN, "metrics.json"),
+        timed=("metrics.json", "history.csv"),
+    ),
+    Stage("render", ("train",), "run", RUN, "turntable", usual=TURNTABLE),
+    Stage("view", ("train",), "folder", RUN, "character.html"),
+    Stage("mesh", ("train",), "run", RUN, "character.glb"),
+    Stage("export", ("palette", "calibrate"), "bundle", BUNDLE, "export", imports="dataset"),
+)
+STAGES: Mapping[str, Stage] = {stage.name: stage for stage in _LIST}
+RANKS = {name: rank for rank, name in enumerate(STAGES)}
+
+
+def before(stage: str, chosen: Sequence[str]) -> str | None:
+    """Return the chosen stage whose results a stage takes; None for the first."""
+    return next((name for name in STAGES[stage].after if name in chosen), None)
+
+
+def in_order(names: Sequence[str]) -> tuple[str, ...]:
+    """Return stages in the order in which they run.
+
+    Raises:
+        UsageError: one is unknown, or takes what none of the others makes.
+    """
+    from toonset.suggest import did_you_mean
+
+    if not names:
+        raise UsageError(f"--stages: names no stage; known are {', '.join(STAGES)}")
+    for name in names:
+        if name not in STAGES:
+            near = did_you_mean(name, STAGES)
+            raise UsageError(
+                f"--stages: {name!r} is none of {', '.join(STAGES)}" + (f"; {near}" if near else "")
+            )
+    for name in names:
+        if STAGES[name].after and before(name, names) is None:
+            raise UsageError(f"--stages: {name} needs {STAGES[name].after[-1]}; add it")
+    return tuple(sorted(set(names), key=RANKS.__getitem__))
+
+
+def parse(stage: str, words: Sequence[str], where: str) -> dict[str, Any]:
+    """Return a verb's arguments for words as they are typed after it, defaults included.
+
+    Args:
+        stage: the verb.
+        words: options only: what it reads and writes is the batch's.
+        where: who says so, for messages.
+
+    Raises:
+        UsageError: the verb does not take them, or a batch sets them itself.
+    """
+    verb, command = STAGES[stage], _command(stage)
+    own = [str(PLACE), *(("--out", str(PLACE)) if verb.has_out else ())]
+    try:
+        with _silent_help(command):
+            context = command.make_context(f"toonset {stage}", [*_usual(verb, words), *words, *own])
+    except Exception as error:
+        said = refusal(error)
+        if said is None:
+            raise
+        raise UsageError(f"{where}: {said}") from error
+    values = dict(context.params)
+    given = values.pop(verb.argument)
+    if given not in ([PLACE], PLACE):
+        raise UsageError(f"{where}: {stage} reads the sheet's own; options only are taken here")
+    if typed := _typed(context, verb, words):
+        raise UsageError(f"{where}: {typed} is set by toonset batch; leave it out")
+    return values
+
+
+def _usual(verb: Stage, words: Sequence[str]) -> list[str]:
+    said = {word.split("=")[0] for word in words}
+    return [word for flags, usual in verb.usual.items() if not said & {*flags} for word in usual]
+
+
+def check_options(entries: Iterable[Entry], stages: Sequence[str]) -> None:
+    """Refuse sheets whose stages lack an option that they need.
+
+    Raises:
+        UsageError: naming the first.
+    """
+    seen = set()
+    for entry in entries:
+        for stage in stages:
+            words = entry.words.get(stage, ())
+            if (stage, words) not in seen:
+                parse(stage, words, f"{entry.name}: {stage}")
+            seen.add((stage, words))
+
+
+def _typed(context: Any, verb: Stage, words: Sequence[str]) -> str:
+    """Return an option among words that is not theirs to give."""
+    for param in context.command.params:
+        flags = [*param.opts, *param.secondary_opts]
+        if param.name in OWN:
+            source = context.get_parameter_source(param.name)
+            ours = param.name == "out" and not any(
+                word.split("=")[0] in flags or word.startswith("-o") for word in words
+            )
+            if source is not None and source.name == "COMMANDLINE" and not ours:
+                return str(max(flags, key=len))
+    return ""
+
+
+@contextlib.contextmanager
+def _silent_help(command: Any) -> Iterator[None]:
+    """Refuse -h among words as any other unknown option."""
+    added, command.add_help_option = command.add_help_option, False
+    try:
+        yield
+    finally:
+        command.add_help_option = added
+
+
+@cache
+def _command(stage: str) -> Any:
+    from toonset.cli.main import app
+
+    return typer.main.get_command(app).commands[stage]  # type: ignore[attr-defined]
+
+
+def files_among(values: Mapping[str, Any], root: Path) -> Iterator[str]:
+    """Yield the files among a verb's arguments, as they were typed.
+
+    Args:
+        values: what `parse` returned.
+        root: what they are relative to.
+    """
+    for name, value in values.items():
+        for one in value if isinstance(value, list | tuple) else [value]:
+            is_path = isinstance(one, Path) and one != PLACE
+            if is_path and not (name == "mesh" and str(one) == NO_BODY):
+                yield ONE_SLASH.sub(r"\1://", str(one))
+            elif name in FILE_OR_COLORS and isinstance(one, str) and (root / one).is_file():
+                yield one
+
+
+def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> int:
+    """Run a verb on a sheet; what it says for machines goes to standard output.
+
+    Args:
+        stage: the verb.
+        words: of its command line.
+        sheets: the drawings.
+        home: the sheet's folder.
+
+    Returns:
+        its exit code.
+
+    Raises:
+        Exception: what the verb raises.
+    """
+    verb = STAGES[stage]
+    values = parse(stage, words, stage)
+    reads: Any = home / verb.reads if verb.reads else [Path(sheet) for sheet in sheets]
+    values[verb.argument] = [reads] if verb.argument == "inputs" else reads
+    values |= {"out": home / verb.writes} if verb.has_out else {}
+    own = {"force": True, "as_json": True, "threads": 1}
+    values |= {name: value for name, value in own.items() if name in values}
+    try:
+        _command(stage).callback(**values)
+    except typer.Exit as leaving:
+        return leaving.exit_code
+    return 0
+
+
+def import_parts(stages: Sequence[str]) -> None:
+    """Import what the stages would, so that processes forked from this one need not."""
+    for part in dict.fromkeys(STAGES[name].imports for name in stages):
+        package = importlib.import_module(f"toonset.{part}")
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            importlib.import_module(module.name)
+    for name in ("PIL.Image", "trimesh.exchange.load", "skimage.measure"):
+        importlib.import_module(name)
+    importlib.import_module("PIL.Image").init()
+
+
+def as_words(text: str, where: str) -> tuple[str, ...]:
+    """Return words as a shell would read them.
+
+    Raises:
+        UsageError: a quote is not closed.
+    """
+    try:
+        return tuple(shlex.split(text))
+    except ValueError as error:
+        raise UsageError(f"{where}: {text!r}: {error}; close the quote") from error
+
+
+def keys_of(entry: Entry, stages: Sequence[str], hash_of: Callable[[str], str]) -> dict[str, str]:
+    """Return the key of every stage: of inputs, all options, versions and the stage before.
+
+    Args:
+        entry: the sheet.
+        stages: in order.
+        hash_of: returns the hash of a file's or folder's content.
+
+    Raises:
+        UsageError: a stage lacks an option that it needs.
+    """
+    keys: dict[str, str] = {}
+    for stage in stages:
+        earlier = before(stage, stages)
+        content = {
+            "stage": stage,
+            "from": keys[earlier] if earlier else [_file(one, hash_of) for one in entry.sheets],
+            "options": _options(stage, entry, hash_of),
+            "versions": _versions(),
+        }
+        keys[stage] = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return keys
+
+
+def _options(stage: str, entry: Entry, hash_of: Callable[[str], str]) -> dict[str, Any]:
+    values = parse(stage, entry.words.get(stage, ()), f"{entry.name}: {stage}")
+    files = {*files_among(values, Path("/"))}
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return [plain(one) for one in value]
+        if (
+            isinstance(value, str | Path)
+            and (typed := ONE_SLASH.sub(r"\1://", str(value))) in files
+        ):
+            return _file(typed, hash_of)
+        return value.value if isinstance(value, Enum) else str(value)
+
+    return {name: plain(value) for name, value in values.items()}
+
+
+def _file(place: str, hash_of: Callable[[str], str]) -> list[str]:
+    """Return a file's name, which bundles record, and its content's hash."""
+    return [place.rstrip("/").rsplit("/", 1)[-1], hash_of(place)]
+
+
+@cache
+def _versions() -> dict[str, str]:
+    return {name: version(name) for name in PACKAGES}

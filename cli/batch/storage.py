@@ -1,0 +1,182 @@
+"""Reach inputs and results that lie on disk, or behind a URL that fsspec can open.
+
+A URL's scheme says by which package: file:// and memory:// need none, s3:// s3fs, gs:// gcsfs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from toonset.cli.batch.table import Table
+from toonset.errors import SheetError, ToonsetError, one_line
+
+URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
+MANY = 500  # hashes that are kept until the table takes them
+
+
+def is_url(place: str) -> bool:
+    """Return whether a place is a URL rather than a path."""
+    return URL.match(place) is not None
+
+
+def find(pattern: str) -> list[str]:
+    """Return the files behind a URL with wildcards, in order.
+
+    Raises:
+        ToonsetError: it cannot be reached.
+    """
+    with _reached(pattern) as (files, path):
+        return [files.unstrip_protocol(found) for found in sorted(files.glob(path))]
+
+
+def looks(place: str) -> str | None:
+    """Return what changes when a file or folder does; None if there is nothing.
+
+    Of a path the size, time and number of every file, of a URL what its server says of it.
+
+    Raises:
+        ToonsetError: a URL cannot be reached.
+    """
+    if is_url(place):
+        with _reached(place) as (files, path):
+            if not files.exists(path):
+                return None
+            info = {name: str(value) for name, value in files.info(path).items()}
+            named = ("ETag", "etag", "md5Hash", "generation", "mtime", "LastModified", "created")
+            return json.dumps({name: info[name] for name in ("size", *named) if name in info})
+    try:
+        return json.dumps([[str(file), *_stat(file)] for file in _files(Path(place))])
+    except OSError:
+        return None
+
+
+def content_hash(place: str) -> str:
+    """Return the SHA-256 of a file's bytes, or of a folder's names and bytes.
+
+    Of a URL it is the hash of what its server says, for the bytes are not here.
+
+    Raises:
+        OSError: it cannot be read.
+        ToonsetError: a URL cannot be reached.
+    """
+    if is_url(place):
+        return hashlib.sha256((looks(place) or "").encode()).hexdigest()
+    root, found = Path(place), hashlib.sha256()
+    if not root.is_dir():
+        return _sha256(root)
+    for file in _files(root):
+        found.update(f"{file.relative_to(root).as_posix()}\0{_sha256(file)}\n".encode())
+    return found.hexdigest()
+
+
+def fetch(url: str, folder: Path) -> Path:
+    """Copy what is behind a URL, a file or a folder, into a folder; return where it lies.
+
+    Raises:
+        ToonsetError: it cannot be reached.
+    """
+    with _reached(url) as (files, path):
+        place = folder / (path.rstrip("/").rsplit("/", 1)[-1] or "sheet")
+        files.get(path, str(place), recursive=files.isdir(path))
+        return place
+
+
+def push(folder: Path, url: str, last: tuple[str, ...] = ()) -> None:
+    """Copy a folder's files behind a URL, some of them when all others are there.
+
+    Raises:
+        ToonsetError: it cannot be reached.
+    """
+    with _reached(url) as (files, path):
+        names = [file.relative_to(folder).as_posix() for file in _files(folder)]
+        there = files.find(path) if files.exists(path) else []
+        gone = {name.removeprefix(path.rstrip("/") + "/") for name in there} - set(names)
+        early = [name for name in last if name in {*names, *gone}]
+        files_at = {name: f"{path.rstrip('/')}/{name}" for name in {*names, *gone}}
+        for name in (*early, *sorted(gone)):  # first what says that all is there
+            with contextlib.suppress(FileNotFoundError):
+                files.rm_file(files_at[name])
+        for name in sorted(names, key=lambda name: (name in last, name)):
+            files.makedirs(files_at[name].rsplit("/", 1)[0], exist_ok=True)
+            files.put_file(str(folder / name), files_at[name])
+
+
+def _files(root: Path) -> list[Path]:
+    """Return a file, or all regular files below a folder but hidden ones, in order."""
+    if not root.is_dir():
+        root.stat()
+        return [root]
+    found = []
+    for folder, folders, names in os.walk(root):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        found += [Path(folder, name) for name in sorted(names) if not name.startswith(".")]
+    return [file for file in found if file.is_file()]
+
+
+def _stat(file: Path) -> tuple[int, int, int]:
+    stat = file.stat()
+    return stat.st_size, stat.st_mtime_ns, stat.st_ino
+
+
+def _sha256(file: Path) -> str:
+    with open(file, "rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
+@contextlib.contextmanager
+def _reached(url: str) -> Iterator[tuple[Any, str]]:
+    """Yield the file system behind a URL, and its path there; one line for what goes wrong."""
+    import fsspec
+
+    try:
+        yield fsspec.core.url_to_fs(url)
+    except ToonsetError:
+        raise
+    except ImportError as error:
+        raise ToonsetError(f"{url}: {one_line(error)}") from error
+    except Exception as error:  # each package has its own
+        raise ToonsetError(f"{url}: cannot be reached ({one_line(error)})") from error
+
+
+class Hashes:
+    """Hashes of inputs; a file that looks as it did in an earlier run is not read again."""
+
+    def __init__(self, table: Table) -> None:
+        """Keep them in a table."""
+        self._table, self._new = table, dict[str, tuple[str, str]]()
+
+    def __call__(self, place: str) -> str:
+        """Return the hash of a file's or folder's content.
+
+        Raises:
+            SheetError: it cannot be read.
+        """
+        seen = looks(place)
+        if seen is None:
+            raise SheetError(f"{place}: does not exist; check the name")
+        if place in self._new and self._new[place][0] == seen:
+            return self._new[place][1]
+        known = self._table.hash_of(place, seen)
+        if known is not None:
+            return known
+        try:
+            found = content_hash(place)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise SheetError(f"{place}: cannot be read ({reason}); check permissions") from error
+        self._new[place] = seen, found
+        if len(self._new) >= MANY:
+            self.keep()
+        return found
+
+    def keep(self) -> None:
+        """Write the new ones to the table."""
+        self._table.keep_hashes((place, *new) for place, new in self._new.items())
+        self._new.clear()

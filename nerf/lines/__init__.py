@@ -1,1 +1,0 @@
-"""Find the drawings' contour lines, and the depth steps that have one."""

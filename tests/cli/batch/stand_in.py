@@ -1,0 +1,106 @@
+"""A stage that takes no time: a sheet is a text file that says how to behave."""
+
+import json
+import os
+import signal
+import time
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+from toonset.cli.batch.dispatch import Limits, Runner
+from toonset.cli.batch.local import LocalWorkers
+from toonset.cli.batch.stages import STAGES, Entry
+from toonset.cli.batch.table import TABLE, Plan, SheetRow, StageRow, Table
+from toonset.errors import SheetError
+from toonset.write import new_folder, write_json
+
+count_in: Path | None = None  # which stages were run; None: OUT/runs
+CHOSEN = ("calibrate", "palette")
+
+
+def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> int:
+    """Write what the stage would, or do what the sheet says; count it in `runs`."""
+    text = Path(sheets[0]).read_text()
+    with open(count_in or home.parents[1] / "runs", "a") as file:
+        file.write(f"{home.name} {stage}\n")
+    what, _, where = text.partition(" ")
+    if where in ("", stage):
+        _behave(what, home)
+    verb = STAGES[stage]
+    if stage == "calibrate":
+        with new_folder(home / verb.writes, force=True) as folder:
+            write_json(folder / verb.mark, [text, list(words)])
+    else:
+        write_json(home / verb.writes / verb.mark, [text, list(words)])
+    said = {"verdict": "ok", "reason": "", "views": [1], "colors": [1, 2]}
+    print(json.dumps(said))
+    return 0
+
+
+def _behave(what: str, home: Path) -> None:
+    if what == "fail":
+        raise SheetError("sheet.png: no figures; draw some")
+    if what == "bug":
+        raise KeyError("views")
+    if what == "crash":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if what == "exit":
+        os._exit(7)
+    if what == "killed":  # by somebody else, the first three times
+        tries = (home / "tries").read_text() if (home / "tries").is_file() else ""
+        (home / "tries").write_text(f"{tries}x")
+        if len(tries) < 3:
+            os.kill(os.getpid(), signal.SIGKILL)
+    if what == "hang":
+        time.sleep(600)
+    if what == "eat":
+        held = [bytes([n]) * (1 << 27) for n in range(1, 33)]
+        time.sleep(len(held))
+    if what == "slow":
+        time.sleep(0.3)
+    if what == "full" and not (home.parents[1] / "room").is_file():
+        raise OSError(28, "No space left on device", str(home))
+
+
+def make_table(out: Path, sheets: dict[str, str], words: Sequence[str] = ()) -> Table:
+    """Return a table of sheets that behave as they say."""
+    (out / "in").mkdir(parents=True, exist_ok=True)
+    plans = []
+    for position, (name, text) in enumerate(sheets.items()):
+        file = out / "in" / f"{name}.txt"
+        file.write_text(text)
+        keys = {"calibrate": text, "palette": " ".join((text, *words))}
+        entry = Entry(name, (str(file),), {"palette": tuple(words)}, name)
+        plans.append(Plan(entry, position, keys))
+    table = Table(out / TABLE, make=True)
+    table.plan(plans, lambda name: set(CHOSEN))
+    table.choose(sheets)
+    return table
+
+
+def run_all(
+    out: Path,
+    sheets: dict[str, str],
+    *,
+    count: int = 2,
+    limits: Limits = Limits(60),  # noqa: B008
+    words: Sequence[str] = (),
+) -> dict[str, SheetRow]:
+    """Run sheets on local workers; return their rows."""
+    ended: Counter[str] = Counter()
+
+    def take(name: str, rows: Sequence[StageRow]) -> None:
+        ended[name] += 1
+
+    with closing(make_table(out, sheets, words)) as table:
+        with closing(LocalWorkers(count)) as workers:
+            Runner(out, limits, CHOSEN).run(table, workers, take, lambda: None)
+        assert set(ended.values()) <= {1}
+        return {row.name: row for row in table.rows()}
+
+
+def runs(out: Path) -> Counter[str]:
+    """Return how often every stage of every sheet was run."""
+    return Counter((out / "runs").read_text().splitlines())

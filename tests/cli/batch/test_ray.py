@@ -1,0 +1,116 @@
+"""`toonset batch --ray`: the same bytes on a cluster of two nodes, whatever becomes of them."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench.batch.sheets import write_sheets
+from tests.batch.cluster import make_cluster
+from tests.conftest import Command, contents
+
+STAGES = ("--stages", "calibrate,palette")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    made = make_cluster()
+    yield made
+    made.shutdown()
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("library")
+    write_sheets(folder, 6, seed=5)
+    data = (folder / "s0.png").read_bytes()
+    (folder / "torn.png").write_bytes(data[: len(data) // 2])
+    with (folder / "sheets.csv").open("a") as file:
+        file.write("torn.png,body0.obj,torn,,\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def local(library: Path, toonset: Command) -> dict[str, str]:
+    out = library.parent / "local"
+    assert toonset("batch", library / "sheets.csv", "-o", out, *STAGES).code == 3
+    return results(out)
+
+
+def results(out: Path) -> dict[str, str]:
+    found = contents(out / "sheets")
+    return {name: value for name, value in found.items() if name.count("/") > 1}
+
+
+def command(library: Path, out: Path, address: str) -> list[str]:
+    words = ["batch", str(library / "sheets.csv"), "-o", str(out), *STAGES, "--ray", address]
+    return [sys.executable, "-P", "-m", "toonset", *words]
+
+
+def test_two_nodes_give_the_bytes_of_one_machine(
+    library: Path, local: dict[str, str], cluster: Any, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    done = subprocess.run(command(library, out, cluster.address), capture_output=True, text=True)
+    assert done.returncode == 3, done.stderr
+    assert "torn: failed: " in done.stderr
+    assert "Traceback" not in done.stderr
+    assert results(out) == local
+
+
+def test_a_lost_node_loses_no_sheet(
+    library: Path, local: dict[str, str], cluster: Any, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    node = cluster.add_node(num_cpus=2)
+    with subprocess.Popen(command(library, out, cluster.address), stderr=subprocess.PIPE) as run:
+        while run.poll() is None and not list(out.glob("sheets/*/log.txt")):
+            time.sleep(0.05)
+        time.sleep(1)
+        cluster.remove_node(node, allow_graceful=False)
+        _, said = run.communicate(timeout=300)
+    assert run.returncode == 3, said
+    assert results(out) == local
+
+
+def test_a_lost_head_ends_it_with_one_line_and_loses_nothing(
+    library: Path, local: dict[str, str], tmp_path: Path
+) -> None:
+    out, other = tmp_path / "out", make_cluster()
+    with subprocess.Popen(command(library, out, other.address), stderr=subprocess.PIPE) as run:
+        while run.poll() is None and not list(out.glob("sheets/*/palette.json")):
+            time.sleep(0.05)
+        other.shutdown()
+        _, said = run.communicate(timeout=300)
+    assert run.returncode == 2, said
+    assert said.decode().splitlines()[-1].startswith("toonset: the Ray cluster is gone; ")
+    done = subprocess.run(command(library, out, "local"), capture_output=True, text=True)
+    assert done.returncode == 3, done.stderr
+    assert results(out) == local
+
+
+def test_results_go_to_a_store(
+    library: Path, local: dict[str, str], cluster: Any, tmp_path: Path
+) -> None:
+    out, store = tmp_path / "out", tmp_path / "store"
+    words = command(library, out, cluster.address)
+    done = subprocess.run([*words, "--store", f"file://{store}"], capture_output=True, text=True)
+    assert done.returncode == 3, done.stderr
+    found = contents(store)
+    assert {name: found[name] for name in local if local[name] != "folder"} == {
+        name: value for name, value in local.items() if value != "folder"
+    }
+
+
+def test_no_cluster_is_told_in_one_line(library: Path, tmp_path: Path) -> None:
+    words = command(library, tmp_path / "out", "127.0.0.1:1")
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2, done
+    assert done.stderr.startswith("toonset: --ray 127.0.0.1:1: no cluster answers there; ")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,122 @@
+"""Sheets and results behind URLs."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import fsspec
+import pytest
+
+from tests.cli.batch import stand_in
+from toonset.cli.batch import job
+from toonset.cli.batch.job import Job, run_sheet
+from toonset.cli.batch.sheets import list_sheets
+from toonset.cli.batch.storage import content_hash, fetch, find, looks, push
+from toonset.errors import ToonsetError
+
+
+@pytest.fixture
+def memory() -> Iterator[fsspec.AbstractFileSystem]:
+    files = fsspec.filesystem("memory")
+    files.store.clear()
+    yield files
+    files.store.clear()
+
+
+def test_sheets_are_found_behind_a_pattern(memory: fsspec.AbstractFileSystem) -> None:
+    for name in ("b.png", "a.png", "notes.txt"):
+        memory.pipe_file(f"/library/{name}", b"picture")
+    assert find("memory://library/*.png") == ["memory:///library/a.png", "memory:///library/b.png"]
+    entries = list_sheets(["memory://library/*.png"], {})
+    assert [(entry.name, *entry.sheets) for entry in entries] == [
+        ("a", "memory:///library/a.png"),
+        ("b", "memory:///library/b.png"),
+    ]
+
+
+@pytest.mark.parametrize("scheme", ["memory", "file"])
+def test_what_is_put_there_comes_back(
+    scheme: str, tmp_path: Path, memory: fsspec.AbstractFileSystem
+) -> None:
+    url = f"{scheme}://{tmp_path}/there/s"
+    home = tmp_path / "s"
+    (home / "bundle" / "images").mkdir(parents=True)
+    (home / "bundle" / "images" / "000.png").write_bytes(b"1")
+    (home / "calibrate.json").write_text("{}")
+    (home / ".batch.lock").touch()
+    push(home, url, ("calibrate.json",))
+    got = fetch(url, tmp_path / "back")
+    found = sorted(p.relative_to(got).as_posix() for p in got.rglob("*") if p.is_file())
+    assert found == ["bundle/images/000.png", "calibrate.json"]
+    (home / "bundle" / "images" / "000.png").unlink()
+    (home / "bundle" / "images" / "001.png").write_bytes(b"2")
+    push(home, url, ("calibrate.json",))
+    got = fetch(url, tmp_path / "again")
+    assert [p.name for p in (got / "bundle" / "images").iterdir()] == ["001.png"]
+
+
+def test_what_says_that_all_is_there_comes_last(
+    tmp_path: Path, memory: fsspec.AbstractFileSystem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "s").mkdir()
+    for name in ("calibrate.json", "a.png", "z.png"):
+        (tmp_path / "s" / name).write_text(name)
+    push(tmp_path / "s", "memory://there/s", ("calibrate.json",))
+    put = []
+
+    def cut_short(self: object, file: str, path: str, **_: object) -> None:
+        put.append(path.rsplit("/", 1)[-1])
+        if len(put) == 2:
+            raise ConnectionError("gone")
+
+    monkeypatch.setattr(type(memory), "put_file", cut_short)
+    with pytest.raises(ToonsetError, match=r"memory://there/s: cannot be reached \(gone\)"):
+        push(tmp_path / "s", "memory://there/s", ("calibrate.json",))
+    assert put == ["a.png", "z.png"]
+    assert not memory.exists("/there/s/calibrate.json")
+
+
+def test_hashes_tell_files_and_folders_apart(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "x").write_text("1")
+    one = content_hash(str(tmp_path / "a"))
+    (tmp_path / "a" / "x").rename(tmp_path / "a" / "y")
+    two = content_hash(str(tmp_path / "a"))
+    assert len({one, two, content_hash(str(tmp_path / "a" / "y"))}) == 3
+    assert looks(str(tmp_path / "none")) is None
+
+
+def test_a_changed_object_looks_different(memory: fsspec.AbstractFileSystem) -> None:
+    memory.pipe_file("/a.png", b"one")
+    first = content_hash("memory://a.png")
+    memory.pipe_file("/a.png", b"three")
+    assert content_hash("memory://a.png") != first
+    assert looks("memory://b.png") is None
+
+
+@pytest.mark.parametrize(
+    "place", ["nothing://x/y.png", "s3://bucket/none.png", "memory://none/at/all.png"]
+)
+def test_what_cannot_be_reached_is_told_in_a_line(place: str, tmp_path: Path) -> None:
+    with pytest.raises(ToonsetError) as caught:
+        fetch(place, tmp_path)
+    assert str(caught.value).startswith(f"{place}: ")
+    assert str(caught.value).isprintable()
+
+
+def test_a_sheet_and_its_results_behind_urls(
+    tmp_path: Path, memory: fsspec.AbstractFileSystem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job, "run", stand_in.run)
+    monkeypatch.setattr(job, "_pictures", lambda home: {})
+    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
+    memory.pipe_file("/in/a.txt", b"ok")
+    keys = {"calibrate": "k1", "palette": "k2"}
+    one = Job("a", ("memory://in/a.txt",), {}, keys, str(tmp_path / "a"), "memory://out")
+    first = run_sheet(one)
+    assert first.kind == "done", first
+    assert json.loads(memory.cat_file("/out/a/calibrate.json"))["key"] == "k1"
+    assert memory.exists("/out/a/bundle/palette.json")
+    assert run_sheet(one).rows == first.rows  # as its stamps say
+    assert (tmp_path / "runs").read_text().splitlines() == ["a calibrate", "a palette"]
+    assert not list((tmp_path / "a").rglob("*.json"))

@@ -1,0 +1,205 @@
+"""What becomes of sheets whose workers fail, crash, hang, take too much, or are killed."""
+
+import os
+import signal
+import threading
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from tests.cli.batch import stand_in
+from tests.cli.batch.stand_in import CHOSEN, make_table, run_all, runs
+from toonset.cli.batch import dispatch, job
+from toonset.cli.batch.dispatch import Limits, Runner, alive, home_of, release_dead
+from toonset.cli.batch.local import LocalWorkers, usual_workers
+from toonset.cli.batch.table import TABLE, Table
+from toonset.errors import OutputError
+
+
+@pytest.fixture(autouse=True)
+def stands_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(job, "run", stand_in.run)
+    monkeypatch.setattr(job, "_pictures", lambda home: {})
+    monkeypatch.setattr(dispatch, "LOOK_S", 0.05)
+
+
+def test_every_sheet_is_run_once(tmp_path: Path) -> None:
+    rows = run_all(tmp_path, {f"s{i}": "ok" for i in range(20)}, count=3)
+    assert {row.state for row in rows.values()} == {"done"}
+    assert {row.verdict for row in rows.values()} == {"ok"}
+    assert set(runs(tmp_path).values()) == {1}
+    assert len(runs(tmp_path)) == 20 * len(CHOSEN)
+    assert not list(tmp_path.rglob("log.txt"))
+    assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
+
+
+def test_the_same_again_runs_nothing(tmp_path: Path) -> None:
+    sheets = {f"s{i}": "ok" for i in range(4)}
+    run_all(tmp_path, sheets)
+    assert run_all(tmp_path, sheets) == run_all(tmp_path, sheets)
+    assert set(runs(tmp_path).values()) == {1}
+
+
+def test_other_options_of_a_stage_run_that_stage(tmp_path: Path) -> None:
+    run_all(tmp_path, {"a": "ok"})
+    run_all(tmp_path, {"a": "ok"}, words=("--min-share", "0.1"))
+    assert runs(tmp_path) == {"a calibrate": 1, "a palette": 2}
+    run_all(tmp_path, {"a": "ok "}, words=("--min-share", "0.1"))
+    assert runs(tmp_path) == {"a calibrate": 2, "a palette": 3}
+
+
+@pytest.mark.parametrize(
+    ("does", "state", "line", "tried"),
+    [
+        ("fail", "failed", "sheet.png: no figures; draw some", 1),
+        ("bug", "failed", "this is a bug of toonset: KeyError: 'views'", 1),
+        ("crash", "quarantined", "its worker ended by SIGSEGV, 3 times", 3),
+        ("exit", "quarantined", "its worker ended with code 7, 3 times", 3),
+        ("hang", "failed", "took longer than 1 s", 1),
+        ("eat", "failed", "took more than 600 MB of memory", 1),
+    ],
+)
+def test_a_bad_sheet_is_told_and_the_others_are_done(
+    tmp_path: Path, does: str, state: str, line: str, tried: int
+) -> None:
+    sheets = {"a": "ok", "bad": f"{does} palette", "c": "ok", "d": "ok"}
+    rows = run_all(tmp_path, sheets, limits=Limits(1 if does == "hang" else 60, 600))
+    bad = rows.pop("bad")
+    assert {row.state for row in rows.values()} == {"done"}
+    assert (bad.state, bad.error) == (state, line)
+    assert [one.state for one in bad.stages] == ["done", state]
+    assert "--- palette" in bad.stages[1].log
+    assert runs(tmp_path) == {
+        **{f"{name} {stage}": 1 for name in rows for stage in CHOSEN},
+        "bad calibrate": 1,  # is not run again after a crash
+        "bad palette": tried,
+    }
+
+
+def test_crash_leaves_its_last_lines(tmp_path: Path) -> None:
+    row = run_all(tmp_path, {"a": "crash"})["a"]
+    assert "Fatal Python error: Segmentation fault" in row.stages[0].log
+    assert 'stand_in.py", line' in row.stages[0].log
+
+
+def test_a_bug_leaves_its_traceback(tmp_path: Path) -> None:
+    assert "Traceback" in run_all(tmp_path, {"a": "bug"})["a"].stages[0].log
+
+
+def test_a_worker_that_is_killed_is_not_its_sheets_fault(tmp_path: Path) -> None:
+    row = run_all(tmp_path, {"a": "killed palette", "b": "ok"})["a"]
+    assert (row.state, row.crashes) == ("done", 0)
+    assert runs(tmp_path)["a palette"] == 4
+
+
+def test_a_full_disk_stops_all_with_one_line_and_loses_nothing(tmp_path: Path) -> None:
+    with closing(make_table(tmp_path, {"a": "ok", "b": "full palette", "c": "slow"})) as table:
+        runner = Runner(tmp_path, Limits(60), CHOSEN)
+        with closing(LocalWorkers(1)) as workers, pytest.raises(OutputError) as caught:
+            runner.run(table, workers, lambda *_: None, lambda: None)
+        assert str(caught.value).isprintable()
+        assert "No space left on device" in str(caught.value)
+        assert {row.name: row.state for row in table.rows()} == {
+            "a": "done",
+            "b": "waiting",
+            "c": "waiting",
+        }
+    before = runs(tmp_path)
+    (tmp_path / "room").touch()
+    rows = run_all(tmp_path, {"a": "ok", "b": "full palette", "c": "slow"})
+    assert {row.state for row in rows.values()} == {"done"}
+    assert runs(tmp_path) - before == {"b palette": 1, "c calibrate": 1, "c palette": 1}
+
+
+def test_two_runners_share_the_sheets(tmp_path: Path) -> None:
+    sheets = {f"s{i:02d}": "slow" for i in range(8)}
+    make_table(tmp_path, sheets).close()
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            run_all(tmp_path, sheets, count=1)
+            code = 0
+        finally:
+            os._exit(code)
+    rows = run_all(tmp_path, sheets, count=1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert {row.state for row in rows.values()} == {"done"}
+    assert set(runs(tmp_path).values()) == {1}
+    assert len({one.worker for row in rows.values() for one in row.stages}) == 2
+
+
+def test_what_a_dead_runner_had_is_run_by_the_next(tmp_path: Path) -> None:
+    sheets = {f"s{i}": "ok" for i in range(3)}
+    with closing(make_table(tmp_path, sheets)) as table:
+        (tmp_path / dispatch.HOLDERS).mkdir()
+        (tmp_path / dispatch.HOLDERS / "dead").touch()
+        with alive(tmp_path, "living"):
+            for who in ("dead", "living"):
+                table.claim(who, 600)
+            release_dead(table, tmp_path, "me")
+            assert table.runners() == ["living"]
+
+
+def test_workers_end_with_their_parent(tmp_path: Path) -> None:
+    read, write = os.pipe()
+    parent = os.fork()
+    if parent == 0:
+        os.close(read)
+        table = make_table(tmp_path, {"a": "hang", "b": "hang"})
+        workers = LocalWorkers(2)
+        threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGKILL)).start()
+        Runner(tmp_path, Limits(600), CHOSEN).run(table, workers, lambda *_: None, lambda: None)
+        os._exit(0)
+    os.close(write)
+    assert os.waitstatus_to_exitcode(os.waitpid(parent, 0)[1]) == -signal.SIGKILL
+    assert os.read(read, 1) == b""  # until all who have the other end are gone
+    os.close(read)
+
+
+def test_a_stamp_on_disk_counts_when_the_table_forgot(tmp_path: Path) -> None:
+    run_all(tmp_path, {"a": "ok"})
+    for file in tmp_path.glob(f"{TABLE}*"):
+        file.unlink()
+    assert run_all(tmp_path, {"a": "ok"})["a"].state == "done"
+    assert set(runs(tmp_path).values()) == {1}
+
+
+def test_a_damaged_stamp_does_not_count(tmp_path: Path) -> None:
+    run_all(tmp_path, {"a": "ok"})
+    (home_of(tmp_path, "a") / "palette.json").write_text('{"stage": "pal')
+    for file in tmp_path.glob(f"{TABLE}*"):
+        file.unlink()
+    run_all(tmp_path, {"a": "ok"})
+    assert runs(tmp_path) == {"a calibrate": 1, "a palette": 2}
+
+
+def test_the_parents_memory_does_not_grow_with_sheets(tmp_path: Path) -> None:
+    def parents_kb() -> int:
+        status = Path("/proc/self/status").read_text()
+        return int(status.split("VmRSS:")[1].split()[0])
+
+    run_all(tmp_path, {f"s{i:03d}": "ok" for i in range(20)})
+    before = parents_kb()
+    run_all(tmp_path, {f"s{i:03d}": "ok" for i in range(220)})
+    assert parents_kb() - before < 4000
+
+
+def test_workers_fit_into_the_memory() -> None:
+    assert usual_workers(1) == len(os.sched_getaffinity(0))
+    assert usual_workers(10**9) == 1
+
+
+def test_a_table_can_be_looked_at_while_sheets_run(tmp_path: Path) -> None:
+    seen = []
+    with closing(make_table(tmp_path, {f"s{i}": "slow" for i in range(3)})) as table:
+
+        def look() -> None:
+            with closing(Table(tmp_path / TABLE)) as other:
+                seen.append(sum(row.state == "done" for row in other.rows()))
+
+        with closing(LocalWorkers(1)) as workers:
+            Runner(tmp_path, Limits(60), CHOSEN).run(table, workers, lambda *_: None, look)
+    assert seen == sorted(seen)
+    assert seen[-1] == 3
