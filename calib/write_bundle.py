@@ -32,6 +32,14 @@ def write_bundle(
         OutputError: the folder exists and `force` is off or it holds what no bundle does, or it
             cannot be written.
     """
+    save_bundle(folder, found, palette, force=force)
+    return read_bundle(folder)
+
+
+def save_bundle(
+    folder: str | Path, found: Calibration, palette: Palette | None = None, *, force: bool = False
+) -> None:
+    """Write a bundle as `write_bundle` does, without reading it again."""
     folder = Path(folder)
     check_output(folder, [], WRITTEN, force=force)
     cameras = [view.camera for view in found.views]
@@ -48,4 +56,3 @@ def write_bundle(
             sheets = (file["name"] for file in report.get("inputs", ()) if file["role"] == SHEET)
             titled = replace(palette, title=palette.title or palette_title(sheets, folder))
             write_labelled(place, titled, names, pictures, find_contours(pictures))
-    return read_bundle(folder)

@@ -140,7 +140,7 @@ def calibrate(
     """
     from toonset.calib.hints import Hints
     from toonset.calib.verdict.report import calibration_dict
-    from toonset.calib.write_bundle import write_bundle
+    from toonset.calib.write_bundle import save_bundle
     from toonset.dataset.bundle.bundle import WRITTEN
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
@@ -170,7 +170,7 @@ def calibrate(
     if front is not None:
         hints = replace(hints, labels=front_label(front, len(sheet.views)))
     found = _fitted(sheet, body, hints, seed, printer)
-    write_bundle(out, found, force=force)
+    save_bundle(out, found, force=force)
     _say_result(found, out, printer)
     printer.result({"bundle": out, **calibration_dict(found)}, str(out))
     if not found.is_certain:

@@ -1,6 +1,6 @@
 """`python -m bench.batch`: the table's pace; sheets per hour; what a batch costs beside its stages.
 
-Small sheets of three drawings each (`bench.batch.sheets`) run on one worker, on two, and with one
+Small sheets of two drawings each (`bench.batch.sheets`) run on one worker, on two, and with one
 command each.
 """
 

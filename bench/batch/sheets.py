@@ -12,7 +12,7 @@ from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import save_obj
 from toonset.dataset.synthetic.turnaround import make_turnaround
 
-SMALL = replace(DRAWN, views=3, cell_px=64, outline_px=1.5)
+SMALL = replace(DRAWN, views=2, cell_px=48, outline_px=1.5)
 BODIES = 10  # that the sheets share
 MANIFEST = "sheets.csv"
 

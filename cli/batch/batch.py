@@ -302,8 +302,12 @@ def _run(
         table = stack.enter_context(closing(Table(wanted.out / wanted.table, make=True)))
         release_dead(table, wanted.out, runner.ident)
         _plan(table, wanted, printer)
-        mine = (row for row in table.rows() if row.name in wanted.names)
-        progress = Progress(printer, count_stages(mine, wanted.stages))
+
+        def counted() -> dict[str, Counter[str]]:
+            mine = (row for row in table.rows() if row.name in wanted.names)
+            return count_stages(mine, wanted.stages)
+
+        progress = Progress(printer, counted())
         if table.is_due():
             workers = stack.enter_context(closing(start(wanted)))
             page = _Page(wanted, table)
@@ -313,7 +317,7 @@ def _run(
                 page.tick()
 
             runner.run(table, workers, progress.take, tick)
-        progress.close()
+        progress.close(counted())
         _write_page(wanted, table)
         return progress.counts
 

@@ -173,7 +173,8 @@ class Runner:
             if outcome.kind == "gone":
                 line = f"took longer than {self.limits.seconds:g} s"
                 outcome = replace(outcome, kind="failed", line=line)
-        state = self._state(outcome)
+        state, line = self._state(outcome)
+        outcome = replace(outcome, line=line)
         if state == "waiting":
             self._table.release(self.ident, name)
             return
@@ -182,15 +183,17 @@ class Runner:
         if self._table.record(self.ident, name, rows, state):
             ended(name, [row for row in rows if row.stage in due])
 
-    def _state(self, outcome: Outcome) -> State:
-        """Return the state that a sheet goes into; waiting: once more."""
+    def _state(self, outcome: Outcome) -> tuple[State, str]:
+        """Return the state that a sheet goes into, waiting: once more; and why."""
         if outcome.kind in ("done", "failed"):
-            return "done" if outcome.kind == "done" else "failed"
+            return ("done" if outcome.kind == "done" else "failed"), outcome.line
         if outcome.kind == "busy":
-            return "waiting"
-        count = self._table.count_crash(outcome.name, from_outside=outcome.from_outside)
-        most = MOST_KILLS if outcome.from_outside else MOST_CRASHES
-        return "quarantined" if count >= most else "waiting"
+            return "waiting", outcome.line
+        outside = outcome.from_outside
+        count = self._table.count_crash(outcome.name, from_outside=outside)
+        most = MOST_KILLS if outside else MOST_CRASHES
+        line = f"{outcome.line}{' from outside' if outside else ''}, {count} times"
+        return ("quarantined" if count >= most else "waiting"), line
 
     def _with_failure(self, outcome: Outcome, state: State) -> tuple[StageRow, ...]:
         """Return the rows of what failed, with its line; of a death the first that is not done."""
@@ -208,10 +211,9 @@ class Runner:
                 continue
             found = None if self.store else read_stamp(home, row.stage, row.key)
             if found is None:
-                times = f", {sheet.crashes} times" if sheet.crashes > 1 else ""
-                error, tried = f"{outcome.line}{times}", max(sheet.crashes, 1)
-                failed = replace(row, state=state, error=error, log=outcome.log, attempts=tried)
-                return (*rows, replace(failed, ended=time.time()))
+                tried = max(sheet.crashes, 1)
+                failed = replace(row, state=state, error=outcome.line, attempts=tried)
+                return (*rows, replace(failed, log=outcome.log, ended=time.time()))
             rows.append(found)
         return tuple(rows)
 

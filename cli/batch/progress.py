@@ -64,9 +64,10 @@ class Progress:
             self.printer.say(line)
         self._lines = len(lines) if live else 0
 
-    def close(self) -> None:
-        """Say where it stands at the end."""
+    def close(self, counts: Mapping[str, Counter[str]]) -> None:
+        """Say where it stands at the end, with what others did."""
         self._erase()
+        self.counts = counts
         for line in self.lines():
             self.printer.say(line)
 

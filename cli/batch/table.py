@@ -286,10 +286,9 @@ class Table:
         name, states, earlier = plan.entry.name, [], False
         rows = db.execute("SELECT stage, key, state FROM stages WHERE sheet = ?", (name,))
         old = {row["stage"]: row for row in rows}
+        changed = any(s not in old or old[s]["key"] != key for s, key in plan.keys.items())
         if self._is_running(db, name):
-            if any(
-                stage not in old or old[stage]["key"] != key for stage, key in plan.keys.items()
-            ):
+            if changed:
                 raise ToonsetError(
                     f"{self.path.parent}: {name!r} is being worked on with other inputs or options "
                     "by another toonset batch; wait for it, or choose another -o"
@@ -316,6 +315,8 @@ class Table:
             "state = excluded.state",
             (name, plan.position, json.dumps(asdict(plan.entry)), _whole(states)),
         )
+        if changed:
+            db.execute("UPDATE sheets SET crashes = 0, kills = 0 WHERE name = ?", (name,))
 
     @staticmethod
     def _is_running(db: sqlite3.Connection, name: str) -> bool:

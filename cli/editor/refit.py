@@ -15,7 +15,7 @@ from typing import Any, Literal
 from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
 from toonset.calib.without_body.cues import Cues
-from toonset.calib.write_bundle import write_bundle
+from toonset.calib.write_bundle import save_bundle
 from toonset.cli.common.label_drawings import label_drawings
 from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
 from toonset.dataset.bundle.palette_files import write_labelled
@@ -168,7 +168,7 @@ def make_bundle(
     hints = Hints(corrections=file)
     views, body = drawn.sheet.views, subject.body
     found = calibrate(views, body, hints, progress=progress, cues=drawn.cues)
-    write_bundle(new, found)
+    save_bundle(new, found)
     if old.is_dir():
         _take_along(old, new)
     if changed.palette:

@@ -23,29 +23,25 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--ray", action="store_true", help="on a Ray cluster of two nodes")
     given = parser.parse_args()
-    wrong = 0
     with tempfile.TemporaryDirectory() as place:
         work, library = Path(place), Path(place, "library")
         kills.make_library(library, given.sheets, given.seed)
         kills.run_undisturbed(library, work / "undisturbed", "--workers", "2")
-        ends = {"local": ("--workers", "2")}
+        more, pace = ("--workers", "2"), kills.LOCAL
         if given.ray:
             cluster = make_cluster()
             atexit.register(cluster.shutdown)
-            ends = {"ray": ("--ray", cluster.address)}
-        for name, more in ends.items():
-            told = kills.try_back_end(work, library, given.kills, given.seed, *more)
-            twice = kills.twice(work / "disturbed")
-            print(
-                f"{name}: {given.sheets} sheets, {told.killed['workers']} workers and "
-                f"{told.killed['batches']} batches killed in {told.seconds:.0f} s, {twice} stages "
-                f"completed again, {len(told.wrong)} wrong",
-                flush=True,
-            )
-            for line in told.wrong[:20]:
-                print(f"  {line}")
-            wrong += len(told.wrong)
-    return int(wrong > 0)
+            more, pace = ("--ray", cluster.address), kills.RAY
+        told = kills.try_back_end(work, library, given.kills, given.seed, pace, *more)
+        twice = kills.twice(work / "disturbed")
+        print(
+            f"{'ray' if given.ray else 'local'}: {given.sheets} sheets, {told.killed['workers']} "
+            f"workers and {told.killed['batches']} batches killed in {told.seconds:.0f} s, {twice} "
+            f"stages completed again, {len(told.wrong)} wrong"
+        )
+        for line in told.wrong[:20]:
+            print(f"  {line}")
+    return int(bool(told.wrong))
 
 
 if __name__ == "__main__":

@@ -4,8 +4,10 @@ import hashlib
 import io
 import itertools
 import json
+import os
 import re
 import shutil
+import subprocess
 import sys
 import tarfile
 from collections.abc import Callable, Sequence
@@ -263,23 +265,19 @@ def test_parquet_features_are_those_that_datasets_writes(packed: dict[str, Path]
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_what_the_card_says_of_loading_runs(
-    packed: dict[str, Path],
-    kind: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    packed: dict[str, Path], kind: str, tmp_path: Path
 ) -> None:
-    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
-    import datasets
-
-    monkeypatch.setattr("datasets.config.HF_DATASETS_CACHE", tmp_path)
-    monkeypatch.chdir(packed[kind])
-    text = Path("README.md").read_text()
+    text = (packed[kind] / "README.md").read_text()
     (script,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    exec(compile(script, "README.md", "exec"), {"__name__": "snippet"})
-    assert len(capsys.readouterr().out.splitlines()) == (3 if kind == "folder" else 12)
     (call,) = re.findall(r"load_dataset(\(.*split=\"train\"\))", text)
-    assert len(eval(f"load_dataset{call}", {"load_dataset": datasets.load_dataset})) == 12
+    asked = f"from datasets import load_dataset\nprint(len(load_dataset{call}))\n"
+    offline = os.environ | {"HF_HUB_OFFLINE": "1", "HF_DATASETS_CACHE": str(tmp_path)}
+    command = [sys.executable, "-c", script + asked]
+    done = subprocess.run(command, cwd=packed[kind], env=offline, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    *lines, count = done.stdout.splitlines()
+    assert len(lines) == (3 if kind == "folder" else 12)
+    assert count == "12"
 
 
 @pytest.mark.parametrize("kind", FORMATS)

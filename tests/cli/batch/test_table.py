@@ -133,6 +133,14 @@ def test_a_failed_sheet_whose_options_changed_is_due(table: Table) -> None:
     assert states(table) == ["waiting"] * 3
 
 
+def test_crashes_count_for_the_inputs_that_they_came_from(table: Table) -> None:
+    assert [table.count_crash("s000", from_outside=False) for _ in range(2)] == [1, 2]
+    put(table)
+    assert table.count_crash("s000", from_outside=False) == 3
+    put(table, keys=KEYS | {"calibrate": "mended"})
+    assert table.count_crash("s000", from_outside=False) == 1
+
+
 def test_a_redone_stage_makes_due_what_was_made_of_it(table: Table) -> None:
     finish(table)
     some = {stage: "new" for stage in ("calibrate", "palette")}
