@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import socket
 import time
 from collections.abc import Iterator
@@ -54,6 +55,9 @@ class RayWorkers:
             raise SetupError("--ray needs Ray: pip install 'toonset[ray]'") from error
         self._ray: Any = ray
         _check_answers(address, f"--ray {address}: no cluster answers there; `ray start --head`")
+        self._hushed = contextlib.ExitStack()  # Ray prints what became of workers, as we do
+        nowhere = self._hushed.enter_context(open(os.devnull, "w"))
+        self._hushed.enter_context(contextlib.redirect_stdout(nowhere))
         environment = {"env_vars": {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}}
         try:
             ray.init(
@@ -111,6 +115,7 @@ class RayWorkers:
             with contextlib.suppress(Exception):  # the cluster may be what is gone
                 self._ray.cancel(reference, force=True)
         self._ray.shutdown()
+        self._hushed.close()
 
     def _outcome(self, reference: Any) -> Outcome:
         """Return how a sheet ended, or what became of its process."""

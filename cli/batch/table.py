@@ -42,7 +42,7 @@ CREATE TABLE sheets (
     crashes INTEGER NOT NULL DEFAULT 0,
     kills INTEGER NOT NULL DEFAULT 0  -- of its worker, from outside
 );
-CREATE INDEX by_state ON sheets (state, position);
+CREATE INDEX by_turn ON sheets (state, crashes + kills, position);
 CREATE TABLE stages (
     sheet TEXT NOT NULL,
     stage TEXT NOT NULL,
@@ -350,13 +350,16 @@ class Table:
     # ---- who does it ----------------------------------------------------------------------------
 
     def claim(self, runner: str, lease_s: float) -> SheetRow | None:
-        """Claim the first chosen sheet that is waiting, or whose lease is over; None if none is."""
+        """Claim the next chosen sheet that is waiting, or whose lease is over; None if none is.
+
+        What has ended a worker comes last: it must not keep the others waiting.
+        """
         now = time.time()
         with self.transaction() as db:
             found = db.execute(
                 "UPDATE sheets SET state = 'running', worker = ?, lease = ? WHERE name = ("
                 "SELECT name FROM sheets WHERE state = 'waiting' AND name IN chosen "
-                "ORDER BY position LIMIT 1) RETURNING name",
+                "ORDER BY crashes + kills, position LIMIT 1) RETURNING name",
                 (runner, now + lease_s),
             ).fetchone()
             if found is None:

@@ -71,6 +71,7 @@ CASES = (
         for to in ("colmap", "nerfstudio", "blender-synthetic", "blender", "gltf")
     ),
     Case("import", "import {i}/colmap -o {o}/a", "import {i}/colmap2 -o {o}/a"),
+    Case("pack", "pack {i}/batch --to folder -o {o}/a", "pack {i}/batch --to webdataset -o {o}/a"),
     Case("mannequin", "mannequin -o {o}/a.obj", "mannequin --heads 4 -o {o}/a.obj"),
     Case(
         "synth",
@@ -85,6 +86,13 @@ INPUTS = {  # what verbs read: what it is made of, and how
     "bundle": ("sheet.png", [f"{CALIBRATE} bundle", "palette bundle"]),
     "other": ("sheet.png", [f"{CALIBRATE} other --drop 1", "palette other"]),
     "run": ("bundle", ["train bundle --steps 2 --threads 1 -o run"]),
+    "batch": (
+        "sheet.png",
+        [
+            "batch sheet.png -o batch --stages calibrate,palette --workers 1 "
+            "--with 'calibrate --mesh mannequin.obj'"
+        ],
+    ),
     "colmap": ("bundle", ["export bundle --to colmap -o colmap"]),
     "colmap2": ("other", ["export other --to colmap -o colmap2"]),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import sys
 import traceback
 from collections.abc import Iterator, Sequence
@@ -26,7 +27,7 @@ def in_child(line: str) -> None:
     """Run a verb that must not fail."""
     if (child := os.fork()) == 0:
         with leaving(Path("err")):
-            call_main(line.split())
+            call_main(shlex.split(line))
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     assert code in FINE, (line, code, Path("err").read_text())
 

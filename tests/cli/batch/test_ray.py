@@ -1,5 +1,6 @@
 """`toonset batch --ray`: the same bytes on a cluster of two nodes, whatever becomes of them."""
 
+import json
 import subprocess
 import sys
 import time
@@ -69,13 +70,15 @@ def test_a_lost_node_loses_no_sheet(
 ) -> None:
     out = tmp_path / "out"
     node = cluster.add_node(num_cpus=2)
-    with subprocess.Popen(command(library, out, cluster.address), stderr=subprocess.PIPE) as run:
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([*command(library, out, cluster.address), "--json"], **pipes) as run:
         while run.poll() is None and not list(out.glob("sheets/*/log.txt")):
             time.sleep(0.05)
         time.sleep(1)
         cluster.remove_node(node, allow_graceful=False)
-        _, said = run.communicate(timeout=300)
+        told, said = run.communicate(timeout=300)
     assert run.returncode == 3, said
+    assert json.loads(told)["failed"] == 1
     assert results(out) == local
 
 

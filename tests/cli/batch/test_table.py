@@ -58,6 +58,13 @@ def test_sheets_are_claimed_in_order_and_once(table: Table) -> None:
     assert sorted(table.runners()) == ["a", "b"]
 
 
+def test_what_ended_a_worker_waits_for_the_others(table: Table) -> None:
+    table.count_crash("s000", from_outside=False)
+    table.count_crash("s001", from_outside=True)
+    claims = [table.claim("a", 60) for _ in range(3)]
+    assert [row and row.name for row in claims] == ["s002", "s000", "s001"]
+
+
 def test_what_is_not_chosen_is_not_claimed(tmp_path: Path) -> None:
     with closing(Table(tmp_path / TABLE, make=True)) as table:
         put(table)
