@@ -37,12 +37,12 @@ def test_what_is_lost_or_left_is_seen(tmp_path: Path) -> None:
     good = {"s0": "done", "s1": "done", "torn0": "failed: the PNG file is damaged or cut off"}
     first = batch(tmp_path / "first", good)
     assert faults(first, batch(tmp_path / "same", good)) == []
-    odd = batch(tmp_path / "odd", good | {"s1": "waiting", "torn0": "done"})
+    odd = batch(tmp_path / "odd", good | {"s1": "quarantined", "torn0": "done"})
     (odd / "sheets" / "s0" / "bundle" / "transforms.json").write_text("other")
     (odd / "sheets" / "s0" / ".bundle.abcdefgh.tmp").mkdir()
     shutil.rmtree(odd / "sheets" / "s1" / "bundle")
     said = faults(first, odd)
-    for sign in ("s0/bundle/transforms.json", "s1/bundle", "s1: is waiting", "torn0: is done"):
+    for sign in ("s0/bundle/transforms.json", "s1/bundle", "s1: is quarantined", "torn0: is done"):
         assert any(line.startswith(sign) for line in said), sign
     assert any(line.endswith(".tmp: is left") for line in said)
 
