@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import json
 import os
 import re
 import time
@@ -179,7 +180,17 @@ def batch(
     count = _count(workers, memory_limit or 0)
     share = 0 if ray else _share(count)
     limits = Limits(time_limit, memory_limit or share)
-    wanted = Wanted(out, chosen, entries, names, retry_failed, limits, store, table_name)
+    wanted = Wanted(
+        Path(os.path.abspath(out)),
+        chosen,
+        entries,
+        names,
+        retry_failed,
+        limits,
+        store,
+        table_name,
+        given or [],
+    )
     start = partial(_ray_workers, ray, gpus, limits) if ray else partial(_local_workers, count)
     found = _run(wanted, start, printer)
     _report(wanted, found, printer)
@@ -198,6 +209,7 @@ class Wanted:
         limits: of a sheet.
         store: URL of results, or "".
         table: file name of the table.
+        given: options of stages, for all sheets.
     """
 
     out: Path
@@ -208,6 +220,12 @@ class Wanted:
     limits: Limits
     store: str
     table: str
+    given: Sequence[str]
+
+    @property
+    def does(self) -> str:
+        """Return what all who work on the batch at once must do alike."""
+        return json.dumps([self.stages, self.store, self.given])
 
     @property
     def is_shard(self) -> bool:
@@ -265,10 +283,11 @@ def _count(workers: str, memory_mb: int) -> int:
 
 
 def _share(count: int) -> int:
-    """Return a sheet's share of the memory that is free, MB."""
-    from toonset.cli.batch.local import free_memory_mb
+    """Return a sheet's share of the memory that is free, MB; 0: it may take what it likes."""
+    from toonset.cli.batch.local import WORKER_MB, free_memory_mb
 
-    return int((free_memory_mb() or 0) / count)
+    free = free_memory_mb()
+    return 0 if free is None else max(int(free / count), WORKER_MB)
 
 
 def _local_workers(count: int, wanted: Wanted) -> Workers:
@@ -297,9 +316,11 @@ def _run(
 
     _check_out(wanted.out)
     with ExitStack() as stack:
-        runner = Runner(wanted.out, wanted.limits, wanted.stages, wanted.store)
-        stack.enter_context(alive(wanted.out, runner.ident))
-        table = stack.enter_context(closing(Table(wanted.out / wanted.table, make=True)))
+        out = Path(os.path.abspath(wanted.out))  # workers may have another current folder
+        runner = Runner(out, wanted.limits, wanted.stages, wanted.store)
+        stack.enter_context(alive(wanted.out, runner.ident, wanted.does))
+        path = wanted.out / wanted.table
+        table = stack.enter_context(closing(Table(path, make=True, alone=wanted.is_shard)))
         release_dead(table, wanted.out, runner.ident)
         _plan(table, wanted, printer)
 
@@ -324,18 +345,19 @@ def _run(
 
 def _check_out(out: Path) -> None:
     """Make the batch's folder; refuse one that is none."""
+    from toonset.cli.batch.dispatch import HOLDERS
     from toonset.cli.batch.table import TABLE
-    from toonset.write import check_new_folder
 
-    if not any((out / name).is_file() for name in (TABLE, *_shards(out))):
-        if out.is_dir() and any(out.iterdir()):
-            raise OutputError(f"{out}: holds files, but no {TABLE}; choose another -o")
-        check_new_folder(out)
+    if os.path.lexists(out) and not out.is_dir():
+        raise OutputError(f"{out}: is a file, a folder is needed; choose another -o")
     try:
         out.mkdir(parents=True, exist_ok=True)
+        names = {path.name for path in out.iterdir()} - {HOLDERS}  # another may just begin
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"{out}: cannot be made ({reason}); choose another -o") from error
+    if names and not any((out / name).is_file() for name in (TABLE, *_shards(out))):
+        raise OutputError(f"{out}: holds files, but no {TABLE}; choose another -o")
 
 
 def _shards(out: Path) -> list[str]:
@@ -348,12 +370,17 @@ def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
     from toonset.cli.batch.dispatch import home_of
     from toonset.cli.batch.job import stages_there
     from toonset.cli.batch.stages import STAGES, keys_of
-    from toonset.cli.batch.storage import Hashes
+    from toonset.cli.batch.storage import Hashes, stamps_behind
     from toonset.cli.batch.table import Plan
 
-    def there(name: str) -> set[str]:
-        return {*STAGES} if wanted.store else stages_there(home_of(wanted.out, name))
+    behind = stamps_behind(wanted.store) if wanted.store else set()
 
+    def there(name: str) -> set[str]:
+        if wanted.store:
+            return {stage for stage in STAGES if (name, stage) in behind}
+        return stages_there(home_of(wanted.out, name))
+
+    table.store = wanted.store
     hashes, plans = Hashes(table), list[Plan]()
     for position, entry in enumerate(wanted.entries):
         if entry.name in wanted.names:
@@ -442,6 +469,7 @@ def _merge(out: Path, printer: Printer) -> None:
         for name in shards:
             with closing(Table(out / name)) as part:
                 count += table.take_in(part)
-        write_page(out, table.rows(), out.resolve().name)
+                table.store = part.store
+        write_page(out, table.rows(), out.resolve().name, store=table.store)
     text = f"{out}: {count} sheets of {len(shards)} parts; look at {out / 'index.html'}"
     printer.result({"out": out, "sheets": count, "parts": len(shards)}, text)

@@ -13,14 +13,14 @@ import re
 import secrets
 import socket
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
-from toonset.cli.batch.job import Job, Outcome, read_stamp, tidy
+from toonset.cli.batch.job import Job, Outcome, last_stage, read_stamp, tidy
 from toonset.cli.batch.table import SheetRow, StageRow, State, Table
-from toonset.errors import OutputError
+from toonset.errors import OutputError, ToonsetError
 
 try:
     import fcntl
@@ -33,7 +33,9 @@ LOOK_S = 1.0  # between looks at sheets that another runner has
 MOST_CRASHES = 3  # of a sheet's worker: then it is left alone
 MOST_KILLS = 20  # of it, from outside: by then it is no accident
 HOLDERS = ".runners"  # folder of locked files, one for each runner
-THUMBS = "thumbs"
+THUMBS, PICTURES = "thumbs", (".webp", ".turn.webp")
+RAISE = "raise --time-limit, then --retry-failed"
+Ended = Callable[[str, Sequence[StageRow], Container[str]], object]
 
 
 class Workers(Protocol):
@@ -93,19 +95,13 @@ class Runner:
     _due: dict[str, set[str]] = field(default_factory=dict)  # stages of them that are not done
     _late: set[str] = field(default_factory=set)  # of them, ended for it
 
-    def run(
-        self,
-        table: Table,
-        workers: Workers,
-        ended: Callable[[str, Sequence[StageRow]], object],
-        tick: Callable[[], object],
-    ) -> None:
+    def run(self, table: Table, workers: Workers, ended: Ended, tick: Callable[[], object]) -> None:
         """Run all chosen sheets that are due, and wait for those that other runners have.
 
         Args:
             table: of the batch.
             workers: that run them.
-            ended: is told of every sheet that ended, with the stages that did.
+            ended: is told of every sheet that ended, the stages that did, and those that were due.
             tick: is called a few times a second.
 
         Raises:
@@ -161,7 +157,7 @@ class Runner:
                 self._late.add(name)
                 workers.kill(name)
 
-    def _take(self, outcome: Outcome, ended: Callable[[str, Sequence[StageRow]], object]) -> None:
+    def _take(self, outcome: Outcome, ended: Ended) -> None:
         """Put into the table how a sheet ended."""
         name = outcome.name
         due = self._due.pop(name)
@@ -171,32 +167,36 @@ class Runner:
         if name in self._late:
             self._late.discard(name)
             if outcome.kind == "gone":
-                line = f"took longer than {self.limits.seconds:g} s"
-                outcome = replace(outcome, kind="failed", line=line)
+                said = f"took longer than {self.limits.seconds:g} s; {RAISE}"
+                outcome = replace(outcome, kind="failed", line=said)
         state, line = self._state(outcome)
-        outcome = replace(outcome, line=line)
         if state == "waiting":
             self._table.release(self.ident, name)
+            if outcome.kind == "busy":
+                time.sleep(LOOK_S)  # another process is at it
             return
+        rows = outcome.rows
+        if state != "done":
+            rows = self._with_failure(replace(outcome, line=line), state)
+            state = state if any(row.state == state for row in rows) else "done"
         self._keep_pictures(outcome)
-        rows = outcome.rows if state == "done" else self._with_failure(outcome, state)
         if self._table.record(self.ident, name, rows, state):
-            ended(name, [row for row in rows if row.stage in due])
+            ended(name, [row for row in rows if row.stage in due], due)
 
     def _state(self, outcome: Outcome) -> tuple[State, str]:
         """Return the state that a sheet goes into, waiting: once more; and why."""
         if outcome.kind in ("done", "failed"):
             return ("done" if outcome.kind == "done" else "failed"), outcome.line
-        if outcome.kind == "busy":
-            return "waiting", outcome.line
-        outside = outcome.from_outside
+        outside = outcome.from_outside or outcome.kind == "busy"
         count = self._table.count_crash(outcome.name, from_outside=outside)
         most = MOST_KILLS if outside else MOST_CRASHES
-        line = f"{outcome.line}{' from outside' if outside else ''}, {count} times"
-        return ("quarantined" if count >= most else "waiting"), line
+        how = " from outside" if outcome.from_outside else ""
+        return (
+            "quarantined" if count >= most else "waiting"
+        ), f"{outcome.line}{how}, {count} times"
 
     def _with_failure(self, outcome: Outcome, state: State) -> tuple[StageRow, ...]:
-        """Return the rows of what failed, with its line; of a death the first that is not done."""
+        """Return the rows of what failed, with its line; of a death the stage that was run."""
         if outcome.rows:
             return tuple(
                 row if row.state == "done" else replace(row, log=outcome.log)
@@ -204,24 +204,27 @@ class Runner:
             )
         sheet, rows = self._table.row(outcome.name), list[StageRow]()
         assert sheet is not None
-        home = home_of(self.out, outcome.name)
+        home, said = home_of(self.out, outcome.name), last_stage(outcome.log)
         tidy(home)
         for row in sheet.stages:
             if row.stage not in self.stages:
                 continue
-            found = None if self.store else read_stamp(home, row.stage, row.key)
-            if found is None:
-                tried = max(sheet.crashes, 1)
-                failed = replace(row, state=state, error=outcome.line, attempts=tried)
-                return (*rows, replace(failed, log=outcome.log, ended=time.time()))
+            found = read_stamp(home, row.stage, row.key) if not self.store else row
+            if found is None or (self.store and said in ("", row.stage)):
+                failed = replace(row, state=state, error=outcome.line, log=outcome.log)
+                return (*rows, replace(failed, attempts=max(sheet.crashes, 1), ended=time.time()))
             rows.append(found)
         return tuple(rows)
 
     def _keep_pictures(self, outcome: Outcome) -> None:
         from toonset.write import write_bytes
 
-        for end, text in outcome.pictures.items():
-            write_bytes(self.out / THUMBS / f"{outcome.name}{end}", base64.b64decode(text))
+        for end in PICTURES:
+            file = self.out / THUMBS / f"{outcome.name}{end}"
+            if end in outcome.pictures:
+                write_bytes(file, base64.b64decode(outcome.pictures[end]))
+            else:
+                file.unlink(missing_ok=True)  # of an older result
 
 
 def _ident() -> str:
@@ -241,21 +244,43 @@ def _nap() -> list[Outcome]:
 
 
 @contextlib.contextmanager
-def alive(out: Path, ident: str) -> Iterator[None]:
-    """Hold a file within the block; children hold it, too, so that it is free when all are gone."""
-    folder = out / HOLDERS
-    file = folder / ident
+def alive(out: Path, ident: str, does: str = "") -> Iterator[None]:
+    """Hold a file within the block; children hold it, too, so that it is free when all are gone.
+
+    Args:
+        out: folder of the batch.
+        ident: of the runner.
+        does: what it does; all who are alive must do the same.
+
+    Raises:
+        ToonsetError: another one does something else.
+    """
+    file = out / HOLDERS / ident
     descriptor = _made(file)
     try:
+        os.write(descriptor, does.encode())
         if fcntl is not None:
             with contextlib.suppress(OSError):  # a file system without locks
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        for other in file.parent.iterdir():
+            if other != file and not _is_dead(other) and _said(other) != does:
+                raise ToonsetError(
+                    f"{out}: another toonset batch works there with other stages or options; wait "
+                    "for it, or choose another -o"
+                )
         yield
     finally:
         with contextlib.suppress(OSError):
             file.unlink()
-            folder.rmdir()  # unless another is alive
+            file.parent.rmdir()  # unless another is alive
         os.close(descriptor)
+
+
+def _said(file: Path) -> str | None:
+    try:
+        return file.read_text("utf-8")
+    except OSError:  # it has just ended
+        return None
 
 
 def _made(file: Path) -> int:

@@ -16,24 +16,25 @@ import io
 import json
 import os
 import resource
+import shutil
 import sys
-import tempfile
 import threading
 import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from toonset import lock
-from toonset.cli.batch.stages import BUNDLE, RANKS, STAGES, run
+from toonset.cli.batch.stages import BUNDLE, STAGES, dependents, run, value_of
 from toonset.cli.batch.table import StageRow
 from toonset.cli.common.refusals import refusal
 from toonset.errors import OutputError, ToonsetError, one_line, printable
 from toonset.write import write_json
 
-LOG = "log.txt"
+LOG, SCRATCH = "log.txt", ".scratch"  # in a sheet's folder
+BEGINS = "--- "  # a line that says which stage is run
 OVER_MEMORY = "batch: took more than"  # begins the line that says so
 PATIENCE_S = 30.0  # for the worker of a batch that has just been killed
 FATAL = "Fatal Python error"  # begins what faulthandler says of a crash, the last call first
@@ -97,7 +98,7 @@ def run_sheet(job: Job) -> Outcome:
     try:
         home.mkdir(parents=True, exist_ok=True)
         with lock.hold(home / "batch", home, PATIENCE_S), _logged(home / LOG, job.memory_mb):
-            outcome = _run_stored(job) if job.store else _run_stages(job, home, job.sheets)
+            outcome = _run_near(job, home)
     except OutputError as error:
         return Outcome(job.name, "busy", line=one_line(error))
     except OSError as error:
@@ -109,27 +110,33 @@ def run_sheet(job: Job) -> Outcome:
     return replace(outcome, log=last_lines(home / LOG))
 
 
-def _run_stored(job: Job) -> Outcome:
-    """Run a sheet whose results lie behind a URL, in a folder that goes afterwards."""
+def _run_near(job: Job, home: Path) -> Outcome:
+    """Run a sheet whose drawings or results may lie behind URLs, on copies that go afterwards."""
     from toonset.cli.batch.storage import fetch, is_url, looks, push
 
+    words = [word for said in job.words.values() for word in said]
+    if not job.store and not any(map(is_url, (*job.sheets, *map(value_of, words)))):
+        return _run_stages(job, home, job.sheets)
+    scratch = home / SCRATCH
+    shutil.rmtree(scratch, ignore_errors=True)
     url = f"{job.store.rstrip('/')}/{job.name}"
-    stamps = tuple(f"{stage}.json" for stage in STAGES)
-    with tempfile.TemporaryDirectory(prefix="toonset-") as scratch:
-        home, inputs = Path(scratch, job.name), Path(scratch, "inputs")
-        inputs.mkdir()
-        try:
-            if looks(f"{url}/calibrate.json") is not None:
-                fetch(url, Path(scratch))
-            home.mkdir(exist_ok=True)
-            sheets = [str(fetch(one, inputs)) if is_url(one) else one for one in job.sheets]
-            words = {stage: _fetched(said, inputs) for stage, said in job.words.items()}
-            outcome = _run_stages(replace(job, words=words), home, sheets)
-            if outcome.rows:
-                push(home, url, stamps)
-        except ToonsetError as error:
-            return Outcome(job.name, "place", line=one_line(error))
-    return outcome
+    inputs = scratch / "inputs"
+    inputs.mkdir(parents=True)
+    try:
+        work = scratch / job.name if job.store else home
+        if job.store and looks(f"{url}/calibrate.json") is not None:
+            fetch(url, scratch)
+        work.mkdir(exist_ok=True)
+        sheets = [str(fetch(one, inputs)) if is_url(one) else one for one in job.sheets]
+        near = {stage: _fetched(said, inputs) for stage, said in job.words.items()}
+        outcome = _run_stages(replace(job, words=near), work, sheets)
+        if job.store and outcome.rows:
+            push(work, url, tuple(f"{stage}.json" for stage in STAGES))
+        return outcome
+    except ToonsetError as error:
+        return Outcome(job.name, "place", line=one_line(error))
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _fetched(words: Sequence[str], folder: Path) -> tuple[str, ...]:
@@ -138,8 +145,9 @@ def _fetched(words: Sequence[str], folder: Path) -> tuple[str, ...]:
 
     found = []
     for word in words:
-        flag, equals, value = word.rpartition("=") if word.startswith("--") else ("", "", word)
-        found.append(f"{flag}{equals}{fetch(value, folder)}" if is_url(value) else word)
+        value = value_of(word)
+        near = str(fetch(value, folder)) if is_url(value) else value
+        found.append(word.removesuffix(value) + near if value else word)
     return tuple(found)
 
 
@@ -152,11 +160,11 @@ def _run_stages(job: Job, home: Path, sheets: Sequence[str]) -> Outcome:
             _remove_stamps(home, stage)
             ended = _run_stage(job, home, sheets, stage, key)
             if isinstance(ended, Outcome):
-                return replace(ended, rows=(*rows, *ended.rows), pictures=_pictures(home))
+                return replace(ended, rows=(*rows, *ended.rows), pictures=_pictures(home, rows))
             row = ended
             _write_stamp(home, row)
         rows.append(row)
-    return Outcome(job.name, "done", tuple(rows), pictures=_pictures(home))
+    return Outcome(job.name, "done", tuple(rows), pictures=_pictures(home, rows))
 
 
 def _run_stage(
@@ -164,10 +172,10 @@ def _run_stage(
 ) -> StageRow | Outcome:
     """Run one stage; return its row, or the outcome that it leads to."""
     row = StageRow(stage, key, attempts=1, worker=f"{os.uname().nodename}:{os.getpid()}")
-    print(f"--- {stage}", file=sys.stderr, flush=True)
+    print(f"{BEGINS}{stage}", file=sys.stderr, flush=True)
     _forget_peak()
     began, cpu = time.monotonic(), time.process_time()
-    said, code, line, full = io.StringIO(), 0, "", False
+    said, code, line, full, is_held = io.StringIO(), 0, "", False, False
     try:
         with lock.command(), contextlib.redirect_stdout(said):
             code = run(stage, job.words.get(stage, ()), sheets, home)
@@ -176,7 +184,7 @@ def _run_stage(
         if found is None:
             traceback.print_exc()
         line = found or f"this is a bug of toonset: {type(error).__name__}: {one_line(error)}"
-        full = _is_full(error)
+        full, is_held = _is_full(error), isinstance(error.__cause__, BlockingIOError)
     row = replace(
         row,
         ended=time.time(),
@@ -186,6 +194,8 @@ def _run_stage(
     )
     if full:
         return Outcome(job.name, "place", line=line)
+    if is_held:
+        return Outcome(job.name, "busy", line=line)
     if code not in FINE:
         return Outcome(job.name, "busy", line=f"{stage} was ended")
     if line:
@@ -198,10 +208,13 @@ def _run_stage(
 def _is_full(error: BaseException | None) -> bool:
     """Return whether the place for results is at fault, not the sheet."""
     while error is not None:
-        wrote = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
+        cause = error.__cause__
+        wrote = isinstance(error, OutputError) and isinstance(cause, OSError)
+        if isinstance(cause, BlockingIOError):
+            return False  # another process holds it
         if wrote or (isinstance(error, OSError) and error.errno in FULL):
             return True
-        error = error.__cause__
+        error = cause
     return False
 
 
@@ -248,14 +261,14 @@ def _write_stamp(home: Path, row: StageRow) -> None:
 
 
 def _remove_stamps(home: Path, first: str) -> None:
-    """Remove what says that a stage and the later ones are done."""
-    for stage in STAGES:
-        if RANKS[stage] >= RANKS[first]:
-            (home / f"{stage}.json").unlink(missing_ok=True)
+    """Remove what says that a stage, and what is made of its result, is done."""
+    for stage in (first, *dependents(first)):
+        (home / f"{stage}.json").unlink(missing_ok=True)
 
 
 def tidy(home: Path) -> None:
     """Clear away what a worker that was killed has left in its sheet's folder."""
+    shutil.rmtree(home / SCRATCH, ignore_errors=True)
     writes = [home / stage.writes for stage in STAGES.values()]
     for place in (home / "batch", *writes, lock.set_of(home / BUNDLE / "palette.json")):
         if place.parent.is_dir():
@@ -277,16 +290,17 @@ def _hash_output(home: Path, stage: str) -> str:
     return found.hexdigest()
 
 
-def _pictures(home: Path) -> dict[str, str]:
-    """Return the page's small pictures of a sheet, by the end of their name."""
+def _pictures(home: Path, rows: Iterable[StageRow]) -> dict[str, str]:
+    """Return the page's small pictures of a sheet's results, by the end of their name."""
     from toonset.dataset.images.thumbnails import thumbnail, turn_thumbnail
 
-    overlay, turn = home / BUNDLE / "overlay.png", home / STAGES["render"].writes
-    found = {}
+    there, found = {row.stage for row in rows}, {}
     with contextlib.suppress(ToonsetError):
-        found[".webp"] = thumbnail(overlay)
+        if "calibrate" in there:
+            found[".webp"] = thumbnail(home / BUNDLE / "overlay.png")
     with contextlib.suppress(ToonsetError):  # a turn of several layers has no picture of itself
-        found[".turn.webp"] = turn_thumbnail(turn)
+        if "render" in there:
+            found[".turn.webp"] = turn_thumbnail(home / STAGES["render"].writes)
     return {name: base64.b64encode(data).decode() for name, data in found.items()}
 
 
@@ -369,4 +383,11 @@ def last_lines(log: Path) -> str:
 def over_memory(log: str) -> str:
     """Return the line by which a worker ended itself for the memory it took, or ""."""
     found = (line for line in log.splitlines() if line.startswith(OVER_MEMORY))
-    return next(found, "").removeprefix("batch: ")
+    said = next(found, "").removeprefix("batch: ")
+    return f"{said}; raise --memory-limit, then --retry-failed" if said else ""
+
+
+def last_stage(log: str) -> str:
+    """Return the stage that was run last, as a log says."""
+    found = [line for line in log.splitlines() if line.startswith(BEGINS)]
+    return found[-1].removeprefix(BEGINS) if found else ""

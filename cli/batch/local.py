@@ -43,11 +43,12 @@ def free_memory_mb() -> float | None:
     with contextlib.suppress(OSError, IndexError, ValueError):
         text = Path("/proc/meminfo").read_text()
         found.append(int(text.split("MemAvailable:")[1].split()[0]) / 1024)
-    with contextlib.suppress(OSError, ValueError):  # "max" is no limit
+    with contextlib.suppress(OSError, IndexError, ValueError):  # "max" is no limit
         group = Path("/sys/fs/cgroup")
         most, used = (int((group / f"memory.{name}").read_text()) for name in ("max", "current"))
-        found.append((most - used) / 2**20)
-    return min(found, default=None)
+        cached = (group / "memory.stat").read_text().split("inactive_file ")[1].split()[0]
+        found.append((most - used + int(cached)) / 2**20)
+    return max(min(found), 0) if found else None
 
 
 @dataclass

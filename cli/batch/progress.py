@@ -5,16 +5,15 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from toonset.cli.batch.table import SheetRow, StageRow
+from toonset.cli.batch.table import BAD, SheetRow, StageRow
 from toonset.cli.common.output import Printer
 
 LIVE_S, LOG_S = 0.5, 30.0  # between lines on a terminal; in a log
 HOUR_S = 3600.0
-BAD = ("failed", "quarantined")
 UNREACHED = "not reached"  # stages after one that failed
 MOST_BAD = 20  # lines of what failed
 ERASE_LINE = "\x1b[K"
@@ -40,12 +39,12 @@ class Progress:
         """Remember what was done before."""
         self._first = {stage: _ended(count) for stage, count in self.counts.items()}
 
-    def take(self, name: str, rows: Iterable[StageRow]) -> None:
-        """Count the stages of a sheet that ended; say what failed."""
+    def take(self, name: str, rows: Iterable[StageRow], due: Container[str]) -> None:
+        """Count the stages of a sheet that ended, of those that were due; say what failed."""
         ended = {row.stage: row for row in rows}
         failed = next((row for row in ended.values() if row.state in BAD), None)
         for stage, count in self.counts.items():
-            if stage in ended or failed is not None:
+            if stage in ended or (failed is not None and stage in due):
                 count["waiting"] -= 1
                 count[ended[stage].state if stage in ended else UNREACHED] += 1
         if failed is not None:

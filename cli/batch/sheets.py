@@ -25,9 +25,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from toonset.cli.batch.stages import STAGES, Entry, as_words, files_among, parse
+from toonset.cli.batch.stages import STAGES, Entry, as_words, files_among, parse, value_of
 from toonset.cli.batch.storage import find, is_url
-from toonset.errors import SheetError, one_line, printable
+from toonset.errors import SheetError, as_text, one_line, printable
 
 MANIFESTS = (".csv", ".jsonl")
 LONGEST_NAME = 100  # bytes: a folder of toonset's own adds some, 255 is the most
@@ -260,6 +260,10 @@ def _place(place: str, given: Given) -> str:
         return place
     path = _within(place, given)
     try:
+        str(path).encode()
+    except UnicodeEncodeError as error:
+        raise SheetError(f"{as_text(given.where)}: its name is no UTF-8; rename it") from error
+    try:
         check_there([path], "picture", SheetError)
     except SheetError as error:
         raise SheetError(f"{given.where}: {error}" if given.inside else str(error)) from error
@@ -286,18 +290,17 @@ def _absolute(
     if not words:
         return ()
     where = given.where or f"--with {stage}"
-    files = {
-        str(Path(text)) for text in files_among(parse(stage, [*common, *words], where), given.root)
-    }
+    values = parse(stage, [*common, *words], where)
+    files = {*files_among(values, words, given.root).values()}
     absolute = []
     for word in words:
-        flag, equals, value = word.rpartition("=") if word.startswith("--") else ("", "", word)
-        if value and not is_url(value) and str(Path(value)) in files:
+        value = value_of(word)
+        if value in files and not is_url(value):
             path = _within(value, given)
             try:
                 check_there([path], "file", SheetError)
             except SheetError as error:
                 raise SheetError(f"{where}: {error}") from error
-            word = f"{flag}{equals}{path}"
+            word = word.removesuffix(value) + str(path)
         absolute.append(word)
     return tuple(absolute)

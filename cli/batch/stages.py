@@ -10,7 +10,6 @@ import hashlib
 import importlib
 import json
 import pkgutil
-import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -29,7 +28,6 @@ PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless", "torc
 BUNDLE = "bundle"
 RUN = f"{BUNDLE}/run"
 OWN = ("out", "force", "as_json", "quiet", "verbose", "threads", "preview_every", "strict")
-ONE_SLASH = re.compile(r"^([a-z][a-z0-9+.-]+):/(?!/)")  # what a path makes of a URL
 NO_BODY = "none"  # as of `calibrate --mesh`
 FILE_OR_COLORS = ("colors", "palette", "variants")
 PLACE = Path("place")  # stands for a sheet's own folders while words are checked
@@ -62,7 +60,7 @@ class Stage:
 
     Attributes:
         name: of the verb.
-        after: stages whose results it takes: the first of them that the sheet has.
+        after: the stage whose result it takes; "" for the first.
         argument: its parameter for what it reads.
         reads: that, in the sheet's folder; "": the sheets.
         writes: file or folder in the sheet's folder.
@@ -74,7 +72,7 @@ class Stage:
     """
 
     name: str
-    after: tuple[str, ...]
+    after: str
     argument: str
     reads: str
     writes: str
@@ -89,28 +87,32 @@ TURNTABLE: dict[tuple[str, ...], tuple[str, ...]] = {
     ("--turntable", "--cameras"): ("--turntable", "36")
 }
 _LIST = (
-    Stage("calibrate", (), "sheets", "", BUNDLE, "transforms.json", imports="calib"),
+    Stage("calibrate", "", "sheets", "", BUNDLE, "transforms.json", imports="calib"),
     Stage(
-        *("palette", ("calibrate",), "inputs", BUNDLE, BUNDLE, "palette.json"),
+        *("palette", "calibrate", "inputs", BUNDLE, BUNDLE, "palette.json"),
         has_out=False,
         imports="palette",
     ),
     Stage(
-        *("train", ("palette", "calibrate"), "bundle", BUNDLE, RUN, "metrics.json"),
+        *("train", "palette", "bundle", BUNDLE, RUN, "metrics.json"),
         timed=("metrics.json", "history.csv"),
     ),
-    Stage("render", ("train",), "run", RUN, "turntable", usual=TURNTABLE),
-    Stage("view", ("train",), "folder", RUN, "character.html"),
-    Stage("mesh", ("train",), "run", RUN, "character.glb"),
-    Stage("export", ("palette", "calibrate"), "bundle", BUNDLE, "export", imports="dataset"),
+    Stage("render", "train", "run", RUN, "turntable", usual=TURNTABLE),
+    Stage("view", "train", "folder", RUN, "character.html"),
+    Stage("mesh", "train", "run", RUN, "character.glb"),
+    Stage("export", "calibrate", "bundle", BUNDLE, "export", imports="dataset"),
 )
 STAGES: Mapping[str, Stage] = {stage.name: stage for stage in _LIST}
 RANKS = {name: rank for rank, name in enumerate(STAGES)}
 
 
-def before(stage: str, chosen: Sequence[str]) -> str | None:
-    """Return the chosen stage whose results a stage takes; None for the first."""
-    return next((name for name in STAGES[stage].after if name in chosen), None)
+@cache
+def dependents(stage: str) -> tuple[str, ...]:
+    """Return the stages that are made of a stage's result, in order."""
+    found = {stage}
+    for name, verb in STAGES.items():
+        found |= {name} if verb.after in found else set()
+    return tuple(name for name in STAGES if name in found - {stage})
 
 
 def in_order(names: Sequence[str]) -> tuple[str, ...]:
@@ -130,8 +132,8 @@ def in_order(names: Sequence[str]) -> tuple[str, ...]:
                 f"--stages: {name!r} is none of {', '.join(STAGES)}" + (f"; {near}" if near else "")
             )
     for name in names:
-        if STAGES[name].after and before(name, names) is None:
-            raise UsageError(f"--stages: {name} needs {STAGES[name].after[-1]}; add it")
+        if (after := STAGES[name].after) and after not in names:
+            raise UsageError(f"--stages: {name} needs {after}; add it")
     return tuple(sorted(set(names), key=RANKS.__getitem__))
 
 
@@ -216,20 +218,29 @@ def _command(stage: str) -> Any:
     return typer.main.get_command(app).commands[stage]  # type: ignore[attr-defined]
 
 
-def files_among(values: Mapping[str, Any], root: Path) -> Iterator[str]:
-    """Yield the files among a verb's arguments, as they were typed.
+def value_of(word: str) -> str:
+    """Return what a word of a command line says: of --option=value the value."""
+    return word.partition("=")[2] if word.startswith("--") else word
+
+
+def files_among(values: Mapping[str, Any], words: Sequence[str], root: Path) -> dict[str, str]:
+    """Return the files and URLs among a verb's arguments, as typed, by the argument's text.
 
     Args:
         values: what `parse` returned.
+        words: that it was given.
         root: what they are relative to.
     """
+    typed = {str(Path(value)): value for value in map(value_of, words) if value}
+    found = {}
     for name, value in values.items():
         for one in value if isinstance(value, list | tuple) else [value]:
-            is_path = isinstance(one, Path) and one != PLACE
-            if is_path and not (name == "mesh" and str(one) == NO_BODY):
-                yield ONE_SLASH.sub(r"\1://", str(one))
+            text, is_path = str(one), isinstance(one, Path) and one != PLACE
+            if is_path and not (name == "mesh" and text == NO_BODY):
+                found[text] = typed.get(text, text)
             elif name in FILE_OR_COLORS and isinstance(one, str) and (root / one).is_file():
-                yield one
+                found[text] = one
+    return found
 
 
 def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> int:
@@ -297,7 +308,7 @@ def keys_of(entry: Entry, stages: Sequence[str], hash_of: Callable[[str], str]) 
     """
     keys: dict[str, str] = {}
     for stage in stages:
-        earlier = before(stage, stages)
+        earlier = STAGES[stage].after
         content = {
             "stage": stage,
             "from": keys[earlier] if earlier else [_file(one, hash_of) for one in entry.sheets],
@@ -309,17 +320,15 @@ def keys_of(entry: Entry, stages: Sequence[str], hash_of: Callable[[str], str]) 
 
 
 def _options(stage: str, entry: Entry, hash_of: Callable[[str], str]) -> dict[str, Any]:
-    values = parse(stage, entry.words.get(stage, ()), f"{entry.name}: {stage}")
-    files = {*files_among(values, Path("/"))}
+    words = entry.words.get(stage, ())
+    values = parse(stage, words, f"{entry.name}: {stage}")
+    files = files_among(values, words, Path("/"))
 
     def plain(value: Any) -> Any:
         if isinstance(value, list | tuple):
             return [plain(one) for one in value]
-        if (
-            isinstance(value, str | Path)
-            and (typed := ONE_SLASH.sub(r"\1://", str(value))) in files
-        ):
-            return _file(typed, hash_of)
+        if isinstance(value, str | Path) and str(value) in files:
+            return _file(files[str(value)], hash_of)
         return value.value if isinstance(value, Enum) else str(value)
 
     return {name: plain(value) for name, value in values.items()}

@@ -36,6 +36,18 @@ def find(pattern: str) -> list[str]:
         return [files.unstrip_protocol(found) for found in sorted(files.glob(path))]
 
 
+def stamps_behind(url: str) -> set[tuple[str, str]]:
+    """Return the sheets and stages that have a stamp behind a URL.
+
+    Raises:
+        ToonsetError: it cannot be reached.
+    """
+    with _reached(url) as (files, path):
+        found = files.glob(f"{path.rstrip('/')}/*/*.json")
+        parts = (name.rsplit("/", 2)[1:] for name in found)
+        return {(sheet, stamp.removesuffix(".json")) for sheet, stamp in parts}
+
+
 def looks(place: str) -> str | None:
     """Return what changes when a file or folder does; None if there is nothing.
 

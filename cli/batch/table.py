@@ -18,17 +18,18 @@ import sqlite3
 import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from toonset.cli.batch.stages import RANKS, Entry
+from toonset.cli.batch.stages import RANKS, Entry, dependents
 from toonset.errors import OutputError, ToonsetError
 
 SCHEMA = 1  # in the table's user_version
 TABLE = "batch.sqlite"
 AT_ONCE = 500  # sheets of one transaction
 PATIENCE_S = 60.0  # for another process's transaction; each takes milliseconds
+BAD = ("quarantined", "failed")  # the worse first
 State = Literal["waiting", "running", "done", "failed", "quarantined"]
 
 TABLES = """
@@ -40,7 +41,8 @@ CREATE TABLE sheets (
     worker TEXT NOT NULL DEFAULT '',  -- runner that has claimed it
     lease REAL NOT NULL DEFAULT 0,    -- until then, seconds since 1970
     crashes INTEGER NOT NULL DEFAULT 0,
-    kills INTEGER NOT NULL DEFAULT 0  -- of its worker, from outside
+    kills INTEGER NOT NULL DEFAULT 0, -- of its worker, from outside
+    planned REAL NOT NULL DEFAULT 0   -- when its inputs or options changed last
 );
 CREATE INDEX by_turn ON sheets (state, crashes + kills, position);
 CREATE TABLE stages (
@@ -64,6 +66,9 @@ CREATE TABLE stages (
 ) WITHOUT ROWID;
 CREATE TABLE files (                  -- hashes of inputs, for as long as they look the same
     path TEXT PRIMARY KEY, looks TEXT NOT NULL, hash TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE store (                  -- where results are, if not beside the table
+    url TEXT PRIMARY KEY
 ) WITHOUT ROWID;
 """
 
@@ -115,6 +120,7 @@ class SheetRow:
         state: of the sheet as a whole.
         worker: runner that has claimed it.
         crashes: of its worker, caused by the sheet.
+        planned: when its inputs or options changed last, seconds since 1970.
         stages: in the order in which they run.
     """
 
@@ -123,12 +129,18 @@ class SheetRow:
     state: State
     worker: str
     crashes: int
+    planned: float
     stages: tuple[StageRow, ...]
 
     @property
     def name(self) -> str:
         """Return the sheet's name."""
         return self.entry.name
+
+    @property
+    def newest(self) -> float:
+        """Return when something of it changed last."""
+        return max((self.planned, *(row.ended for row in self.stages)))
 
     @property
     def verdict(self) -> str:
@@ -159,12 +171,14 @@ class Plan:
 class Table:
     """An open table. One connection: of one process, used by one thread."""
 
-    def __init__(self, path: Path, *, make: bool = False) -> None:
+    def __init__(self, path: Path, *, make: bool = False, alone: bool = False) -> None:
         """Open a table.
 
         Args:
             path: the file.
             make: make it if it is not there.
+            alone: make it without a write-ahead file, which processes of one machine only share:
+                for the parts of a batch on a shared disk.
 
         Raises:
             OutputError: it cannot be read or written.
@@ -176,9 +190,9 @@ class Table:
         with self._errors():
             self._db = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None)
             self._db.row_factory = sqlite3.Row
-            self._open(make=make)
+            self._open(make=make, alone=alone)
 
-    def _open(self, *, make: bool) -> None:
+    def _open(self, *, make: bool, alone: bool) -> None:
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version > SCHEMA:
             raise ToonsetError(f"{self.path}: is of a newer toonset; install that one")
@@ -187,7 +201,7 @@ class Table:
             return
         if not make or self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             raise ToonsetError(f"{self.path}: is no table of toonset batch; choose another -o")
-        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.execute(f"PRAGMA journal_mode = {'DELETE' if alone else 'WAL'}")
         with self.transaction():
             if self._db.execute("PRAGMA user_version").fetchone()[0] == 0:  # nobody else has
                 for statement in TABLES.split(";"):
@@ -230,7 +244,7 @@ class Table:
         with self._errors():
             found = self._db.cursor().execute(
                 "SELECT s.name, s.position, s.entry, s.state AS sheet_state, s.worker AS runner, "
-                "s.crashes, t.* FROM sheets s LEFT JOIN stages t ON t.sheet = s.name "
+                "s.crashes, s.planned, t.* FROM sheets s LEFT JOIN stages t ON t.sheet = s.name "
                 "ORDER BY s.position, s.name, t.rank"
             )
             of_sheet: list[sqlite3.Row] = []
@@ -247,11 +261,25 @@ class Table:
         with self._errors():
             found = self._db.execute(
                 "SELECT s.name, s.position, s.entry, s.state AS sheet_state, s.worker AS runner, "
-                "s.crashes, t.* FROM sheets s LEFT JOIN stages t ON t.sheet = s.name "
+                "s.crashes, s.planned, t.* FROM sheets s LEFT JOIN stages t ON t.sheet = s.name "
                 "WHERE s.name = ? ORDER BY t.rank",
                 (name,),
             ).fetchall()
         return _sheet(found) if found else None
+
+    @property
+    def store(self) -> str:
+        """Return the URL of the results, "" where they lie beside the table."""
+        with self._errors():
+            found = self._db.execute("SELECT url FROM store").fetchone()
+        return "" if found is None else str(found["url"])
+
+    @store.setter
+    def store(self, url: str) -> None:
+        with self.transaction() as db:
+            db.execute("DELETE FROM store")
+            if url:
+                db.execute("INSERT INTO store VALUES (?)", (url,))
 
     # ---- what is to be done ---------------------------------------------------------------------
 
@@ -283,7 +311,7 @@ class Table:
                 self._plan(db, plan, is_there(plan.entry.name))
 
     def _plan(self, db: sqlite3.Connection, plan: Plan, there: Container[str]) -> None:
-        name, states, earlier = plan.entry.name, [], False
+        name = plan.entry.name
         rows = db.execute("SELECT stage, key, state FROM stages WHERE sheet = ?", (name,))
         old = {row["stage"]: row for row in rows}
         changed = any(s not in old or old[s]["key"] != key for s, key in plan.keys.items())
@@ -294,29 +322,36 @@ class Table:
                     "by another toonset batch; wait for it, or choose another -o"
                 )
             return
+        states = {stage: row["state"] for stage, row in old.items()}
+        due: set[str] = set()  # with what is made of them
+        blocked: set[str] = set()  # by what has failed
         for stage, key in plan.keys.items():
             known = stage in old and old[stage]["key"] == key
-            state = old[stage]["state"] if known else "waiting"
-            if state == "done" and (earlier or stage not in there):
-                state = "waiting"
-            earlier = earlier or state == "waiting"  # makes all later ones due
-            states.append(state)
+            is_gone = states.get(stage) == "done" and stage not in there
             if not known:
-                blank = StageRow(stage, key)
-                _put(db, name, blank)
-            elif state != old[stage]["state"]:
+                _put(db, name, StageRow(stage, key))
+            if not known or is_gone or stage in due:
+                states[stage] = "waiting"
                 db.execute(
-                    "UPDATE stages SET state = ? WHERE sheet = ? AND stage = ?",
-                    (state, name, stage),
+                    "UPDATE stages SET state = 'waiting' WHERE sheet = ? AND stage = ?",
+                    (name, stage),
                 )
+            if states[stage] in BAD:
+                blocked |= {*dependents(stage)}
+            if states[stage] == "waiting" and stage not in blocked:
+                due |= {stage, *dependents(stage)}
+        state = "waiting" if due else _worst(states.values())
         db.execute(
             "INSERT INTO sheets (name, position, entry, state) VALUES (?, ?, ?, ?) ON CONFLICT "
             "(name) DO UPDATE SET position = excluded.position, entry = excluded.entry, "
             "state = excluded.state",
-            (name, plan.position, json.dumps(asdict(plan.entry)), _whole(states)),
+            (name, plan.position, json.dumps(asdict(plan.entry)), state),
         )
         if changed:
-            db.execute("UPDATE sheets SET crashes = 0, kills = 0 WHERE name = ?", (name,))
+            db.execute(
+                "UPDATE sheets SET crashes = 0, kills = 0, planned = ? WHERE name = ?",
+                (time.time(), name),
+            )
 
     @staticmethod
     def _is_running(db: sqlite3.Connection, name: str) -> bool:
@@ -423,15 +458,32 @@ class Table:
                 "state = 'running' AND worker = ?",
                 (state, name, runner),
             ).rowcount
-            if taken and rows:  # results of later stages went with it
-                db.execute(
-                    "UPDATE stages SET state = 'waiting' WHERE sheet = ? AND state = 'done' "
-                    "AND rank > ?",
-                    (name, RANKS[rows[0].stage]),
-                )
-            for row in rows if taken else ():
-                _put(db, name, row)
-        return bool(taken)
+            if not taken:
+                return False
+            for row in rows:
+                self._record(db, name, row)
+            found = db.execute("SELECT state FROM stages WHERE sheet = ?", (name,))
+            if state == "done":  # a stage of an earlier command may have failed
+                whole = _worst(row["state"] for row in found)
+                db.execute("UPDATE sheets SET state = ? WHERE name = ?", (whole, name))
+        return True
+
+    @staticmethod
+    def _record(db: sqlite3.Connection, name: str, row: StageRow) -> None:
+        """Put in a stage that was run; what was made of its old result is gone."""
+        old = db.execute(
+            "SELECT key, state, attempts, ended FROM stages WHERE sheet = ? AND stage = ?",
+            (name, row.stage),
+        ).fetchone()
+        same = old is not None and old["key"] == row.key
+        if same and old["state"] == "done" and old["ended"] == row.ended:
+            return  # it was there
+        for stage in dependents(row.stage):
+            db.execute(
+                "DELETE FROM stages WHERE sheet = ? AND stage = ? AND state = 'done'", (name, stage)
+            )
+        tried = row.attempts + (old["attempts"] if same else 0)
+        _put(db, name, replace(row, attempts=tried))
 
     def count_crash(self, name: str, *, from_outside: bool) -> int:
         """Count the death of a sheet's worker; return how many of its kind there were."""
@@ -451,7 +503,7 @@ class Table:
             with self.transaction() as db:
                 for row in some:
                     known = self.row(row.name)
-                    if known is None or _last(known) <= _last(row):
+                    if known is None or known.newest <= row.newest:
                         _take_in(db, row)
             count += len(some)
         return count
@@ -469,23 +521,22 @@ def _put(db: sqlite3.Connection, name: str, row: StageRow) -> None:
     db.execute(f"REPLACE INTO stages ({columns}) VALUES ({marks})", values)  # noqa: S608
 
 
-def _last(row: SheetRow) -> float:
-    return max((one.ended for one in row.stages), default=0.0)
-
-
 def _take_in(db: sqlite3.Connection, row: SheetRow) -> None:
     state = "waiting" if row.state == "running" else row.state
     db.execute(
-        "REPLACE INTO sheets (name, position, entry, state, crashes) VALUES (?, ?, ?, ?, ?)",
-        (row.name, row.position, json.dumps(asdict(row.entry)), state, row.crashes),
+        "REPLACE INTO sheets (name, position, entry, state, crashes, planned) "
+        "VALUES (?, ?, ?, ?, ?, ?)",
+        (row.name, row.position, json.dumps(asdict(row.entry)), state, row.crashes, row.planned),
     )
+    db.execute("DELETE FROM stages WHERE sheet = ?", (row.name,))
     for one in row.stages:
         _put(db, row.name, one)
 
 
-def _whole(states: Iterable[str]) -> str:
-    """Return the state of a sheet: that of its first stage that is not done."""
-    return next((state for state in states if state != "done"), "done")
+def _worst(states: Iterable[str]) -> str:
+    """Return the state of a sheet that nothing is to be done for."""
+    found = {*states}
+    return next((state for state in BAD if state in found), "done")
 
 
 def _sheet(rows: Sequence[sqlite3.Row]) -> SheetRow:
@@ -499,6 +550,7 @@ def _sheet(rows: Sequence[sqlite3.Row]) -> SheetRow:
         first["sheet_state"],
         first["runner"],
         first["crashes"],
+        first["planned"],
         tuple(_stage(row) for row in rows if row["stage"] is not None),
     )
 

@@ -5,11 +5,12 @@ import os
 import signal
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from contextlib import closing
 from pathlib import Path
 
-from toonset.cli.batch.dispatch import Limits, Runner
+from toonset.cli.batch.dispatch import Limits, Runner, home_of
+from toonset.cli.batch.job import stages_there
 from toonset.cli.batch.local import LocalWorkers
 from toonset.cli.batch.stages import STAGES, Entry
 from toonset.cli.batch.table import TABLE, Plan, SheetRow, StageRow, Table
@@ -32,6 +33,9 @@ def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> 
     if stage == "calibrate":
         with new_folder(home / verb.writes, force=True) as folder:
             write_json(folder / verb.mark, [text, list(words)])
+    elif stage == "export":
+        with new_folder(home / verb.writes, force=True) as folder:
+            write_json(folder / "made.json", [text, list(words)])
     else:
         write_json(home / verb.writes / verb.mark, [text, list(words)])
     said = {"verdict": "ok", "reason": "", "views": [1], "colors": [1, 2]}
@@ -64,18 +68,21 @@ def _behave(what: str, home: Path) -> None:
         raise OSError(28, "No space left on device", str(home))
 
 
-def make_table(out: Path, sheets: dict[str, str], words: Sequence[str] = ()) -> Table:
+def make_table(
+    out: Path, sheets: dict[str, str], words: Sequence[str] = (), stages: Sequence[str] = CHOSEN
+) -> Table:
     """Return a table of sheets that behave as they say."""
     (out / "in").mkdir(parents=True, exist_ok=True)
     plans = []
     for position, (name, text) in enumerate(sheets.items()):
         file = out / "in" / f"{name}.txt"
         file.write_text(text)
-        keys = {"calibrate": text, "palette": " ".join((text, *words))}
+        every = {"calibrate": text, "palette": " ".join((text, *words)), "export": f"{text} export"}
+        keys = {stage: every[stage] for stage in stages}
         entry = Entry(name, (str(file),), {"palette": tuple(words)}, name)
         plans.append(Plan(entry, position, keys))
     table = Table(out / TABLE, make=True)
-    table.plan(plans, lambda name: set(CHOSEN))
+    table.plan(plans, lambda name: stages_there(home_of(out, name)))
     table.choose(sheets)
     return table
 
@@ -87,16 +94,17 @@ def run_all(
     count: int = 2,
     limits: Limits = Limits(60),  # noqa: B008
     words: Sequence[str] = (),
+    stages: Sequence[str] = CHOSEN,
 ) -> dict[str, SheetRow]:
     """Run sheets on local workers; return their rows."""
     ended: Counter[str] = Counter()
 
-    def take(name: str, rows: Sequence[StageRow]) -> None:
+    def take(name: str, rows: Sequence[StageRow], due: Container[str]) -> None:
         ended[name] += 1
 
-    with closing(make_table(out, sheets, words)) as table:
+    with closing(make_table(out, sheets, words, stages)) as table:
         with closing(LocalWorkers(count)) as workers:
-            Runner(out, limits, CHOSEN).run(table, workers, take, lambda: None)
+            Runner(out, limits, (*stages,)).run(table, workers, take, lambda: None)
         assert set(ended.values()) <= {1}
         return {row.name: row for row in table.rows()}
 

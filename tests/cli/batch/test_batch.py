@@ -106,6 +106,34 @@ def test_other_options_of_one_stage_redo_that_stage(
     assert (bundle / "palette.json").read_bytes() != colors
 
 
+def test_results_go_where_they_are_asked_for(
+    library: Path, ran: Path, toonset: Command, tmp_path: Path
+) -> None:
+    out, store = tmp_path / "out", tmp_path / "store"
+    shutil.copytree(ran, out)
+    command = ("batch", library / "sheets.csv", "-o", out, *STAGES, "--only", "s0", "--only", "s1")
+    for place in (store, tmp_path / "another"):  # what is done elsewhere is not done there
+        assert toonset(*command, "--store", f"file://{place}").code == 0
+        found = contents(place)
+        expected = {n: v for n, v in results(ran).items() if n[:2] in ("s0", "s1")}
+        assert {n: v for n, v in found.items() if n.count("/") > 1} == expected
+    shutil.rmtree(store / "s1")
+    assert toonset(*command, "--store", f"file://{store}").code == 0
+    assert (store / "s1" / "bundle" / "transforms.json").is_file()
+    assert not list((out / "sheets").rglob(".scratch"))
+
+
+def test_sheets_and_meshes_behind_urls(
+    library: Path, ran: Path, toonset: Command, tmp_path: Path
+) -> None:
+    options = f"calibrate --mesh file://{library / 'body1.obj'}"
+    sheet = f"file://{library / 's1.png'}"
+    done = toonset("batch", sheet, "-o", tmp_path / "out", *STAGES, "--with", options)
+    assert done.code == 0, done
+    there = contents(tmp_path / "out" / "sheets" / "s1" / "bundle")
+    assert there == contents(ran / "sheets" / "s1" / "bundle")
+
+
 def test_parts_are_merged(library: Path, ran: Path, toonset: Command, tmp_path: Path) -> None:
     out = tmp_path / "out"
     for part in ("1/2", "2/2"):
@@ -127,6 +155,7 @@ def test_parts_are_merged(library: Path, ran: Path, toonset: Command, tmp_path: 
         (("--merge", "nowhere"), "has no batch-*of*.sqlite"),
         (("s.png", "-o", "o", "--stages", "calibrat"), "did you mean 'calibrate'"),
         (("s.png", "-o", "o", "--stages", "render,calibrate"), "render needs train; add it"),
+        (("s.png", "-o", "o", "--stages", "calibrate,train"), "train needs palette; add it"),
         (("s.png", "-o", "o", "--stages", ""), "names no stage"),
         (("s.png", "-o", "o", "--shard", "0/3"), "is not I/N"),
         (("s.png", "-o", "o", "--shard", "4/3"), "is not I/N"),

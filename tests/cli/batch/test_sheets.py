@@ -191,6 +191,11 @@ def test_a_link_does_not_lead_out_of_the_manifests_folder(library: Path) -> None
     assert entry.name == "link"
 
 
+def test_names_that_are_no_text_are_told(library: Path) -> None:
+    Path(os.fsdecode(b"x\xff.png")).touch()
+    assert "its name is no UTF-8; rename it" in reason("*.png")
+
+
 def test_places_without_sheets_are_told(library: Path) -> None:
     assert "no such file" in reason("gone.png")
     assert "no sheets there" in reason("sub/*.jpg")

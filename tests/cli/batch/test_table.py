@@ -22,7 +22,7 @@ def everything(name: str) -> set[str]:
 
 
 def done(keys: dict[str, str] = KEYS) -> list[StageRow]:
-    return [StageRow(stage, key, "done", ended=1.0) for stage, key in keys.items()]
+    return [StageRow(stage, key, "done", ended=time.time()) for stage, key in keys.items()]
 
 
 def put(table: Table, count: int = 3, keys: dict[str, str] = KEYS) -> list[str]:
@@ -153,7 +153,7 @@ def test_a_redone_stage_makes_due_what_was_made_of_it(table: Table) -> None:
     some = {stage: "new" for stage in ("calibrate", "palette")}
     put(table, 1, some)
     finish(table, some)
-    assert states(table) == ["done", "done", "waiting"]  # the run went with the old bundle
+    assert states(table) == ["done", "done"]  # the run went with the old bundle
 
 
 def test_other_options_wait_for_who_works_on_a_sheet(table: Table) -> None:
@@ -187,12 +187,32 @@ def test_hashes_hold_while_a_file_looks_the_same(table: Table) -> None:
 
 
 def test_parts_are_put_together_and_the_newer_row_counts(table: Table, tmp_path: Path) -> None:
+    with closing(Table(tmp_path / "part.sqlite", make=True, alone=True)) as part:
+        put(part, 5)
+        finish(table)
+        assert table.take_in(part) == 5
+        assert states(table) == ["done"] * 3  # the part has not begun with it
+        assert states(table, "s004") == ["waiting"] * 3
+        put(part, 5, {"calibrate": "k1"} | {"palette": "new"})
+        table.take_in(part)
+        assert states(table)[:2] == ["waiting", "waiting"]
+
+
+def test_a_parts_row_replaces_all_stages(table: Table, tmp_path: Path) -> None:
     finish(table)
     with closing(Table(tmp_path / "part.sqlite", make=True)) as part:
-        put(part, 5)
-        assert table.take_in(part) == 5
-    assert states(table) == ["done"] * 3  # the part has not begun with it
-    assert states(table, "s004") == ["waiting"] * 3
+        part.choose(put(part, 1, {"calibrate": "other"}))
+        finish(part, {"calibrate": "other"})
+        table.take_in(part)
+    assert states(table) == ["done"]  # what was made of the old one is gone
+
+
+def test_a_store_is_remembered(table: Table, tmp_path: Path) -> None:
+    table.store = "s3://bucket/results"
+    with closing(Table(tmp_path / TABLE)) as other:
+        assert other.store == "s3://bucket/results"
+        other.store = ""
+    assert table.store == ""
 
 
 def test_many_processes_claim_every_sheet_once(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -10,17 +11,20 @@ import pytest
 
 from tests.cli.batch import stand_in
 from tests.cli.batch.stand_in import CHOSEN, make_table, run_all, runs
+from toonset import lock
 from toonset.cli.batch import dispatch, job
 from toonset.cli.batch.dispatch import Limits, Runner, alive, home_of, release_dead
 from toonset.cli.batch.local import LocalWorkers, usual_workers
-from toonset.cli.batch.table import TABLE, Table
-from toonset.errors import OutputError
+from toonset.cli.batch.table import TABLE, SheetRow, Table
+from toonset.errors import OutputError, ToonsetError
+
+RAISE = "raise --memory-limit, then --retry-failed"
 
 
 @pytest.fixture(autouse=True)
 def stands_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job, "run", stand_in.run)
-    monkeypatch.setattr(job, "_pictures", lambda home: {})
+    monkeypatch.setattr(job, "_pictures", lambda home, rows: {})
     monkeypatch.setattr(dispatch, "LOOK_S", 0.05)
 
 
@@ -56,8 +60,8 @@ def test_other_options_of_a_stage_run_that_stage(tmp_path: Path) -> None:
         ("bug", "failed", "this is a bug of toonset: KeyError: 'views'", 1),
         ("crash", "quarantined", "its worker ended by SIGSEGV, 3 times", 3),
         ("exit", "quarantined", "its worker ended with code 7, 3 times", 3),
-        ("hang", "failed", "took longer than 1 s", 1),
-        ("eat", "failed", "took more than 600 MB of memory", 1),
+        ("hang", "failed", "took longer than 1 s; raise --time-limit, then --retry-failed", 1),
+        ("eat", "failed", f"took more than 600 MB of memory; {RAISE}", 1),
     ],
 )
 def test_a_bad_sheet_is_told_and_the_others_are_done(
@@ -156,6 +160,76 @@ def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     assert os.waitstatus_to_exitcode(os.waitpid(parent, 0)[1]) == -signal.SIGKILL
     assert os.read(read, 1) == b""  # until all who have the other end are gone
     os.close(read)
+
+
+def test_who_works_on_a_batch_must_do_the_same(tmp_path: Path) -> None:
+    with alive(tmp_path, "one", "calibrate"):
+        with alive(tmp_path, "two", "calibrate"):
+            pass
+        with pytest.raises(ToonsetError, match="with other stages or options"):
+            with alive(tmp_path, "three", "palette"):
+                pass
+    with alive(tmp_path, "four", "palette"):
+        pass
+    assert not (tmp_path / dispatch.HOLDERS).exists()
+
+
+def states(row: SheetRow) -> dict[str, str]:
+    return {one.stage: one.state for one in row.stages}
+
+
+def test_a_later_run_with_other_stages_keeps_results(tmp_path: Path) -> None:
+    run_all(tmp_path, {"a": "ok"})
+    row = run_all(tmp_path, {"a": "ok"}, stages=("calibrate", "export"))["a"]
+    assert states(row) == {"calibrate": "done", "palette": "done", "export": "done"}
+    assert set(runs(tmp_path).values()) == {1}
+
+
+def test_a_redone_stage_takes_results_of_other_stages_with_it(tmp_path: Path) -> None:
+    run_all(tmp_path, {"a": "ok"})
+    row = run_all(tmp_path, {"a": "ok "}, stages=("calibrate", "export"))["a"]
+    assert states(row) == {"calibrate": "done", "export": "done"}
+    assert job.stages_there(home_of(tmp_path, "a")) == {"calibrate", "export"}
+
+
+def test_a_failed_stage_is_not_forgotten_by_a_run_without_it(tmp_path: Path) -> None:
+    run_all(tmp_path, {"a": "fail palette"})
+    row = run_all(tmp_path, {"a": "fail palette"}, stages=("calibrate",))["a"]
+    assert (row.state, row.error) == ("failed", "sheet.png: no figures; draw some")
+    row = run_all(tmp_path, {"a": "fail palette"}, stages=("calibrate", "export"))["a"]
+    assert states(row) == {"calibrate": "done", "palette": "failed", "export": "done"}
+    assert row.state == "failed"
+    assert set(runs(tmp_path).values()) == {1}
+
+
+def test_tries_are_counted(tmp_path: Path) -> None:
+    for _ in range(2):
+        run_all(tmp_path, {"a": "ok"})
+        (home_of(tmp_path, "a") / "calibrate.json").unlink()
+    row = run_all(tmp_path, {"a": "ok"})["a"]
+    assert [one.attempts for one in row.stages] == [3, 3]
+
+
+def test_a_sheet_that_is_held_by_others_waits_and_stops_nobody(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dispatch, "MOST_KILLS", 2)
+    make_table(tmp_path, {"a": "ok", "b": "ok"}).close()
+    home = home_of(tmp_path, "a")
+    home.mkdir(parents=True)
+    child = os.fork()
+    if child == 0:
+        with lock.hold(home / "bundle"):
+            (tmp_path / "held").touch()
+            time.sleep(600)
+    while not (tmp_path / "held").exists():
+        time.sleep(0.01)
+    rows = run_all(tmp_path, {"a": "ok", "b": "ok"})
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    assert rows["b"].state == "done"
+    assert rows["a"].state == "quarantined"
+    assert "is in use by another toonset" in rows["a"].error
 
 
 def test_a_stamp_on_disk_counts_when_the_table_forgot(tmp_path: Path) -> None:
