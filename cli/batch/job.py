@@ -40,6 +40,7 @@ PATIENCE_S = 30.0  # for the worker of a batch that has just been killed
 FATAL = "Fatal Python error"  # begins what faulthandler says of a crash, the last call first
 GUARD_S = 0.1  # between looks at the memory in use
 LINES, CHARACTERS = 12, 2000  # of a log that are kept
+READ = 1 << 16  # bytes of its end that are looked at: a crash names all modules
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ESTALE)
 FINE = (0, 3)  # exit codes of verbs that have written
 Kind = Literal["done", "failed", "busy", "place", "gone"]
@@ -371,7 +372,7 @@ def _peak_mb() -> float:
 def last_lines(log: Path) -> str:
     """Return the end of what a sheet's worker has printed."""
     try:
-        text = log.read_bytes()[-4 * CHARACTERS :].decode("utf-8", "replace")
+        text = log.read_bytes()[-READ:].decode("utf-8", "replace")
     except OSError:
         return ""
     lines = [printable(line) for line in text.splitlines() if line.strip()]

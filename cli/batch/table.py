@@ -475,14 +475,14 @@ class Table:
             "SELECT key, state, attempts, ended FROM stages WHERE sheet = ? AND stage = ?",
             (name, row.stage),
         ).fetchone()
-        same = old is not None and old["key"] == row.key
-        if same and old["state"] == "done" and old["ended"] == row.ended:
+        before = old if old is not None and old["key"] == row.key else None
+        if before and before["state"] == "done" and before["ended"] == row.ended:
             return  # it was there
         for stage in dependents(row.stage):
             db.execute(
                 "DELETE FROM stages WHERE sheet = ? AND stage = ? AND state = 'done'", (name, stage)
             )
-        tried = row.attempts + (old["attempts"] if same else 0)
+        tried = row.attempts + (before["attempts"] if before else 0)
         _put(db, name, replace(row, attempts=tried))
 
     def count_crash(self, name: str, *, from_outside: bool) -> int:

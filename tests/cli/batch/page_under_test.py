@@ -11,7 +11,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import Page
 
-from toonset.cli.batch.sheets import Entry
+from toonset.cli.batch.stages import Entry
 from toonset.cli.batch.table import SheetRow, StageRow
 
 STAGES = ("calibrate", "palette", "train", "render")
@@ -77,7 +77,7 @@ def sheet(
         stages.append(StageRow(stage, "key", **own))
     entry = Entry(name, (f"{name}.png",), words or {}, character or name)
     crashes = 3 if state == "quarantined" else 0
-    return SheetRow(entry, position, state, "", crashes, tuple(stages))  # type: ignore[arg-type]
+    return SheetRow(entry, position, state, "", crashes, 0.0, tuple(stages))  # type: ignore[arg-type]
 
 
 def one_of_each() -> list[SheetRow]:
