@@ -19,7 +19,6 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
-from toonset.nerf.look.step_lines import draw_steps
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
@@ -34,6 +33,7 @@ from toonset.nerf.look.drawings import (
 from toonset.nerf.look.outline import CRUMB_PX, crisp_outline
 from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
+from toonset.nerf.look.step_lines import draw_steps
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.recolor import tones_of
 from toonset.raster import nearest

@@ -12,10 +12,10 @@ from jaxtyping import Bool, Float, Float16, Shaped, UInt8
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
-from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.nerf.look.outline import Outline, without_crumbs
 from toonset.nerf.look.paint_labels import paint_labels, repainted
 from toonset.nerf.look.shade import Shade
+from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.palette.palette import Shadow
 from toonset.raster import depth_inside, distance_to, nearest
 

@@ -16,6 +16,8 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
+from toonset.nerf.look.outline import Outline
+from toonset.nerf.look.shade import Shade, learn_shade, smoothed
 from toonset.nerf.look.step_lines import (
     StepLines,
     learn_steps,
@@ -23,8 +25,6 @@ from toonset.nerf.look.step_lines import (
     step_places,
     step_sides,
 )
-from toonset.nerf.look.outline import Outline
-from toonset.nerf.look.shade import Shade, learn_shade, smoothed
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.raster import depth_inside, distance_to, nearest
 

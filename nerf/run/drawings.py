@@ -30,10 +30,10 @@ from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
 from toonset.errors import BundleError, CameraError
 from toonset.nerf.hull.mannequin_shape import MOST_FACES, MOST_STEPS, Shape
-from toonset.nerf.look.step_lines import StepLines
 from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.look.shade import Shade
+from toonset.nerf.look.step_lines import StepLines
 from toonset.palette.palette import Shadow
 from toonset.write import write_bytes
 

@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy import ndimage
 
+from toonset.nerf.look.drawings import SQUARE, Drawings, Texture
 from toonset.nerf.look.step_lines import step_edges
 from toonset.nerf.look.strokes import SOFT, lines_of, strokes_of
-from toonset.nerf.look.drawings import SQUARE, Drawings, Texture
 from toonset.raster import depth_inside, distance_to, nearest, parts
 
 STEP = 0.015  # of the figure's height: an outline may be drawn where depth steps by so much
