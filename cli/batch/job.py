@@ -322,6 +322,7 @@ def _logged(file: Path, memory_mb: int) -> Iterator[None]:
         for number in (1, 2):
             os.dup2(log, number)
         sys.stdout, sys.stderr = (open(n, "w", closefd=False, errors="replace") for n in (1, 2))
+        faulthandler.disable()  # libraries may have put handlers of their own over it
         faulthandler.enable(2, all_threads=False)
         if memory_mb:
             guard.start()
