@@ -21,7 +21,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -161,11 +161,11 @@ def _run_stages(job: Job, home: Path, sheets: Sequence[str]) -> Outcome:
             _remove_stamps(home, stage)
             ended = _run_stage(job, home, sheets, stage, key)
             if isinstance(ended, Outcome):
-                return replace(ended, rows=(*rows, *ended.rows), pictures=_pictures(home, rows))
+                return replace(ended, rows=(*rows, *ended.rows), pictures=_pictures(home))
             row = ended
             _write_stamp(home, row)
         rows.append(row)
-    return Outcome(job.name, "done", tuple(rows), pictures=_pictures(home, rows))
+    return Outcome(job.name, "done", tuple(rows), pictures=_pictures(home))
 
 
 def _run_stage(
@@ -291,11 +291,11 @@ def _hash_output(home: Path, stage: str) -> str:
     return found.hexdigest()
 
 
-def _pictures(home: Path, rows: Iterable[StageRow]) -> dict[str, str]:
+def _pictures(home: Path) -> dict[str, str]:
     """Return the page's small pictures of a sheet's results, by the end of their name."""
     from toonset.dataset.images.thumbnails import thumbnail, turn_thumbnail
 
-    there, found = {row.stage for row in rows}, {}
+    there, found = stages_there(home), {}
     with contextlib.suppress(ToonsetError):
         if "calibrate" in there:
             found[".webp"] = thumbnail(home / BUNDLE / "overlay.png")

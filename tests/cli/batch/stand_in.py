@@ -30,12 +30,9 @@ def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> 
     if where in ("", stage):
         _behave(what, home)
     verb = STAGES[stage]
-    if stage == "calibrate":
+    if stage in ("calibrate", "export"):
         with new_folder(home / verb.writes, force=True) as folder:
-            write_json(folder / verb.mark, [text, list(words)])
-    elif stage == "export":
-        with new_folder(home / verb.writes, force=True) as folder:
-            write_json(folder / "made.json", [text, list(words)])
+            write_json(folder / (verb.mark or "made.json"), [text, list(words)])
     else:
         write_json(home / verb.writes / verb.mark, [text, list(words)])
     said = {"verdict": "ok", "reason": "", "views": [1], "colors": [1, 2]}

@@ -93,6 +93,20 @@ def test_a_mended_sheet_is_run_and_no_other(
     assert {name.split("/")[0] for name in changed} == {"torn"}
 
 
+def test_a_run_of_fewer_stages_leaves_the_pages_pictures(
+    library: Path, ran: Path, toonset: Command, tmp_path: Path
+) -> None:
+    out, options = tmp_path / "out", ("--only", "s0", "--with", "export --to gltf")
+    shutil.copytree(ran, out)
+    home, thumbs = out / "sheets" / "s0", out / "thumbs"
+    (home / "turntable").mkdir()
+    shutil.copy(home / "bundle" / "images" / "000.png", home / "turntable" / "000.png")
+    shutil.copy(home / "palette.json", home / "render.json")
+    stages = ("--stages", "calibrate,export")
+    assert toonset("batch", library / "sheets.csv", "-o", out, *stages, *options).code == 0
+    assert {file.name for file in thumbs.glob("s0.*")} == {"s0.webp", "s0.turn.webp"}
+
+
 def test_other_options_of_one_stage_redo_that_stage(
     library: Path, ran: Path, toonset: Command, tmp_path: Path
 ) -> None:

@@ -108,7 +108,7 @@ def test_a_sheet_and_its_results_behind_urls(
     tmp_path: Path, memory: fsspec.AbstractFileSystem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(job, "run", stand_in.run)
-    monkeypatch.setattr(job, "_pictures", lambda home, rows: {})
+    monkeypatch.setattr(job, "_pictures", lambda home: {})
     monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
     memory.pipe_file("/in/a.txt", b"ok")
     keys = {"calibrate": "k1", "palette": "k2"}

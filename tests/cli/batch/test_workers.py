@@ -25,7 +25,7 @@ RAISE = "raise --memory-limit, then --retry-failed"
 @pytest.fixture(autouse=True)
 def stands_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job, "run", stand_in.run)
-    monkeypatch.setattr(job, "_pictures", lambda home, rows: {})
+    monkeypatch.setattr(job, "_pictures", lambda home: {})
     monkeypatch.setattr(dispatch, "LOOK_S", 0.05)
 
 
