@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import json
 import os
 import re
@@ -31,7 +30,6 @@ TIME_LIMIT_S = 1800.0
 PAGE_S, PAUSE = 30.0, 50  # between pages: at least; times what the last one took
 LOOK_AT = 3  # exit code: sheets have failed
 AUTO = "auto"
-SHARDS = "batch-*of*.sqlite"
 PLANNED_AT_ONCE = 500  # sheets of one transaction
 
 
@@ -158,25 +156,30 @@ def batch(
     versions touch. OUT/index.html shows all sheets, OUT/batch.sqlite is the table of what is done.
     Exit code 3 when sheets have failed; the others are done then.
     """
+    from toonset.cli.batch.dispatch import Limits
+    from toonset.cli.batch.progress import status_of
+    from toonset.cli.batch.sheets import choose
+    from toonset.cli.batch.stages import check_options, in_order
+
     printer = Printer(as_json, quiet)
     if (status is not None) + (merge is not None) + bool(sheets or out) > 1:
         raise UsageError("--status and --merge take the batch's folder, and nothing beside it")
     if status is not None:
-        return _say_status(status, printer)
+        found = status_of(status)
+        printer.result({"out": status, **found.values()}, "\n".join(found.lines()))
+        return
     if merge is not None:
-        return _merge(merge, printer)
+        _merge(merge, printer)
+        return
     if not sheets or out is None:
         raise UsageError("name sheets, and the folder of the batch with -o")
-    from toonset.cli.batch.dispatch import Limits
-    from toonset.cli.batch.stages import check_options, in_order
-
     chosen = in_order([name.strip() for name in stages.split(",") if name.strip()])
     if gpus and ray is None:
         raise UsageError("--gpus belongs to --ray")
     entries = _listed(sheets, given or [], root, out)
     check_options(entries, chosen)
     part, table_name = _shard(shard)
-    names = _chosen(entries, only or [], part)
+    names = choose(entries, only or [], part)
     count = _count(workers, memory_limit or 0)
     share = 0 if ray else _share(count)
     limits = Limits(time_limit, memory_limit or share)
@@ -192,8 +195,7 @@ def batch(
         given or [],
     )
     start = partial(_ray_workers, ray, gpus, limits) if ray else partial(_local_workers, count)
-    found = _run(wanted, start, printer)
-    _report(wanted, found, printer)
+    _report(wanted, _run(wanted, start, printer), printer)
 
 
 @dataclass(frozen=True)
@@ -230,7 +232,9 @@ class Wanted:
     @property
     def is_shard(self) -> bool:
         """Return whether others have a part of it."""
-        return fnmatch.fnmatchcase(self.table, SHARDS)
+        from toonset.cli.batch.table import TABLE
+
+        return self.table != TABLE
 
 
 def _listed(sheets: list[str], given: list[str], root: Path | None, out: Path) -> list[Entry]:
@@ -258,17 +262,6 @@ def _shard(text: str) -> tuple[tuple[int, int], str]:
     if not 1 <= part <= parts:
         raise UsageError(f"--shard {text!r}: is not I/N with I from 1 to N, as 3/8")
     return (part - 1, parts), f"batch-{part}of{parts}.sqlite"
-
-
-def _chosen(entries: Sequence[Entry], only: list[str], part: tuple[int, int]) -> frozenset[str]:
-    """Return the names of the sheets that are to run."""
-    for pattern in only:
-        if not any(fnmatch.fnmatchcase(entry.name, pattern) for entry in entries):
-            raise UsageError(f"--only {pattern!r}: no sheet is called so; see --status")
-    mine = [entry.name for entry in entries[part[0] :: part[1]]]
-    if only:
-        mine = [n for n in mine if any(fnmatch.fnmatchcase(n, pattern) for pattern in only)]
-    return frozenset(mine)
 
 
 def _count(workers: str, memory_mb: int) -> int:
@@ -346,7 +339,7 @@ def _run(
 def _check_out(out: Path) -> None:
     """Make the batch's folder; refuse one that is none."""
     from toonset.cli.batch.dispatch import HOLDERS
-    from toonset.cli.batch.table import TABLE
+    from toonset.cli.batch.table import TABLE, tables_in
 
     if os.path.lexists(out) and not out.is_dir():
         raise OutputError(f"{out}: is a file, a folder is needed; choose another -o")
@@ -356,13 +349,8 @@ def _check_out(out: Path) -> None:
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"{out}: cannot be made ({reason}); choose another -o") from error
-    if names and not any((out / name).is_file() for name in (TABLE, *_shards(out))):
+    if names and not tables_in(out):
         raise OutputError(f"{out}: holds files, but no {TABLE}; choose another -o")
-
-
-def _shards(out: Path) -> list[str]:
-    """Return the names of the tables of a batch's parts."""
-    return sorted(path.name for path in out.glob(SHARDS)) if out.is_dir() else []
 
 
 def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
@@ -431,38 +419,12 @@ def _report(wanted: Wanted, counts: Mapping[str, Counter[str]], printer: Printer
         raise typer.Exit(LOOK_AT)
 
 
-def _tables(out: Path) -> list[Path]:
-    """Return the tables of a batch's folder: its own, and those of its parts."""
-    from toonset.cli.batch.table import TABLE
-
-    names = [name for name in (TABLE, *_shards(out)) if (out / name).is_file()]
-    if not names:
-        raise UsageError(f"{out}: has no {TABLE}; name the -o of a toonset batch")
-    return [out / name for name in names]
-
-
-def _say_status(out: Path, printer: Printer) -> None:
-    from toonset.cli.batch.progress import Status
-    from toonset.cli.batch.table import Table
-
-    status, paths = Status(), _tables(out)
-    with ExitStack() as stack:
-        tables = [stack.enter_context(closing(Table(path))) for path in paths]
-        whole = tables[0]
-        if len(tables) > 1:  # a sheet may be in several
-            whole = stack.enter_context(closing(Table(Path(":memory:"), make=True)))
-            for table in tables:
-                whole.take_in(table)
-        status.add(whole.rows())
-    printer.result({"out": out, **status.values()}, "\n".join(status.lines()))
-
-
 def _merge(out: Path, printer: Printer) -> None:
     """Put the parts' tables into the batch's own, and write the page."""
     from toonset.cli.batch.page import write_page
-    from toonset.cli.batch.table import TABLE, Table
+    from toonset.cli.batch.table import SHARDS, TABLE, Table, tables_in
 
-    if not (shards := _shards(out)):
+    if not (shards := [name for name in tables_in(out) if name != TABLE]):
         raise UsageError(f"{out}: has no {SHARDS}; run toonset batch --shard first")
     count = 0
     with closing(Table(out / TABLE, make=True)) as table:

@@ -34,7 +34,6 @@ MOST_CRASHES = 3  # of a sheet's worker: then it is left alone
 MOST_KILLS = 20  # of it, from outside: by then it is no accident
 HOLDERS = ".runners"  # folder of locked files, one for each runner
 THUMBS, PICTURES = "thumbs", (".webp", ".turn.webp")
-RAISE = "raise --time-limit, then --retry-failed"
 Ended = Callable[[str, Sequence[StageRow], Container[str]], object]
 
 
@@ -52,9 +51,6 @@ class Workers(Protocol):
     def wait(self, timeout_s: float) -> list[Outcome]:
         """Return what has ended; wait until something has, or the time is over."""
         ...
-
-    def kill(self, name: str) -> None:
-        """End the process of a sheet; `wait` tells of it."""
 
     def close(self) -> None:
         """End them all; what they were writing is cleared away."""
@@ -91,9 +87,7 @@ class Runner:
     store: str = ""
     ident: str = field(default_factory=lambda: _ident())
     _table: Table = field(init=False)
-    _began: dict[str, float] = field(default_factory=dict)  # of sheets that run
-    _due: dict[str, set[str]] = field(default_factory=dict)  # stages of them that are not done
-    _late: set[str] = field(default_factory=set)  # of them, ended for it
+    _due: dict[str, set[str]] = field(default_factory=dict)  # of sheets that run: stages to do
 
     def run(self, table: Table, workers: Workers, ended: Ended, tick: Callable[[], object]) -> None:
         """Run all chosen sheets that are due, and wait for those that other runners have.
@@ -110,12 +104,11 @@ class Runner:
         renewed, self._table = time.monotonic(), table
         try:
             while True:
-                idle = not self._fill(workers) and not self._began
+                idle = not self._fill(workers) and not self._due
                 if idle and not self._table.others_running(self.ident):
                     return
-                for outcome in workers.wait(LOOK_S) if self._began else _nap():
+                for outcome in workers.wait(LOOK_S) if self._due else _nap():
                     self._take(outcome, ended)
-                self._end_late(workers)
                 if time.monotonic() - renewed > RENEW_S:
                     self._table.renew(self.ident, LEASE_S)
                     renewed = time.monotonic()
@@ -129,11 +122,10 @@ class Runner:
     def _fill(self, workers: Workers) -> bool:
         """Give sheets to free workers; return whether there were any."""
         found = False
-        while len(self._began) < workers.capacity:
+        while len(self._due) < workers.capacity:
             row = self._table.claim(self.ident, LEASE_S)
             if row is None:
                 break
-            self._began[row.name] = time.monotonic()
             self._due[row.name] = {one.stage for one in row.stages if one.state != "done"}
             workers.submit(self._job(row))
             found = True
@@ -146,29 +138,16 @@ class Runner:
         return Job(
             *(entry.name, entry.sheets, entry.words, keys, home),
             store=self.store,
+            seconds=self.limits.seconds,
             memory_mb=self.limits.memory_mb,
         )
-
-    def _end_late(self, workers: Workers) -> None:
-        """End what takes longer than it may."""
-        now = time.monotonic()
-        for name, began in self._began.items():
-            if now - began > self.limits.seconds and name not in self._late:
-                self._late.add(name)
-                workers.kill(name)
 
     def _take(self, outcome: Outcome, ended: Ended) -> None:
         """Put into the table how a sheet ended."""
         name = outcome.name
         due = self._due.pop(name)
-        del self._began[name]
         if outcome.kind == "place":
             raise OutputError(f"{outcome.line}; then run the same command again")
-        if name in self._late:
-            self._late.discard(name)
-            if outcome.kind == "gone":
-                said = f"took longer than {self.limits.seconds:g} s; {RAISE}"
-                outcome = replace(outcome, kind="failed", line=said)
         state, line = self._state(outcome)
         if state == "waiting":
             self._table.release(self.ident, name)

@@ -57,6 +57,7 @@ class Job:
         keys: what each stage's result is to be of, in order.
         home: the sheet's folder.
         store: URL that the folder is copied to; "": it stays where it is.
+        seconds: that it may take; 0: no limit.
         memory_mb: most that its process may take; 0: no limit.
     """
 
@@ -66,6 +67,7 @@ class Job:
     keys: Mapping[str, str]
     home: str
     store: str = ""
+    seconds: float = 0.0
     memory_mb: int = 0
 
 

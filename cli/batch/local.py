@@ -27,6 +27,7 @@ WORKER_MB = 1500  # of memory, for a sheet of usual size and its training
 BY_SIGNAL = 128  # plus the signal's number: exit code of a process that cleared up after it
 PARENT_DIED = 1  # PR_SET_PDEATHSIG of Linux
 GRACE_S = 2.0  # for a process to clear up what it was writing
+RAISE = "raise --time-limit, then --retry-failed"
 
 
 def usual_workers(memory_mb: int = 0) -> int:
@@ -58,7 +59,16 @@ class _Worker:
     pid: int
     pipe: Connection
     job: Job | None = None
+    began: float = 0.0
+    is_late: bool = False
     ooms: int = 0
+
+    def end_if_late(self) -> None:
+        """Kill it if its sheet takes longer than it may."""
+        limit = self.job.seconds if self.job is not None else 0
+        if limit and not self.is_late and time.monotonic() - self.began > limit:
+            self.is_late = True
+            os.kill(self.pid, signal.SIGKILL)
 
 
 class LocalWorkers:
@@ -81,6 +91,7 @@ class LocalWorkers:
         """Give a sheet to a free worker."""
         worker = next(worker for worker in self._workers if worker.job is None)
         worker.job, worker.ooms = job, _ooms()
+        worker.began, worker.is_late = time.monotonic(), False
         try:
             worker.pipe.send_bytes(json.dumps(asdict(job)).encode())
         except OSError:  # it has died meanwhile: `wait` says so
@@ -88,6 +99,8 @@ class LocalWorkers:
 
     def wait(self, timeout_s: float) -> list[Outcome]:
         """Return what has ended meanwhile; wait until something has, or the time is over."""
+        for worker in self._workers:
+            worker.end_if_late()
         ready = wait([worker.pipe for worker in self._workers], timeout_s)
         found = []
         for worker in [worker for worker in self._workers if worker.pipe in ready]:
@@ -97,12 +110,6 @@ class LocalWorkers:
             except (EOFError, OSError):
                 found += self._bury(worker)
         return found
-
-    def kill(self, name: str) -> None:
-        """End the worker of a sheet; `wait` tells of it."""
-        for worker in self._workers:
-            if worker.job is not None and worker.job.name == name:
-                os.kill(worker.pid, signal.SIGKILL)
 
     def close(self) -> None:
         """End all workers; what they were writing is cleared away."""
@@ -143,7 +150,8 @@ class LocalWorkers:
         if worker.job is None:
             return []
         log = last_lines(Path(worker.job.home, LOG))
-        if over := over_memory(log):
+        late = f"took longer than {worker.job.seconds:g} s; {RAISE}" if worker.is_late else ""
+        if over := late or over_memory(log):
             return [Outcome(worker.job.name, "failed", line=over, log=log)]
         number = -code if code < 0 else code - BY_SIGNAL
         by_signal = number in {*map(int, signal.Signals)}

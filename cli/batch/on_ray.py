@@ -1,7 +1,7 @@
 """Run sheets on a Ray cluster: the same function that the processes of one machine run.
 
 Ray has no more to do than there are cores, and the table knows all of it: what a lost node, or a
-lost cluster, had to do is claimed again. A sheet's process is ended as here, by time and memory.
+lost cluster, had to do is claimed again.
 """
 
 from __future__ import annotations
@@ -9,28 +9,57 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import socket
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
+from functools import cache
+from types import FrameType
 from typing import Any
 
-from toonset.cli.batch.job import FATAL, LOG, Job, Outcome, last_lines, over_memory, run_sheet
+from toonset.cli.batch.job import Job, Outcome, run_sheet
+from toonset.cli.batch.local import BY_SIGNAL, LocalWorkers, job_of, outcome_of
+from toonset.cli.batch.stages import import_parts
 from toonset.errors import SetupError, ToonsetError, one_line
 
 HERE = "local"
+LOOK_S = 1.0  # between looks at whether a sheet takes too long
 GONE = "the Ray cluster is gone; with another one run the same command again"
 ANSWER_S = 5.0  # for a connection to a cluster
 ASK_S = 5.0  # between questions for how many cores there are
 
 
 def run_told(told: str) -> str:
-    """Run a sheet that is told as JSON, in a process of Ray's."""
-    from toonset.cli.batch.local import job_of, use_one_core
+    """Run a sheet that is told as JSON, in a process forked from one of Ray's.
 
-    use_one_core()
-    return json.dumps(asdict(run_sheet(job_of(json.loads(told)))))
+    So its limits count from its start, and what ends it is seen on its own node, with its last
+    lines, whether or not that shares a disk with others.
+    """
+    job = job_of(json.loads(told))
+    worker = _forked(tuple(job.keys))
+    worker.submit(job)
+    while not (ended := worker.wait(LOOK_S)):
+        pass
+    return json.dumps(asdict(ended[0]))
+
+
+@cache
+def _forked(stages: tuple[str, ...]) -> LocalWorkers:
+    """Return the one worker of a process of Ray's."""
+    import_parts(stages)
+    return LocalWorkers(1, _run)
+
+
+def _run(job: Job) -> Outcome:
+    """Run a sheet in a fork, where Ray's own answer to signals has no place."""
+    signal.signal(signal.SIGTERM, _end)
+    return run_sheet(job)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """Clear away what is half-written, and end."""
+    raise SystemExit(BY_SIGNAL + number)
 
 
 class RayWorkers:
@@ -69,11 +98,12 @@ class RayWorkers:
             )
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise ToonsetError(f"--ray {address}: no cluster there ({one_line(error)})") from error
-        options: dict[str, Any] = {"num_cpus": 1, "num_gpus": gpus, "max_retries": 0}
-        if memory_mb and address != HERE:
-            options["memory"] = memory_mb * 2**20
-        self._run = ray.remote(**options)(run_told)
-        self._gpus, self._jobs = gpus, dict[Any, Job]()
+        memory = memory_mb * 2**20 if address != HERE else 0
+        options = {"num_cpus": 1, "num_gpus": gpus, "memory": memory}
+        shares = zip(("CPU", "GPU", "memory"), options.values(), strict=True)
+        self._shares = {name: share for name, share in shares if share}
+        self._run = ray.remote(**options, max_retries=0)(run_told)
+        self._jobs = dict[Any, Job]()
         self._capacity, self._asked = 1, 0.0
         self._head = address if "://" in address else ray.get_runtime_context().gcs_address
 
@@ -84,8 +114,8 @@ class RayWorkers:
             _check_answers(self._head, GONE)
             with self._lost():
                 found = self._ray.cluster_resources()
-            by_gpu = found.get("GPU", 0) / self._gpus if self._gpus else float("inf")
-            self._capacity = max(1, int(min(found.get("CPU", 1), by_gpu)))
+            fitting = (found.get(name, 0) / share for name, share in self._shares.items())
+            self._capacity = max(1, int(min(fitting)))
             self._asked = time.monotonic()
         return self._capacity
 
@@ -103,12 +133,6 @@ class RayWorkers:
                 ready, _ = self._ray.wait(list(self._jobs), num_returns=every, timeout=0)
         return [self._outcome(reference) for reference in ready]
 
-    def kill(self, name: str) -> None:
-        """End the process of a sheet; `wait` tells of it."""
-        for reference, job in self._jobs.items():
-            if job.name == name:
-                self._ray.cancel(reference, force=True)
-
     def close(self) -> None:
         """End what runs, and leave the cluster."""
         for reference in self._jobs:
@@ -119,8 +143,6 @@ class RayWorkers:
 
     def _outcome(self, reference: Any) -> Outcome:
         """Return how a sheet ended, or what became of its process."""
-        from toonset.cli.batch.local import outcome_of
-
         job, errors = self._jobs.pop(reference), self._ray.exceptions
         try:
             return outcome_of(json.loads(self._ray.get(reference)))
@@ -129,12 +151,7 @@ class RayWorkers:
         except errors.OutOfMemoryError as error:
             return Outcome(job.name, "gone", line=f"its node ran out of memory: {_first(error)}")
         except (errors.WorkerCrashedError, errors.TaskCancelledError):
-            log = last_lines(Path(job.home, LOG))
-            if over := over_memory(log):
-                return Outcome(job.name, "failed", line=over, log=log)
-            fatal = next((line for line in log.splitlines() if line.startswith(FATAL)), "")
-            line = f"its worker ended: {fatal}" if fatal else "its worker was killed"
-            return Outcome(job.name, "gone", line=line, log=log, from_outside=not fatal)
+            return Outcome(job.name, "gone", line="its worker was killed", from_outside=True)
 
     @contextlib.contextmanager
     def _lost(self) -> Iterator[None]:

@@ -8,10 +8,11 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -125,7 +126,26 @@ class Wanted:
         row = self.table.row(name)
         if row is None or row.state != "done":
             return None
-        return read_sheet(self.batch, row, self.verdicts, decode=decode)
+        with self._home(name) as home:
+            return read_sheet(home, row, self.verdicts, decode=decode)
+
+    @contextmanager
+    def _home(self, name: str) -> Iterator[Path]:
+        """Yield a sheet's folder; of a batch with a store a copy, for as long as it is read."""
+        from toonset.cli.batch.dispatch import home_of
+        from toonset.cli.batch.stages import BUNDLE, STAGES
+        from toonset.cli.batch.storage import fetch
+
+        if not (store := self.table.store):
+            yield home_of(self.batch, name)
+            return
+        url = f"{store.rstrip('/')}/{name}"
+        with TemporaryDirectory() as place:
+            fetch(f"{url}/{BUNDLE}", Path(place), without=Path(STAGES["train"].writes).name)
+            try:
+                yield Path(place)
+            except ToonsetError as error:
+                raise type(error)(str(error).replace(place, url)) from error
 
 
 @dataclass(frozen=True, order=True)
@@ -165,10 +185,9 @@ def _shares(text: str) -> tuple[float, ...]:
 
 def _table(batch: Path) -> Table:
     """Open the table of a batch."""
-    from toonset.cli.batch.batch import SHARDS
-    from toonset.cli.batch.table import TABLE, Table
+    from toonset.cli.batch.table import TABLE, Table, tables_in
 
-    if not (batch / TABLE).is_file() and batch.is_dir() and any(batch.glob(SHARDS)):
+    if TABLE not in (found := tables_in(batch)) and found:
         raise UsageError(f"{batch}: is in parts still; run `toonset batch --merge` on it first")
     return Table(batch / TABLE)
 

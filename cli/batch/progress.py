@@ -6,10 +6,12 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from toonset.cli.batch.table import BAD, SheetRow, StageRow
+from toonset.cli.batch.table import BAD, TABLE, SheetRow, StageRow, Table, tables_in
 from toonset.cli.common.output import Printer
 
 LIVE_S, LOG_S = 0.5, 30.0  # between lines on a terminal; in a log
@@ -116,7 +118,7 @@ def _duration(seconds: float) -> str:
 
 @dataclass
 class Status:
-    """Where a batch stands, from its table or those of its parts."""
+    """Where a batch stands, counted."""
 
     sheets: Counter[str] = field(default_factory=Counter)
     verdicts: Counter[str] = field(default_factory=Counter)
@@ -157,6 +159,27 @@ class Status:
         found += [f"{name}: {state}: {error}" for name, state, error in self.bad[:MOST_BAD]]
         more = len(self.bad) - MOST_BAD
         return [*found, *([f"... and {more} more; all are in index.html"] if more > 0 else [])]
+
+
+def status_of(out: Path) -> Status:
+    """Return where a batch stands, its parts together.
+
+    Args:
+        out: its folder.
+
+    Raises:
+        ToonsetError: no table is there, or one cannot be read.
+    """
+    status, paths = Status(), [out / name for name in tables_in(out)]
+    with ExitStack() as stack:
+        tables = [stack.enter_context(closing(Table(path))) for path in paths or [out / TABLE]]
+        whole = tables[0]
+        if len(tables) > 1:  # a sheet may be in several
+            whole = stack.enter_context(closing(Table(Path(":memory:"), make=True)))
+            for table in tables:
+                whole.take_in(table)
+        status.add(whole.rows())
+    return status
 
 
 def _said(counts: Counter[str]) -> str:

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from toonset.cli.batch.dispatch import home_of
 from toonset.cli.batch.stages import BUNDLE
 from toonset.cli.batch.table import SheetRow
 from toonset.dataset.bundle.bundle import CALIBRATION, IMAGES, LABELS
@@ -165,12 +164,12 @@ class SheetRecord:
 
 
 def read_sheet(
-    out: Path, row: SheetRow, verdicts: Container[str], *, decode: bool
+    home: Path, row: SheetRow, verdicts: Container[str], *, decode: bool
 ) -> SheetRecord | None:
     """Return the record of a sheet that is done; None if its verdict is none of those wanted.
 
     Args:
-        out: folder of the batch.
+        home: the sheet's folder.
         row: of the sheet.
         verdicts: those that are wanted.
         decode: look into the pictures, too, and not only at their bytes.
@@ -178,7 +177,7 @@ def read_sheet(
     Raises:
         ToonsetError: its bundle is gone, damaged, or its files do not belong together.
     """
-    folder = home_of(out, row.name) / BUNDLE
+    folder = home / BUNDLE
     if not re.fullmatch(r"[\w-]+", row.name) or not folder.is_dir():
         raise BundleError(
             f"{folder}: is not there; copy it back, or run the batch again with --only {row.name}"

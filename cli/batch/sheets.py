@@ -15,6 +15,7 @@ Paths are relative to the manifest's folder, and must lie in it, or in the folde
 from __future__ import annotations
 
 import csv
+import fnmatch
 import glob
 import io
 import os
@@ -27,7 +28,7 @@ from typing import Any
 
 from toonset.cli.batch.stages import STAGES, Entry, as_words, files_among, parse, value_of
 from toonset.cli.batch.storage import find, is_url
-from toonset.errors import SheetError, as_text, one_line, printable
+from toonset.errors import SheetError, UsageError, as_text, one_line, printable
 
 MANIFESTS = (".csv", ".jsonl")
 LONGEST_NAME = 100  # bytes: a folder of toonset's own adds some, 255 is the most
@@ -81,6 +82,28 @@ def list_sheets(
     entries = [_entry(one, common) for one in given]
     _check_names(entries, given)
     return sorted(entries, key=lambda entry: entry.name)
+
+
+def choose(
+    entries: Sequence[Entry], only: Sequence[str] = (), part: tuple[int, int] = (0, 1)
+) -> frozenset[str]:
+    """Return the names of the sheets that are to run.
+
+    Args:
+        entries: all of them.
+        only: names, or patterns of names; none: all.
+        part: which one, from 0, of how many.
+
+    Raises:
+        UsageError: nothing is called so.
+    """
+    for pattern in only:
+        if not any(fnmatch.fnmatchcase(entry.name, pattern) for entry in entries):
+            raise UsageError(f"--only {pattern!r}: no sheet is called so; see --status")
+    mine = [entry.name for entry in entries[part[0] :: part[1]]]
+    if only:
+        mine = [n for n in mine if any(fnmatch.fnmatchcase(n, pattern) for pattern in only)]
+    return frozenset(mine)
 
 
 def _given(place: str, root: Path | None, out: Path | None) -> Iterator[Given]:

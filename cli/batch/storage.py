@@ -88,15 +88,28 @@ def content_hash(place: str) -> str:
     return found.hexdigest()
 
 
-def fetch(url: str, folder: Path) -> Path:
+def fetch(url: str, folder: Path, without: str = "") -> Path:
     """Copy what is behind a URL, a file or a folder, into a folder; return where it lies.
+
+    Args:
+        url: of it.
+        folder: to put it in.
+        without: a folder in it that is left; "": none.
 
     Raises:
         ToonsetError: it cannot be reached.
     """
     with _reached(url) as (files, path):
-        place = folder / (path.rstrip("/").rsplit("/", 1)[-1] or "sheet")
-        files.get(path, str(place), recursive=files.isdir(path))
+        root = path.rstrip("/")
+        place = folder / (root.rsplit("/", 1)[-1] or "sheet")
+        if not files.isdir(path):
+            files.get(path, str(place))
+            return place
+        found = {name.removeprefix(f"{root}/"): name for name in files.find(path)}
+        wanted = [name for name in found if not (without and name.startswith(f"{without}/"))]
+        for parent in {(place / name).parent for name in wanted}:
+            parent.mkdir(parents=True, exist_ok=True)
+        files.get([found[name] for name in wanted], [str(place / name) for name in wanted])
         return place
 
 

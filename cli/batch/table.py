@@ -26,7 +26,7 @@ from toonset.cli.batch.stages import RANKS, Entry, dependents
 from toonset.errors import OutputError, ToonsetError
 
 SCHEMA = 1  # in the table's user_version
-TABLE = "batch.sqlite"
+TABLE, SHARDS = "batch.sqlite", "batch-*of*.sqlite"  # of a batch; of its parts
 AT_ONCE = 500  # sheets of one transaction
 PATIENCE_S = 60.0  # for another process's transaction; each takes milliseconds
 BAD = ("quarantined", "failed")  # the worse first
@@ -166,6 +166,12 @@ class Plan:
     entry: Entry
     position: int
     keys: Mapping[str, str]
+
+
+def tables_in(out: Path) -> list[str]:
+    """Return the names of the tables in a batch's folder: its own first, then those of parts."""
+    parts = sorted(path.name for path in out.glob(SHARDS)) if out.is_dir() else []
+    return [TABLE] * (out / TABLE).is_file() + parts
 
 
 class Table:

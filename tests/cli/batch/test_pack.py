@@ -172,6 +172,36 @@ def test_webdataset_has_every_view_as_the_bundle_has_it(
             assert view["labels.png"] == (bundle / "labels" / f"{number:03d}.png").read_bytes()
 
 
+def test_results_behind_a_url_are_packed_alike(
+    make: Make, packed: dict[str, Path], tmp_path: Path
+) -> None:
+    out, store = make(tmp_path / "out", SHEETS), tmp_path / "store"
+    (out / "sheets").rename(store)
+    run = store / "knight-1" / "bundle" / "run"
+    run.mkdir()
+    os.mkfifo(run / "never-read")  # a field is not packed: nor is it fetched
+    with closing(Table(out / TABLE)) as table:
+        table.store = f"file://{store}"
+    done = pack(out, "--to", "webdataset", "-o", tmp_path / "packed")
+    assert done.code == 0, done
+    assert contents(tmp_path / "packed") == contents(packed["webdataset"])
+
+
+def test_what_is_wrong_behind_a_url_is_told_with_the_url(make: Make, tmp_path: Path) -> None:
+    out, store = make(tmp_path / "out", SHEETS[:1]), tmp_path / "store"
+    (out / "sheets").rename(store)
+    with closing(Table(out / TABLE)) as table:
+        table.store = f"file://{store}"
+    (store / "knight-1" / "bundle" / "images" / "000.png").write_bytes(b"torn")
+    done = pack(out, "--to", "webdataset", "-o", tmp_path / "packed")
+    assert (done.code, done.err.count("\n")) == (2, 1), done
+    assert f"file://{store}/knight-1/bundle/images/000.png" in done.err
+    shutil.rmtree(store / "knight-1" / "bundle")
+    done = pack(out, "--to", "webdataset", "-o", tmp_path / "packed")
+    assert (done.code, done.err.count("\n")) == (2, 1), done
+    assert f"file://{store}/knight-1/bundle" in done.err
+
+
 def test_parquet_has_every_view_as_the_bundle_has_it(batch: Path, packed: dict[str, Path]) -> None:
     from pyarrow import parquet
 

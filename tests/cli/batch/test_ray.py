@@ -1,6 +1,8 @@
 """`toonset batch --ray`: the same bytes on a cluster of two nodes, whatever becomes of them."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 import time
@@ -15,6 +17,8 @@ from tests.batch.cluster import make_cluster
 from tests.conftest import Command, contents
 
 STAGES = ("--stages", "calibrate,palette")
+ROOT = Path(__file__).resolve().parents[3]
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 
 pytestmark = pytest.mark.slow
 
@@ -109,6 +113,22 @@ def test_results_go_to_a_store(
     assert {name: found[name] for name in local if local[name] != "folder"} == {
         name: value for name, value in local.items() if value != "folder"
     }
+
+
+def test_what_crashes_or_hangs_is_told_as_on_one_machine(
+    library: Path, cluster: Any, tmp_path: Path
+) -> None:
+    for name in ("crash0.png", "hang0.png", "s0.png"):  # tests.batch.child behaves by names
+        shutil.copy(library / "s0.png", tmp_path / name)
+    words = [*("batch", str(tmp_path / "*.png"), "-o", str(tmp_path / "out"), "--json")]
+    words += ["--with", f"calibrate --mesh {library / 'body0.obj'}", "--stages", "calibrate"]
+    words += ["--time-limit", "20", "--ray", cluster.address]
+    child = [sys.executable, "-P", "-m", "tests.batch.child", *words]
+    done = subprocess.run(child, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True)
+    assert done.returncode == 3, done.stderr
+    assert "crash0: quarantined: its worker ended by SIGSEGV, 3 times" in done.stderr
+    assert "hang0: failed: took longer than 20 s; raise --time-limit" in done.stderr
+    assert json.loads(done.stdout)["stages"]["calibrate"]["done"] == 1
 
 
 def test_no_cluster_is_told_in_one_line(library: Path, tmp_path: Path) -> None:
