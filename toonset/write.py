@@ -26,8 +26,13 @@ THERE_ALREADY = (errno.ENOTEMPTY, errno.EEXIST)
 ENDINGS = {signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: Path, data: bytes, *, lasting: bool = True) -> None:
     """Write `data` to `path` so that `path` holds either its old content or all of the new.
+
+    Args:
+        path: the file.
+        data: its content.
+        lasting: wait until the disk has it; else it may be lost if the machine loses power.
 
     Raises:
         OutputError: the place cannot be written (missing permission, full disk, a folder there).
@@ -44,10 +49,11 @@ def write_bytes(path: Path, data: bytes) -> None:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
             file.flush()
-            os.fsync(file.fileno())
+            if lasting:
+                os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-        if new is None:  # a new folder is flushed as a whole
+        if lasting and new is None:  # a new folder is flushed as a whole
             flush(path.parent)
     except OSError as error:
         raise _output_error(path, error) from error

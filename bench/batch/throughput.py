@@ -11,6 +11,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.batch.cluster import make_cluster
 from bench.batch.sheets import MANIFEST
 from toonset.cli.batch.table import TABLE, Table
 
@@ -95,22 +96,36 @@ def report(library: Path, work: Path, alone: int, say: Callable[[str], None]) ->
     """Print a line for every way to run the sheets."""
     each = run_commands(library, work, alone)
     say(f"one command each: {each:.2f} s a sheet (n = {alone})")
-    runs = []
-    for workers in (1, 2):
-        out = work / f"out{workers}"
-        runs.append(run_batch(library, out, workers))
-        shutil.rmtree(out / "sheets")
-        one = runs[-1]
-        say(
-            f"{workers} workers: {one.sheets} sheets in {one.wall_s:.1f} s, "
-            f"{3600 * one.sheets / one.wall_s:,.0f} an hour; {one.first_s:.1f} s to start"
-        )
-        say(
-            f"  a sheet: stages {one.stages_s / one.sheets:.3f} s (CPU "
-            f"{one.cpu_s / one.sheets:.3f}), {one.overhead_ms:.1f} ms beside them"
-        )
-        quarter, end = one.memory_mb
-        say(f"  parent's memory: {quarter:.1f} MB at a quarter, {end:.1f} MB at the end")
+    runs = [_told(library, work, workers, say) for workers in (1, 2)]
     say(f"2 workers : 1 worker = {runs[0].wall_s / runs[1].wall_s:.3f} times as fast")
     warm = runs[0].wall_s / runs[0].sheets
     say(f"1 warm worker : one command each = {each / warm:.2f} times as fast")
+
+
+def report_ray(library: Path, work: Path, say: Callable[[str], None]) -> None:
+    """Print what two nodes of Ray take for the sheets, of one core each, beside two workers."""
+    cluster = make_cluster()
+    try:
+        here = _told(library, work, 2, say)
+        there = _told(library, work, 2, say, "--ray", cluster.address)
+    finally:
+        cluster.shutdown()
+    say(f"two nodes of Ray : 2 workers = {here.wall_s / there.wall_s:.3f} times as fast")
+
+
+def _told(library: Path, work: Path, workers: int, say: Callable[[str], None], *more: str) -> Run:
+    """Run the sheets, and print what it took."""
+    out = work / "-".join(("out", str(workers), *more[:1]))
+    one = run_batch(library, out, workers, more)
+    shutil.rmtree(out / "sheets")
+    say(
+        f"{workers} workers{' of Ray' * bool(more)}: {one.sheets} sheets in {one.wall_s:.1f} s, "
+        f"{3600 * one.sheets / one.wall_s:,.0f} an hour; {one.first_s:.1f} s to start"
+    )
+    say(
+        f"  a sheet: stages {one.stages_s / one.sheets:.3f} s (CPU "
+        f"{one.cpu_s / one.sheets:.3f}), {one.overhead_ms:.1f} ms beside them"
+    )
+    quarter, end = one.memory_mb
+    say(f"  parent's memory: {quarter:.1f} MB at a quarter, {end:.1f} MB at the end")
+    return one

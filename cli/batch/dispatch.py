@@ -201,7 +201,7 @@ class Runner:
         for end in PICTURES:
             file = self.out / THUMBS / f"{outcome.name}{end}"
             if end in outcome.pictures:
-                write_bytes(file, base64.b64decode(outcome.pictures[end]))
+                write_bytes(file, base64.b64decode(outcome.pictures[end]), lasting=False)
             else:
                 file.unlink(missing_ok=True)  # of an older result
 

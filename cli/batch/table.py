@@ -18,7 +18,7 @@ import sqlite3
 import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -108,6 +108,9 @@ class StageRow:
     error: str = ""
     log: str = ""
     output: str = ""
+
+
+COLUMNS = tuple(one.name for one in fields(StageRow))
 
 
 @dataclass(frozen=True)
@@ -351,7 +354,7 @@ class Table:
             "INSERT INTO sheets (name, position, entry, state) VALUES (?, ?, ?, ?) ON CONFLICT "
             "(name) DO UPDATE SET position = excluded.position, entry = excluded.entry, "
             "state = excluded.state",
-            (name, plan.position, json.dumps(asdict(plan.entry)), state),
+            (name, plan.position, json.dumps(vars(plan.entry)), state),
         )
         if changed:
             db.execute(
@@ -516,12 +519,7 @@ class Table:
 
 
 def _put(db: sqlite3.Connection, name: str, row: StageRow) -> None:
-    values = {
-        **asdict(row),
-        "sheet": name,
-        "rank": RANKS[row.stage],
-        "facts": json.dumps(row.facts),
-    }
+    values = {**vars(row), "sheet": name, "rank": RANKS[row.stage], "facts": json.dumps(row.facts)}
     columns = ", ".join(values)
     marks = ", ".join(f":{column}" for column in values)
     db.execute(f"REPLACE INTO stages ({columns}) VALUES ({marks})", values)  # noqa: S608
@@ -532,7 +530,7 @@ def _take_in(db: sqlite3.Connection, row: SheetRow) -> None:
     db.execute(
         "REPLACE INTO sheets (name, position, entry, state, crashes, planned) "
         "VALUES (?, ?, ?, ?, ?, ?)",
-        (row.name, row.position, json.dumps(asdict(row.entry)), state, row.crashes, row.planned),
+        (row.name, row.position, json.dumps(vars(row.entry)), state, row.crashes, row.planned),
     )
     db.execute("DELETE FROM stages WHERE sheet = ?", (row.name,))
     for one in row.stages:
@@ -562,5 +560,4 @@ def _sheet(rows: Sequence[sqlite3.Row]) -> SheetRow:
 
 
 def _stage(row: sqlite3.Row) -> StageRow:
-    names = [one.name for one in fields(StageRow)]
-    return StageRow(**{name: row[name] for name in names} | {"facts": json.loads(row["facts"])})
+    return StageRow(**{name: row[name] for name in COLUMNS} | {"facts": json.loads(row["facts"])})

@@ -11,8 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from bench.batch.cluster import make_cluster
 from tests.batch import kills
-from tests.batch.cluster import make_cluster
 
 
 def main() -> int:

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
+from bench.batch.cluster import make_cluster
 from bench.batch.sheets import write_sheets
-from tests.batch.cluster import make_cluster
 from tests.conftest import Command, contents
 
 STAGES = ("--stages", "calibrate,palette")
