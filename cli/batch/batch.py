@@ -22,7 +22,7 @@ from toonset.errors import OutputError, UsageError
 if TYPE_CHECKING:
     from toonset.cli.batch.dispatch import Limits, Workers
     from toonset.cli.batch.stages import Entry
-    from toonset.cli.batch.table import Table
+    from toonset.cli.batch.table import Plan, Table
 
 USUAL = "calibrate,palette,train,render"
 WORKERS_PANEL, CHOICE_PANEL = "Workers", "Which sheets"
@@ -355,33 +355,50 @@ def _check_out(out: Path) -> None:
 
 def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
     """Put into the table what is to be done."""
-    from toonset.cli.batch.dispatch import home_of
-    from toonset.cli.batch.job import stages_there
-    from toonset.cli.batch.stages import STAGES, keys_of
-    from toonset.cli.batch.storage import Hashes, stamps_behind
+    from toonset.cli.batch.stages import keys_of
+    from toonset.cli.batch.storage import Hashes
     from toonset.cli.batch.table import Plan
 
-    behind = stamps_behind(wanted.store) if wanted.store else set()
-
-    def there(name: str) -> set[str]:
-        if wanted.store:
-            return {stage for stage in STAGES if (name, stage) in behind}
-        return stages_there(home_of(wanted.out, name))
-
+    if table.store != wanted.store and not table.is_empty():
+        where = f"in {table.store}" if table.store else "in its folder"
+        raise UsageError(f"{wanted.out}: has its results {where}; give the same --store")
     table.store = wanted.store
     hashes, plans = Hashes(table), list[Plan]()
     for position, entry in enumerate(wanted.entries):
         if entry.name in wanted.names:
             plans.append(Plan(entry, position, keys_of(entry, wanted.stages, hashes)))
         if len(plans) == PLANNED_AT_ONCE or position == len(wanted.entries) - 1:
-            table.plan(plans, there)
+            table.plan(plans, _there(wanted, plans).__getitem__)
             plans.clear()
             if len(wanted.entries) > PLANNED_AT_ONCE:
                 printer.progress(f"reading sheets {position + 1}/{len(wanted.entries)}")
     hashes.keep()
     if wanted.retry:
-        table.retry(wanted.names)
+        table.retry(wanted.names, wanted.stages)
     table.choose(wanted.names)
+
+
+def _there(wanted: Wanted, plans: Sequence[Plan]) -> Mapping[str, set[str]]:
+    """Return which stages of sheets are done with the keys that are planned, as stamps say."""
+    from toonset.cli.batch.dispatch import home_of
+    from toonset.cli.batch.job import read_stamp
+    from toonset.cli.batch.storage import keys_behind
+
+    if wanted.store:
+        names = [f"{plan.entry.name}/{stage}.json" for plan in plans for stage in plan.keys]
+        behind = keys_behind(wanted.store, names)
+        return {
+            (name := plan.entry.name): {
+                s for s, key in plan.keys.items() if behind.get(f"{name}/{s}.json") == key
+            }
+            for plan in plans
+        }
+    return {
+        (name := plan.entry.name): {
+            s for s, key in plan.keys.items() if read_stamp(home_of(wanted.out, name), s, key)
+        }
+        for plan in plans
+    }
 
 
 @dataclass

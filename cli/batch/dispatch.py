@@ -18,8 +18,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
-from toonset.cli.batch.job import Job, Outcome, last_stage, read_stamp, tidy
-from toonset.cli.batch.table import SheetRow, StageRow, State, Table
+from toonset.cli.batch.job import Job, Outcome, read_stamp, tidy
+from toonset.cli.batch.stages import dependents
+from toonset.cli.batch.table import BAD, SheetRow, StageRow, State, Table
 from toonset.errors import OutputError, ToonsetError
 
 try:
@@ -132,7 +133,10 @@ class Runner:
         return found
 
     def _job(self, row: SheetRow) -> Job:
-        keys = {stage.stage: stage.key for stage in row.stages if stage.stage in self.stages}
+        bad = {one.stage for one in row.stages if one.state in BAD}
+        cut = bad.union(*map(dependents, bad))
+        mine = [one for one in row.stages if one.stage in self.stages and one.stage not in cut]
+        keys = {one.stage: one.key for one in mine}
         home = str(home_of(self.out, row.name))
         entry = row.entry
         return Job(
@@ -155,10 +159,10 @@ class Runner:
                 time.sleep(LOOK_S)  # another process is at it
             return
         rows = outcome.rows
-        if state != "done":
+        if state != "done" and not any(row.state == state for row in rows):
             rows = self._with_failure(replace(outcome, line=line), state)
             state = state if any(row.state == state for row in rows) else "done"
-        self._keep_pictures(outcome)
+        self._keep_pictures(outcome, rows)
         if self._table.record(self.ident, name, rows, state):
             ended(name, [row for row in rows if row.stage in due], due)
 
@@ -175,34 +179,32 @@ class Runner:
         ), f"{outcome.line}{how}, {count} times"
 
     def _with_failure(self, outcome: Outcome, state: State) -> tuple[StageRow, ...]:
-        """Return the rows of what failed, with its line; of a death the stage that was run."""
-        if outcome.rows:
-            return tuple(
-                row if row.state == "done" else replace(row, log=outcome.log)
-                for row in outcome.rows
-            )
-        sheet, rows = self._table.row(outcome.name), list[StageRow]()
+        """Return rows of what a worker had done when it died or gave up, and of what it was at."""
+        sheet, rows = self._table.row(outcome.name), [*outcome.rows]
         assert sheet is not None
-        home, said = home_of(self.out, outcome.name), last_stage(outcome.log)
-        tidy(home)
-        for row in sheet.stages:
-            if row.stage not in self.stages:
-                continue
-            found = read_stamp(home, row.stage, row.key) if not self.store else row
-            if found is None or (self.store and said in ("", row.stage)):
-                failed = replace(row, state=state, error=outcome.line, log=outcome.log)
-                return (*rows, replace(failed, attempts=max(sheet.crashes, 1), ended=time.time()))
-            rows.append(found)
-        return tuple(rows)
+        mine = [row for row in sheet.stages if row.stage in self.stages]
+        if not rows and not self.store:
+            home = home_of(self.out, outcome.name)
+            tidy(home)
+            found = (read_stamp(home, row.stage, row.key) for row in mine)
+            rows = [row for row in found if row is not None]
+        done = {row.stage for row in (*rows, *mine) if row.state == "done"}
+        left = [row for row in mine if row.stage not in done and row.state not in BAD]
+        at = next((row for row in left if row.stage == outcome.stage), left[0] if left else None)
+        if at is None:
+            return tuple(rows)
+        at = replace(at, state=state, attempts=max(sheet.crashes, 1), ended=time.time())
+        return (*rows, replace(at, error=outcome.line, log=outcome.log))
 
-    def _keep_pictures(self, outcome: Outcome) -> None:
+    def _keep_pictures(self, outcome: Outcome, rows: Sequence[StageRow]) -> None:
         from toonset.write import write_bytes
 
+        is_known = outcome.rows or (rows and rows[0].state in BAD)  # else its process died
         for end in PICTURES:
             file = self.out / THUMBS / f"{outcome.name}{end}"
             if end in outcome.pictures:
                 write_bytes(file, base64.b64decode(outcome.pictures[end]), lasting=False)
-            else:
+            elif is_known:
                 file.unlink(missing_ok=True)  # of an older result
 
 
@@ -235,17 +237,13 @@ def alive(out: Path, ident: str, does: str = "") -> Iterator[None]:
         ToonsetError: another one does something else.
     """
     file = out / HOLDERS / ident
-    descriptor = _made(file)
+    descriptor = _held(file, does.encode())
     try:
-        os.write(descriptor, does.encode())
-        if fcntl is not None:
-            with contextlib.suppress(OSError):  # a file system without locks
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         for other in file.parent.iterdir():
             if other != file and not _is_dead(other) and _said(other) != does:
                 raise ToonsetError(
                     f"{out}: another toonset batch works there with other stages or options; wait "
-                    "for it, or choose another -o"
+                    f"for it, or choose another -o; if none does, delete {other}"
                 )
         yield
     finally:
@@ -262,12 +260,20 @@ def _said(file: Path) -> str | None:
         return None
 
 
-def _made(file: Path) -> int:
-    """Return the descriptor of a new file; another runner may remove its folder meanwhile."""
+def _held(file: Path, content: bytes) -> int:
+    """Return the descriptor of a new file that is locked; others may take it away until it is."""
     while True:
         file.parent.mkdir(exist_ok=True)
         with contextlib.suppress(FileNotFoundError):
-            return os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
+            os.write(descriptor, content)  # before it is locked: who is alive has said what it does
+            if fcntl is None:
+                return descriptor
+            with contextlib.suppress(OSError):  # a file system without locks
+                fcntl.flock(descriptor, fcntl.LOCK_EX)
+            if os.fstat(descriptor).st_nlink:
+                return descriptor
+            os.close(descriptor)
 
 
 def release_dead(table: Table, out: Path, ident: str) -> None:

@@ -13,8 +13,10 @@ import errno
 import faulthandler
 import hashlib
 import io
+import itertools
 import json
 import os
+import re
 import resource
 import shutil
 import sys
@@ -27,14 +29,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toonset import lock
-from toonset.cli.batch.stages import BUNDLE, STAGES, dependents, run, value_of
+from toonset.cli.batch.stages import BUNDLE, STAGES, command_of, dependents, run, value_of
 from toonset.cli.batch.table import StageRow
 from toonset.cli.common.refusals import refusal
 from toonset.errors import OutputError, ToonsetError, one_line, printable
 from toonset.write import write_json
 
 LOG, SCRATCH = "log.txt", ".scratch"  # in a sheet's folder
-BEGINS = "--- "  # a line that says which stage is run
+BEGINS, BEGUN = "--- ", re.compile(rb"(?m)^--- ([a-z]+)$")  # lines that say which stage is run
 OVER_MEMORY = "batch: took more than"  # begins the line that says so
 PATIENCE_S = 30.0  # for the worker of a batch that has just been killed
 FATAL = "Fatal Python error"  # begins what faulthandler says of a crash, the last call first
@@ -81,7 +83,8 @@ class Outcome:
             results cannot be written; gone: its process died.
         rows: of the stages that ended.
         line: why, where it is not done.
-        log: last lines of what was printed, where it is not done.
+        log: last lines of what was printed, of a process that died.
+        stage: that was run then.
         from_outside: of what is gone: somebody killed the process.
         pictures: small ones for the page, by file name, in base64.
     """
@@ -91,6 +94,7 @@ class Outcome:
     rows: tuple[StageRow, ...] = ()
     line: str = ""
     log: str = ""
+    stage: str = ""
     from_outside: bool = False
     pictures: Mapping[str, str] = field(default_factory=dict)
 
@@ -103,14 +107,13 @@ def run_sheet(job: Job) -> Outcome:
         with lock.hold(home / "batch", home, PATIENCE_S), _logged(home / LOG, job.memory_mb):
             outcome = _run_near(job, home)
     except OutputError as error:
-        return Outcome(job.name, "busy", line=one_line(error))
+        return Outcome(job.name, "place" if _is_full(error) else "busy", line=one_line(error))
     except OSError as error:
         reason = error.strerror or str(error)
         return Outcome(job.name, "place", line=f"{home}: cannot be written ({reason}); make room")
     if outcome.kind == "done":
         (home / LOG).unlink(missing_ok=True)
-        return outcome
-    return replace(outcome, log=last_lines(home / LOG))
+    return outcome
 
 
 def _run_near(job: Job, home: Path) -> Outcome:
@@ -123,15 +126,19 @@ def _run_near(job: Job, home: Path) -> Outcome:
     scratch = home / SCRATCH
     shutil.rmtree(scratch, ignore_errors=True)
     url = f"{job.store.rstrip('/')}/{job.name}"
-    inputs = scratch / "inputs"
-    inputs.mkdir(parents=True)
     try:
         work = scratch / job.name if job.store else home
         if job.store and looks(f"{url}/calibrate.json") is not None:
             fetch(url, scratch)
-        work.mkdir(exist_ok=True)
-        sheets = [str(fetch(one, inputs)) if is_url(one) else one for one in job.sheets]
-        near = {stage: _fetched(said, inputs) for stage, said in job.words.items()}
+        work.mkdir(parents=True, exist_ok=True)
+        due = [stage for stage, key in job.keys.items() if read_stamp(work, stage, key) is None]
+        places = (scratch / "inputs" / str(number) for number in itertools.count())
+        try:
+            sheets = [str(fetch(one, next(places))) if is_url(one) else one for one in job.sheets]
+            near = {stage: _fetched(job.words.get(stage, ()), places) for stage in due}
+        except ToonsetError as error:
+            row = StageRow(due[0], job.keys[due[0]], "failed", 1, _worker(), time.time())
+            return Outcome(job.name, "failed", (replace(row, error=one_line(error)),))
         outcome = _run_stages(replace(job, words=near), work, sheets)
         if job.store and outcome.rows:
             push(work, url, tuple(f"{stage}.json" for stage in STAGES))
@@ -142,40 +149,47 @@ def _run_near(job: Job, home: Path) -> Outcome:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _fetched(words: Sequence[str], folder: Path) -> tuple[str, ...]:
-    """Return words with the URLs among them as files here."""
+def _fetched(words: Sequence[str], places: Iterator[Path]) -> tuple[str, ...]:
+    """Return words with the URLs among them as files here, each in a folder of its own."""
     from toonset.cli.batch.storage import fetch, is_url
 
     found = []
     for word in words:
         value = value_of(word)
-        near = str(fetch(value, folder)) if is_url(value) else value
+        near = str(fetch(value, next(places))) if is_url(value) else value
         found.append(word.removesuffix(value) + near if value else word)
     return tuple(found)
 
 
 def _run_stages(job: Job, home: Path, sheets: Sequence[str]) -> Outcome:
-    """Run what is not done of a sheet's stages, in order, until one fails."""
+    """Run what is not done of a sheet's stages, in order; what is made of one that fails is not."""
     rows: list[StageRow] = []
+    cut: set[str] = set()
     for stage, key in job.keys.items():
         row = read_stamp(home, stage, key)
-        if row is None:
+        if row is None and stage not in cut:
             _remove_stamps(home, stage)
             ended = _run_stage(job, home, sheets, stage, key)
             if isinstance(ended, Outcome):
-                return replace(ended, rows=(*rows, *ended.rows), pictures=_pictures(home))
+                return replace(ended, rows=tuple(rows), pictures=_pictures(home))
             row = ended
-            _write_stamp(home, row)
-        rows.append(row)
-    return Outcome(job.name, "done", tuple(rows), pictures=_pictures(home))
+            if row.state == "done":
+                write_json(_stamp(home, stage), asdict(row))
+            else:
+                cut |= {*dependents(stage)}
+        rows += [row] if row is not None else []
+    line = next((row.error for row in rows if row.error), "")
+    kind: Kind = "failed" if line else "done"
+    return Outcome(job.name, kind, tuple(rows), line, pictures=_pictures(home))
 
 
 def _run_stage(
     job: Job, home: Path, sheets: Sequence[str], stage: str, key: str
 ) -> StageRow | Outcome:
-    """Run one stage; return its row, or the outcome that it leads to."""
-    row = StageRow(stage, key, attempts=1, worker=f"{os.uname().nodename}:{os.getpid()}")
-    print(f"{BEGINS}{stage}", file=sys.stderr, flush=True)
+    """Run one stage; return its row, or the outcome where the sheet is not at fault."""
+    row = StageRow(stage, key, attempts=1, worker=_worker())
+    print(f"{BEGINS}{stage}", file=sys.stderr)
+    print(command_of(stage, job.words.get(stage, ()), sheets, home), file=sys.stderr, flush=True)
     _forget_peak()
     began, cpu = time.monotonic(), time.process_time()
     said, code, line, full, is_held = io.StringIO(), 0, "", False, False
@@ -202,10 +216,15 @@ def _run_stage(
     if code not in FINE:
         return Outcome(job.name, "busy", line=f"{stage} was ended")
     if line:
-        return Outcome(job.name, "failed", (replace(row, state="failed", error=line),), line)
+        print(line, file=sys.stderr, flush=True)
+        return replace(row, state="failed", error=line, log=last_lines(Path(job.home, LOG)))
     verdict, facts = _facts(stage, json.loads(said.getvalue()))
     output = _hash_output(home, stage)
     return replace(row, state="done", verdict=verdict, facts=facts, output=output)
+
+
+def _worker() -> str:
+    return f"{os.uname().nodename}:{os.getpid()}"
 
 
 def _is_full(error: BaseException | None) -> bool:
@@ -244,7 +263,7 @@ def stages_there(home: Path) -> set[str]:
     return {
         name
         for name, stage in STAGES.items()
-        if (home / f"{name}.json").is_file() and (home / stage.writes / stage.mark).exists()
+        if _stamp(home, name).is_file() and (home / stage.writes / stage.mark).exists()
     }
 
 
@@ -253,20 +272,20 @@ def read_stamp(home: Path, stage: str, key: str) -> StageRow | None:
     if stage not in stages_there(home):
         return None
     try:
-        row = StageRow(**json.loads((home / f"{stage}.json").read_bytes()))
+        row = StageRow(**json.loads(_stamp(home, stage).read_bytes()))
     except (OSError, ValueError, TypeError):  # cut short, or of an older toonset
         return None
     return row if row.key == key else None
 
 
-def _write_stamp(home: Path, row: StageRow) -> None:
-    write_json(home / f"{row.stage}.json", asdict(row))
+def _stamp(home: Path, stage: str) -> Path:
+    return home / f"{stage}.json"
 
 
 def _remove_stamps(home: Path, first: str) -> None:
     """Remove what says that a stage, and what is made of its result, is done."""
     for stage in (first, *dependents(first)):
-        (home / f"{stage}.json").unlink(missing_ok=True)
+        _stamp(home, stage).unlink(missing_ok=True)
 
 
 def tidy(home: Path) -> None:
@@ -391,7 +410,10 @@ def over_memory(log: str) -> str:
     return f"{said}; raise --memory-limit, then --retry-failed" if said else ""
 
 
-def last_stage(log: str) -> str:
-    """Return the stage that was run last, as a log says."""
-    found = [line for line in log.splitlines() if line.startswith(BEGINS)]
-    return found[-1].removeprefix(BEGINS) if found else ""
+def last_stage(log: Path) -> str:
+    """Return the stage that was run last, as a log says; "" of none."""
+    try:
+        found = BEGUN.findall(log.read_bytes())
+    except OSError:
+        return ""
+    return next((name for name in reversed([*map(bytes.decode, found)]) if name in STAGES), "")

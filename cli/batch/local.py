@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 from typing import Any
 
-from toonset.cli.batch.job import LOG, Job, Outcome, last_lines, over_memory, run_sheet
+from toonset.cli.batch.job import LOG, Job, Outcome, last_lines, last_stage, over_memory, run_sheet
 from toonset.cli.batch.table import StageRow
 from toonset.write import ENDINGS
 
@@ -59,14 +59,15 @@ class _Worker:
     pid: int
     pipe: Connection
     job: Job | None = None
-    began: float = 0.0
+    spent: float = 0.0
     is_late: bool = False
     ooms: int = 0
 
-    def end_if_late(self) -> None:
-        """Kill it if its sheet takes longer than it may."""
+    def count(self, seconds: float) -> None:
+        """Count time; kill it if its sheet takes longer than it may, and is not done by now."""
+        self.spent += seconds
         limit = self.job.seconds if self.job is not None else 0
-        if limit and not self.is_late and time.monotonic() - self.began > limit:
+        if limit and self.spent > limit and not self.is_late and not self.pipe.poll():
             self.is_late = True
             os.kill(self.pid, signal.SIGKILL)
 
@@ -91,7 +92,9 @@ class LocalWorkers:
         """Give a sheet to a free worker."""
         worker = next(worker for worker in self._workers if worker.job is None)
         worker.job, worker.ooms = job, _ooms()
-        worker.began, worker.is_late = time.monotonic(), False
+        worker.spent, worker.is_late = 0.0, False
+        with contextlib.suppress(OSError):  # an earlier try's says nothing of this one
+            Path(job.home, LOG).unlink()
         try:
             worker.pipe.send_bytes(json.dumps(asdict(job)).encode())
         except OSError:  # it has died meanwhile: `wait` says so
@@ -99,16 +102,17 @@ class LocalWorkers:
 
     def wait(self, timeout_s: float) -> list[Outcome]:
         """Return what has ended meanwhile; wait until something has, or the time is over."""
-        for worker in self._workers:
-            worker.end_if_late()
+        found, began = list[Outcome](), time.monotonic()
         ready = wait([worker.pipe for worker in self._workers], timeout_s)
-        found = []
+        waited = min(time.monotonic() - began, timeout_s)  # all may have been stopped meanwhile
         for worker in [worker for worker in self._workers if worker.pipe in ready]:
             try:
                 found.append(outcome_of(json.loads(worker.pipe.recv_bytes())))
                 worker.job = None
             except (EOFError, OSError):
                 found += self._bury(worker)
+        for worker in self._workers:
+            worker.count(waited)
         return found
 
     def close(self) -> None:
@@ -151,8 +155,9 @@ class LocalWorkers:
             return []
         log = last_lines(Path(worker.job.home, LOG))
         late = f"took longer than {worker.job.seconds:g} s; {RAISE}" if worker.is_late else ""
+        stage = last_stage(Path(worker.job.home, LOG))
         if over := late or over_memory(log):
-            return [Outcome(worker.job.name, "failed", line=over, log=log)]
+            return [Outcome(worker.job.name, "failed", line=over, log=log, stage=stage)]
         number = -code if code < 0 else code - BY_SIGNAL
         by_signal = number in {*map(int, signal.Signals)}
         out_of_memory = number == signal.SIGKILL and _ooms() > worker.ooms
@@ -163,6 +168,7 @@ class LocalWorkers:
                 *(worker.job.name, "gone"),
                 line=line or f"its worker ended with code {code}",
                 log=log,
+                stage=stage,
                 from_outside=number in {*ENDINGS, signal.SIGKILL} and not out_of_memory,
             )
         ]

@@ -152,6 +152,11 @@ class RayWorkers:
             return Outcome(job.name, "gone", line=f"its node ran out of memory: {_first(error)}")
         except (errors.WorkerCrashedError, errors.TaskCancelledError):
             return Outcome(job.name, "gone", line="its worker was killed", from_outside=True)
+        except errors.RayError as error:
+            said = one_line(str(error).strip().split("\n")[-1])
+            raise ToonsetError(
+                f"--ray: a node cannot run sheets ({said}); is toonset there?"
+            ) from error
 
     @contextlib.contextmanager
     def _lost(self) -> Iterator[None]:

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from toonset.cli.batch.stages import STAGES, Entry, as_words, files_among, parse, value_of
-from toonset.cli.batch.storage import find, is_url
+from toonset.cli.batch.storage import file_name, find, is_url
 from toonset.errors import SheetError, UsageError, as_text, one_line, printable
 
 MANIFESTS = (".csv", ".jsonl")
@@ -113,9 +113,12 @@ def _given(place: str, root: Path | None, out: Path | None) -> Iterator[Given]:
 
     path, here = Path(place), Path.cwd()
     if is_url(place):
-        found = find(place) if WILD.search(place) else [place]
+        is_web = place.lower().startswith(("http://", "https://"))  # a "?" there is no wildcard
+        found = find(place) if "*" in place or (WILD.search(place) and not is_web) else [place]
+        if found != [place]:
+            found = [url for url in found if Path(url).suffix.lower() in ENDINGS]
         for url in found:
-            yield Given(url, here, False, clean_name(url.rsplit("/", 1)[-1]), {"sheet": url})
+            yield Given(url, here, False, clean_name(_stem(file_name(url))), {"sheet": url})
         return
     if path.suffix.lower() in MANIFESTS and not path.is_dir():
         yield from _manifest(path, root)
@@ -143,9 +146,13 @@ def _is_within(file: Path, folder: Path) -> bool:
 
 
 def clean_name(text: str) -> str:
-    """Return a file's name as the name of a sheet: what may stand in no folder's name is "_"."""
-    stem = text.rsplit(".", 1)[0] if "." in text[1:] else text
-    return re.sub(r"[^\w-]+", "_", unicodedata.normalize("NFC", stem)).strip("_").lstrip("-")
+    """Return a text as the name of a sheet: what may stand in no folder's name is "_"."""
+    return re.sub(r"[^\w-]+", "_", unicodedata.normalize("NFC", text)).strip("_").lstrip("-")
+
+
+def _stem(name: str) -> str:
+    """Return a file's name without its ending."""
+    return name.rsplit(".", 1)[0] if "." in name[1:] else name
 
 
 def _manifest(path: Path, root: Path | None) -> Iterator[Given]:
@@ -165,7 +172,7 @@ def _manifest(path: Path, root: Path | None) -> Iterator[Given]:
         sheets = _sheets_of(values)
         if not sheets:
             raise SheetError(f"{where}: names no sheet; give its picture under 'sheet'")
-        name = values.get("name") or clean_name(sheets[0].replace("\\", "/").rsplit("/", 1)[-1])
+        name = values.get("name") or clean_name(_stem(file_name(sheets[0].replace("\\", "/"))))
         yield Given(where, base, True, name, {**values, "sheet": sheets})
 
 
@@ -251,7 +258,7 @@ def _entry(given: Given, common: Mapping[str, tuple[str, ...]]) -> Entry:
 def _check_name(given: Given) -> None:
     """Refuse a name that could mean something to a shell, a page or another system."""
     name = given.name
-    if not name or clean_name(name) != name or "." in name:
+    if not name or clean_name(name) != name:
         raise SheetError(
             f"{given.where}: {printable(name)!r} is no name for a sheet; take letters, digits, "
             "'_' and '-', a letter or digit first"
@@ -280,6 +287,7 @@ def _place(place: str, given: Given) -> str:
     from toonset.read import check_there
 
     if is_url(place):
+        _check_url(place, given)
         return place
     path = _within(place, given)
     try:
@@ -291,6 +299,12 @@ def _place(place: str, given: Given) -> str:
     except SheetError as error:
         raise SheetError(f"{given.where}: {error}" if given.inside else str(error)) from error
     return str(path)
+
+
+def _check_url(place: str, given: Given) -> None:
+    """Refuse a manifest's URL that is a path of this machine."""
+    if given.inside and place.lower().startswith(("file:", "local:")):
+        raise SheetError(f"{given.where}: {printable(place)!r} is a file here; name its path")
 
 
 def _within(place: str, given: Given) -> Path:
@@ -318,7 +332,9 @@ def _absolute(
     absolute = []
     for word in words:
         value = value_of(word)
-        if value in files and not is_url(value):
+        if is_url(value):
+            _check_url(value, given)
+        elif value in files:
             path = _within(value, given)
             try:
                 check_there([path], "file", SheetError)

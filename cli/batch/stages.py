@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,10 @@ import typer
 from toonset.cli.common.refusals import refusal
 from toonset.errors import UsageError
 
-PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless", "torch")
+PACKAGES = (  # whose versions results depend on
+    *("toonset", "numpy", "scipy", "opencv-contrib-python-headless", "torch", "kornia", "Pillow"),
+    *("trimesh", "scikit-image", "pycolmap", "xatlas"),
+)
 BUNDLE = "bundle"
 RUN = f"{BUNDLE}/run"
 OWN = ("out", "force", "as_json", "quiet", "verbose", "threads", "preview_every", "strict")
@@ -272,6 +275,14 @@ def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> 
     return 0
 
 
+def command_of(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> str:
+    """Return the command line that does what `run` does, for people."""
+    verb = STAGES[stage]
+    reads = [str(home / verb.reads)] if verb.reads else sheets
+    out = ["-o", str(home / verb.writes)] if verb.has_out else []
+    return shlex.join(["toonset", stage, *reads, *_usual(verb, words), *words, *out])
+
+
 def import_parts(stages: Sequence[str]) -> None:
     """Import what the stages would, so that processes forked from this one need not."""
     for part in dict.fromkeys(STAGES[name].imports for name in stages):
@@ -336,9 +347,15 @@ def _options(stage: str, entry: Entry, hash_of: Callable[[str], str]) -> dict[st
 
 def _file(place: str, hash_of: Callable[[str], str]) -> list[str]:
     """Return a file's name, which bundles record, and its content's hash."""
-    return [place.rstrip("/").rsplit("/", 1)[-1], hash_of(place)]
+    from toonset.cli.batch.storage import file_name
+
+    return [file_name(place), hash_of(place)]
 
 
 @cache
 def _versions() -> dict[str, str]:
-    return {name: version(name) for name in PACKAGES}
+    found = {}
+    for name in PACKAGES:
+        with contextlib.suppress(PackageNotFoundError):  # xatlas is not on every machine
+            found[name] = version(name)
+    return found

@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,11 @@ from toonset.errors import SheetError, ToonsetError, one_line
 
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 MANY = 500  # hashes that are kept until the table takes them
+CHANGING = (  # names that servers have, letters only, for what changes with a file
+    *("etag", "generation", "mtime", "lastmodified", "modified", "created"),
+    *("md5hash", "contentmd5", "digest", "checksum"),
+)
+LONGEST = 100  # characters of a name that a copy gets
 
 
 def is_url(place: str) -> bool:
@@ -36,16 +41,22 @@ def find(pattern: str) -> list[str]:
         return [files.unstrip_protocol(found) for found in sorted(files.glob(path))]
 
 
-def stamps_behind(url: str) -> set[tuple[str, str]]:
-    """Return the sheets and stages that have a stamp behind a URL.
+def keys_behind(url: str, names: Sequence[str]) -> dict[str, str]:
+    """Return the keys that stamps behind a URL hold, by their names; of those that are there.
 
     Raises:
         ToonsetError: it cannot be reached.
     """
     with _reached(url) as (files, path):
-        found = files.glob(f"{path.rstrip('/')}/*/*.json")
-        parts = (name.rsplit("/", 2)[1:] for name in found)
-        return {(sheet, stamp.removesuffix(".json")) for sheet, stamp in parts}
+        at = {f"{path.rstrip('/')}/{name}": name for name in names}
+        found = files.cat([*at], on_error="return")
+        keys = {}
+        for place, data in found.items():
+            if isinstance(data, Exception) and not isinstance(data, FileNotFoundError):
+                raise data
+            with contextlib.suppress(ValueError, TypeError, KeyError):  # it is cut short
+                keys[at[place]] = str(json.loads(data)["key"])
+        return keys
 
 
 def looks(place: str) -> str | None:
@@ -60,17 +71,29 @@ def looks(place: str) -> str | None:
         with _reached(place) as (files, path):
             if not files.exists(path):
                 return None
-            info = {name: str(value) for name, value in files.info(path).items()}
-            named = ("ETag", "etag", "md5Hash", "generation", "mtime", "LastModified", "created")
-            return json.dumps({name: info[name] for name in ("size", *named) if name in info})
+            found = files.find(path, detail=True) if files.isdir(path) else {}
+            return json.dumps(
+                [
+                    [name.removeprefix(path), _told(files, name, info)]
+                    for name, info in sorted((found or {path: files.info(path)}).items())
+                ]
+            )
     try:
         return json.dumps([[str(file), *_stat(file)] for file in _files(Path(place))])
     except OSError:
         return None
 
 
+def _told(files: Any, path: str, info: dict[str, Any]) -> list[str]:
+    """Return what a server says of a file that changes with it; where that is nothing, its hash."""
+    plain = {re.sub(r"[^a-z0-9]", "", name.lower()): str(value) for name, value in info.items()}
+    told = [f"{name} {plain[name]}" for name in CHANGING if plain.get(name, "None") != "None"]
+    size = f"size {plain.get('size')}"
+    return [size, *(told or [hashlib.sha256(files.cat_file(path)).hexdigest()])]
+
+
 def content_hash(place: str) -> str:
-    """Return the SHA-256 of a file's bytes, or of a folder's names and bytes.
+    """Return the SHA-256 of a file's bytes; of a folder, or a mesh with materials, names and bytes.
 
     Of a URL it is the hash of what its server says, for the bytes are not here.
 
@@ -81,10 +104,12 @@ def content_hash(place: str) -> str:
     if is_url(place):
         return hashlib.sha256((looks(place) or "").encode()).hexdigest()
     root, found = Path(place), hashlib.sha256()
-    if not root.is_dir():
+    files = _files(root)
+    if files == [root]:
         return _sha256(root)
-    for file in _files(root):
-        found.update(f"{file.relative_to(root).as_posix()}\0{_sha256(file)}\n".encode())
+    base = root if root.is_dir() else root.parent
+    for file in files:
+        found.update(f"{file.relative_to(base).as_posix()}\0{_sha256(file)}\n".encode())
     return found.hexdigest()
 
 
@@ -101,9 +126,16 @@ def fetch(url: str, folder: Path, without: str = "") -> Path:
     """
     with _reached(url) as (files, path):
         root = path.rstrip("/")
-        place = folder / (root.rsplit("/", 1)[-1] or "sheet")
+        place = folder / (file_name(url) or "sheet")
+        folder.mkdir(parents=True, exist_ok=True)
         if not files.isdir(path):
             files.get(path, str(place))
+            for _ in range(2):  # materials, then their textures
+                for name in _named_by(place):
+                    there, here = f"{root.rsplit('/', 1)[0]}/{name}", folder / name
+                    if not here.exists() and files.isfile(there):
+                        here.parent.mkdir(parents=True, exist_ok=True)
+                        files.get(there, str(here))
             return place
         found = {name.removeprefix(f"{root}/"): name for name in files.find(path)}
         wanted = [name for name in found if not (without and name.startswith(f"{without}/"))]
@@ -133,11 +165,25 @@ def push(folder: Path, url: str, last: tuple[str, ...] = ()) -> None:
             files.put_file(str(folder / name), files_at[name])
 
 
+def file_name(place: str) -> str:
+    """Return the last part of a path or URL, without what a web address has behind it."""
+    path = re.split(r"[?#]", place)[0] if re.match("https?://", place, re.IGNORECASE) else place
+    return path.rstrip("/").rsplit("/", 1)[-1][-LONGEST:]
+
+
+def _named_by(file: Path) -> list[str]:
+    """Return the files that a mesh is read with; none of another file."""
+    from toonset.dataset.mesh.obj import material_files
+
+    return material_files(file) if file.suffix.lower() == ".obj" else []
+
+
 def _files(root: Path) -> list[Path]:
-    """Return a file, or all regular files below a folder but hidden ones, in order."""
+    """Return a file with those that it names, or all files below a folder but hidden ones."""
     if not root.is_dir():
         root.stat()
-        return [root]
+        named = [root.parent / name for name in _named_by(root)]
+        return [root, *(file for file in named if file.is_file())]
     found = []
     for folder, folders, names in os.walk(root):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
@@ -176,6 +222,7 @@ class Hashes:
     def __init__(self, table: Table) -> None:
         """Keep them in a table."""
         self._table, self._new = table, dict[str, tuple[str, str]]()
+        self._known = dict[str, str]()  # of this run
 
     def __call__(self, place: str) -> str:
         """Return the hash of a file's or folder's content.
@@ -183,20 +230,21 @@ class Hashes:
         Raises:
             SheetError: it cannot be read.
         """
+        if place in self._known:
+            return self._known[place]
         seen = looks(place)
         if seen is None:
             raise SheetError(f"{place}: does not exist; check the name")
-        if place in self._new and self._new[place][0] == seen:
-            return self._new[place][1]
         known = self._table.hash_of(place, seen)
         if known is not None:
+            self._known[place] = known
             return known
         try:
             found = content_hash(place)
         except OSError as error:
             reason = error.strerror or str(error)
             raise SheetError(f"{place}: cannot be read ({reason}); check permissions") from error
-        self._new[place] = seen, found
+        self._new[place], self._known[place] = (seen, found), found
         if len(self._new) >= MANY:
             self.keep()
         return found

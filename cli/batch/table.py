@@ -12,6 +12,7 @@ or let one machine do the writing (--ray).
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import sqlite3
@@ -208,14 +209,20 @@ class Table:
         self._db.execute("PRAGMA synchronous = NORMAL")  # a lost commit is a sheet found done
         if version == SCHEMA:
             return
-        if not make or self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-            raise ToonsetError(f"{self.path}: is no table of toonset batch; choose another -o")
-        self._db.execute(f"PRAGMA journal_mode = {'DELETE' if alone else 'WAL'}")
+        none = ToonsetError(f"{self.path}: is no table of toonset batch; choose another -o")
+        if not make:
+            raise none
         with self.transaction():
-            if self._db.execute("PRAGMA user_version").fetchone()[0] == 0:  # nobody else has
-                for statement in TABLES.split(";"):
-                    self._db.execute(statement)
-                self._db.execute(f"PRAGMA user_version = {SCHEMA}")
+            if self._db.execute("PRAGMA user_version").fetchone()[0]:
+                return  # another runner has just made it
+            if self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+                raise none
+            for statement in TABLES.split(";"):
+                self._db.execute(statement)
+            self._db.execute(f"PRAGMA user_version = {SCHEMA}")
+        if not alone:
+            with contextlib.suppress(sqlite3.OperationalError):  # another one is at it
+                self._db.execute("PRAGMA journal_mode = WAL")
 
     def close(self) -> None:
         """Close the connection; the last one tidies the write-ahead file away."""
@@ -310,7 +317,7 @@ class Table:
 
         Args:
             plans: the sheets with the stages that they are to have.
-            is_there: returns which stages' results of a sheet are on disk.
+            is_there: returns which stages' results of a sheet are there, with their keys.
 
         Raises:
             ToonsetError: another runner works on one of them with other inputs or options.
@@ -367,19 +374,22 @@ class Table:
         found = db.execute("SELECT state FROM sheets WHERE name = ?", (name,)).fetchone()
         return found is not None and found["state"] == "running"
 
-    def retry(self, names: Iterable[str]) -> None:
-        """Let failed and quarantined sheets run again."""
+    def retry(self, names: Iterable[str], stages: Sequence[str]) -> None:
+        """Let stages of sheets that have failed or crashed run again."""
         with self.transaction() as db:
             for name in names:
-                again = db.execute(
-                    "UPDATE sheets SET state = 'waiting', crashes = 0, kills = 0 WHERE name = ? "
-                    "AND state IN ('failed', 'quarantined')",
-                    (name,),
-                ).rowcount
-                if again:
+                again = [
                     db.execute(
-                        "UPDATE stages SET state = 'waiting', error = '', log = '' "
-                        "WHERE sheet = ? AND state != 'done'",
+                        "UPDATE stages SET state = 'waiting', error = '', log = '' WHERE sheet = ? "
+                        "AND stage = ? AND state IN ('failed', 'quarantined')",
+                        (name, stage),
+                    ).rowcount
+                    for stage in stages
+                ]
+                if any(again):
+                    db.execute(
+                        "UPDATE sheets SET state = 'waiting', crashes = 0, kills = 0 "
+                        "WHERE name = ? AND state != 'running'",
                         (name,),
                     )
 
@@ -394,7 +404,7 @@ class Table:
     # ---- who does it ----------------------------------------------------------------------------
 
     def claim(self, runner: str, lease_s: float) -> SheetRow | None:
-        """Claim the next chosen sheet that is waiting, or whose lease is over; None if none is.
+        """Claim the next chosen sheet that waits, or whose runner's lease is over; None if none is.
 
         What has ended a worker comes last: it must not keep the others waiting.
         """
@@ -409,9 +419,9 @@ class Table:
             if found is None:
                 found = db.execute(
                     "UPDATE sheets SET worker = ?, lease = ? WHERE name = ("
-                    "SELECT name FROM sheets WHERE state = 'running' AND lease < ? "
+                    "SELECT name FROM sheets WHERE state = 'running' AND lease < ? AND worker != ? "
                     "AND name IN chosen ORDER BY position LIMIT 1) RETURNING name",
-                    (runner, now + lease_s, now),
+                    (runner, now + lease_s, now, runner),
                 ).fetchone()
         return None if found is None else self.row(found["name"])
 
@@ -437,6 +447,11 @@ class Table:
         with self._errors():
             found = self._db.execute("SELECT DISTINCT worker FROM sheets WHERE state = 'running'")
             return [row["worker"] for row in found]
+
+    def is_empty(self) -> bool:
+        """Return whether no sheet is in it."""
+        with self._errors():
+            return self._db.execute("SELECT 1 FROM sheets LIMIT 1").fetchone() is None
 
     def is_due(self) -> bool:
         """Return whether a chosen sheet waits, or runs."""

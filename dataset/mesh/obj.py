@@ -7,6 +7,7 @@ end, and names parts by their materials.
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass, field
 from itertools import pairwise, takewhile
 from pathlib import Path
@@ -23,6 +24,8 @@ UNKNOWN_COLOR = (204, 204, 204)  # a face whose material is not described; trime
 MAX_LIBRARY_BYTES = 4 * 2**20
 MOST_INDEX = 10**9
 LINES_BETWEEN = 100_000  # of two looks at how much it has become
+LIBRARY = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^\r\n]+)")
+TEXTURE = re.compile(rb"(?m)^[ \t]*map_Kd[ \t]+([^\r\n]*[^\s])")
 
 
 @dataclass
@@ -195,6 +198,30 @@ def _read_materials(
                 picture = _beside(mesh_path, words[-1])
                 found[name] = (rgb, None if picture is None else load_rgba(picture))
     return found
+
+
+def material_files(path: Path) -> list[str]:
+    """Return the names of the MTL files that a mesh names, and of the textures that these name.
+
+    They are relative to the mesh's folder, and lie in it; what a library that is missing names is
+    not among them.
+    """
+    found = []
+    for library in _names(path, LIBRARY):
+        found.append(library)
+        if (file := _beside(path, library)) is not None:
+            found += [words.split()[-1] for words in _names(file, TEXTURE)]
+    folder = Path(os.path.realpath(path.parent))
+    inside = [name for name in found if "\0" not in name and ".." not in Path(name).parts]
+    return [name for name in inside if (folder / name).is_relative_to(folder)]
+
+
+def _names(file: Path, pattern: re.Pattern[bytes]) -> list[str]:
+    try:
+        found = pattern.findall(file.read_bytes())
+    except OSError:
+        return []
+    return [name.decode("utf-8", "replace").strip().replace("\\", "/") for name in found]
 
 
 def _beside(mesh_path: Path, name: str) -> Path | None:

@@ -124,13 +124,15 @@ def test_results_go_where_they_are_asked_for(
     library: Path, ran: Path, toonset: Command, tmp_path: Path
 ) -> None:
     out, store = tmp_path / "out", tmp_path / "store"
-    shutil.copytree(ran, out)
     command = ("batch", library / "sheets.csv", "-o", out, *STAGES, "--only", "s0", "--only", "s1")
-    for place in (store, tmp_path / "another"):  # what is done elsewhere is not done there
-        assert toonset(*command, "--store", f"file://{place}").code == 0
-        found = contents(place)
-        expected = {n: v for n, v in results(ran).items() if n[:2] in ("s0", "s1")}
-        assert {n: v for n, v in found.items() if n.count("/") > 1} == expected
+    assert toonset(*command, "--store", f"file://{store}").code == 0
+    expected = {n: v for n, v in results(ran).items() if n[:2] in ("s0", "s1")}
+    assert {n: v for n, v in contents(store).items() if n.count("/") > 1} == expected
+    for more in ((), ("--store", f"file://{tmp_path}/another")):  # the others would lie elsewhere
+        refused = toonset(*command, *more)
+        assert refused.code == 2
+        assert f"has its results in file://{store}; give the same --store" in refused.err
+    (store / "s0" / "palette.json").write_text("{}")  # of whatever
     shutil.rmtree(store / "s1")
     assert toonset(*command, "--store", f"file://{store}").code == 0
     assert (store / "s1" / "bundle" / "transforms.json").is_file()

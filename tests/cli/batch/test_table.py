@@ -126,7 +126,9 @@ def test_a_failed_sheet_waits_for_somebody_to_ask(table: Table) -> None:
     found = table.row(row.name)
     assert found is not None
     assert (found.state, found.error) == ("failed", "no figures")
-    table.retry([row.name])
+    table.retry([row.name], ["palette"])
+    assert table.row(row.name) == found  # another stage has failed
+    table.retry([row.name], ["calibrate"])
     found = table.row(row.name)
     assert found is not None
     assert (found.state, found.error, found.stages[0].state) == ("waiting", "", "waiting")
