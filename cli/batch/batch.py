@@ -30,6 +30,7 @@ TIME_LIMIT_S = 1800.0
 PAGE_S, PAUSE = 30.0, 50  # between pages: at least; times what the last one took
 LOOK_AT = 3  # exit code: sheets have failed
 AUTO = "auto"
+SOME = 5  # names that a line says
 PLANNED_AT_ONCE = 500  # sheets of one transaction
 
 
@@ -147,6 +148,14 @@ def batch(
     merge: Annotated[
         Path | None, typer.Option("--merge", metavar="OUT", help="Put the shards' tables together.")
     ] = None,
+    forget: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--forget",
+            metavar="NAME",
+            help="Take a sheet of -o OUT out of table, page and data set: name or 'pattern*'.",
+        ),
+    ] = None,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
@@ -156,29 +165,34 @@ def batch(
     versions touch. OUT/index.html shows all sheets, OUT/batch.sqlite is the table of what is done.
     Exit code 3 when sheets have failed; the others are done then.
     """
+    from toonset.cli.batch import whole
     from toonset.cli.batch.dispatch import Limits
-    from toonset.cli.batch.progress import status_of
     from toonset.cli.batch.sheets import choose
     from toonset.cli.batch.stages import check_options, in_order
 
+    os.environ["OMP_NUM_THREADS"] = "1"  # a sheet has one core; must precede torch
     printer = Printer(as_json, quiet)
     if (status is not None) + (merge is not None) + bool(sheets or out) > 1:
         raise UsageError("--status and --merge take the batch's folder, and nothing beside it")
     if status is not None:
-        found = status_of(status)
-        printer.result({"out": status, **found.values()}, "\n".join(found.lines()))
+        whole.say_status(status, printer)
         return
     if merge is not None:
-        _merge(merge, printer)
+        whole.merge(merge, printer)
         return
+    if forget and out is not None and not sheets:
+        whole.forget(out, forget, printer)
+        return
+    if forget:
+        raise UsageError("--forget takes -o OUT, and no sheets beside it")
     if not sheets or out is None:
         raise UsageError("name sheets, and the folder of the batch with -o")
     chosen = in_order([name.strip() for name in stages.split(",") if name.strip()])
     if gpus and ray is None:
         raise UsageError("--gpus belongs to --ray")
-    entries = _listed(sheets, given or [], root, out)
+    entries = _listed(sheets, given or [], root, out, printer.say)
     check_options(entries, chosen)
-    part, table_name = _shard(shard)
+    part, table_name = _shard(shard, out)
     names = choose(entries, only or [], part)
     count = _count(workers, memory_limit or 0)
     share = 0 if ray else _share(count)
@@ -237,7 +251,9 @@ class Wanted:
         return self.table != TABLE
 
 
-def _listed(sheets: list[str], given: list[str], root: Path | None, out: Path) -> list[Entry]:
+def _listed(
+    sheets: list[str], given: list[str], root: Path | None, out: Path, say: Callable[[str], None]
+) -> list[Entry]:
     """Return all sheets that are named, with their options."""
     from toonset.cli.batch.sheets import list_sheets
     from toonset.cli.batch.stages import STAGES, as_words
@@ -248,12 +264,12 @@ def _listed(sheets: list[str], given: list[str], root: Path | None, out: Path) -
         if stage not in STAGES:
             raise UsageError(f"--with {text!r}: begins with none of {', '.join(STAGES)}")
         words[stage] = (*words.get(stage, ()), *said)
-    return list_sheets(sheets, words, root, out)
+    return list_sheets(sheets, words, root, out, say)
 
 
-def _shard(text: str) -> tuple[tuple[int, int], str]:
+def _shard(text: str, out: Path) -> tuple[tuple[int, int], str]:
     """Return which part of how many, from 0, and the name of its table."""
-    from toonset.cli.batch.table import TABLE
+    from toonset.cli.batch.table import TABLE, tables_in
 
     if not text:
         return (0, 1), TABLE
@@ -261,6 +277,9 @@ def _shard(text: str) -> tuple[tuple[int, int], str]:
     part, parts = (int(found[1]), int(found[2])) if found else (0, 0)
     if not 1 <= part <= parts:
         raise UsageError(f"--shard {text!r}: is not I/N with I from 1 to N, as 3/8")
+    for name in tables_in(out):
+        if name != TABLE and not name.endswith(f"of{parts}.sqlite"):
+            raise UsageError(f"--shard {text}: {out} has parts of another number, as {name}")
     return (part - 1, parts), f"batch-{part}of{parts}.sqlite"
 
 
@@ -288,7 +307,6 @@ def _local_workers(count: int, wanted: Wanted) -> Workers:
     from toonset.cli.batch.local import LocalWorkers
     from toonset.cli.batch.stages import import_parts
 
-    os.environ["OMP_NUM_THREADS"] = "1"  # a sheet has one core; must precede torch
     import_parts(wanted.stages)
     return LocalWorkers(min(count, len(wanted.names)))
 
@@ -330,7 +348,13 @@ def _run(
                 progress.tick()
                 page.tick()
 
-            runner.run(table, workers, progress.take, tick)
+            try:
+                runner.run(table, workers, progress.take, tick)
+            except (KeyboardInterrupt, SystemExit):  # the page must not say that sheets run
+                progress.close(counted())
+                _write_page(wanted, table)
+                printer.say("the same command continues")
+                raise
         progress.close(counted())
         _write_page(wanted, table)
         return progress.counts
@@ -355,11 +379,13 @@ def _check_out(out: Path) -> None:
 
 def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
     """Put into the table what is to be done."""
+    from toonset.cli.batch.progress import sheets_of
     from toonset.cli.batch.stages import keys_of
-    from toonset.cli.batch.storage import Hashes
     from toonset.cli.batch.table import Plan
+    from toonset.cli.common.storage import Hashes
 
-    if table.store != wanted.store and not table.is_empty():
+    names = {*table.names()}
+    if table.store != wanted.store and names:
         where = f"in {table.store}" if table.store else "in its folder"
         raise UsageError(f"{wanted.out}: has its results {where}; give the same --store")
     table.store = wanted.store
@@ -373,6 +399,9 @@ def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
             if len(wanted.entries) > PLANNED_AT_ONCE:
                 printer.progress(f"reading sheets {position + 1}/{len(wanted.entries)}")
     hashes.keep()
+    if other := sorted(names - {entry.name for entry in wanted.entries}):
+        some = ", ".join(other[:SOME]) + ", ..." * (len(other) > SOME)
+        printer.say(f"{sheets_of(len(other))} not named now, kept ({some}); see --forget")
     if wanted.retry:
         table.retry(wanted.names, wanted.stages)
     table.choose(wanted.names)
@@ -382,7 +411,7 @@ def _there(wanted: Wanted, plans: Sequence[Plan]) -> Mapping[str, set[str]]:
     """Return which stages of sheets are done with the keys that are planned, as stamps say."""
     from toonset.cli.batch.dispatch import home_of
     from toonset.cli.batch.job import read_stamp
-    from toonset.cli.batch.storage import keys_behind
+    from toonset.cli.common.storage import keys_behind
 
     if wanted.store:
         names = [f"{plan.entry.name}/{stage}.json" for plan in plans for stage in plan.keys]
@@ -426,29 +455,14 @@ def _write_page(wanted: Wanted, table: Table) -> None:
 
 def _report(wanted: Wanted, counts: Mapping[str, Counter[str]], printer: Printer) -> None:
     """Print the result; exit with 3 where sheets failed."""
+    from toonset.cli.batch.progress import sheets_of
+
     found = {stage: {k: n for k, n in count.items() if n} for stage, count in counts.items()}
     bad = sum(count[state] for count in counts.values() for state in ("failed", "quarantined"))
     look = "" if wanted.is_shard else f": look at {wanted.out / 'index.html'}"
-    text = f"{wanted.out}: {len(wanted.names)} sheets, {bad} failed{look}"
+    again = "; mend them, or --retry-failed" if bad else ""
+    text = f"{wanted.out}: {sheets_of(len(wanted.names))}, {bad} failed{look}{again}"
     values = {"out": wanted.out, "sheets": len(wanted.names), "failed": bad, "stages": found}
     printer.result(values, text)
     if bad:
         raise typer.Exit(LOOK_AT)
-
-
-def _merge(out: Path, printer: Printer) -> None:
-    """Put the parts' tables into the batch's own, and write the page."""
-    from toonset.cli.batch.page import write_page
-    from toonset.cli.batch.table import SHARDS, TABLE, Table, tables_in
-
-    if not (shards := [name for name in tables_in(out) if name != TABLE]):
-        raise UsageError(f"{out}: has no {SHARDS}; run toonset batch --shard first")
-    count = 0
-    with closing(Table(out / TABLE, make=True)) as table:
-        for name in shards:
-            with closing(Table(out / name)) as part:
-                count += table.take_in(part)
-                table.store = part.store
-        write_page(out, table.rows(), out.resolve().name, store=table.store)
-    text = f"{out}: {count} sheets of {len(shards)} parts; look at {out / 'index.html'}"
-    printer.result({"out": out, "sheets": count, "parts": len(shards)}, text)

@@ -118,7 +118,7 @@ def run_sheet(job: Job) -> Outcome:
 
 def _run_near(job: Job, home: Path) -> Outcome:
     """Run a sheet whose drawings or results may lie behind URLs, on copies that go afterwards."""
-    from toonset.cli.batch.storage import fetch, is_url, looks, push
+    from toonset.cli.common.storage import fetch, is_url, looks, push
 
     words = [word for said in job.words.values() for word in said]
     if not job.store and not any(map(is_url, (*job.sheets, *map(value_of, words)))):
@@ -151,7 +151,7 @@ def _run_near(job: Job, home: Path) -> Outcome:
 
 def _fetched(words: Sequence[str], places: Iterator[Path]) -> tuple[str, ...]:
     """Return words with the URLs among them as files here, each in a folder of its own."""
-    from toonset.cli.batch.storage import fetch, is_url
+    from toonset.cli.common.storage import fetch, is_url
 
     found = []
     for word in words:

@@ -85,6 +85,7 @@ def pack(
     README.md and card.json say what is in it and how it is loaded. The same sheets give the same
     bytes, and a character stays in its split when sheets are added.
     """
+    from toonset.cli.batch.progress import sheets_of
     from toonset.cli.batch.shards import check_parquet
 
     printer, shares = Printer(as_json, quiet), _shares(split)
@@ -98,7 +99,10 @@ def pack(
             card = _write(folder, wanted, to, chosen, tally, shard_size * MB, printer)
     splits = {name: card["splits"][name]["sheets"] for name in card["splits"]}
     told = ", ".join(f"{name} {count}" for name, count in splits.items())
-    printer.say(f"{card['sheets']} sheets, {card['views']} views: {told}")
+    printer.say(f"{sheets_of(card['sheets'])}, {card['views']} views: {told}")
+    for name, share in zip(SPLITS, shares, strict=True):
+        if share and name not in splits:
+            printer.say(f"{name} is empty: no character fell into its share of {share:g}")
     values = {name: card[name] for name in ("format", "sheets", "views", "characters")}
     printer.result({"out": out, **values, "splits": splits}, str(out))
 
@@ -134,7 +138,7 @@ class Wanted:
         """Yield a sheet's folder; of a batch with a store a copy, for as long as it is read."""
         from toonset.cli.batch.dispatch import home_of
         from toonset.cli.batch.stages import BUNDLE, STAGES
-        from toonset.cli.batch.storage import fetch
+        from toonset.cli.common.storage import fetch
 
         if not (store := self.table.store):
             yield home_of(self.batch, name)

@@ -1,4 +1,4 @@
-"""Say where a batch stands: a line for every stage, while it runs and afterwards."""
+"""Say where a batch stands while it runs: a line for every stage."""
 
 from __future__ import annotations
 
@@ -6,18 +6,14 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
-from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
 
-from toonset.cli.batch.table import BAD, TABLE, SheetRow, StageRow, Table, tables_in
+from toonset.cli.batch.table import BAD, SheetRow, StageRow
 from toonset.cli.common.output import Printer
 
 LIVE_S, LOG_S = 0.5, 30.0  # between lines on a terminal; in a log
 HOUR_S = 3600.0
 UNREACHED = "not reached"  # stages after one that failed
-MOST_BAD = 20  # lines of what failed
 ERASE_LINE = "\x1b[K"
 
 
@@ -116,71 +112,6 @@ def _duration(seconds: float) -> str:
     return duration(seconds)
 
 
-@dataclass
-class Status:
-    """Where a batch stands, counted."""
-
-    sheets: Counter[str] = field(default_factory=Counter)
-    verdicts: Counter[str] = field(default_factory=Counter)
-    stages: dict[str, Counter[str]] = field(default_factory=dict)
-    wall_s: Counter[str] = field(default_factory=Counter)
-    peak_mb: dict[str, float] = field(default_factory=dict)
-    bad: list[tuple[str, str, str]] = field(default_factory=list)  # name, state, why
-
-    def add(self, rows: Iterable[SheetRow]) -> None:
-        """Count a table's sheets."""
-        for row in rows:
-            self.sheets[row.state] += 1
-            self.verdicts[row.verdict or "none yet"] += 1
-            for one in row.stages:
-                self.stages.setdefault(one.stage, Counter())[one.state] += 1
-                self.wall_s[one.stage] += one.wall_s  # type: ignore[assignment]
-                self.peak_mb[one.stage] = max(self.peak_mb.get(one.stage, 0), one.peak_mb)
-            if row.state in BAD:
-                self.bad.append((row.name, row.state, row.error))
-
-    def values(self) -> dict[str, Any]:
-        """Return it for machines."""
-        return {
-            "sheets": dict(self.sheets),
-            "verdicts": dict(self.verdicts),
-            "stages": {stage: dict(count) for stage, count in self.stages.items()},
-            "failed": [{"name": n, "state": s, "error": e} for n, s, e in self.bad],
-        }
-
-    def lines(self) -> list[str]:
-        """Return it for people."""
-        total = sum(self.sheets.values())
-        found = [f"{total} sheets: {_said(self.sheets)}", f"cameras: {_said(self.verdicts)}"]
-        for stage, count in self.stages.items():
-            mean, peak = self.wall_s[stage] / max(count["done"], 1), self.peak_mb[stage]
-            each = f"; {mean:.1f} s each, {peak:.0f} MB at most" if count["done"] else ""
-            found.append(f"{stage}: {_said(count)}{each}")
-        found += [f"{name}: {state}: {error}" for name, state, error in self.bad[:MOST_BAD]]
-        more = len(self.bad) - MOST_BAD
-        return [*found, *([f"... and {more} more; all are in index.html"] if more > 0 else [])]
-
-
-def status_of(out: Path) -> Status:
-    """Return where a batch stands, its parts together.
-
-    Args:
-        out: its folder.
-
-    Raises:
-        ToonsetError: no table is there, or one cannot be read.
-    """
-    status, paths = Status(), [out / name for name in tables_in(out)]
-    with ExitStack() as stack:
-        tables = [stack.enter_context(closing(Table(path))) for path in paths or [out / TABLE]]
-        whole = tables[0]
-        if len(tables) > 1:  # a sheet may be in several
-            whole = stack.enter_context(closing(Table(Path(":memory:"), make=True)))
-            for table in tables:
-                whole.take_in(table)
-        status.add(whole.rows())
-    return status
-
-
-def _said(counts: Counter[str]) -> str:
-    return ", ".join(f"{count} {name}" for name, count in counts.most_common() if count)
+def sheets_of(count: int) -> str:
+    """Return how many sheets, in words."""
+    return f"{count:,} {'sheet' if count == 1 else 'sheets'}"

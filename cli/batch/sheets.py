@@ -21,17 +21,18 @@ import io
 import os
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from toonset.cli.batch.stages import STAGES, Entry, as_words, files_among, parse, value_of
-from toonset.cli.batch.storage import file_name, find, is_url
+from toonset.cli.common.storage import file_name, find, is_url
 from toonset.errors import SheetError, UsageError, as_text, one_line, printable
 
 MANIFESTS = (".csv", ".jsonl")
 LONGEST_NAME = 100  # bytes: a folder of toonset's own adds some, 255 is the most
+SOME = 5  # names that a line says
 WILD = re.compile(r"[*?\[]")
 SPLIT = "split.json"  # in a folder that `toonset split` wrote
 PLAIN = ("sheet", "name", "mesh", "views", "character", "license", "source")
@@ -62,6 +63,7 @@ def list_sheets(
     words: Mapping[str, Sequence[str]],
     root: Path | None = None,
     out: Path | None = None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> list[Entry]:
     """Return the sheets of places as a person names them, each checked, by name.
 
@@ -70,11 +72,12 @@ def list_sheets(
         words: of every stage's command line, for all sheets; those of a manifest follow.
         root: the folder that a manifest's paths are relative to; None: the manifest's own.
         out: the batch's folder: what a pattern finds in there is no sheet.
+        say: is told what a folder holds that is not taken.
 
     Raises:
         ToonsetError: nothing is there, a manifest says what cannot be, two have one name.
     """
-    given = [one for place in places for one in _given(place, root, out)]
+    given = [one for place in places for one in _given(place, root, out, say)]
     if not given:
         raise SheetError(f"{', '.join(map(printable, places))}: no sheets there; name pictures")
     here = Given("", Path.cwd(), False, "", {})
@@ -97,16 +100,27 @@ def choose(
     Raises:
         UsageError: nothing is called so.
     """
-    for pattern in only:
-        if not any(fnmatch.fnmatchcase(entry.name, pattern) for entry in entries):
-            raise UsageError(f"--only {pattern!r}: no sheet is called so; see --status")
-    mine = [entry.name for entry in entries[part[0] :: part[1]]]
-    if only:
-        mine = [n for n in mine if any(fnmatch.fnmatchcase(n, pattern) for pattern in only)]
-    return frozenset(mine)
+    mine = frozenset(entry.name for entry in entries[part[0] :: part[1]])
+    return mine & named({entry.name for entry in entries}, only, "--only") if only else mine
 
 
-def _given(place: str, root: Path | None, out: Path | None) -> Iterator[Given]:
+def named(names: Iterable[str], patterns: Sequence[str], option: str) -> frozenset[str]:
+    """Return those of names that patterns match.
+
+    Raises:
+        UsageError: nothing is called as one of them.
+    """
+    found = set[str]()
+    for pattern in patterns:
+        if not (some := {name for name in names if fnmatch.fnmatchcase(name, pattern)}):
+            raise UsageError(f"{option} {pattern!r}: no sheet is called so")
+        found |= some
+    return frozenset(found)
+
+
+def _given(
+    place: str, root: Path | None, out: Path | None, say: Callable[[str], None]
+) -> Iterator[Given]:
     """Yield the sheets of one place."""
     from toonset.dataset.images.folder import ENDINGS, picture_files
     from toonset.read import check_there
@@ -128,17 +142,34 @@ def _given(place: str, root: Path | None, out: Path | None) -> Iterator[Given]:
         files = [Path(name) for name in sorted(glob.glob(place, recursive=True))]
         files = [file for file in files if file.is_dir() or file.suffix.lower() in ENDINGS]
         files = [file for file in files if out is None or not _is_within(file, out)]
+        parents = {parent for file in files for parent in file.parents}
+        files = [file for file in files if file not in parents]  # what is in it is taken
     else:
         check_there([path], "picture", SheetError)
         base, files = path.parent, [path]
         if path.is_dir() and not (path / SPLIT).is_file():
             base, files = path, list(picture_files(path)[0])
+            _say_left(path, say)
     for file in files:
         inside = file.relative_to(base)
         name = clean_name(
             "-".join(inside.with_name(inside.name if file.is_dir() else inside.stem).parts)
         )
         yield Given(str(file), here, False, name, {"sheet": str(file)})
+
+
+def _say_left(folder: Path, say: Callable[[str], None]) -> None:
+    """Say what of a folder is not taken though it might be meant."""
+    from toonset.dataset.images.folder import ENDINGS
+
+    for file in sorted(folder.iterdir()):
+        if file.suffix.lower() in MANIFESTS and file.is_file():
+            say(f"{file}: is not used; to use a manifest, name it in place of its folder")
+    pictures = [file for file in folder.glob("*/*") if file.suffix.lower() in ENDINGS]
+    below = sorted({file.parent.name for file in pictures if file.parent.name[0] != "."})
+    if below:
+        some = ", ".join(below[:SOME]) + ", ..." * (len(below) > SOME)
+        say(f"{folder}: folders in it are not read ({some}); '{folder}/**/*.png' takes theirs, too")
 
 
 def _is_within(file: Path, folder: Path) -> bool:
@@ -181,6 +212,9 @@ def _csv_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
     try:
         rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
         head = [cell.strip() for cell in next(rows)]
+        if len(head) == 1 and ";" in head[0]:
+            raise SheetError(f"{path}: line 1: its cells end in ';'; save it with ',' between them")
+        _check_columns(f"{path}: line 1", head)
         if double := next((name for name in head if head.count(name) > 1), None):
             raise SheetError(f"{path}: has two columns {double!r}; take one out")
         for row in rows:
@@ -213,13 +247,19 @@ def _jsonl_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]
 
 
 def _check_values(where: str, values: Mapping[str, Any]) -> None:
-    """Refuse a column that means nothing, and text that no file's name can hold."""
-    from toonset.suggest import did_you_mean
-
-    known = [*PLAIN, *(f"{stage}{OPTIONS}" for stage in STAGES)]
+    """Refuse a key that means nothing, and text that no file's name can hold."""
     for name, value in values.items():
         if "\0" in "".join(value):
             raise SheetError(f"{where}: {name!r} holds a zero character; take it out")
+    _check_columns(where, values)
+
+
+def _check_columns(where: str, names: Iterable[str]) -> None:
+    """Refuse a column that means nothing."""
+    from toonset.suggest import did_you_mean
+
+    known = [*PLAIN, *(f"{stage}{OPTIONS}" for stage in STAGES)]
+    for name in names:
         if name not in known:
             said = did_you_mean(name, known) or f"known are {', '.join(known)}"
             raise SheetError(f"{where}: {name!r} is no column of a manifest; {said}")

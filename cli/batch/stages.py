@@ -22,7 +22,7 @@ from typing import Any
 import typer
 
 from toonset.cli.common.refusals import refusal
-from toonset.errors import UsageError
+from toonset.errors import ToonsetError, UsageError, one_line
 
 PACKAGES = (  # whose versions results depend on
     *("toonset", "numpy", "scipy", "opencv-contrib-python-headless", "torch", "kornia", "Pillow"),
@@ -176,7 +176,7 @@ def _usual(verb: Stage, words: Sequence[str]) -> list[str]:
 
 
 def check_options(entries: Iterable[Entry], stages: Sequence[str]) -> None:
-    """Refuse sheets whose stages lack an option that they need.
+    """Refuse sheets whose stages lack an option that they need, or have values that cannot be.
 
     Raises:
         UsageError: naming the first.
@@ -185,9 +185,33 @@ def check_options(entries: Iterable[Entry], stages: Sequence[str]) -> None:
     for entry in entries:
         for stage in stages:
             words = entry.words.get(stage, ())
-            if (stage, words) not in seen:
-                parse(stage, words, f"{entry.name}: {stage}")
+            if (stage, words) in seen:
+                continue
             seen.add((stage, words))
+            where = f"{entry.name}: {stage}"
+            values = parse(stage, words, where)
+            try:
+                if words:
+                    _check_values(stage, values)
+            except ToonsetError as error:
+                raise UsageError(f"{where}: {one_line(error)}") from error
+
+
+def _check_values(stage: str, values: Mapping[str, Any]) -> None:
+    """Refuse what a verb refuses before it reads anything."""
+    from toonset.calib.hints import Hints
+    from toonset.dataset.split_folder.cutting import Cutting
+    from toonset.dataset.split_folder.view_labels import parse_labels
+    from toonset.palette.extract import options_of
+
+    if stage == "calibrate":
+        labels, locked = values["labels"], tuple(lock.value for lock in values["locked"] or ())
+        Hints(labels, values["landmarks"], values["landmarks_only"], values["init"], locked).check()
+        Cutting(*(values[name] for name in ("boxes", "grid", "background", "drop"))).check()
+        if labels:
+            parse_labels(labels, labels.count(",") + 1)
+    if stage == "palette":
+        options_of(*(values[name] for name in ("min_share", "max_colors", "keep")))
 
 
 def _typed(context: Any, verb: Stage, words: Sequence[str]) -> str:
@@ -347,7 +371,7 @@ def _options(stage: str, entry: Entry, hash_of: Callable[[str], str]) -> dict[st
 
 def _file(place: str, hash_of: Callable[[str], str]) -> list[str]:
     """Return a file's name, which bundles record, and its content's hash."""
-    from toonset.cli.batch.storage import file_name
+    from toonset.cli.common.storage import file_name
 
     return [file_name(place), hash_of(place)]
 

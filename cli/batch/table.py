@@ -15,6 +15,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import os
 import sqlite3
 import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
@@ -198,7 +199,11 @@ class Table:
         if not make and not path.is_file():
             raise ToonsetError(f"{path.parent}: has no {path.name}; name the -o of a toonset batch")
         with self._errors():
-            self._db = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None)
+            is_fixed = not make and not os.access(path.parent, os.W_OK)
+            place = f"{path.absolute().as_uri()}?immutable=1" if is_fixed else path
+            self._db = sqlite3.connect(
+                place, timeout=PATIENCE_S, isolation_level=None, uri=is_fixed
+            )
             self._db.row_factory = sqlite3.Row
             self._open(make=make, alone=alone)
 
@@ -282,6 +287,11 @@ class Table:
                 (name,),
             ).fetchall()
         return _sheet(found) if found else None
+
+    def names(self) -> list[str]:
+        """Return the names of all sheets."""
+        with self._errors():
+            return [row["name"] for row in self._db.execute("SELECT name FROM sheets")]
 
     @property
     def store(self) -> str:
@@ -393,6 +403,18 @@ class Table:
                         (name,),
                     )
 
+    def forget(self, name: str) -> None:
+        """Take a sheet out.
+
+        Raises:
+            ToonsetError: it is being worked on.
+        """
+        with self.transaction() as db:
+            if self._is_running(db, name):
+                raise ToonsetError(f"{self.path.parent}: {name!r} is being worked on; wait for it")
+            db.execute("DELETE FROM sheets WHERE name = ?", (name,))
+            db.execute("DELETE FROM stages WHERE sheet = ?", (name,))
+
     def choose(self, names: Iterable[str]) -> None:
         """Claim only these sheets from now on."""
         with self._errors():
@@ -447,11 +469,6 @@ class Table:
         with self._errors():
             found = self._db.execute("SELECT DISTINCT worker FROM sheets WHERE state = 'running'")
             return [row["worker"] for row in found]
-
-    def is_empty(self) -> bool:
-        """Return whether no sheet is in it."""
-        with self._errors():
-            return self._db.execute("SELECT 1 FROM sheets LIMIT 1").fetchone() is None
 
     def is_due(self) -> bool:
         """Return whether a chosen sheet waits, or runs."""
@@ -519,9 +536,8 @@ class Table:
             ).fetchone()
         return int(found[0])
 
-    def take_in(self, other: Table) -> int:
-        """Put another table's sheets in, in place of older ones; return how many it has."""
-        count = 0
+    def take_in(self, other: Table) -> None:
+        """Put another table's sheets in, in place of older ones."""
         rows = other.rows()
         while some := [*itertools.islice(rows, AT_ONCE)]:
             with self.transaction() as db:
@@ -529,8 +545,6 @@ class Table:
                     known = self.row(row.name)
                     if known is None or known.newest <= row.newest:
                         _take_in(db, row)
-            count += len(some)
-        return count
 
 
 def _put(db: sqlite3.Connection, name: str, row: StageRow) -> None:

@@ -14,7 +14,7 @@ from toonset.cli.batch.job import stages_there
 from toonset.cli.batch.local import LocalWorkers
 from toonset.cli.batch.stages import STAGES, Entry
 from toonset.cli.batch.table import TABLE, Plan, SheetRow, StageRow, Table
-from toonset.errors import SheetError
+from toonset.errors import OutputError, SheetError
 from toonset.write import new_folder, write_json
 
 count_in: Path | None = None  # which stages were run; None: OUT/runs
@@ -59,6 +59,11 @@ def _behave(what: str, home: Path) -> None:
     if what == "eat":
         held = [bytes([n]) * (1 << 27) for n in range(1, 33)]
         time.sleep(len(held))
+    if what == "held":
+        raise OutputError("bundle: is in use by another toonset") from BlockingIOError()
+    if what == "talk":
+        print("\n".join(f"step {number}" for number in range(100)), flush=True)
+        os.kill(os.getpid(), signal.SIGSEGV)
     if what == "slow":
         time.sleep(0.3)
     if what == "full" and not (home.parents[1] / "room").is_file():
@@ -75,6 +80,7 @@ def make_table(
         file = out / "in" / f"{name}.txt"
         file.write_text(text)
         every = {"calibrate": text, "palette": " ".join((text, *words)), "export": f"{text} export"}
+        every["train"] = f"{every['palette']} train"
         keys = {stage: every[stage] for stage in stages}
         entry = Entry(name, (str(file),), {"palette": tuple(words)}, name)
         plans.append(Plan(entry, position, keys))
@@ -92,6 +98,7 @@ def run_all(
     limits: Limits = Limits(60),  # noqa: B008
     words: Sequence[str] = (),
     stages: Sequence[str] = CHOSEN,
+    store: str = "",
 ) -> dict[str, SheetRow]:
     """Run sheets on local workers; return their rows."""
     ended: Counter[str] = Counter()
@@ -101,7 +108,7 @@ def run_all(
 
     with closing(make_table(out, sheets, words, stages)) as table:
         with closing(LocalWorkers(count)) as workers:
-            Runner(out, limits, (*stages,)).run(table, workers, take, lambda: None)
+            Runner(out, limits, (*stages,), store).run(table, workers, take, lambda: None)
         assert set(ended.values()) <= {1}
         return {row.name: row for row in table.rows()}
 

@@ -150,6 +150,101 @@ def test_sheets_and_meshes_behind_urls(
     assert there == contents(ran / "sheets" / "s1" / "bundle")
 
 
+def test_two_urls_of_one_name_are_two_files(
+    library: Path, toonset: Command, tmp_path: Path
+) -> None:
+    for number, name in enumerate(("front", "side")):
+        (tmp_path / name).mkdir()
+        shutil.copyfile(library / f"s{number}.png", tmp_path / name / "view.png")
+    words = ("--stages", "calibrate", "--json")
+    done = toonset("batch", f"file://{tmp_path}/*/view.png", "-o", tmp_path / "o", *words)
+    assert "two sheets are called 'view'" in done.err
+    (tmp_path / "s.jsonl").write_text(
+        json.dumps({"sheet": [f"memory://x/{name}/view.png" for name in ("front", "side")]})
+    )
+    import fsspec
+
+    files = fsspec.filesystem("memory")
+    for name in ("front", "side"):
+        files.pipe_file(f"/x/{name}/view.png", (tmp_path / name / "view.png").read_bytes())
+    done = toonset("batch", tmp_path / "s.jsonl", "-o", tmp_path / "out", *words)
+    assert done.json["stages"]["calibrate"] == {"done": 1}, done
+
+
+def test_an_input_that_cannot_be_read_fails_its_sheet_alone(
+    library: Path, toonset: Command, tmp_path: Path
+) -> None:
+    words = (f"file://{library}/s0.png", "file:///proc/self/mem", "--stages", "calibrate")
+    done = toonset("batch", *words, "-o", tmp_path / "out", "--json")
+    assert (done.code, done.json["stages"]["calibrate"]) == (3, {"done": 1, "failed": 1}), done
+    assert "mem: failed: file:///proc/self/mem: cannot be reached" in done.err
+
+
+def test_another_tables_result_is_not_taken_for_ones_own(
+    library: Path, ran: Path, toonset: Command, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(ran, out)
+    command = ("batch", library / "sheets.csv", "-o", out, *STAGES, "--only", "s0")
+    colors = out / "sheets" / "s0" / "bundle" / "palette.json"
+    before = colors.read_bytes()
+    toonset(*command, "--shard", "1/1", "--with", "palette --max-colors 2")
+    assert colors.read_bytes() != before
+    assert toonset(*command).code == 0
+    assert colors.read_bytes() == before
+    refused = toonset(*command, "--shard", "1/2")
+    assert "has parts of another number, as batch-1of1.sqlite" in refused.err
+
+
+def test_a_mesh_is_its_materials_too(library: Path, toonset: Command, tmp_path: Path) -> None:
+    mesh, out = tmp_path / "body.obj", tmp_path / "out"
+    text = (library / "body0.obj").read_text().splitlines()
+    plain = [" ".join(line.split()[:4]) if line.startswith("v ") else line for line in text]
+    mesh.write_text("\n".join(["mtllib body.mtl", "usemtl m", *plain]) + "\n")
+    places = {str(mesh): tmp_path / "out", f"file://{mesh}": tmp_path / "url"}
+    found = []
+    for red in (1, 0):
+        (tmp_path / "body.mtl").write_text(f"newmtl m\nKd {red} 0 1\n")
+        for place, out in places.items():
+            given = ("--stages", "calibrate", "--with", f"calibrate --mesh {place}")
+            if red or place == str(mesh):
+                assert toonset("batch", library / "s0.png", "-o", out, *given).code == 0
+            found.append((out / "sheets" / "s0" / "bundle" / "mannequin.obj").read_bytes())
+    here, there, changed, _ = found
+    assert here == there
+    assert changed != here
+
+
+def test_a_sheet_that_is_named_no_longer_is_told_and_can_be_forgotten(
+    library: Path, ran: Path, toonset: Command, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(ran, out)
+    fewer = library / "fewer.csv"
+    fewer.write_text("".join((library / "sheets.csv").read_text().splitlines(True)[:3]))
+    done = toonset("batch", fewer, "-o", out, *STAGES)
+    assert (done.code, done.err.splitlines()[0]) == (
+        0,
+        "2 sheets not named now, kept (s2, torn); see --forget",
+    )
+    assert toonset("batch", "-o", out, "--forget", "t*", "--forget", "s2").code == 0
+    assert toonset("batch", "--status", out, "--json").json["sheets"] == {"done": 2}
+    assert "s2" not in (out / "index.html").read_text()
+    assert not list((out / "thumbs").glob("s2.*"))
+    assert (out / "sheets" / "s2").is_dir()
+    assert "--forget 'x': no sheet is called so" in toonset("batch", "-o", out, "--forget", "x").err
+
+
+def test_a_folder_of_views_behind_a_url_is_its_files(tmp_path: Path) -> None:
+    from toonset.cli.common.storage import content_hash
+
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.png").write_text(name)
+    before = content_hash(f"file://{tmp_path}")
+    (tmp_path / "b.png").write_text("c")
+    assert content_hash(f"file://{tmp_path}") != before
+
+
 def test_parts_are_merged(library: Path, ran: Path, toonset: Command, tmp_path: Path) -> None:
     out = tmp_path / "out"
     for part in ("1/2", "2/2"):
@@ -185,6 +280,11 @@ def test_parts_are_merged(library: Path, ran: Path, toonset: Command, tmp_path: 
         (("t.png", "-o", "o"), "no such file"),
         (("s.png", "-o", "s.png"), "is a file, a folder is needed"),
         (("s.png", "-o", "full"), "holds files, but no batch.sqlite"),
+        (("s.png", "-o", "o", "--with", "palette --min-share 2"), "2 is no share; give 0 to 1"),
+        (("s.png", "-o", "o", "--with", "calibrate --views a,b"), "'a' is no direction"),
+        (("s.png", "-o", "o", "--with", "calibrate --grid x"), "s: calibrate: --grid"),
+        (("s.png", "-o", "o", "--forget", "a"), "takes -o OUT, and no sheets beside it"),
+        (("-o", "full", "--forget", "a"), "has no batch.sqlite"),
     ],
 )
 def test_a_mistake_is_told_before_anything_runs(
@@ -233,6 +333,8 @@ def test_ctrl_c_leaves_a_batch_that_goes_on(library: Path, ran: Path, tmp_path: 
     first = subprocess.run([sys.executable, "-c", script, str(sign), *command], capture_output=True)
     assert first.returncode == 130, first.stderr
     assert b"Traceback" not in first.stderr
+    assert b"the same command continues\n" in first.stderr
+    assert '"running"' not in (tmp_path / "out" / "index.html").read_text().split("<script")[-2]
     second = subprocess.run(command, capture_output=True)
     assert second.returncode == 3, second.stderr
     assert results(tmp_path / "out") == results(ran)

@@ -56,6 +56,28 @@ def test_a_folder_means_its_pictures_and_a_pattern_what_it_matches(library: Path
     assert names("bob.png", "sub") == ["bob", "cat"]
 
 
+def test_a_pattern_takes_a_folder_or_what_is_in_it(library: Path) -> None:
+    assert names("**/*") == ["ann", "bob", "sub-cat", "sub-deep-dan"]
+    assert names("*") == ["ann", "bob", "sub"]
+
+
+def test_names_with_dots_keep_what_is_before_the_last(library: Path) -> None:
+    for name in ("eve.v1.png", "eve.v2.png"):
+        Image.new("RGB", (8, 8)).save(library / name)
+    assert names("eve*.png") == ["eve_v1", "eve_v2"]
+    assert one(manifest(library, "sheet\neve.v1.png\n")).name == "eve_v1"
+
+
+def test_what_a_folder_holds_besides_is_told(library: Path) -> None:
+    manifest(library, "sheet\nann.png\n")
+    said: list[str] = []
+    list_sheets([str(library)], {}, say=said.append)
+    assert said == [
+        f"{library}/sheets.csv: is not used; to use a manifest, name it in place of its folder",
+        f"{library}: folders in it are not read (sub); '{library}/**/*.png' takes theirs, too",
+    ]
+
+
 def test_a_pattern_finds_no_results_of_the_batch(library: Path) -> None:
     (library / "out" / "sheets").mkdir(parents=True)
     Image.new("RGB", (8, 8)).save("out/sheets/overlay.png")
@@ -142,7 +164,10 @@ def test_no_body_is_no_file(library: Path) -> None:
         ("sheet\n/etc/passwd\n", "lies outside of"),
         ("sheet,mesh\nann.png,/etc/passwd\n", "lies outside of"),
         ("sheet,calibrate_options\nann.png,--init=../x\n", "lies outside of"),
-        ("sheet,colour\nann.png,red\n", "'colour' is no column of a manifest"),
+        ("sheet,colour\nann.png,red\n", "line 1: 'colour' is no column of a manifest"),
+        ("sheet;name\nann.png;x\n", "its cells end in ';'"),
+        ("sheet\nfile:///etc/passwd\n", "is a file here; name its path"),
+        ("sheet,mesh\nann.png,file:///etc/passwd\n", "is a file here; name its path"),
         ("sheet,licence\nann.png,CC0\n", "did you mean 'license'"),
         ("name\nann\n", "names no sheet"),
         ("sheet\n", "no sheets there"),

@@ -11,7 +11,7 @@ from tests.cli.batch import stand_in
 from toonset.cli.batch import job
 from toonset.cli.batch.job import Job, run_sheet
 from toonset.cli.batch.sheets import list_sheets
-from toonset.cli.batch.storage import content_hash, fetch, find, looks, push
+from toonset.cli.common.storage import content_hash, fetch, find, looks, push
 from toonset.errors import ToonsetError
 
 

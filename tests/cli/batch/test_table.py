@@ -188,11 +188,44 @@ def test_hashes_hold_while_a_file_looks_the_same(table: Table) -> None:
     assert table.hash_of("a.png", "size 4") is None
 
 
+def test_a_runner_does_not_claim_what_it_has(table: Table) -> None:
+    claims = [table.claim("me", -1) for _ in range(4)]
+    assert [row and row.name for row in claims] == ["s000", "s001", "s002", None]
+    other = table.claim("other", 60)
+    assert other is not None
+
+
+def test_many_may_make_a_table_at_once(tmp_path: Path) -> None:
+    for number in range(20):
+        path, children = tmp_path / f"{number}.sqlite", []
+        start = time.time() + 0.05
+        for _ in range(4):
+            if (child := os.fork()) == 0:
+                code = 1
+                try:
+                    while time.time() < start:
+                        pass
+                    Table(path, make=True).close()
+                    code = 0
+                finally:
+                    os._exit(code)
+            children.append(child)
+        assert [os.waitpid(child, 0)[1] for child in children] == [0] * 4
+
+
+def test_a_sheet_can_be_taken_out_but_not_while_it_runs(table: Table) -> None:
+    table.forget("s001")
+    assert table.names() == ["s000", "s002"]
+    table.claim("me", 60)
+    with pytest.raises(ToonsetError, match="'s000' is being worked on"):
+        table.forget("s000")
+
+
 def test_parts_are_put_together_and_the_newer_row_counts(table: Table, tmp_path: Path) -> None:
     with closing(Table(tmp_path / "part.sqlite", make=True, alone=True)) as part:
         put(part, 5)
         finish(table)
-        assert table.take_in(part) == 5
+        table.take_in(part)
         assert states(table) == ["done"] * 3  # the part has not begun with it
         assert states(table, "s004") == ["waiting"] * 3
         put(part, 5, {"calibrate": "k1"} | {"palette": "new"})

@@ -14,6 +14,7 @@ from tests.cli.batch.stand_in import CHOSEN, make_table, run_all, runs
 from toonset import lock
 from toonset.cli.batch import dispatch, job
 from toonset.cli.batch.dispatch import Limits, Runner, alive, home_of, release_dead
+from toonset.cli.batch.job import Job, Outcome
 from toonset.cli.batch.local import LocalWorkers, usual_workers
 from toonset.cli.batch.table import TABLE, SheetRow, Table
 from toonset.errors import OutputError, ToonsetError
@@ -231,6 +232,82 @@ def test_a_sheet_that_is_held_by_others_waits_and_stops_nobody(
     assert rows["b"].state == "done"
     assert rows["a"].state == "quarantined"
     assert "is in use by another toonset" in rows["a"].error
+
+
+def test_a_stage_that_is_held_is_the_one_that_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dispatch, "MOST_KILLS", 2)
+    row = run_all(tmp_path, {"a": "held palette"})["a"]
+    assert (row.state, states(row)) == (
+        "quarantined",
+        {"calibrate": "done", "palette": "quarantined"},
+    )
+    assert row.error == "bundle: is in use by another toonset, 2 times"
+
+
+def test_what_does_not_need_a_failed_stage_is_run_and_the_failed_one_waits(tmp_path: Path) -> None:
+    stages = (*CHOSEN, "train", "export")
+    for _ in range(2):
+        row = run_all(tmp_path, {"a": "fail palette"}, stages=stages)["a"]
+        assert states(row) == {
+            "calibrate": "done",
+            "palette": "failed",
+            "train": "waiting",
+            "export": "done",
+        }
+        assert row.state == "failed"
+    assert set(runs(tmp_path).values()) == {1}
+
+
+def test_a_death_far_into_a_stage_of_a_store_is_that_stages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
+    store = f"file://{tmp_path}/store"
+    row = run_all(tmp_path, {"a": "talk palette"}, store=store)["a"]
+    assert states(row) == {"calibrate": "waiting", "palette": "quarantined"}
+    assert "SIGSEGV" in row.error
+
+
+def test_a_picture_stays_where_a_later_stage_dies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job, "_pictures", lambda home: {".webp": "AAAA"})
+    run_all(tmp_path, {"a": "crash palette"}, stages=("calibrate",))
+    run_all(tmp_path, {"a": "crash palette"})
+    assert (tmp_path / "thumbs" / "a.webp").is_file()
+
+
+def test_time_in_which_nothing_runs_does_not_count(tmp_path: Path) -> None:
+    def large(job: Job) -> Outcome:
+        return Outcome(job.name, "done", log="x" * 4_000_000)  # more than a pipe holds
+
+    with closing(LocalWorkers(1, large)) as workers:
+        for _ in range(2):
+            workers.submit(Job("a", (), {}, {}, str(tmp_path), seconds=0.5))
+            time.sleep(1)
+            found: list[Outcome] = []
+            while not found:
+                found = workers.wait(0.1)
+            assert [outcome.kind for outcome in found] == ["done"]
+
+
+def test_a_runner_that_others_take_for_dead_is_alive_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lock_file, taken = dispatch.fcntl.flock, list[int]()
+
+    def late(descriptor: int, how: int) -> None:
+        if not taken:  # another has looked before the file was locked
+            (tmp_path / dispatch.HOLDERS / "me").unlink()
+        taken.append(descriptor)
+        lock_file(descriptor, how)
+
+    monkeypatch.setattr(dispatch.fcntl, "flock", late)
+    with alive(tmp_path, "me", "calibrate"):
+        assert (tmp_path / dispatch.HOLDERS / "me").read_text() == "calibrate"
+        assert not dispatch._is_dead(tmp_path / dispatch.HOLDERS / "me")
 
 
 def test_a_stamp_on_disk_counts_when_the_table_forgot(tmp_path: Path) -> None:

@@ -10,11 +10,10 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from toonset.cli.batch.table import Table
 from toonset.errors import SheetError, ToonsetError, one_line
 
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
@@ -216,10 +215,20 @@ def _reached(url: str) -> Iterator[tuple[Any, str]]:
         raise ToonsetError(f"{url}: cannot be reached ({one_line(error)})") from error
 
 
+class Kept(Protocol):
+    """What keeps hashes from run to run."""
+
+    def hash_of(self, path: str, looks: str) -> str | None:
+        """Return the hash of what still looks as it did when it was hashed."""
+
+    def keep_hashes(self, found: Iterable[tuple[str, str, str]]) -> None:
+        """Keep paths, how they look and their hashes."""
+
+
 class Hashes:
     """Hashes of inputs; a file that looks as it did in an earlier run is not read again."""
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: Kept) -> None:
         """Keep them in a table."""
         self._table, self._new = table, dict[str, tuple[str, str]]()
         self._known = dict[str, str]()  # of this run
