@@ -51,7 +51,9 @@ def keys_behind(url: str, names: Sequence[str]) -> dict[str, str]:
         found = files.cat([*at], on_error="return")
         keys = {}
         for place, data in found.items():
-            if isinstance(data, Exception) and not isinstance(data, FileNotFoundError):
+            if isinstance(data, FileNotFoundError):
+                continue
+            if isinstance(data, Exception):
                 raise data
             with contextlib.suppress(ValueError, TypeError, KeyError):  # it is cut short
                 keys[at[place]] = str(json.loads(data)["key"])
