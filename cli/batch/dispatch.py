@@ -127,8 +127,10 @@ class Runner:
             row = self._table.claim(self.ident, LEASE_S)
             if row is None:
                 break
-            self._due[row.name] = {one.stage for one in row.stages if one.state != "done"}
-            workers.submit(self._job(row))
+            job = self._job(row)
+            left = {one.stage for one in row.stages if one.state != "done"}
+            self._due[row.name] = left & {*job.keys}
+            workers.submit(job)
             found = True
         return found
 

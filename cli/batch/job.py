@@ -134,7 +134,8 @@ def _run_near(job: Job, home: Path) -> Outcome:
         due = [stage for stage, key in job.keys.items() if read_stamp(work, stage, key) is None]
         places = (scratch / "inputs" / str(number) for number in itertools.count())
         try:
-            sheets = [str(fetch(one, next(places))) if is_url(one) else one for one in job.sheets]
+            given = job.sheets if due else ()
+            sheets = [str(fetch(one, next(places))) if is_url(one) else one for one in given]
             near = {stage: _fetched(job.words.get(stage, ()), places) for stage in due}
         except ToonsetError as error:
             row = StageRow(due[0], job.keys[due[0]], "failed", 1, _worker(), time.time())

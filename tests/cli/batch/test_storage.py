@@ -117,6 +117,7 @@ def test_a_sheet_and_its_results_behind_urls(
     assert first.kind == "done", first
     assert json.loads(memory.cat_file("/out/a/calibrate.json"))["key"] == "k1"
     assert memory.exists("/out/a/bundle/palette.json")
+    memory.rm_file("/in/a.txt")
     assert run_sheet(one).rows == first.rows  # as its stamps say
     assert (tmp_path / "runs").read_text().splitlines() == ["a calibrate", "a palette"]
     assert not list((tmp_path / "a").rglob("*.json"))
