@@ -36,7 +36,7 @@ def report(work: Path, rows: int, tried: int, say: Callable[[str], None]) -> Non
         began = time.perf_counter()
         for row in claims:
             assert row is not None
-            table.record("me", row.name, done, "done")
+            table.record("me", row.name, done)
         say(f"record: {tried / (time.perf_counter() - began):,.0f} a second")
         began = time.perf_counter()
         table.renew("me", 60)

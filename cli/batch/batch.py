@@ -8,7 +8,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag
-from toonset.errors import OutputError, UsageError
+from toonset.errors import OutputError, ToonsetError, UsageError
 
 if TYPE_CHECKING:
     from toonset.cli.batch.dispatch import Limits, Workers
@@ -172,7 +172,7 @@ def batch(
 
     os.environ["OMP_NUM_THREADS"] = "1"  # a sheet has one core; must precede torch
     printer = Printer(as_json, quiet)
-    if (status is not None) + (merge is not None) + bool(sheets or out) > 1:
+    if (status is not None) + (merge is not None) + bool(sheets or out or forget) > 1:
         raise UsageError("--status and --merge take the batch's folder, and nothing beside it")
     if status is not None:
         whole.say_status(status, printer)
@@ -350,10 +350,13 @@ def _run(
 
             try:
                 runner.run(table, workers, progress.take, tick)
-            except (KeyboardInterrupt, SystemExit):  # the page must not say that sheets run
-                progress.close(counted())
-                _write_page(wanted, table)
-                printer.say("the same command continues")
+            except (KeyboardInterrupt, SystemExit, ToonsetError) as error:
+                workers.close()
+                with suppress(ToonsetError):  # the page must not say that sheets run
+                    progress.close(counted())
+                    _write_page(wanted, table)
+                if not isinstance(error, ToonsetError):
+                    printer.say("the same command continues")
                 raise
         progress.close(counted())
         _write_page(wanted, table)

@@ -163,9 +163,8 @@ class Runner:
         rows = outcome.rows
         if state != "done" and not any(row.state == state for row in rows):
             rows = self._with_failure(replace(outcome, line=line), state)
-            state = state if any(row.state == state for row in rows) else "done"
         self._keep_pictures(outcome, rows)
-        if self._table.record(self.ident, name, rows, state):
+        if self._table.record(self.ident, name, rows):
             ended(name, [row for row in rows if row.stage in due], due)
 
     def _state(self, outcome: Outcome) -> tuple[State, str]:
@@ -185,18 +184,24 @@ class Runner:
         sheet, rows = self._table.row(outcome.name), [*outcome.rows]
         assert sheet is not None
         mine = [row for row in sheet.stages if row.stage in self.stages]
-        if not rows and not self.store:
-            home = home_of(self.out, outcome.name)
+        home = home_of(self.out, outcome.name)
+        if not rows:
             tidy(home)
+        if not rows and not self.store:
             found = (read_stamp(home, row.stage, row.key) for row in mine)
             rows = [row for row in found if row is not None]
         done = {row.stage for row in (*rows, *mine) if row.state == "done"}
         left = [row for row in mine if row.stage not in done and row.state not in BAD]
-        at = next((row for row in left if row.stage == outcome.stage), left[0] if left else None)
-        if at is None:
+        if not left:
             return tuple(rows)
+        at, line = left[0], outcome.line
+        begun = {row.stage: row for row in left}
+        if outcome.stage in begun and not self.store:
+            at = begun[outcome.stage]
+        elif outcome.stage not in ("", at.stage):  # what was done before it is in no store
+            line = f"{outcome.stage}: {line}"
         at = replace(at, state=state, attempts=max(sheet.crashes, 1), ended=time.time())
-        return (*rows, replace(at, error=outcome.line, log=outcome.log))
+        return (*rows, replace(at, error=line, log=outcome.log))
 
     def _keep_pictures(self, outcome: Outcome, rows: Sequence[StageRow]) -> None:
         from toonset.write import write_bytes
@@ -242,7 +247,7 @@ def alive(out: Path, ident: str, does: str = "") -> Iterator[None]:
     descriptor = _held(file, does.encode())
     try:
         for other in file.parent.iterdir():
-            if other != file and not _is_dead(other) and _said(other) != does:
+            if other != file and not _is_dead(other) and _said(other) not in (None, does):
                 raise ToonsetError(
                     f"{out}: another toonset batch works there with other stages or options; wait "
                     f"for it, or choose another -o; if none does, delete {other}"

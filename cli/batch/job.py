@@ -43,7 +43,7 @@ FATAL = "Fatal Python error"  # begins what faulthandler says of a crash, the la
 GUARD_S = 0.1  # between looks at the memory in use
 LINES, CHARACTERS = 12, 2000  # of a log that are kept
 READ = 1 << 16  # bytes of its end that are looked at: a crash names all modules
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ESTALE)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # whoever says so; another is an input's too
 FINE = (0, 3)  # exit codes of verbs that have written
 Kind = Literal["done", "failed", "busy", "place", "gone"]
 
@@ -118,31 +118,20 @@ def run_sheet(job: Job) -> Outcome:
 
 def _run_near(job: Job, home: Path) -> Outcome:
     """Run a sheet whose drawings or results may lie behind URLs, on copies that go afterwards."""
-    from toonset.cli.common.storage import fetch, is_url, looks, push
+    from toonset.cli.common.storage import fetch, looks, push
 
-    words = [word for said in job.words.values() for word in said]
-    if not job.store and not any(map(is_url, (*job.sheets, *map(value_of, words)))):
-        return _run_stages(job, home, job.sheets)
     scratch = home / SCRATCH
     shutil.rmtree(scratch, ignore_errors=True)
     url = f"{job.store.rstrip('/')}/{job.name}"
     try:
-        work = scratch / job.name if job.store else home
-        if job.store and looks(f"{url}/calibrate.json") is not None:
+        if not job.store:
+            return _run_stages(job, home)
+        if looks(f"{url}/calibrate.json") is not None:
             fetch(url, scratch)
-        work.mkdir(parents=True, exist_ok=True)
-        due = [stage for stage, key in job.keys.items() if read_stamp(work, stage, key) is None]
-        places = (scratch / "inputs" / str(number) for number in itertools.count())
-        try:
-            given = job.sheets if due else ()
-            sheets = [str(fetch(one, next(places))) if is_url(one) else one for one in given]
-            near = {stage: _fetched(job.words.get(stage, ()), places) for stage in due}
-        except ToonsetError as error:
-            row = StageRow(due[0], job.keys[due[0]], "failed", 1, _worker(), time.time())
-            return Outcome(job.name, "failed", (replace(row, error=one_line(error)),))
-        outcome = _run_stages(replace(job, words=near), work, sheets)
-        if job.store and outcome.rows:
-            push(work, url, tuple(f"{stage}.json" for stage in STAGES))
+        (scratch / job.name).mkdir(parents=True, exist_ok=True)
+        outcome = _run_stages(job, scratch / job.name)
+        if outcome.rows:
+            push(scratch / job.name, url, tuple(f"{stage}.json" for stage in STAGES))
         return outcome
     except ToonsetError as error:
         return Outcome(job.name, "place", line=one_line(error))
@@ -162,7 +151,7 @@ def _fetched(words: Sequence[str], places: Iterator[Path]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _run_stages(job: Job, home: Path, sheets: Sequence[str]) -> Outcome:
+def _run_stages(job: Job, home: Path) -> Outcome:
     """Run what is not done of a sheet's stages, in order; what is made of one that fails is not."""
     rows: list[StageRow] = []
     cut: set[str] = set()
@@ -170,7 +159,7 @@ def _run_stages(job: Job, home: Path, sheets: Sequence[str]) -> Outcome:
         row = read_stamp(home, stage, key)
         if row is None and stage not in cut:
             _remove_stamps(home, stage)
-            ended = _run_stage(job, home, sheets, stage, key)
+            ended = _run_stage(job, home, stage, key)
             if isinstance(ended, Outcome):
                 return replace(ended, rows=tuple(rows), pictures=_pictures(home))
             row = ended
@@ -184,19 +173,22 @@ def _run_stages(job: Job, home: Path, sheets: Sequence[str]) -> Outcome:
     return Outcome(job.name, kind, tuple(rows), line, pictures=_pictures(home))
 
 
-def _run_stage(
-    job: Job, home: Path, sheets: Sequence[str], stage: str, key: str
-) -> StageRow | Outcome:
+def _run_stage(job: Job, home: Path, stage: str, key: str) -> StageRow | Outcome:
     """Run one stage; return its row, or the outcome where the sheet is not at fault."""
-    row = StageRow(stage, key, attempts=1, worker=_worker())
+    given = job.words.get(stage, ())
+    row = StageRow(stage, key, attempts=1, worker=f"{os.uname().nodename}:{os.getpid()}")
     print(f"{BEGINS}{stage}", file=sys.stderr)
-    print(command_of(stage, job.words.get(stage, ()), sheets, home), file=sys.stderr, flush=True)
+    print(command_of(stage, given, job.sheets, home), file=sys.stderr, flush=True)
     _forget_peak()
     began, cpu = time.monotonic(), time.process_time()
     said, code, line, full, is_held = io.StringIO(), 0, "", False, False
+    inputs = Path(job.home, SCRATCH, "inputs", stage)
+    places = (inputs / str(number) for number in itertools.count())
     try:
+        sheets = job.sheets if STAGES[stage].after else _fetched(job.sheets, places)
+        words = _fetched(given, places)
         with lock.command(), contextlib.redirect_stdout(said):
-            code = run(stage, job.words.get(stage, ()), sheets, home)
+            code = run(stage, words, sheets, home)
     except Exception as error:
         found = refusal(error)
         if found is None:
@@ -222,10 +214,6 @@ def _run_stage(
     verdict, facts = _facts(stage, json.loads(said.getvalue()))
     output = _hash_output(home, stage)
     return replace(row, state="done", verdict=verdict, facts=facts, output=output)
-
-
-def _worker() -> str:
-    return f"{os.uname().nodename}:{os.getpid()}"
 
 
 def _is_full(error: BaseException | None) -> bool:

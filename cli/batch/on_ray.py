@@ -14,7 +14,6 @@ import socket
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
-from functools import cache
 from types import FrameType
 from typing import Any
 
@@ -26,6 +25,8 @@ from toonset.errors import SetupError, ToonsetError, one_line
 HERE = "local"
 LOOK_S = 1.0  # between looks at whether a sheet takes too long
 GONE = "the Ray cluster is gone; with another one run the same command again"
+FORKED: list[LocalWorkers] = []  # the one worker of a process of Ray's
+FIT_S = 120.0  # for a node that sheets fit on: some clusters grow when they are asked
 ANSWER_S = 5.0  # for a connection to a cluster
 ASK_S = 5.0  # between questions for how many cores there are
 
@@ -37,18 +38,13 @@ def run_told(told: str) -> str:
     lines, whether or not that shares a disk with others.
     """
     job = job_of(json.loads(told))
-    worker = _forked(tuple(job.keys))
-    worker.submit(job)
-    while not (ended := worker.wait(LOOK_S)):
+    if not FORKED:
+        import_parts((*job.keys,))
+        FORKED.append(LocalWorkers(1, _run))
+    FORKED[0].submit(job)
+    while not (ended := FORKED[0].wait(LOOK_S)):
         pass
     return json.dumps(asdict(ended[0]))
-
-
-@cache
-def _forked(stages: tuple[str, ...]) -> LocalWorkers:
-    """Return the one worker of a process of Ray's."""
-    import_parts(stages)
-    return LocalWorkers(1, _run)
 
 
 def _run(job: Job) -> Outcome:
@@ -104,7 +100,7 @@ class RayWorkers:
         self._shares = {name: share for name, share in shares if share}
         self._run = ray.remote(**options, max_retries=0)(run_told)
         self._jobs = dict[Any, Job]()
-        self._capacity, self._asked = 1, 0.0
+        self._capacity, self._asked, self._fitted = 1, 0.0, time.monotonic()
         self._head = address if "://" in address else ray.get_runtime_context().gcs_address
 
     @property
@@ -113,11 +109,17 @@ class RayWorkers:
         if time.monotonic() - self._asked > ASK_S:
             _check_answers(self._head, GONE)
             with self._lost():
-                found = self._ray.cluster_resources()
-            fitting = (found.get(name, 0) / share for name, share in self._shares.items())
-            self._capacity = max(1, int(min(fitting)))
+                nodes = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
             self._asked = time.monotonic()
-        return self._capacity
+            self._capacity = sum(
+                int(min(node.get(name, 0) / share for name, share in self._shares.items()))
+                for node in nodes
+            )
+            self._fitted = self._asked if self._capacity else self._fitted
+            if self._asked - self._fitted > FIT_S:
+                needs = ", ".join(f"{share:g} {name}" for name, share in self._shares.items())
+                raise ToonsetError(f"--ray: no node has {needs}; give less to a sheet, or add one")
+        return max(self._capacity, 1)
 
     def submit(self, job: Job) -> None:
         """Run a sheet on some node."""

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from toonset.cli.batch.stages import dependents
 from toonset.cli.batch.table import BAD, SheetRow, StageRow
 from toonset.cli.common.output import Printer
 
@@ -95,9 +96,10 @@ def count_stages(rows: Iterable[SheetRow], stages: Sequence[str]) -> dict[str, C
     counts = {stage: Counter[str]() for stage in stages}
     for row in rows:
         found = {one.stage: one.state for one in row.stages}
+        cut = {s for one in row.stages if one.state in BAD for s in dependents(one.stage)}
         for stage in stages:
             state = found.get(stage, "waiting")
-            is_cut = state == "waiting" and row.state in BAD
+            is_cut = state == "waiting" and (row.state in BAD or stage in cut)
             counts[stage][UNREACHED if is_cut else state] += 1
     return counts
 

@@ -32,7 +32,7 @@ BUNDLE = "bundle"
 RUN = f"{BUNDLE}/run"
 OWN = ("out", "force", "as_json", "quiet", "verbose", "threads", "preview_every", "strict")
 NO_BODY = "none"  # as of `calibrate --mesh`
-FILE_OR_COLORS = ("colors", "palette", "variants")
+FILE_OR_COLORS = ("colors", "keep", "palette", "variants")
 PLACE = Path("place")  # stands for a sheet's own folders while words are checked
 
 
@@ -200,6 +200,7 @@ def check_options(entries: Iterable[Entry], stages: Sequence[str]) -> None:
 def _check_values(stage: str, values: Mapping[str, Any]) -> None:
     """Refuse what a verb refuses before it reads anything."""
     from toonset.calib.hints import Hints
+    from toonset.cli.common.storage import is_url
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.view_labels import parse_labels
     from toonset.palette.extract import options_of
@@ -211,7 +212,8 @@ def _check_values(stage: str, values: Mapping[str, Any]) -> None:
         if labels:
             parse_labels(labels, labels.count(",") + 1)
     if stage == "palette":
-        options_of(*(values[name] for name in ("min_share", "max_colors", "keep")))
+        kept = "" if is_url(values["keep"]) else values["keep"]
+        options_of(values["min_share"], values["max_colors"], kept)
 
 
 def _typed(context: Any, verb: Stage, words: Sequence[str]) -> str:

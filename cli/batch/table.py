@@ -16,6 +16,7 @@ import contextlib
 import itertools
 import json
 import os
+import re
 import sqlite3
 import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
@@ -175,7 +176,8 @@ class Plan:
 
 def tables_in(out: Path) -> list[str]:
     """Return the names of the tables in a batch's folder: its own first, then those of parts."""
-    parts = sorted(path.name for path in out.glob(SHARDS)) if out.is_dir() else []
+    names = sorted(path.name for path in out.glob(SHARDS)) if out.is_dir() else []
+    parts = [name for name in names if re.fullmatch(r"batch-\d+of\d+\.sqlite", name)]
     return [TABLE] * (out / TABLE).is_file() + parts
 
 
@@ -199,7 +201,9 @@ class Table:
         if not make and not path.is_file():
             raise ToonsetError(f"{path.parent}: has no {path.name}; name the -o of a toonset batch")
         with self._errors():
-            is_fixed = not make and not os.access(path.parent, os.W_OK)
+            wal = path.with_name(f"{path.name}-wal")
+            is_whole = not wal.exists() or not wal.stat().st_size
+            is_fixed = not make and is_whole and not os.access(path.parent, os.W_OK)
             place = f"{path.absolute().as_uri()}?immutable=1" if is_fixed else path
             self._db = sqlite3.connect(
                 place, timeout=PATIENCE_S, isolation_level=None, uri=is_fixed
@@ -212,8 +216,13 @@ class Table:
         if version > SCHEMA:
             raise ToonsetError(f"{self.path}: is of a newer toonset; install that one")
         self._db.execute("PRAGMA synchronous = NORMAL")  # a lost commit is a sheet found done
-        if version == SCHEMA:
-            return
+        if version != SCHEMA:
+            self._make(make=make)
+        if make and not alone:
+            with contextlib.suppress(sqlite3.OperationalError):  # somebody reads: the next time
+                self._db.execute("PRAGMA journal_mode = WAL")
+
+    def _make(self, *, make: bool) -> None:
         none = ToonsetError(f"{self.path}: is no table of toonset batch; choose another -o")
         if not make:
             raise none
@@ -225,9 +234,6 @@ class Table:
             for statement in TABLES.split(";"):
                 self._db.execute(statement)
             self._db.execute(f"PRAGMA user_version = {SCHEMA}")
-        if not alone:
-            with contextlib.suppress(sqlite3.OperationalError):  # another one is at it
-                self._db.execute("PRAGMA journal_mode = WAL")
 
     def close(self) -> None:
         """Close the connection; the last one tidies the write-ahead file away."""
@@ -387,7 +393,7 @@ class Table:
     def retry(self, names: Iterable[str], stages: Sequence[str]) -> None:
         """Let stages of sheets that have failed or crashed run again."""
         with self.transaction() as db:
-            for name in names:
+            for name in (name for name in names if not self._is_running(db, name)):
                 again = [
                     db.execute(
                         "UPDATE stages SET state = 'waiting', error = '', log = '' WHERE sheet = ? "
@@ -399,21 +405,23 @@ class Table:
                 if any(again):
                     db.execute(
                         "UPDATE sheets SET state = 'waiting', crashes = 0, kills = 0 "
-                        "WHERE name = ? AND state != 'running'",
+                        "WHERE name = ?",
                         (name,),
                     )
 
-    def forget(self, name: str) -> None:
-        """Take a sheet out.
+    def forget(self, names: Iterable[str]) -> None:
+        """Take sheets out.
 
         Raises:
-            ToonsetError: it is being worked on.
+            ToonsetError: one is being worked on.
         """
         with self.transaction() as db:
-            if self._is_running(db, name):
-                raise ToonsetError(f"{self.path.parent}: {name!r} is being worked on; wait for it")
-            db.execute("DELETE FROM sheets WHERE name = ?", (name,))
-            db.execute("DELETE FROM stages WHERE sheet = ?", (name,))
+            for name in names:
+                if self._is_running(db, name):
+                    where = self.path.parent
+                    raise ToonsetError(f"{where}: {name!r} is being worked on; wait for it")
+                db.execute("DELETE FROM sheets WHERE name = ?", (name,))
+                db.execute("DELETE FROM stages WHERE sheet = ?", (name,))
 
     def choose(self, names: Iterable[str]) -> None:
         """Claim only these sheets from now on."""
@@ -491,22 +499,21 @@ class Table:
 
     # ---- how it ended ---------------------------------------------------------------------------
 
-    def record(self, runner: str, name: str, rows: Sequence[StageRow], state: State) -> bool:
+    def record(self, runner: str, name: str, rows: Sequence[StageRow]) -> bool:
         """Put in how a claimed sheet ended; False if it is no longer this runner's."""
         with self.transaction() as db:
             taken = db.execute(
-                "UPDATE sheets SET state = ?, worker = '', lease = 0 WHERE name = ? AND "
-                "state = 'running' AND worker = ?",
-                (state, name, runner),
+                "UPDATE sheets SET worker = '', lease = 0 WHERE name = ? AND state = 'running' "
+                "AND worker = ?",
+                (name, runner),
             ).rowcount
             if not taken:
                 return False
             for row in rows:
                 self._record(db, name, row)
             found = db.execute("SELECT state FROM stages WHERE sheet = ?", (name,))
-            if state == "done":  # a stage of an earlier command may have failed
-                whole = _worst(row["state"] for row in found)
-                db.execute("UPDATE sheets SET state = ? WHERE name = ?", (whole, name))
+            whole = _worst(row["state"] for row in found)  # a stage of before may have failed
+            db.execute("UPDATE sheets SET state = ? WHERE name = ?", (whole, name))
         return True
 
     @staticmethod

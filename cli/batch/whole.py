@@ -106,8 +106,7 @@ def forget(out: Path, patterns: Sequence[str], printer: Printer) -> None:
         every = {name for table in tables for name in table.names()}
         gone = named(every, patterns, "--forget")
         for table in tables:
-            for name in gone:
-                table.forget(name)
+            table.forget(gone)
         if tables[0].path.name == TABLE:
             write_page(out, tables[0].rows(), out.resolve().name, store=tables[0].store)
     for name in gone:

@@ -19,7 +19,7 @@ from toonset.errors import SheetError, ToonsetError, one_line
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 MANY = 500  # hashes that are kept until the table takes them
 CHANGING = (  # names that servers have, letters only, for what changes with a file
-    *("etag", "generation", "mtime", "lastmodified", "modified", "created"),
+    *("etag", "generation", "mtime", "lastmodified", "modified"),
     *("md5hash", "contentmd5", "digest", "checksum"),
 )
 LONGEST = 100  # characters of a name that a copy gets
@@ -46,6 +46,8 @@ def keys_behind(url: str, names: Sequence[str]) -> dict[str, str]:
     Raises:
         ToonsetError: it cannot be reached.
     """
+    if not names:
+        return {}
     with _reached(url) as (files, path):
         at = {f"{path.rstrip('/')}/{name}": name for name in names}
         found = files.cat([*at], on_error="return")
@@ -72,13 +74,13 @@ def looks(place: str) -> str | None:
         with _reached(place) as (files, path):
             if not files.exists(path):
                 return None
-            found = files.find(path, detail=True) if files.isdir(path) else {}
-            return json.dumps(
-                [
-                    [name.removeprefix(path), _told(files, name, info)]
-                    for name, info in sorted((found or {path: files.info(path)}).items())
-                ]
-            )
+            if files.isdir(path):
+                found = files.find(path, detail=True)
+            else:
+                found = {name: files.info(name) for name in _whole(files, path)}
+            base = path.rstrip("/").rsplit("/", 1)[0]
+            told = [[n.removeprefix(base), _told(files, n, found[n])] for n in sorted(found)]
+            return json.dumps(told)
     try:
         return json.dumps([[str(file), *_stat(file)] for file in _files(Path(place))])
     except OSError:
@@ -110,7 +112,8 @@ def content_hash(place: str) -> str:
         return _sha256(root)
     base = root if root.is_dir() else root.parent
     for file in files:
-        found.update(f"{file.relative_to(base).as_posix()}\0{_sha256(file)}\n".encode())
+        name = Path(os.path.relpath(file, base)).as_posix()
+        found.update(f"{name}\0{_sha256(file)}\n".encode())
     return found.hexdigest()
 
 
@@ -131,12 +134,10 @@ def fetch(url: str, folder: Path, without: str = "") -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         if not files.isdir(path):
             files.get(path, str(place))
-            for _ in range(2):  # materials, then their textures
-                for name in _named_by(place):
-                    there, here = f"{root.rsplit('/', 1)[0]}/{name}", folder / name
-                    if not here.exists() and files.isfile(there):
-                        here.parent.mkdir(parents=True, exist_ok=True)
-                        files.get(there, str(here))
+            for there in _whole(files, path)[1:]:
+                here = folder / there.removeprefix(f"{root.rsplit('/', 1)[0]}/")
+                here.parent.mkdir(parents=True, exist_ok=True)
+                files.get(there, str(here))
             return place
         found = {name.removeprefix(f"{root}/"): name for name in files.find(path)}
         wanted = [name for name in found if not (without and name.startswith(f"{without}/"))]
@@ -172,24 +173,45 @@ def file_name(place: str) -> str:
     return path.rstrip("/").rsplit("/", 1)[-1][-LONGEST:]
 
 
-def _named_by(file: Path) -> list[str]:
-    """Return the files that a mesh is read with; none of another file."""
+def _whole(files: Any, path: str) -> list[str]:
+    """Return a file behind a URL, and, of a mesh, those in its folder that it is read with."""
     from toonset.dataset.mesh.obj import material_files
 
-    return material_files(file) if file.suffix.lower() == ".obj" else []
+    if not path.lower().endswith(".obj"):
+        return [path]
+    folder = path.rsplit("/", 1)[0]
+
+    def read(name: str) -> bytes | None:
+        there = f"{folder}/{name}"
+        is_inside = name and ".." not in name.split("/") and "\\" not in name
+        return files.cat_file(there) if is_inside and files.isfile(there) else None
+
+    named = material_files(files.cat_file(path), read)
+    return [path, *(f"{folder}/{name}" for name in dict.fromkeys(named) if read(name) is not None)]
 
 
 def _files(root: Path) -> list[Path]:
     """Return a file with those that it names, or all files below a folder but hidden ones."""
     if not root.is_dir():
         root.stat()
-        named = [root.parent / name for name in _named_by(root)]
-        return [root, *(file for file in named if file.is_file())]
+        return _with_materials(root) if root.suffix.lower() == ".obj" else [root]
     found = []
     for folder, folders, names in os.walk(root):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         found += [Path(folder, name) for name in sorted(names) if not name.startswith(".")]
     return [file for file in found if file.is_file()]
+
+
+def _with_materials(mesh: Path) -> list[Path]:
+    """Return a mesh, and the files in its folder that it is read with."""
+    from toonset.dataset.mesh.obj import beside, material_files
+
+    def read(name: str) -> bytes | None:
+        file = beside(mesh, name)
+        return None if file is None else file.read_bytes()
+
+    found = (beside(mesh, name) for name in material_files(mesh.read_bytes(), read))
+    return [mesh, *dict.fromkeys(file for file in found if file is not None)]
 
 
 def _stat(file: Path) -> tuple[int, int, int]:

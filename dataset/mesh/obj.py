@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise, takewhile
 from pathlib import Path
@@ -24,8 +25,7 @@ UNKNOWN_COLOR = (204, 204, 204)  # a face whose material is not described; trime
 MAX_LIBRARY_BYTES = 4 * 2**20
 MOST_INDEX = 10**9
 LINES_BETWEEN = 100_000  # of two looks at how much it has become
-LIBRARY = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^\r\n]+)")
-TEXTURE = re.compile(rb"(?m)^[ \t]*map_Kd[ \t]+([^\r\n]*[^\s])")
+MTLLIB = re.compile(r"(?m)^.*mtllib.*$")
 
 
 @dataclass
@@ -84,7 +84,7 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> RawTriangles:
     """
     lists = _Lists()
     for number, line in enumerate(_text(data).split("\n"), start=1):
-        words = list(takewhile(lambda word: word[0] != "#", line.split()))
+        words = _words(line)
         if not words:
             continue
         try:
@@ -109,6 +109,11 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> RawTriangles:
         parts=np.array([numbers[name] for name in lists.parts]) if len(names) > 1 else None,
         part_names=tuple(name or "body" for name in names),
     )
+
+
+def _words(line: str) -> list[str]:
+    """Return the words before a comment."""
+    return list(takewhile(lambda word: word[0] != "#", line.split()))
 
 
 def _text(data: bytes) -> str:
@@ -183,7 +188,7 @@ def _read_materials(
     """
     found: dict[str, tuple[tuple[int, ...], UInt8[np.ndarray, "height width 4"] | None]] = {}
     for library in libraries:
-        file = _beside(mesh_path, library)
+        file = beside(mesh_path, library)
         data = b"" if file is None else read_whole(file, "material", MeshError, MAX_LIBRARY_BYTES)
         name = ""
         for line in data.decode("utf-8", errors="replace").splitlines():
@@ -195,36 +200,31 @@ def _read_materials(
             elif key == "Kd":
                 found[name] = (_rgb(words), texture)
             elif key == "map_Kd" and words:
-                picture = _beside(mesh_path, words[-1])
+                picture = beside(mesh_path, words[-1])
                 found[name] = (rgb, None if picture is None else load_rgba(picture))
     return found
 
 
-def material_files(path: Path) -> list[str]:
-    """Return the names of the MTL files that a mesh names, and of the textures that these name.
+def material_files(mesh: bytes, read: Callable[[str], bytes | None]) -> list[str]:
+    """Return the names of the files that a mesh's colours come from: libraries, their textures.
 
-    They are relative to the mesh's folder, and lie in it; what a library that is missing names is
-    not among them.
+    Args:
+        mesh: content of an OBJ file.
+        read: returns the content of a file in the mesh's folder; None if it is not there.
     """
     found = []
-    for library in _names(path, LIBRARY):
-        found.append(library)
-        if (file := _beside(path, library)) is not None:
-            found += [words.split()[-1] for words in _names(file, TEXTURE)]
-    folder = Path(os.path.realpath(path.parent))
-    inside = [name for name in found if "\0" not in name and ".." not in Path(name).parts]
-    return [name for name in inside if (folder / name).is_relative_to(folder)]
+    for line in MTLLIB.findall(_text(mesh)):
+        key, *words = _words(line) or [""]
+        library = read(" ".join(words)) if key == "mtllib" else None
+        if library is not None:
+            found.append(" ".join(words))
+            lines = library.decode("utf-8", errors="replace").splitlines()
+            of_line = [words for words in map(str.split, lines) if words[:1] == ["map_Kd"]]
+            found += [words[-1] for words in of_line if len(words) > 1]
+    return found
 
 
-def _names(file: Path, pattern: re.Pattern[bytes]) -> list[str]:
-    try:
-        found = pattern.findall(file.read_bytes())
-    except OSError:
-        return []
-    return [name.decode("utf-8", "replace").strip().replace("\\", "/") for name in found]
-
-
-def _beside(mesh_path: Path, name: str) -> Path | None:
+def beside(mesh_path: Path, name: str) -> Path | None:
     """Return the file `name` in the mesh's own folder; None if it is elsewhere or missing."""
     if "\0" in name:  # no file is called so
         return None

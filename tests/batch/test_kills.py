@@ -26,7 +26,7 @@ def batch(out: Path, states: dict[str, str]) -> Path:
         while (row := table.claim("me", 60)) is not None:
             state, _, error = states[row.name].partition(": ")
             ended = StageRow("calibrate", "k", state, error=error)  # type: ignore[arg-type]
-            table.record("me", row.name, [ended], state)  # type: ignore[arg-type]
+            table.record("me", row.name, [ended])
             bundle = out / "sheets" / row.name / "bundle"
             bundle.mkdir(parents=True)
             (bundle / "transforms.json").write_text(row.name)

@@ -262,6 +262,7 @@ def test_parts_are_merged(library: Path, ran: Path, toonset: Command, tmp_path: 
         (("-o", "o"), "name sheets"),
         (("s.png",), "with -o"),
         (("--status", "o", "-o", "p"), "and nothing beside it"),
+        (("--status", "o", "--forget", "a"), "and nothing beside it"),
         (("--status", "nowhere"), "has no batch.sqlite"),
         (("--merge", "nowhere"), "has no batch-*of*.sqlite"),
         (("s.png", "-o", "o", "--stages", "calibrat"), "did you mean 'calibrate'"),

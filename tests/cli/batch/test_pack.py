@@ -82,7 +82,7 @@ def make(small_bundle: Path) -> Make:
             while (row := table.claim("me", 60)) is not None:
                 sheet = state[row.name]
                 rows = [StageRow(stage, KEYS[stage], sheet.state) for stage in sheet.stages]  # type: ignore[arg-type]
-                table.record("me", row.name, rows, sheet.state)  # type: ignore[arg-type]
+                table.record("me", row.name, rows)
         return out
 
     return batch

@@ -1,6 +1,7 @@
 """Sheets and results behind URLs."""
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -102,6 +103,61 @@ def test_what_cannot_be_reached_is_told_in_a_line(place: str, tmp_path: Path) ->
         fetch(place, tmp_path)
     assert str(caught.value).startswith(f"{place}: ")
     assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"mtllib the body.mtl # colours\n",
+        b"\xef\xbb\xbfmtllib the body.mtl\r",
+        "mtllib the body.mtl\n".encode("utf-16"),
+        b"v 0 0 0\nmtllib \\\nthe body.mtl\n",
+    ],
+)
+def test_a_mesh_is_what_it_is_read_with(
+    text: bytes, tmp_path: Path, memory: fsspec.AbstractFileSystem
+) -> None:
+    files = {"m.obj": text, "the body.mtl": b"newmtl a\n\tmap_Kd -s 1 1 1 a/t.png\nmap_Kd \x1f\n"}
+    files["a/t.png"] = b"1"
+    for name, data in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+        memory.pipe_file(f"/in/{name}", data)
+    fetch("memory://in/m.obj", tmp_path / "back")
+    back = {p.relative_to(tmp_path / "back").as_posix() for p in (tmp_path / "back").rglob("*.*")}
+    assert back == {*files}
+    places = (str(tmp_path / "m.obj"), "memory://in/m.obj")
+    before = [(looks(place), content_hash(place)) for place in places]
+    assert before == [(looks(place), content_hash(place)) for place in places]
+    (tmp_path / "a" / "t.png").write_bytes(b"2")
+    memory.pipe_file("/in/a/t.png", b"2")
+    after = [(looks(place), content_hash(place)) for place in places]
+    assert all(
+        a != b
+        for old, new in zip(before, after, strict=True)
+        for a, b in zip(old, new, strict=True)
+    )
+
+
+def test_a_stage_whose_input_cannot_be_reached_is_the_one_that_fails(
+    tmp_path: Path, memory: fsspec.AbstractFileSystem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job, "run", stand_in.run)
+    monkeypatch.setattr(job, "_pictures", lambda home: {})
+    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
+    memory.pipe_file("/in/a.txt", b"ok")
+    words = {"palette": ("--keep=memory://none",), "export": ("--format", "nerf")}
+    keys = {"calibrate": "k1", "palette": "k2", "export": "k3"}
+    one = Job("a", ("memory://in/a.txt",), words, keys, str(tmp_path / "a"))
+    done = run_sheet(one)
+    assert [row.state for row in done.rows] == ["done", "failed", "done"]
+    assert "memory://none: cannot be reached" in done.rows[1].error
+    shutil.rmtree(tmp_path / "a" / "bundle")  # what is made of it is made again, as it was
+    made = (tmp_path / "a" / "export" / "made.json").read_bytes()
+    run_sheet(one)
+    assert (tmp_path / "a" / "export" / "made.json").read_bytes() == made
+    assert b"nerf" in made
+    assert not (tmp_path / "a" / ".scratch").exists()
 
 
 def test_a_sheet_and_its_results_behind_urls(

@@ -49,7 +49,7 @@ def finish(table: Table, keys: dict[str, str] = KEYS) -> None:
     row = table.claim("me", 60)
     assert row is not None
     assert row.name == "s000"
-    assert table.record("me", row.name, done(keys), "done")
+    assert table.record("me", row.name, done(keys))
 
 
 def test_sheets_are_claimed_in_order_and_once(table: Table) -> None:
@@ -78,8 +78,8 @@ def test_what_is_not_chosen_is_not_claimed(tmp_path: Path) -> None:
 def test_lease_that_is_over_is_anothers_and_its_owner_records_nothing(table: Table) -> None:
     assert table.claim("dead", -1) is not None
     row = next(row for _ in range(3) if (row := table.claim("b", 60)) and row.name == "s000")
-    assert not table.record("dead", row.name, done(), "done")
-    assert table.record("b", row.name, done(), "done")
+    assert not table.record("dead", row.name, done())
+    assert table.record("b", row.name, done())
 
 
 def test_lease_that_is_renewed_is_kept(table: Table) -> None:
@@ -121,7 +121,7 @@ def test_a_failed_sheet_waits_for_somebody_to_ask(table: Table) -> None:
     row = table.claim("me", 60)
     assert row is not None
     rows = [StageRow("calibrate", "k1", "failed", error="no figures")]
-    table.record("me", row.name, rows, "failed")
+    table.record("me", row.name, rows)
     put(table)
     found = table.row(row.name)
     assert found is not None
@@ -137,7 +137,7 @@ def test_a_failed_sheet_waits_for_somebody_to_ask(table: Table) -> None:
 def test_a_failed_sheet_whose_options_changed_is_due(table: Table) -> None:
     row = table.claim("me", 60)
     assert row is not None
-    table.record("me", row.name, [StageRow("calibrate", "k1", "failed", error="x")], "failed")
+    table.record("me", row.name, [StageRow("calibrate", "k1", "failed", error="x")])
     put(table, keys={stage: f"{key}'" for stage, key in KEYS.items()})
     assert states(table) == ["waiting"] * 3
 
@@ -195,6 +195,34 @@ def test_a_runner_does_not_claim_what_it_has(table: Table) -> None:
     assert other is not None
 
 
+def test_who_asks_for_another_try_waits_for_who_runs_it(table: Table) -> None:
+    row = table.claim("me", 60)
+    assert row is not None
+    rows = [StageRow("calibrate", "k1", "failed", error="no figures")]
+    table.record("me", row.name, rows)
+    put(table, keys=KEYS | {"export": "k4"})
+    table.retry([row.name], ["calibrate"])
+    assert table.claim("me", 60) is not None
+    table.retry([row.name], ["calibrate"])
+    found = table.row(row.name)
+    assert found is not None
+    assert found.state == "running"
+
+
+def test_a_table_on_a_read_only_place_is_read_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with closing(Table(tmp_path / TABLE, make=True)) as writer:
+        put(writer, 20)
+        with closing(Table(tmp_path / TABLE)) as reader:  # its rows are in the write-ahead file
+            assert len(reader.names()) == 20
+    assert not (tmp_path / f"{TABLE}-wal").exists()
+    with closing(Table(tmp_path / TABLE)) as reader:
+        assert len(reader.names()) == 20
+    assert [path.name for path in tmp_path.iterdir()] == [TABLE]
+
+
 def test_many_may_make_a_table_at_once(tmp_path: Path) -> None:
     for number in range(20):
         path, children = tmp_path / f"{number}.sqlite", []
@@ -214,11 +242,12 @@ def test_many_may_make_a_table_at_once(tmp_path: Path) -> None:
 
 
 def test_a_sheet_can_be_taken_out_but_not_while_it_runs(table: Table) -> None:
-    table.forget("s001")
+    table.forget(["s001"])
     assert table.names() == ["s000", "s002"]
     table.claim("me", 60)
     with pytest.raises(ToonsetError, match="'s000' is being worked on"):
-        table.forget("s000")
+        table.forget(["s002", "s000"])
+    assert table.names() == ["s000", "s002"]
 
 
 def test_parts_are_put_together_and_the_newer_row_counts(table: Table, tmp_path: Path) -> None:

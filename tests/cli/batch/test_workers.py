@@ -260,14 +260,17 @@ def test_what_does_not_need_a_failed_stage_is_run_and_the_failed_one_waits(tmp_p
     assert set(runs(tmp_path).values()) == {1}
 
 
-def test_a_death_far_into_a_stage_of_a_store_is_that_stages(
+def test_a_death_of_a_sheet_with_a_store_names_its_stage_and_waits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
+    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")  # elsewhere than beside it
     store = f"file://{tmp_path}/store"
-    row = run_all(tmp_path, {"a": "talk palette"}, store=store)["a"]
-    assert states(row) == {"calibrate": "waiting", "palette": "quarantined"}
-    assert "SIGSEGV" in row.error
+    for _ in range(2):
+        row = run_all(tmp_path, {"a": "talk palette"}, store=store)["a"]
+        assert states(row) == {"calibrate": "quarantined", "palette": "waiting"}
+        assert row.error == "palette: its worker ended by SIGSEGV, 3 times"
+    assert set(runs(tmp_path).values()) == {3}
+    assert not list(tmp_path.rglob(".scratch"))
 
 
 def test_a_picture_stays_where_a_later_stage_dies(
