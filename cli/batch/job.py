@@ -105,6 +105,7 @@ def run_sheet(job: Job) -> Outcome:
     try:
         home.mkdir(parents=True, exist_ok=True)
         with lock.hold(home / "batch", home, PATIENCE_S), _logged(home / LOG, job.memory_mb):
+            _sweep(home)
             outcome = _run_near(job, home)
     except OutputError as error:
         return Outcome(job.name, "place" if _is_full(error) else "busy", line=one_line(error))
@@ -121,7 +122,6 @@ def _run_near(job: Job, home: Path) -> Outcome:
     from toonset.cli.common.storage import fetch, looks, push
 
     scratch = home / SCRATCH
-    shutil.rmtree(scratch, ignore_errors=True)
     url = f"{job.store.rstrip('/')}/{job.name}"
     try:
         if not job.store:
@@ -277,9 +277,16 @@ def _remove_stamps(home: Path, first: str) -> None:
         _stamp(home, stage).unlink(missing_ok=True)
 
 
+def _sweep(home: Path) -> None:
+    """Clear away what a worker that was killed has left of the batch's own."""
+    shutil.rmtree(home / SCRATCH, ignore_errors=True)
+    for stamp in home.glob(f".*.json.*{lock.TEMPORARY}"):
+        stamp.unlink(missing_ok=True)
+
+
 def tidy(home: Path) -> None:
     """Clear away what a worker that was killed has left in its sheet's folder."""
-    shutil.rmtree(home / SCRATCH, ignore_errors=True)
+    _sweep(home)
     writes = [home / stage.writes for stage in STAGES.values()]
     for place in (home / "batch", *writes, lock.set_of(home / BUNDLE / "palette.json")):
         if place.parent.is_dir():

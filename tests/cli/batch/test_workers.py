@@ -321,6 +321,14 @@ def test_a_stamp_on_disk_counts_when_the_table_forgot(tmp_path: Path) -> None:
     assert set(runs(tmp_path).values()) == {1}
 
 
+def test_what_a_killed_worker_was_writing_goes(tmp_path: Path) -> None:
+    home = home_of(tmp_path, "a")
+    (home / ".scratch" / "inputs").mkdir(parents=True)
+    (home / ".calibrate.json.abcdefgh.tmp").write_text("{")
+    run_all(tmp_path, {"a": "ok"})
+    assert not list(home.glob(".*"))
+
+
 def test_a_damaged_stamp_does_not_count(tmp_path: Path) -> None:
     run_all(tmp_path, {"a": "ok"})
     (home_of(tmp_path, "a") / "palette.json").write_text('{"stage": "pal')
