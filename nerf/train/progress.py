@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from toonset.nerf.train.loop import Moment
-from toonset.nerf.train.result import HeldOut
+if TYPE_CHECKING:  # torch takes seconds to import, and these lines need none
+    from toonset.nerf.train.loop import Moment
+    from toonset.nerf.train.result import HeldOut
 
 RECENT = 50  # steps whose mean loss is shown: single batches differ
 
