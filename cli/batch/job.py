@@ -111,7 +111,8 @@ def run_sheet(job: Job) -> Outcome:
         return Outcome(job.name, "place" if _is_full(error) else "busy", line=one_line(error))
     except OSError as error:
         reason = error.strerror or str(error)
-        return Outcome(job.name, "place", line=f"{home}: cannot be written ({reason}); make room")
+        line = f"{home}: cannot be written ({reason}); make room, or make it writable"
+        return Outcome(job.name, "place", line=line)
     if outcome.kind == "done":
         (home / LOG).unlink(missing_ok=True)
     return outcome
