@@ -30,7 +30,6 @@ TIME_LIMIT_S = 1800.0
 PAGE_S, PAUSE = 30.0, 50  # between pages: at least; times what the last one took
 LOOK_AT = 3  # exit code: sheets have failed
 AUTO = "auto"
-SOME = 5  # names that a line says
 PLANNED_AT_ONCE = 500  # sheets of one transaction
 
 
@@ -198,7 +197,7 @@ def batch(
     share = 0 if ray else _share(count)
     limits = Limits(time_limit, memory_limit or share)
     wanted = Wanted(
-        Path(os.path.abspath(out)),
+        Path(os.path.abspath(out)),  # workers may have another current folder
         chosen,
         entries,
         names,
@@ -327,8 +326,7 @@ def _run(
 
     _check_out(wanted.out)
     with ExitStack() as stack:
-        out = Path(os.path.abspath(wanted.out))  # workers may have another current folder
-        runner = Runner(out, wanted.limits, wanted.stages, wanted.store)
+        runner = Runner(wanted.out, wanted.limits, wanted.stages, wanted.store)
         stack.enter_context(alive(wanted.out, runner.ident, wanted.does))
         path = wanted.out / wanted.table
         table = stack.enter_context(closing(Table(path, make=True, alone=wanted.is_shard)))
@@ -383,6 +381,7 @@ def _check_out(out: Path) -> None:
 def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
     """Put into the table what is to be done."""
     from toonset.cli.batch.progress import sheets_of
+    from toonset.cli.batch.sheets import some_of
     from toonset.cli.batch.stages import keys_of
     from toonset.cli.batch.table import Plan
     from toonset.cli.common.storage import Hashes
@@ -403,8 +402,8 @@ def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
                 printer.progress(f"reading sheets {position + 1}/{len(wanted.entries)}")
     hashes.keep()
     if other := sorted(names - {entry.name for entry in wanted.entries}):
-        some = ", ".join(other[:SOME]) + ", ..." * (len(other) > SOME)
-        printer.say(f"{sheets_of(len(other))} not named now, kept ({some}); see --forget")
+        said = f"{sheets_of(len(other))} not named now, kept ({some_of(other)}); see --forget"
+        printer.say(said)
     if wanted.retry:
         table.retry(wanted.names, wanted.stages)
     table.choose(wanted.names)
@@ -416,19 +415,18 @@ def _there(wanted: Wanted, plans: Sequence[Plan]) -> Mapping[str, set[str]]:
     from toonset.cli.batch.job import read_stamp
     from toonset.cli.common.storage import keys_behind
 
+    behind: Mapping[str, str] = {}
     if wanted.store:
-        names = [f"{plan.entry.name}/{stage}.json" for plan in plans for stage in plan.keys]
-        behind = keys_behind(wanted.store, names)
-        return {
-            (name := plan.entry.name): {
-                s for s, key in plan.keys.items() if behind.get(f"{name}/{s}.json") == key
-            }
-            for plan in plans
-        }
+        stamps = [f"{plan.entry.name}/{stage}.json" for plan in plans for stage in plan.keys]
+        behind = keys_behind(wanted.store, stamps)
+
+    def is_done(name: str, stage: str, key: str) -> bool:
+        if wanted.store:
+            return behind.get(f"{name}/{stage}.json") == key
+        return read_stamp(home_of(wanted.out, name), stage, key) is not None
+
     return {
-        (name := plan.entry.name): {
-            s for s, key in plan.keys.items() if read_stamp(home_of(wanted.out, name), s, key)
-        }
+        plan.entry.name: {s for s, key in plan.keys.items() if is_done(plan.entry.name, s, key)}
         for plan in plans
     }
 

@@ -119,25 +119,24 @@ def run_sheet(job: Job) -> Outcome:
 
 
 def _run_near(job: Job, home: Path) -> Outcome:
-    """Run a sheet whose drawings or results may lie behind URLs, on copies that go afterwards."""
+    """Run a sheet here; results of a store on a copy, which goes afterwards as copies of inputs."""
     from toonset.cli.common.storage import fetch, looks, push
 
-    scratch = home / SCRATCH
-    url = f"{job.store.rstrip('/')}/{job.name}"
+    url, near = f"{job.store.rstrip('/')}/{job.name}", home / SCRATCH / "results"
     try:
         if not job.store:
             return _run_stages(job, home)
         if looks(f"{url}/calibrate.json") is not None:
-            fetch(url, scratch)
-        (scratch / job.name).mkdir(parents=True, exist_ok=True)
-        outcome = _run_stages(job, scratch / job.name)
+            fetch(url, near)
+        (near / job.name).mkdir(parents=True, exist_ok=True)
+        outcome = _run_stages(job, near / job.name)
         if outcome.rows:
-            push(scratch / job.name, url, tuple(f"{stage}.json" for stage in STAGES))
+            push(near / job.name, url, tuple(f"{stage}.json" for stage in STAGES))
         return outcome
     except ToonsetError as error:
         return Outcome(job.name, "place", line=one_line(error))
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        shutil.rmtree(home / SCRATCH, ignore_errors=True)
 
 
 def _fetched(words: Sequence[str], places: Iterator[Path]) -> tuple[str, ...]:
@@ -250,16 +249,17 @@ def _facts(stage: str, said: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
 
 def stages_there(home: Path) -> set[str]:
     """Return the stages whose stamps and results lie in a sheet's folder."""
-    return {
-        name
-        for name, stage in STAGES.items()
-        if _stamp(home, name).is_file() and (home / stage.writes / stage.mark).exists()
-    }
+    return {stage for stage in STAGES if _is_there(home, stage)}
+
+
+def _is_there(home: Path, stage: str) -> bool:
+    result = home / STAGES[stage].writes / STAGES[stage].mark
+    return _stamp(home, stage).is_file() and result.exists()
 
 
 def read_stamp(home: Path, stage: str, key: str) -> StageRow | None:
     """Return the row of a stage that is done with a key; None where it is not."""
-    if stage not in stages_there(home):
+    if not _is_there(home, stage):
         return None
     try:
         row = StageRow(**json.loads(_stamp(home, stage).read_bytes()))
@@ -410,7 +410,7 @@ def over_memory(log: str) -> str:
 def last_stage(log: Path) -> str:
     """Return the stage that was run last, as a log says; "" of none."""
     try:
-        found = BEGUN.findall(log.read_bytes())
+        found = [name.decode() for name in BEGUN.findall(log.read_bytes())]
     except OSError:
         return ""
-    return next((name for name in reversed([*map(bytes.decode, found)]) if name in STAGES), "")
+    return next((name for name in reversed(found) if name in STAGES), "")

@@ -117,8 +117,11 @@ class RayWorkers:
             )
             self._fitted = self._asked if self._capacity else self._fitted
             if self._asked - self._fitted > FIT_S:
-                needs = ", ".join(f"{share:g} {name}" for name, share in self._shares.items())
-                raise ToonsetError(f"--ray: no node has {needs}; give less to a sheet, or add one")
+                mb = self._shares.get("memory", 0) / 2**20
+                needs = [f"{self._shares[n]:g} {n}" for n in ("CPU", "GPU") if n in self._shares]
+                needs += [f"{mb:.0f} MB of memory"] * (mb > 0)
+                said = f"--ray: no node has {' and '.join(needs)}"
+                raise ToonsetError(f"{said}; give less to a sheet, or add a node")
         return max(self._capacity, 1)
 
     def submit(self, job: Job) -> None:

@@ -168,8 +168,13 @@ def _say_left(folder: Path, say: Callable[[str], None]) -> None:
     pictures = [file for file in folder.glob("*/*") if file.suffix.lower() in ENDINGS]
     below = sorted({file.parent.name for file in pictures if file.parent.name[0] != "."})
     if below:
-        some = ", ".join(below[:SOME]) + ", ..." * (len(below) > SOME)
-        say(f"{folder}: folders in it are not read ({some}); '{folder}/**/*.png' takes theirs, too")
+        said = f"{folder}: folders in it are not read ({some_of(below)})"
+        say(f"{said}; '{folder}/**/*.png' takes theirs, too")
+
+
+def some_of(names: Sequence[str]) -> str:
+    """Return the first of many names, for a line."""
+    return ", ".join(names[:SOME]) + ", ..." * (len(names) > SOME)
 
 
 def _is_within(file: Path, folder: Path) -> bool:
@@ -213,7 +218,7 @@ def _csv_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
         rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
         head = [cell.strip() for cell in next(rows)]
         if len(head) == 1 and ";" in head[0]:
-            raise SheetError(f"{path}: line 1: its cells end in ';'; save it with ',' between them")
+            raise SheetError(f"{path}: line 1: has ';' between cells; save it with ','")
         _check_columns(f"{path}: line 1", head)
         if double := next((name for name in head if head.count(name) > 1), None):
             raise SheetError(f"{path}: has two columns {double!r}; take one out")
@@ -239,6 +244,7 @@ def _jsonl_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]
         values = parse_json(line, f"{path}: line {number}", SheetError)
         if not isinstance(values, dict):
             raise SheetError(f"{path}: line {number}: is no JSON object; write one per sheet")
+        _check_columns(f"{path}: line {number}", values)
         for name, value in values.items():
             texts = value if isinstance(value, list) and name == "sheet" else [value]
             if not all(isinstance(text, str) for text in texts):
@@ -247,11 +253,10 @@ def _jsonl_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]
 
 
 def _check_values(where: str, values: Mapping[str, Any]) -> None:
-    """Refuse a key that means nothing, and text that no file's name can hold."""
+    """Refuse text that no file's name can hold."""
     for name, value in values.items():
         if "\0" in "".join(value):
             raise SheetError(f"{where}: {name!r} holds a zero character; take it out")
-    _check_columns(where, values)
 
 
 def _check_columns(where: str, names: Iterable[str]) -> None:

@@ -217,23 +217,19 @@ class Table:
             raise ToonsetError(f"{self.path}: is of a newer toonset; install that one")
         self._db.execute("PRAGMA synchronous = NORMAL")  # a lost commit is a sheet found done
         if version != SCHEMA:
-            self._make(make=make)
+            none = ToonsetError(f"{self.path}: is no table of toonset batch; choose another -o")
+            if not make:
+                raise none
+            with self.transaction():
+                if self._db.execute("PRAGMA user_version").fetchone()[0] == 0:  # nobody else has
+                    if self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+                        raise none
+                    for statement in TABLES.split(";"):
+                        self._db.execute(statement)
+                    self._db.execute(f"PRAGMA user_version = {SCHEMA}")
         if make and not alone:
             with contextlib.suppress(sqlite3.OperationalError):  # somebody reads: the next time
                 self._db.execute("PRAGMA journal_mode = WAL")
-
-    def _make(self, *, make: bool) -> None:
-        none = ToonsetError(f"{self.path}: is no table of toonset batch; choose another -o")
-        if not make:
-            raise none
-        with self.transaction():
-            if self._db.execute("PRAGMA user_version").fetchone()[0]:
-                return  # another runner has just made it
-            if self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-                raise none
-            for statement in TABLES.split(";"):
-                self._db.execute(statement)
-            self._db.execute(f"PRAGMA user_version = {SCHEMA}")
 
     def close(self) -> None:
         """Close the connection; the last one tidies the write-ahead file away."""

@@ -18,7 +18,7 @@ from toonset.errors import SheetError, ToonsetError, one_line
 
 URL = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 MANY = 500  # hashes that are kept until the table takes them
-CHANGING = (  # names that servers have, letters only, for what changes with a file
+CHANGING = (  # names of servers, letters and digits only, for what changes with a file
     *("etag", "generation", "mtime", "lastmodified", "modified"),
     *("md5hash", "contentmd5", "digest", "checksum"),
 )

@@ -15,6 +15,8 @@ import pytest
 from bench.batch.cluster import make_cluster
 from bench.batch.sheets import write_sheets
 from tests.conftest import Command, contents
+from toonset.cli.batch import on_ray
+from toonset.errors import ToonsetError
 
 STAGES = ("--stages", "calibrate,palette")
 ROOT = Path(__file__).resolve().parents[3]
@@ -129,6 +131,23 @@ def test_what_crashes_or_hangs_is_told_as_on_one_machine(
     assert "crash0: quarantined: its worker ended by SIGSEGV, 3 times" in done.stderr
     assert "hang0: failed: took longer than 20 s; raise --time-limit" in done.stderr
     assert json.loads(done.stdout)["stages"]["calibrate"]["done"] == 1
+
+
+def test_as_many_sheets_as_fit_run_at_once_and_none_that_fits_nowhere(
+    cluster: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+    for memory_mb in (0, 100, 10**6):
+        workers = on_ray.RayWorkers(cluster.address, memory_mb=memory_mb)
+        monkeypatch.setattr(on_ray, "FIT_S", -1 if memory_mb == 10**6 else 60)
+        try:
+            found.append(workers.capacity)
+        except ToonsetError as error:
+            found.append(str(error))
+        finally:
+            workers.close()
+    assert found[:2] == [2, 2]
+    assert str(found[2]).startswith("--ray: no node has 1 CPU and 1000000 MB of memory; ")
 
 
 def test_no_cluster_is_told_in_one_line(library: Path, tmp_path: Path) -> None:

@@ -24,6 +24,14 @@ def memory() -> Iterator[fsspec.AbstractFileSystem]:
     files.store.clear()
 
 
+@pytest.fixture
+def stands_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Let stages take no time."""
+    monkeypatch.setattr(job, "run", stand_in.run)
+    monkeypatch.setattr(job, "_pictures", lambda home: {})
+    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
+
+
 def test_sheets_are_found_behind_a_pattern(memory: fsspec.AbstractFileSystem) -> None:
     for name in ("b.png", "a.png", "notes.txt"):
         memory.pipe_file(f"/library/{name}", b"picture")
@@ -140,11 +148,8 @@ def test_a_mesh_is_what_it_is_read_with(
 
 
 def test_a_stage_whose_input_cannot_be_reached_is_the_one_that_fails(
-    tmp_path: Path, memory: fsspec.AbstractFileSystem, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, memory: fsspec.AbstractFileSystem, stands_in: None
 ) -> None:
-    monkeypatch.setattr(job, "run", stand_in.run)
-    monkeypatch.setattr(job, "_pictures", lambda home: {})
-    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
     memory.pipe_file("/in/a.txt", b"ok")
     words = {"palette": ("--keep=memory://none",), "export": ("--format", "nerf")}
     keys = {"calibrate": "k1", "palette": "k2", "export": "k3"}
@@ -161,11 +166,8 @@ def test_a_stage_whose_input_cannot_be_reached_is_the_one_that_fails(
 
 
 def test_a_sheet_and_its_results_behind_urls(
-    tmp_path: Path, memory: fsspec.AbstractFileSystem, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, memory: fsspec.AbstractFileSystem, stands_in: None
 ) -> None:
-    monkeypatch.setattr(job, "run", stand_in.run)
-    monkeypatch.setattr(job, "_pictures", lambda home: {})
-    monkeypatch.setattr(stand_in, "count_in", tmp_path / "runs")
     memory.pipe_file("/in/a.txt", b"ok")
     keys = {"calibrate": "k1", "palette": "k2"}
     one = Job("a", ("memory://in/a.txt",), {}, keys, str(tmp_path / "a"), "memory://out")
@@ -177,3 +179,17 @@ def test_a_sheet_and_its_results_behind_urls(
     assert run_sheet(one).rows == first.rows  # as its stamps say
     assert (tmp_path / "runs").read_text().splitlines() == ["a calibrate", "a palette"]
     assert not list((tmp_path / "a").rglob("*.json"))
+
+
+def test_a_sheet_may_be_called_as_a_folder_of_ours(
+    tmp_path: Path, memory: fsspec.AbstractFileSystem, stands_in: None
+) -> None:
+    memory.pipe_file("/in/a.txt", b"ok")
+    for name in ("inputs", "results"):
+        home, keys = str(tmp_path / name), {"calibrate": "k1"}
+        assert run_sheet(Job(name, ("memory://in/a.txt",), {}, keys, home, "memory://out")).rows
+        found = sorted(memory.find(f"/out/{name}"))
+        assert [place.removeprefix(f"/out/{name}/") for place in found] == [
+            "bundle/transforms.json",
+            "calibrate.json",
+        ]
