@@ -7,12 +7,15 @@ have the bytes of an undisturbed run, and every bad one its line. Ends with 1 if
 
 import argparse
 import atexit
+import os
 import sys
 import tempfile
 from pathlib import Path
 
 from bench.batch.cluster import make_cluster
 from tests.batch import kills
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def main() -> int:
@@ -23,6 +26,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--ray", action="store_true", help="on a Ray cluster of two nodes")
     given = parser.parse_args()
+    os.environ["PYTHONPATH"] = str(ROOT)  # batches and Ray's processes find tests.batch.child so
     with tempfile.TemporaryDirectory() as place:
         work, library = Path(place), Path(place, "library")
         kills.make_library(library, given.sheets, given.seed)

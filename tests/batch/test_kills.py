@@ -1,6 +1,5 @@
 """Killing batches (see tests/batch) loses nothing, and would be seen if it did."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -51,7 +50,6 @@ def test_what_is_lost_or_left_is_seen(tmp_path: Path) -> None:
 @pytest.mark.parametrize("more", [(), ("--ray",)], ids=["local", "ray"])
 def test_killing_loses_nothing(more: tuple[str, ...]) -> None:
     command = [sys.executable, "-m", "tests.batch", "--sheets", "40", "--kills", "4", *more]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     print(done.stdout)
     assert done.returncode == 0, done.stdout + done.stderr[-2000:]
