@@ -33,7 +33,7 @@ from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint_agreement import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
-from toonset.nerf.prepare.symmetry import add_mirrored_views, mirror_found
+from toonset.nerf.prepare.symmetry import add_mirrored_views, find_symmetry
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
@@ -97,13 +97,14 @@ def fit_field(
     ready = prepare(scene, options)
     usual = STEPS_ON_SHAPE if ready.shape else USUAL_STEPS
     options = replace(options, steps=usual if options.steps is None else options.steps)
-    whole, symmetry = add_mirrored_views(ready.scene) if options.symmetry else (ready.scene, None)
+    symmetry = find_symmetry(ready.scene, options.symmetric or scene.symmetric)
+    whole = add_mirrored_views(ready.scene, symmetry)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
     hull, evidence = _hull(whole, options, ready)
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
-    scene = mirror_found(ready.scene, symmetry)
+    scene = add_mirrored_views(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
