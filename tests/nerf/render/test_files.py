@@ -12,7 +12,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from toonset.errors import OutputError, SetupError
-from toonset.nerf.render.animation import duration_ms, encode_gif, encode_mp4, encode_webp
+from toonset.nerf.render.animation import duration_ms, encode_gif, encode_mp4, encode_webp, smaller
 from toonset.nerf.render.sprite_sheet import LARGEST_SIDE, sprite_json, sprite_sheet
 
 COLORS = np.array([[200, 40, 40], [40, 80, 200], [20, 20, 20], [250, 240, 10]], dtype=np.uint8)
@@ -65,6 +65,17 @@ def test_gif_shows_flat_colours_over_white_without_flicker() -> None:
         flat = (picture[..., 3] == 255) & (np.arange(31) < 28)[:, None]
         np.testing.assert_array_equal(got[flat], picture[flat][:, :3])
         assert np.abs(got[28:].astype(int) - picture[28:, :, :3]).mean() < 20
+
+
+def test_a_picture_is_made_smaller_with_its_colours() -> None:
+    picture = np.zeros((60, 40, 4), dtype=np.uint8)
+    picture[10:50, 10:30] = (200, 40, 40, 255)
+    small = smaller(picture, 30)
+    assert small.shape == (30, 20, 4)
+    assert set(map(tuple, small[small[..., 3] > 0])) == {(200, 40, 40, 255)}
+    assert small[..., 3].mean() == pytest.approx(picture[..., 3].mean())
+    for most in (60, 90, None):
+        assert smaller(picture, most) is picture
 
 
 @pytest.mark.parametrize("count", [1, 8, 36, 400])
