@@ -43,10 +43,21 @@ def render(
     ] = None,
     elevation: Annotated[
         float | None,
-        typer.Option("--elevation", min=-90, max=90, help="Turntable: degrees, > 0 looks down."),
+        typer.Option(
+            "--elevation",
+            min=-90,
+            max=90,
+            help="Turntable: degrees, > 0 looks down (default: as drawn).",
+        ),
     ] = None,
     size: Annotated[
-        int | None, typer.Option("--size", min=8, max=4096, help="Side in px of a turntable view.")
+        int | None,
+        typer.Option(
+            "--size",
+            min=8,
+            max=4096,
+            help="Side in px of a turntable view (default: as large as drawn).",
+        ),
     ] = None,
     shown: Annotated[
         list[Layer] | None,
@@ -98,12 +109,12 @@ def render(
 ) -> None:
     """Render a trained run: one PNG per camera and layer, and files of a whole turntable.
 
-    `drawn` puts views together from the drawings and draws their outline anew; it is the default of
-    turntables of sheets with outlines. `rgb`, the default else, is the field's own colour.
-    `palette` (the default else with --recolor or --palette) shows palette colours only; `normal`
-    codes x, y, z of the world as red, green, blue, `normal-camera` right, up and towards the
-    viewer; `depth` has 16 bits, which depth.json turns into world units. Several layers are written
-    as NAME-LAYER.png.
+    A turntable passes through the drawings, at their elevation and size, unless --elevation or
+    --size say otherwise; its GIF and WebP are 1024 px at most without --size. `drawn`, the default,
+    puts views together from the drawings and draws their outline anew. `rgb` is the field's own
+    colour; `palette` shows palette colours only; `normal` codes x, y, z of the world as red, green,
+    blue, `normal-camera` right, up and towards the viewer; `depth` has 16 bits, which depth.json
+    turns into world units. Several layers are written as NAME-LAYER.png.
     """
     printer = Printer(as_json, quiet)
     repaint = bool(recolor or palette)
@@ -114,7 +125,7 @@ def render(
 
     import torch
 
-    from toonset.nerf.render.animation import check_mp4
+    from toonset.nerf.render.animation import ANIMATED_PX, check_mp4
     from toonset.nerf.render.files import render_files
     from toonset.nerf.render.layers import default_layer
     from toonset.nerf.render.recolor import change_pen, recolor_run, repaint_run
@@ -128,13 +139,15 @@ def render(
         torch.set_num_threads(threads)
     trained = recolor_run(read_field(run), recolor or [])
     trained = repaint_run(trained, palette, nearest=nearest) if palette else trained
-    wanted = layers or [default_layer(trained) if views else "rgb"]
+    wanted = layers or [default_layer(trained)]
     wanted = ["palette"] if repaint and wanted == ["rgb"] else wanted
     trained = _style(trained, wanted, lines=lines)
     trained = change_pen(trained, ink_width, ink_color)
-    named = _cameras(trained, cameras, views, math.radians(elevation or 0.0), size)
+    angle = None if elevation is None else math.radians(elevation)
+    named = _cameras(trained, cameras, views, angle, size)
     check_output(out, [run, cameras], WRITTEN, force=force)
-    files = render_files(trained, named, wanted, together, printer.progress, printer.say)
+    most_px = ANIMATED_PX if cameras is None and size is None else None
+    files = render_files(trained, named, wanted, together, most_px, printer.progress, printer.say)
     sizes: dict[str, int] = {}
     with new_folder(out, force=force) as folder:
         for name, data in files:
@@ -206,7 +219,7 @@ def _cameras(
     trained: TrainedField,
     cameras: Path | None,
     views: int | None,
-    elevation: float,
+    elevation: float | None,
     size: int | None,
 ) -> Named:
     from toonset.dataset.bundle.transforms_read import read_cameras

@@ -8,16 +8,18 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+import cv2
 import numpy as np
 from jaxtyping import Int, UInt8
 from PIL import Image
 from scipy.spatial.distance import cdist
 
 from toonset.errors import OutputError, SetupError
-from toonset.view import over_white
+from toonset.view import over_white, premultiply, straight
 
 SECONDS_PER_TURN = 3.0
 SHORTEST_MS = 20  # viewers slow shorter frames down
+ANIMATED_PX = 1024  # side of a GIF or WebP unless a size is asked for: larger ones stutter
 GIF_COLORS = 256
 GIF_EXACT = 96  # of them: flat colours stay as they are, mixed ones share the others
 LOSSLESS_EFFORT = 60  # of 100: more takes three times as long for 2 %
@@ -32,6 +34,18 @@ def duration_ms(count: int) -> int:
     return max(SHORTEST_MS, 10 * round(100 * SECONDS_PER_TURN / count))
 
 
+def smaller(
+    picture: UInt8[np.ndarray, "height width 4"], most_px: int | None
+) -> UInt8[np.ndarray, "h w 4"]:
+    """Return a picture with a longest side of at most `most_px`; None: as it is."""
+    height, width = picture.shape[:2]
+    by = 1.0 if most_px is None else most_px / max(height, width)
+    if by >= 1:
+        return picture
+    size = max(1, round(by * width)), max(1, round(by * height))
+    return straight(cv2.resize(premultiply(picture), size, interpolation=cv2.INTER_AREA))
+
+
 def encode_gif(pictures: Pictures) -> bytes:
     """Return the pictures over white as a GIF that turns once in three seconds.
 
@@ -41,16 +55,21 @@ def encode_gif(pictures: Pictures) -> bytes:
         OutputError: the pictures differ in size.
     """
     check_one_size(pictures, "turntable.gif")
-    flat = np.stack([_flat(picture) for picture in pictures])
-    colors, which, counts = np.unique(
-        flat.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True
-    )
+    codes = [_code(_flat(picture)) for picture in pictures]
+    used, counts = np.unique(np.concatenate(codes, axis=None), return_counts=True)
+    colors = np.stack([used >> 16, used >> 8 & 255, used & 255], axis=1).astype(np.uint8)
     shared = _shared_palette(colors, counts)
-    nearest = cdist(colors, shared, "sqeuclidean").argmin(axis=1).astype(np.uint8)
-    frames = [Image.fromarray(codes) for codes in nearest[which].reshape(flat.shape[:3])]
+    nearest = np.zeros(1 << 24, dtype=np.uint8)
+    nearest[used] = cdist(colors, shared, "sqeuclidean").argmin(axis=1)
+    frames = [Image.fromarray(nearest[one]) for one in codes]
     for frame in frames:
         frame.putpalette(shared.tobytes())
     return _loop(frames, "GIF", disposal=1)
+
+
+def _code(rgb: UInt8[np.ndarray, "height width 3"]) -> Int[np.ndarray, "height width"]:
+    """Return colours as 24-bit numbers."""
+    return rgb.astype(np.int32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.int32)
 
 
 def _shared_palette(

@@ -9,7 +9,7 @@ from typing import Any
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.render.animation import Pictures, encode_gif, encode_mp4, encode_webp
+from toonset.nerf.render.animation import Pictures, encode_gif, encode_mp4, encode_webp, smaller
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.depth_levels import DepthLevels
 from toonset.nerf.render.open_raster import PaintLayer, check_layered, encode_ora, layered
@@ -17,6 +17,7 @@ from toonset.nerf.render.sprite_sheet import feet, sprite_json, sprite_sheet
 from toonset.nerf.render.views import render
 
 ANIMATIONS = {"gif": encode_gif, "webp": encode_webp, "mp4": encode_mp4}
+LOOPS = ("gif", "webp")  # which may be smaller than the pictures
 SPRITES, LAYERED = "sprites", "ora"
 UNSEEN = 0.05  # of a view in the drawn look: worth a word
 DEPTH_FILE = "depth.json"  # the scale of depth pictures
@@ -27,6 +28,7 @@ def render_files(
     named: Sequence[tuple[str, Camera]],
     layers: Sequence[str] = ("rgb",),
     formats: Sequence[str] = (),
+    animated_px: int | None = None,
     progress: Callable[[str], None] = lambda line: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Iterator[tuple[str, bytes]]:
@@ -37,6 +39,7 @@ def render_files(
         named: cameras with the names of their pictures, without ending.
         layers: names out of LAYERS; several are written as NAME-LAYER.png.
         formats: names out of `nerf.options.FORMATS`: files of all views of the first layer.
+        animated_px: see `turntable_files`.
         progress: told which view is rendered.
         say: told which view shows most that is in no drawing.
 
@@ -49,6 +52,7 @@ def render_files(
     baked, turning, depths = Baked.of(trained), [], []
     cameras = [camera for _, camera in named]
     levels = DepthLevels.of(trained.hull, cameras)
+    kept_px = animated_px if set(formats) <= set(LOOPS) else None  # whole turns are large
     unseen: dict[str, float] = {}
     for number, (stem, camera) in enumerate(named):
         progress(f"rendering {number + 1} of {len(named)}")
@@ -59,7 +63,7 @@ def render_files(
             yield name, data
             depths += [name] if layer == "depth" else []
             if layer == layers[0]:
-                turning.append(picture)
+                turning.append(smaller(picture, kept_px))
                 in_layers += [(stem, layered(view, layer, picture))] if LAYERED in formats else []
             if layer == "drawn":
                 unseen[stem] = view.drawn.by_field
@@ -69,13 +73,17 @@ def render_files(
     if depths:
         yield DEPTH_FILE, _json(levels.to_json(depths))
     of_pictures = [name for name in formats if name != LAYERED]
-    yield from turntable_files(of_pictures, turning, trained, cameras).items()
+    yield from turntable_files(of_pictures, turning, trained, cameras, animated_px).items()
     if in_layers:
         yield f"turntable.{LAYERED}", encode_ora(in_layers, turning)
 
 
 def turntable_files(
-    formats: Iterable[str], pictures: Pictures, trained: TrainedField, cameras: Sequence[Camera]
+    formats: Iterable[str],
+    pictures: Pictures,
+    trained: TrainedField,
+    cameras: Sequence[Camera],
+    animated_px: int | None = None,
 ) -> dict[str, bytes]:
     """Return turntable.gif, .webp, .mp4 and sprites.png with sprites.json, by name.
 
@@ -84,6 +92,7 @@ def turntable_files(
         pictures: one per camera, in the order of the turn.
         trained: what they show.
         cameras: that saw them.
+        animated_px: longest side of .gif and .webp; None: as large as the pictures.
 
     Raises:
         OutputError: the pictures differ in size or do not fit into a texture.
@@ -97,7 +106,9 @@ def turntable_files(
             files[f"{SPRITES}.png"] = encode_png(sheet.rgba)
             files[f"{SPRITES}.json"] = _json(about)
         else:
-            files[f"turntable.{name}"] = ANIMATIONS[name](pictures)
+            most_px = animated_px if name in LOOPS else None
+            shown = [smaller(picture, most_px) for picture in pictures]
+            files[f"turntable.{name}"] = ANIMATIONS[name](shown)
     return files
 
 

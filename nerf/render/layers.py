@@ -128,9 +128,8 @@ class Rendering:
 
 
 def default_layer(trained: TrainedField) -> str:
-    """Return the layer that people look at: "drawn" where the drawings have outlines."""
-    drawings = trained.drawings
-    return "rgb" if drawings is None or drawings.outline is None else "drawn"
+    """Return the layer that people look at: "drawn" where the run holds drawings."""
+    return "rgb" if trained.drawings is None else "drawn"
 
 
 def color_picture(

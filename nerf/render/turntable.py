@@ -1,49 +1,68 @@
-"""Place cameras that turn round a trained figure."""
+"""Place cameras that turn round a trained figure, as high as its sheet is drawn."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from toonset.camera import Camera
 from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import Hull
+from toonset.nerf.render.turn_angles import Angles, angles_between, ring_of, turn_angles
 
 FILL = 0.94  # of the picture's side that the figure may take
 
 
 def turntable(
-    trained: TrainedField, count: int, elevation: float = 0.0, size: int | None = None
+    trained: TrainedField, count: int, elevation: float | None = None, size: int | None = None
 ) -> tuple[Camera, ...]:
-    """Return `count` cameras at equal turns, the first in front, all at one scale.
+    """Return `count` cameras all round, the first in front, all at one scale.
+
+    They pass through the drawings' own directions, each of which is one of them if there are as
+    many: see `toonset.nerf.render.turn_angles`.
 
     Args:
         trained: the figure; cameras see as far (or as parallel) as its training cameras.
         count: number of views, yaw rising.
-        elevation: radians, > 0 looks down.
-        size: side of the square pictures, px; None: as the training pictures.
+        elevation: radians, > 0 looks down, no camera leans; None: as the sheet is drawn, and each
+            drawing's own at its direction.
+        size: side of the square pictures, px; None: the figure is as large as in the drawings,
+            and at a drawing's direction on the same pixels as there.
 
     Raises:
         UsageError: no view, or pictures without a pixel.
     """
-    if count < 1 or (size is not None and size < 1):
-        raise UsageError(f"turntable: {count} views of {size} px; 1 or more of each are needed")
-    side = size or trained.size_px
-    low, high = filled_box(trained.hull)
-    target = (low + high) / 2
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    corners = low + corners * (high - low)
-    yaws = [2 * math.pi * i / count for i in range(count)]
-    unit = [
-        Camera.looking_at(target, yaw, elevation, 1.0, (side, side), k=trained.k) for yaw in yaws
-    ]
-    reach = max(float(np.abs(c.project(corners)[0] - c.center).max()) for c in unit)
-    scale = FILL * side / 2 / reach
-    return tuple(
-        Camera.looking_at(target, yaw, elevation, scale, (side, side), k=trained.k) for yaw in yaws
-    )
+    _check(count, size)
+    angles = turn_angles(drawn_ring(trained), count)
+    if elevation is not None:
+        angles[:, 1:] = (elevation, 0.0)
+    return _framed(trained, angles, size)
+
+
+def between_drawings(
+    trained: TrainedField, count: int, size: int | None = None
+) -> tuple[Camera, ...]:
+    """Return `count` cameras half way between drawings, the first nearest to front.
+
+    Args:
+        trained: see `turntable`.
+        count: number of views, yaw rising.
+        size: see `turntable`.
+
+    Raises:
+        UsageError: no view, or pictures without a pixel.
+    """
+    _check(count, size)
+    return _framed(trained, angles_between(drawn_ring(trained), count), size)
+
+
+def drawn_ring(trained: TrainedField) -> Angles:
+    """Return yaw, elevation and roll of the drawings that a turn passes through, yaw rising."""
+    return ring_of(_drawn(trained))
 
 
 def filled_box(hull: Hull) -> tuple[np.ndarray, np.ndarray]:
@@ -52,3 +71,53 @@ def filled_box(hull: Hull) -> tuple[np.ndarray, np.ndarray]:
     return hull.low + hull.voxel * cells.min(axis=0), hull.low + hull.voxel * (
         cells.max(axis=0) + 1
     )
+
+
+def _check(count: int, size: int | None) -> None:
+    if count < 1 or (size is not None and size < 1):
+        raise UsageError(f"turntable: {count} views of {size} px; 1 or more of each are needed")
+
+
+def _drawn(trained: TrainedField) -> list[Camera]:
+    return [] if trained.drawings is None else [view.camera for view in trained.drawings.views]
+
+
+def _framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Camera, ...]:
+    """Return cameras at directions, with one scale and size that all the figure fits in."""
+    low, high = filled_box(trained.hull)
+    target = (low + high) / 2
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    corners = low + corners * (high - low)
+
+    def placed(scale: float, side: int) -> tuple[Camera, ...]:
+        return tuple(
+            Camera.looking_at(target, yaw, elevation, scale, (side, side), roll, k=trained.k)
+            for yaw, elevation, roll in angles
+        )
+
+    reach = max(float(np.abs(c.project(corners)[0] - c.center).max()) for c in placed(1.0, 1))
+    drawn = _drawn(trained)
+    if size is None and drawn:
+        scale = float(np.median([_scale_at(camera, target) for camera in drawn]))
+        cameras = placed(scale, math.ceil(2 * reach * scale / FILL))
+        return tuple(_on_its_pixels(camera, drawn) for camera in cameras)
+    side = size or trained.size_px
+    return placed(FILL * side / 2 / reach, side)
+
+
+def _on_its_pixels(camera: Camera, drawn: list[Camera]) -> Camera:
+    """Return a camera moved by half a pixel at most, so that a drawing seen as it is stays sharp.
+
+    Its pixels are then those of the drawing that has its rotation, if there is one.
+    """
+    for own in drawn:
+        if np.allclose(own.rotation, camera.rotation, rtol=0, atol=1e-9):
+            away = own.project(camera.target[None])[0][0] - camera.center
+            return replace(camera, center=camera.center + away - np.rint(away))
+    return camera
+
+
+def _scale_at(camera: Camera, point: Float[np.ndarray, " 3"]) -> float:
+    """Return a camera's pixels per world unit at a point's depth."""
+    depth = float(camera.project(point[None])[1][0])
+    return camera.scale / (1 + camera.k * depth)

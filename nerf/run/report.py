@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
@@ -20,7 +19,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import side_by_side, threads_in_use
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import color_picture, default_layer
-from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.turntable import between_drawings
 from toonset.nerf.render.views import baked_of, render
 from toonset.nerf.run.folder import write_field
 from toonset.nerf.score.metrics import compare, means
@@ -29,7 +28,7 @@ from toonset.nerf.train.result import HeldOut, Step, Training
 from toonset.view import over_white
 from toonset.write import write_bytes, write_json
 
-PREVIEW_VIEWS, PREVIEW_ELEVATION = 4, math.radians(10)
+PREVIEW_VIEWS, PREVIEW_PX = 4, 512  # of a preview: how many, and their side at most
 
 
 def write_run(
@@ -111,9 +110,13 @@ def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
 
 
 def preview(source: TrainedField | Baked) -> np.ndarray:
-    """Return four views side by side over white, (height, 4 height, 3) bytes."""
+    """Return four views side by side over white, (height, 4 height, 3) bytes.
+
+    They lie half way between the drawings, where a field may be wrong.
+    """
     baked = source if isinstance(source, Baked) else Baked.of(source)
-    cameras = turntable(baked.trained, PREVIEW_VIEWS, PREVIEW_ELEVATION)
+    side = min(PREVIEW_PX, baked.trained.size_px)
+    cameras = between_drawings(baked.trained, PREVIEW_VIEWS, side)
     views = side_by_side([partial(render, baked, camera) for camera in cameras])
     layer = default_layer(baked.trained)
     pictures = [over_white(view.picture(layer)) for view in views]

@@ -31,7 +31,6 @@ from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.look.blend import SOLID, Geometry, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.layers import default_layer
 from toonset.nerf.render.views import render
 from toonset.palette.names import name_of
 from toonset.view import over_white
@@ -70,8 +69,8 @@ class LeftOut:
 def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
     """Return every drawing as the others predict it; empty for fewer than FEWEST drawings.
 
-    Where people are shown the field's own colours, the drawing counts as far off as those, if that
-    is farther.
+    Where drawings have no outline, the drawing counts as far off as the field's own colours, if
+    that is farther: nothing but paint tells how far the field has come.
 
     Args:
         baked: a field with its drawings.
@@ -88,7 +87,7 @@ def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
         return []
     drawings = drawings.fitting(TALL_PX / drawings.height)
     assert drawings.textures  # made here: two threads must not make them twice
-    field = default_layer(baked.trained) == "rgb"
+    field = drawings.outline is None
 
     def one(number: int) -> LeftOut:
         camera = small_camera(drawings, number)
@@ -115,7 +114,7 @@ def predicted(
         number: of the drawing.
         view: of the field, by `small_camera`.
         frames: what it is compared with, in the same order.
-        field: people are shown the field's own colours.
+        field: the field's own colours count, too.
     """
     frame, others = frames[number], drawings.without(number)
     names = [own.name for i, own in enumerate(frames) if i != number]

@@ -27,6 +27,7 @@ from toonset.mesh import Mesh
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import LEVEL, carve
 from toonset.nerf.render.layers import default_layer
+from toonset.nerf.render.turn_angles import ring_of, turn_angles
 from toonset.nerf.render.turntable import FILL, turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field
@@ -41,8 +42,7 @@ from toonset.nerf.viewer.scene import (
 from toonset.palette.names import name_of
 from toonset.palette.palette import Palette
 
-FRAMES, FRAME_PX, QUALITY = 16, 280, 80  # of the pictures that turn where the page cannot draw
-AROUND = 36  # cameras that the figure must fit in
+FRAMES, FRAME_PX, QUALITY = 16, 280, 80  # of a turn: its pictures stand where the page cannot draw
 LAYERS = ("drawn", "rgb", "palette", "normal", "depth", "labels")
 HULL_VOXELS = 72  # along the longest side of a bundle's hull
 METRICS = "metrics.json"
@@ -98,7 +98,7 @@ def run_scene(
         BundleError: its field has no planes.
     """
     blob = Blob()
-    camera = turntable(trained, AROUND)[0]
+    turn = turntable(trained, FRAMES, size=FRAME_PX)
     drawings = trained.drawings
     pen = None if drawings is None else drawings.pen
     missing = set() if drawings is not None else {"drawn"}
@@ -110,10 +110,11 @@ def run_scene(
         "title": title,
         "layers": layers,
         "figure": {
-            "target": camera.target.tolist(),
-            "reach": FILL * camera.size_wh[0] / 2 / camera.scale,
+            "target": turn[0].target.tolist(),
+            "reach": FILL * FRAME_PX / 2 / turn[0].scale,
             "fill": FILL,
-            "k": camera.k,
+            "k": turn[0].k,
+            "turn": [list(camera.angles) for camera in turn],
         },
         "pen": pen and {"rgb": list(pen.rgb), "width_px": pen.width_px},
         **about,
@@ -149,6 +150,7 @@ def _bundle_html(bundle: Bundle) -> str:
             "reach": float(np.linalg.norm(mesh.vertices - middle, axis=1).max()),
             "fill": FILL,
             "k": float(np.median([camera.k for camera in cameras])),
+            "turn": turn_angles(ring_of(cameras), 1).tolist(),
         },
         "pen": None,
         "verdict": None,

@@ -6,11 +6,13 @@ import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
+import cv2
 import numpy as np
 import pytest
 
 from toonset.dataset.images.picture import load_rgba
 from toonset.nerf.render.animation import INSTALL_AV
+from toonset.view import over_white
 
 QUICK = ("--steps", 20, "--threads", 1, "--device", "cpu", "-q")
 
@@ -31,13 +33,10 @@ def shown(folder: Path, name: str = "000.png") -> np.ndarray:
     return load_rgba(folder / name).astype(int)
 
 
-def test_turntables_of_lined_sheets_are_drawn_and_cameras_are_the_fields(lined, toonset, tmp_path):
-    turn = toonset("render", lined, "--turntable", 2, "-o", tmp_path / "turn", "--json")
-    assert turn.json["layer"] == "drawn"
+def test_a_drawn_camera_returns_its_drawing(lined: Path, toonset, tmp_path: Path) -> None:
     cameras = lined.parent / "sheet" / "views" / "transforms.json"
     asked = ("render", lined, "--cameras", cameras, "--json", "-o")
-    assert toonset(*asked, tmp_path / "field").json["layer"] == "rgb"
-    assert toonset(*asked, tmp_path / "own", "--layer", "drawn").code == 0
+    assert toonset(*asked, tmp_path / "own").json["layer"] == "drawn"
     frames = json.loads(cameras.read_text())["frames"]
     for frame in frames:
         drawn = load_rgba(cameras.parent / frame["file_path"]).astype(int)
@@ -46,12 +45,35 @@ def test_turntables_of_lined_sheets_are_drawn_and_cameras_are_the_fields(lined, 
         assert np.abs(found - drawn)[drawn[..., 3] == 255].max() <= 1
 
 
-def test_turntables_of_sheets_without_lines_are_the_fields(trained, toonset, tmp_path):
-    turn = toonset("render", trained[0], "--turntable", 1, "-o", tmp_path / "turn", "--json")
-    assert turn.json["layer"] == "rgb"
-    asked = ("render", trained[0], "--turntable", 1, "-o", tmp_path / "drawn", "--layer", "drawn")
-    assert toonset(*asked).code == 0
-    pen = toonset(*asked[:-3], tmp_path / "pen", "--ink-width", 2)
+def test_a_turn_of_as_many_views_as_drawings_is_the_drawings(lined, toonset, tmp_path) -> None:
+    views = lined.parent / "sheet" / "views"
+    frames = json.loads((views / "transforms.json").read_text())["frames"]
+    turn = toonset("render", lined, "--turntable", len(frames), "-o", tmp_path, "--force", "--json")
+    assert turn.json["layer"] == "drawn"
+    turned = [figure(tmp_path / f"{i:03d}.png") for i in range(len(frames))]
+    for frame in frames:
+        drawn = figure(views / frame["file_path"])
+        room = [np.abs(np.subtract(one.shape, drawn.shape)).max() <= 3 for one in turned]
+        apart = [
+            np.abs(cv2.resize(one, drawn.shape[1::-1]).astype(int) - drawn)[..., :3].mean()
+            for one, fits in zip(turned, room, strict=True)
+            if fits
+        ]
+        assert min(apart) < 6  # of 255; those of neighbouring drawings are 20 and more
+
+
+def figure(file: Path) -> np.ndarray:
+    """Return what a picture shows, over white, cut to it."""
+    rgba = load_rgba(file)
+    rows, columns = (np.flatnonzero((rgba[..., 3] > 127).any(axis=axis)) for axis in (1, 0))
+    flat = (over_white(rgba) * 255).astype(np.uint8)
+    return flat[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+def test_turntables_of_sheets_without_lines_are_drawn(trained, toonset, tmp_path: Path) -> None:
+    turn = ("render", trained[0], "--turntable", 1, "-o")
+    assert toonset(*turn, tmp_path / "turn", "--json").json["layer"] == "drawn"
+    pen = toonset(*turn, tmp_path / "pen", "--ink-width", 2)
     assert "no contour lines" in pen.reason
 
 

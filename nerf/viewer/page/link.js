@@ -22,8 +22,8 @@ export function hashOf(scene, state) {
   const colors = state.colors.map((rgb) => hexOf(rgb).slice(1)).join(",");
   /** @type {[string, string, boolean][]} name, value, whether it differs from the start */
   const entries = [
-    ["yaw", short(wrapped(state.yaw)), state.yaw !== 0],
-    ["elevation", short(state.elevation), state.elevation !== 0],
+    ["yaw", short(wrapped(state.yaw)), short(state.yaw) !== short(start.yaw)],
+    ["elevation", short(state.elevation), short(state.elevation) !== short(start.elevation)],
     ["zoom", short(state.zoom, 3), state.zoom !== 1],
     ["pan", state.pan.map((v) => short(v, 3)).join(","), state.pan.some((v) => v !== 0)],
     ["layer", state.layer, state.layer !== start.layer],
@@ -51,8 +51,8 @@ export function stateOfHash(scene, hash) {
   return {
     ...start,
     ...limited({
-      yaw: wrapped(numberOf(words.get("yaw"), 0)),
-      elevation: numberOf(words.get("elevation"), 0),
+      yaw: wrapped(numberOf(words.get("yaw"), start.yaw)),
+      elevation: numberOf(words.get("elevation"), start.elevation),
       zoom: numberOf(words.get("zoom"), 1),
       pan: pan.length === 2 && pan.every(Number.isFinite) ? pan : start.pan,
     }),

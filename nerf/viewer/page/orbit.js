@@ -1,6 +1,7 @@
 // Turning, zooming and moving the figure: mouse, touch and keys.
 
 import { limited, poseOf } from "./framing.js";
+import { startState } from "./state.js";
 
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./state.js").Store} Store */
@@ -51,7 +52,8 @@ export function createOrbit(stage, scene, store) {
 
   function home() {
     stop();
-    store.set({ yaw: 0, elevation: 0, zoom: 1, pan: [0, 0], snapped: -1 });
+    const { yaw, elevation, zoom, pan, snapped } = startState(scene);
+    store.set({ yaw, elevation, zoom, pan, snapped });
   }
 
   const side = () => Math.min(stage.clientWidth, stage.clientHeight) || 1;

@@ -40,9 +40,10 @@ export const COMPARISONS = ["slider", "beside", "onion", "difference"];
  * @returns {State} at the start
  */
 export function startState(scene) {
+  const [yaw, elevation] = scene.figure.turn[0].map((angle) => (angle * 180) / Math.PI);
   return {
-    yaw: 0,
-    elevation: 0,
+    yaw,
+    elevation: clamp(elevation, -STEEPEST, STEEPEST),
     zoom: 1,
     pan: [0, 0],
     layer: scene.layers[0],

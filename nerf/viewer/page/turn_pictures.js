@@ -9,7 +9,7 @@ import { offsetOf } from "./framing.js";
 /**
  * @param {HTMLImageElement} image
  * @param {Scene} scene
- * @param {string[]} pictures data URLs, the front first
+ * @param {string[]} pictures data URLs, in the order of the figure's turn
  */
 export function createTurnPictures(image, scene, pictures) {
   return {
@@ -17,9 +17,10 @@ export function createTurnPictures(image, scene, pictures) {
     draw({ camera }) {
       if (!pictures.length) return;
       const [x, , z] = camera.rotation.slice(6);
-      const step = (2 * Math.PI) / pictures.length;
-      const i = Math.round(Math.atan2(-x, -z) / step + pictures.length) % pictures.length;
-      const shown = turntableCamera(scene.figure, i * step, 0, camera.size);
+      const { turn } = scene.figure;
+      const near = turn.map(([yaw]) => Math.cos(yaw - Math.atan2(-x, -z)));
+      const i = near.indexOf(Math.max(...near));
+      const shown = turntableCamera(scene.figure, turn[i][0], turn[i][1], camera.size);
       const factor = camera.scale / shown.scale;
       const target = offsetOf(camera, shown.target);
       const [moveX, moveY] = target.map((v, axis) => ((v - shown.center[axis]) / camera.size[axis]) * 100);

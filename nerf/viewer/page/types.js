@@ -31,11 +31,20 @@
  */
 
 /**
+ * @typedef {object} Figure how turntable cameras see it
+ * @property {number[]} target
+ * @property {number} reach
+ * @property {number} fill
+ * @property {number} k
+ * @property {number[][]} turn yaw, elevation and roll of the pictures of a turn, radians, the first at the start
+ */
+
+/**
  * @typedef {object} Scene all numbers of the page
  * @property {string} title
  * @property {{state: string, reasons: string[]} | null} verdict of the run
  * @property {Layer[]} layers that can be shown, the first at the start
- * @property {{target: number[], reach: number, fill: number, k: number}} figure how turntable cameras see it
+ * @property {Figure} figure
  * @property {Paint[]} palette
  * @property {{rgb: number[], width_px: number} | null} pen that draws the outline
  * @property {ViewRecord[]} views

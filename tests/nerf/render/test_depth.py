@@ -47,7 +47,7 @@ def test_depth_files_hold_the_rendering(
     assert about["files"] == ["000-depth.png", "001-depth.png"]
     trained = read_field(run)
     scale = DepthLevels(about["nearest"], about["unit"])
-    for name, camera in zip(about["files"], turntable(trained, 2, 0.0), strict=True):
+    for name, camera in zip(about["files"], turntable(trained, 2), strict=True):
         with Image.open(out / name) as image:
             found = scale.depth(np.array(image).astype(np.uint16))
         truth = render(trained, camera).depth

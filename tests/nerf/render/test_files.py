@@ -12,8 +12,11 @@ import pytest
 from PIL import Image, ImageSequence
 
 from toonset.errors import OutputError, SetupError
-from toonset.nerf.render.animation import duration_ms, encode_gif, encode_mp4, encode_webp
+from toonset.nerf.render.animation import duration_ms, encode_gif, encode_mp4, encode_webp, smaller
+from toonset.nerf.render.files import turntable_files
 from toonset.nerf.render.sprite_sheet import LARGEST_SIDE, sprite_json, sprite_sheet
+from toonset.nerf.render.turntable import turntable
+from toonset.nerf.train.result import Training
 
 COLORS = np.array([[200, 40, 40], [40, 80, 200], [20, 20, 20], [250, 240, 10]], dtype=np.uint8)
 
@@ -65,6 +68,29 @@ def test_gif_shows_flat_colours_over_white_without_flicker() -> None:
         flat = (picture[..., 3] == 255) & (np.arange(31) < 28)[:, None]
         np.testing.assert_array_equal(got[flat], picture[flat][:, :3])
         assert np.abs(got[28:].astype(int) - picture[28:, :, :3]).mean() < 20
+
+
+def test_a_picture_is_made_smaller_with_its_colours() -> None:
+    picture = np.zeros((60, 40, 4), dtype=np.uint8)
+    picture[10:50, 10:30] = (200, 40, 40, 255)
+    small = smaller(picture, 30)
+    assert small.shape == (30, 20, 4)
+    assert set(map(tuple, small[small[..., 3] > 0])) == {(200, 40, 40, 255)}
+    assert small[..., 3].mean() == pytest.approx(picture[..., 3].mean())
+    for most in (60, 90, None):
+        assert smaller(picture, most) is picture
+
+
+def test_loops_are_made_smaller_and_sprites_are_not(training: Training) -> None:
+    pictures = turn()
+    cameras = turntable(training.result, len(pictures), size=25)
+    files = turntable_files(["gif", "webp", "sprites"], pictures, training.result, cameras, 20)
+    sizes = {}
+    for name in ("turntable.gif", "turntable.webp", "sprites.png"):
+        with Image.open(io.BytesIO(files[name])) as image:
+            sizes[name] = max(image.size)
+    assert sizes["turntable.gif"] == sizes["turntable.webp"] == 20
+    assert sizes["sprites.png"] > 20
 
 
 @pytest.mark.parametrize("count", [1, 8, 36, 400])

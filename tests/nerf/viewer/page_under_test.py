@@ -85,7 +85,13 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
         "title": "A figure",
         "verdict": {"state": "weak", "reasons": ["no drawing shows the left side"]},
         "layers": ["drawn", "rgb", "palette", "normal", "depth", "labels"],
-        "figure": {"target": [0.0, 1.0, 0.0], "reach": 1.0, "fill": 0.94, "k": 0.0},
+        "figure": {
+            "target": [0.0, 1.0, 0.0],
+            "reach": 1.0,
+            "fill": 0.94,
+            "k": 0.0,
+            "turn": [[0.0, 0.0, 0.0]],
+        },
         "palette": [
             {"name": name, "rgb": rgb, "share": share}
             for name, rgb, share in zip(names, COLORS, (0.6, 0.3, 0.1), strict=True)
