@@ -26,7 +26,14 @@ from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.mannequin_volume import hull_of_shape
 from toonset.nerf.hull.march import surface_depth
-from toonset.nerf.hull.scene_hull import VOXELS, VOXELS_PER_PX, as_stored, hull_of, per_px
+from toonset.nerf.hull.scene_hull import (
+    VOXELS,
+    VOXELS_PER_PX,
+    as_stored,
+    has_sections,
+    hull_of,
+    per_px,
+)
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.threads import SIDES
@@ -34,6 +41,7 @@ from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint_agreement import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
 from toonset.nerf.prepare.symmetry import add_mirrored_views, mirror_found
+from toonset.nerf.sections.shape import mirror_plane
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
@@ -133,6 +141,10 @@ def _hull(scene: Scene, options: TrainOptions, ready: Prepared) -> tuple[Hull, H
     """Return the field's hull, and the evidence for how drawings carve it."""
     if not options.carve:
         return open_box(scene), NO_EVIDENCE
+    if ready.shape is None and has_sections(ready.scene, options):
+        frames = ready.scene.frames  # what is mirrored for the shape, sections know best
+        plane_x = mirror_plane(frames) if options.symmetry else None
+        return hull_of(ready.scene, options, plane_x=plane_x)
     if ready.shape is None:
         return hull_of(scene, options, ready.apart_px)
     extent = float(np.ptp(ready.shape.vertices, axis=0).max())
