@@ -65,11 +65,10 @@ def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> 
         drawn: the drawings as they were drawn.
         baked: its field; None: made here.
     """
-    ready = training.prepared.scene
     reasons = guesses(training.seen)
     if training.result.drawings is None:
         return Verdict(WEAK, (*reasons, NOTHING), ())
-    views = left_out(baked or Baked.of(training.result), ready, drawn)
+    views = left_out(baked or Baked.of(training.result), training.seen, drawn)
     found = judged(views, training)
     reasons += [found] if found else []
     return Verdict(WEAK if reasons else OK, tuple(reasons), tuple(views))

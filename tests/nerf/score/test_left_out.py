@@ -32,8 +32,9 @@ def left_out(scene: Scene, drawn: Sequence[np.ndarray] | None = None) -> list[Le
     drawings = drawings_of(scene, sheet, depth_of, bent=False)
     assert drawings is not None
     drawings = drawings.fitting(TALL_PX / drawings.height)
+    names = [frame.name for frame in frames]
     return [
-        predicted(drawings, i, geometry(small_camera(drawings, i)), frames)
+        predicted(drawings, i, geometry(small_camera(drawings, i)), frames[i], names)
         for i in range(len(frames))
     ]
 
