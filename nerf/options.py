@@ -20,6 +20,7 @@ class Layer(StrEnum):
     labels = "labels"
     alpha = "alpha"
     ink = "ink"
+    source = "source"
     normal = "normal"
     normal_camera = "normal-camera"
 

@@ -46,7 +46,6 @@ FIELD_VOTE = 0.25  # beside 1 of the drawings together
 LEAD = 0.5  # more votes of the nearer of two drawings that were not made to agree
 SOFT = 0.8 / 260  # sigma over the figure's height, over which votes are shared
 FEATHER = 4.0 / 260  # of the height: so near to outlines and steps drawings show different things
-# of the height, beside an outline or a step: a drawing shows what others do not
 LEAST_TRUST = 0.1
 SIDE_VOTE, OWN_VOTE = 0.5, 0.3  # of a third drawing, of the field: only where nothing better is
 SLIVER = 0.03  # of the height: places so near to paint have it, too
@@ -58,6 +57,7 @@ SAME = 1e-9  # radians: seen from one side
 # made to agree and it was bent or moved for that, the less, the steadier
 OWN, OWN_BENT = 0.12, 0.04
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
+SOURCES = ("drawn", "mirrored", "guessed")
 
 
 @dataclass(frozen=True, eq=False)

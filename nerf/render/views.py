@@ -47,7 +47,8 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
 @torch.no_grad()
 @one_thread()
 def _render(baked: Baked, camera: Camera) -> Rendering:
-    small = camera.resized(min(1.0, FINEST / (_detail(baked.trained) * camera.scale)))
+    detail_px = _detail(baked.trained) * camera.scale
+    small = camera.resized(min(1.0, FINEST / detail_px)) if detail_px > FINEST else camera
     width, height = small.size_wh
     sight = ViewRays.of(baked, small)
     seen = cast(sight, _grid(height, width)).view(5, height, width)
@@ -68,10 +69,11 @@ def _render(baked: Baked, camera: Camera) -> Rendering:
 
 
 def _detail(trained: TrainedField) -> float:
-    """Return the size of what a field can show, world units."""
+    """Return the size of the finest that a field can show, world units; 0 where nothing is known."""
     hull, field = trained.hull, trained.field
-    cells = [field.resolution] if isinstance(field, TriplaneField) else []
-    return min(hull.voxel, *(float(hull.box.size.max()) / count for count in cells))
+    if not isinstance(field, TriplaneField):
+        return 0.0
+    return min(hull.voxel, float(hull.box.size.max()) / field.resolution)
 
 
 def enlarged(view: Rendering, camera: Camera) -> Rendering:
