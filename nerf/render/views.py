@@ -69,7 +69,7 @@ def _render(baked: Baked, camera: Camera) -> Rendering:
 
 
 def _detail(trained: TrainedField) -> float:
-    """Return the size of the finest that a field can show, world units; 0 where nothing is known."""
+    """Return the finest that a field can show, world units; 0 where nothing is known."""
     hull, field = trained.hull, trained.field
     if not isinstance(field, TriplaneField):
         return 0.0
