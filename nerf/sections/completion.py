@@ -18,12 +18,14 @@ from jaxtyping import Float
 from toonset.nerf.sections.drawing import Drawing, Mask, sample
 from toonset.nerf.sections.grid import VOXEL_PX, Grid, Volume, distance_again, silhouette
 from toonset.nerf.sections.limbs import thickness
-from toonset.raster import parts
+from toonset.raster import dilate, parts
 
 LACKING_PX = 5.0  # beside the surface, somewhere in a part, ...
 BESIDE_PX = 1.0  # ... all of which lies so far beside it
 LEAST_PART = 8e-4  # of the figure's pixels
 LEAST_PX = 30
+MIRRORED = 0.35  # weight of a mirrored drawing
+INTO_PX = 2  # into the body, that parts hang on it
 HOLD = 0.6  # of the radius: what other drawings have to show round a ball's middle
 MOST_PX = 25.0  # squared: the largest objection
 APART, MOST_APART_PX = 0.03, 60.0  # px^2 per squared px from the body
@@ -122,7 +124,8 @@ def _inflated(
     """Return the balls of a missing part, where the rivals object least."""
     rows, columns = np.nonzero(missing)
     points = grid.along(drawing, np.stack([columns, rows], axis=-1) + 0.5)
-    radii, deep = (picture[rows, columns] for picture in thickness(drawing.mask))
+    part = dilate(missing, INTO_PX) & drawing.mask
+    radii, deep = (picture[rows, columns] for picture in thickness(part))
     cost = APART * grid.at(f, points).clip(0, MOST_APART_PX) ** 2
     cost += _objections(points, radii[:, None], rivals)
     color = drawing.paint[rows, columns, :3]
@@ -160,9 +163,10 @@ def _objections(
 ) -> Float[np.ndarray, "*n"]:
     """Return how far rivals would have balls elsewhere, mean square px."""
     total = np.zeros(points.shape[:-1], np.float32)
-    for other in rivals:
+    weights = [MIRRORED if other.mirrored else 1.0 for other in rivals]
+    for other, weight in zip(rivals, weights, strict=True):
         objection = np.maximum(0, other.distance_at(points) + HOLD * radii)
-        total += np.minimum(objection, MOST_PX) ** 2 / len(rivals)
+        total += weight / sum(weights) * np.minimum(objection, MOST_PX) ** 2
     return total
 
 
