@@ -48,6 +48,7 @@ def completed(
     drawings: Sequence[Drawing],
     everything: Sequence[Drawing],
     plane_x: float | None = None,
+    lacking_px: float = LACKING_PX,
 ) -> Volume:
     """Return f with what it lacks of each drawing in turn.
 
@@ -57,9 +58,10 @@ def completed(
         drawings: that must be covered, the surest first.
         everything: drawings that may object, mirrored ones, too.
         plane_x: of the body's mirror plane; None: it has none.
+        lacking_px: how far a part stands out, somewhere.
     """
     for drawing in drawings:
-        missing = missing_parts(drawing, silhouette(grid, f, drawing))
+        missing = missing_parts(drawing, silhouette(grid, f, drawing), lacking_px)
         if missing.sum() < LEAST_PX:
             continue
         rivals = [other for other in everything if not _opposite(other, drawing)]
@@ -101,17 +103,20 @@ class Balls:
         return f
 
 
-def missing_parts(drawing: Drawing, seen: Float[np.ndarray, "height width"]) -> Mask:
+def missing_parts(
+    drawing: Drawing, seen: Float[np.ndarray, "height width"], lacking_px: float = LACKING_PX
+) -> Mask:
     """Return the parts of a drawing that a body lacks.
 
     Args:
         drawing: what should be there.
         seen: the lowest f along each pixel's ray.
+        lacking_px: how far a part stands out, somewhere.
     """
     labels = parts(drawing.mask & (seen > BESIDE_PX))
     sizes = np.bincount(labels.reshape(-1))
     lacking = np.bincount(
-        labels.reshape(-1), drawing.mask.reshape(-1) & (seen > LACKING_PX).reshape(-1)
+        labels.reshape(-1), drawing.mask.reshape(-1) & (seen > lacking_px).reshape(-1)
     )
     chosen = (lacking > 0) & (sizes > LEAST_PART * drawing.mask.sum())
     chosen[0] = False
