@@ -31,6 +31,7 @@ MOST_PX = 25.0  # squared: the largest objection
 APART, MOST_APART_PX = 0.03, 60.0  # px^2 per squared px from the body
 PAINT, MOST_UNLIKE = 800.0, 0.2
 ALIKE = math.radians(15)  # drawings from opposite sides are one silhouette
+FILLET_PX = 4.0
 BLUR, COARSE_BLUR, DEPTH_BLUR_PX = 9, 25, 3.0
 NEAR_STEPS, AWAY = 5, 1e6  # about the depth of a part as a whole
 NEARER = 0.01  # px^2 per voxel: of two places alike, the nearer is the one seen
@@ -48,7 +49,6 @@ def completed(
     drawings: Sequence[Drawing],
     everything: Sequence[Drawing],
     plane_x: float | None = None,
-    lacking_px: float = LACKING_PX,
 ) -> Volume:
     """Return f with what it lacks of each drawing in turn.
 
@@ -58,10 +58,9 @@ def completed(
         drawings: that must be covered, the surest first.
         everything: drawings that may object, mirrored ones, too.
         plane_x: of the body's mirror plane; None: it has none.
-        lacking_px: how far a part stands out, somewhere.
     """
     for drawing in drawings:
-        missing = missing_parts(drawing, silhouette(grid, f, drawing), lacking_px)
+        missing = missing_parts(drawing, silhouette(grid, f, drawing))
         if missing.sum() < LEAST_PX:
             continue
         rivals = [other for other in everything if not _opposite(other, drawing)]
@@ -69,7 +68,7 @@ def completed(
         added = [balls] if plane_x is None else [balls, *_twins(balls, drawing, rivals, plane_x)]
         for part in added:
             inside = drawing.distance_at(grid.centres).reshape(grid.shape) - OVER_PX
-            f = np.minimum(f, np.maximum(part.distance(grid), inside))
+            f = _united(f, np.maximum(part.distance(grid), inside))
     return distance_again(f)
 
 
@@ -103,20 +102,17 @@ class Balls:
         return f
 
 
-def missing_parts(
-    drawing: Drawing, seen: Float[np.ndarray, "height width"], lacking_px: float = LACKING_PX
-) -> Mask:
+def missing_parts(drawing: Drawing, seen: Float[np.ndarray, "height width"]) -> Mask:
     """Return the parts of a drawing that a body lacks.
 
     Args:
         drawing: what should be there.
         seen: the lowest f along each pixel's ray.
-        lacking_px: how far a part stands out, somewhere.
     """
     labels = parts(drawing.mask & (seen > BESIDE_PX))
     sizes = np.bincount(labels.reshape(-1))
     lacking = np.bincount(
-        labels.reshape(-1), drawing.mask.reshape(-1) & (seen > lacking_px).reshape(-1)
+        labels.reshape(-1), drawing.mask.reshape(-1) & (seen > LACKING_PX).reshape(-1)
     )
     chosen = (lacking > 0) & (sizes > LEAST_PART * drawing.mask.sum())
     chosen[0] = False
@@ -173,6 +169,12 @@ def _objections(
         objection = np.maximum(0, other.distance_at(points) + HOLD * radii)
         total += weight / sum(weights) * np.minimum(objection, MOST_PX) ** 2
     return total
+
+
+def _united(one: Volume, other: Volume) -> Volume:
+    """Return the union of two bodies, without a crease where they meet."""
+    fillet = (1 - np.abs(one - other) / FILLET_PX).clip(min=0)
+    return np.minimum(one, other) - FILLET_PX / 4 * fillet**2
 
 
 def _opposite(one: Drawing, other: Drawing) -> bool:

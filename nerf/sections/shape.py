@@ -27,7 +27,6 @@ from toonset.nerf.sections.roles import mirror_images, roles_of
 from toonset.nerf.sections.touching import touching
 
 CARVE_PX = 2.0  # by which diagonals may be wrong
-LOST_PX = 9.0  # by which a tip stands out that is put back in the end
 SMOOTH_VOXELS = 1.0
 CRUMB = 0.004  # of the largest part
 GONE_PX = 0.5
@@ -57,8 +56,7 @@ def shape_of(frames: Sequence[Frame], plane_x: float | None = None) -> Solid:
     covered = [facing[0], *aside[:1], *roles.between]
     f = completed(grid, f, covered, everything, plane_x)
     f = _without_crumbs(touching(grid, f, everything))
-    # tips that smoothing lost; outlines are met as nearly as drawings agree
-    return Solid(grid, completed(grid, f, covered, everything, lacking_px=LOST_PX))
+    return Solid(grid, completed(grid, f, covered, everything))  # tips that smoothing lost
 
 
 def mirror_plane(frames: Sequence[Frame]) -> float:
