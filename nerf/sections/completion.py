@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from jaxtyping import Float
+from scipy import ndimage
 
 from toonset.nerf.sections.drawing import Drawing, Mask, sample
 from toonset.nerf.sections.grid import VOXEL_PX, Grid, Volume, distance_again, silhouette
@@ -24,6 +25,7 @@ LACKING_PX = 5.0  # beside the surface, somewhere in a part, ...
 BESIDE_PX = 1.0  # ... all of which lies so far beside it
 LEAST_PART = 8e-4  # of the figure's pixels
 LEAST_PX = 30
+STRIP, STRIP_PX = 6.0, 7.0  # times the square of how far it stands out, and how far: no part
 MIRRORED = 0.35  # weight of a mirrored drawing
 INTO_PX = 2  # into the body, that parts hang on it
 HOLD = 0.6  # of the radius: what other drawings have to show round a ball's middle
@@ -59,6 +61,7 @@ def completed(
         everything: drawings that may object, mirrored ones, too.
         plane_x: of the body's mirror plane; None: it has none.
     """
+    before = f
     for drawing in drawings:
         missing = missing_parts(drawing, silhouette(grid, f, drawing))
         if missing.sum() < LEAST_PX:
@@ -69,7 +72,7 @@ def completed(
         for part in added:
             inside = drawing.distance_at(grid.centres).reshape(grid.shape) - OVER_PX
             f = _united(f, np.maximum(part.distance(grid), inside))
-    return distance_again(f)
+    return f if f is before else distance_again(f)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +114,10 @@ def missing_parts(drawing: Drawing, seen: Float[np.ndarray, "height width"]) -> 
     """
     labels = parts(drawing.mask & (seen > BESIDE_PX))
     sizes = np.bincount(labels.reshape(-1))
-    lacking = np.bincount(
-        labels.reshape(-1), drawing.mask.reshape(-1) & (seen > LACKING_PX).reshape(-1)
-    )
-    chosen = (lacking > 0) & (sizes > LEAST_PART * drawing.mask.sum())
+    reach = ndimage.maximum(seen, labels, np.arange(len(sizes)))
+    chosen = (reach > LACKING_PX) & (sizes > LEAST_PART * drawing.mask.sum())
+    strips = (sizes > STRIP * reach**2) & (reach < STRIP_PX)  # the outline is off there
+    chosen &= ~strips
     chosen[0] = False
     return chosen[labels]
 
