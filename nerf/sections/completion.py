@@ -17,7 +17,7 @@ from jaxtyping import Float
 from scipy import ndimage
 
 from toonset.nerf.sections.drawing import Drawing, Mask, sample
-from toonset.nerf.sections.grid import VOXEL_PX, Grid, Volume, distance_again, silhouette
+from toonset.nerf.sections.grid import VOXEL_PX, Grid, Volume, silhouette
 from toonset.nerf.sections.limbs import thickness
 from toonset.raster import dilate, parts
 
@@ -25,7 +25,7 @@ LACKING_PX = 5.0  # beside the surface, somewhere in a part, ...
 BESIDE_PX = 1.0  # ... all of which lies so far beside it
 LEAST_PART = 8e-4  # of the figure's pixels
 LEAST_PX = 30
-STRIP, STRIP_PX = 6.0, 7.0  # times the square of how far it stands out, and how far: no part
+CUT_OFF = 0.35  # of half the width of what a part belongs to, that it stands out
 MIRRORED = 0.35  # weight of a mirrored drawing
 INTO_PX = 2  # into the body, that parts hang on it
 HOLD = 0.6  # of the radius: what other drawings have to show round a ball's middle
@@ -61,7 +61,6 @@ def completed(
         everything: drawings that may object, mirrored ones, too.
         plane_x: of the body's mirror plane; None: it has none.
     """
-    before = f
     for drawing in drawings:
         missing = missing_parts(drawing, silhouette(grid, f, drawing))
         if missing.sum() < LEAST_PX:
@@ -72,7 +71,7 @@ def completed(
         for part in added:
             inside = drawing.distance_at(grid.centres).reshape(grid.shape) - OVER_PX
             f = _united(f, np.maximum(part.distance(grid), inside))
-    return f if f is before else distance_again(f)
+    return f
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +115,8 @@ def missing_parts(drawing: Drawing, seen: Float[np.ndarray, "height width"]) -> 
     sizes = np.bincount(labels.reshape(-1))
     reach = ndimage.maximum(seen, labels, np.arange(len(sizes)))
     chosen = (reach > LACKING_PX) & (sizes > LEAST_PART * drawing.mask.sum())
-    strips = (sizes > STRIP * reach**2) & (reach < STRIP_PX)  # the outline is off there
-    chosen &= ~strips
+    wide = ndimage.median(thickness(drawing.mask)[0], labels, np.arange(len(sizes)))
+    chosen &= reach > CUT_OFF * wide  # else the outline is off, and nothing cut off
     chosen[0] = False
     return chosen[labels]
 

@@ -16,7 +16,7 @@ from toonset.nerf.sections.drawing import TALL, Drawing, Picture, Pixels
 VOXEL_PX = 2.4
 MARGIN_PX = 0.04 * TALL  # round what the drawings span
 ACROSS = 0.8  # cosine: drawings that span an axis look across it
-SURE_VOXELS = 3.0  # within which a distance is f over its slope, beyond, counted in voxels
+SURE_VOXELS = 1.6  # within which a distance is f over its slope, beyond, counted in voxels
 LEAST_SLOPE = 0.4
 NEAR_PX = 12  # of a figure: rays beyond are not looked at
 BACKGROUND_PX = 30.0  # what is said of them

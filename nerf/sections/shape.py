@@ -54,7 +54,7 @@ def shape_of(frames: Sequence[Frame], plane_x: float | None = None) -> Solid:
     f = distance_again(blurred(f, SMOOTH_VOXELS))
     everything = [*facing, *aside, *diagonals]
     covered = [facing[0], *aside[:1], *roles.between]
-    f = completed(grid, f, covered, everything, plane_x)
+    f = distance_again(completed(grid, f, covered, everything, plane_x))
     f = _without_crumbs(touching(grid, f, everything))
     return Solid(grid, completed(grid, f, covered, everything))  # tips that smoothing lost
 
