@@ -17,7 +17,7 @@ SHEET = replace(CONDITIONS["studio"], cell_px=150, outline_px=1.25)
 VIEWS, QUICK_VIEWS = (8, 7, 6, 5, 4, 3, 2), (8, 4, 3)
 POSES, QUICK_POSES = (0.0, 1.0, 2.0), (1.0,)  # times as large as `STUDIO.body`
 HELD_OUT = 12  # views, the first half of the side that is drawn
-QUICK_STEPS = 100  # shape is settled by then, and so is the drawn look
+STEPS = 100  # of training: shape is settled by then, and so is the drawn look
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ def grid(*, quick: bool) -> list[Cell]:
     return [Cell(*place) for place in itertools.product(views, poses, (True, False))]
 
 
-def train_options(cell: Cell, seed: int, *, quick: bool) -> TrainOptions:
+def train_options(cell: Cell, seed: int) -> TrainOptions:
     """Return the options of a cell's training; mirroring is named here alone."""
     mirroring: dict[str, Any] = {"symmetry": cell.mirrored}
-    return TrainOptions(steps=QUICK_STEPS if quick else None, seed=seed, **mirroring)
+    return TrainOptions(steps=STEPS, seed=seed, **mirroring)
 
 
 def draw(cell: Cell, seed: int) -> tuple[Turnaround, Turnaround]:

@@ -49,14 +49,14 @@ class Seen:
     cameras_deg: tuple[float, ...]
 
 
-def measure(cell: Cell, seed: int, *, quick: bool) -> Seen:
+def measure(cell: Cell, seed: int) -> Seen:
     """Return what a sheet comes to; it is trained on with its true cameras.
 
     Cameras do not depend on mirroring: they are looked for where there is some.
     """
     made, exact = draw(cell, seed)
     began = time.process_time()
-    run = train(scene_of(made), train_options(cell, seed, quick=quick), threads=1)
+    run = train(scene_of(made), train_options(cell, seed), threads=1)
     spent = time.process_time() - began
     flip, layer = needed_flip(), default_layer(run.field)
     figures = []

@@ -29,7 +29,7 @@ def test_every_sheet_is_tried_with_mirror_images_and_without() -> None:
     for some in (whole, quick):
         for one, other in zip(some[::2], some[1::2], strict=True):
             assert (one.sheet, one.mirrored, other.mirrored) == (other.sheet, True, False)
-            own, others = (asdict(train_options(cell, 3, quick=True)) for cell in (one, other))
+            own, others = (asdict(train_options(cell, 3)) for cell in (one, other))
             assert len([name for name in own if own[name] != others[name]]) == 1
     assert {cell.views for cell in whole} == set(range(2, 9))
 
@@ -47,7 +47,7 @@ def test_a_cells_sheet_has_its_drawings_and_true_views_of_either_side() -> None:
 def test_the_table_has_medians_over_bodies(tmp_path: Path, monkeypatch) -> None:
     asked: list[tuple[Cell, int]] = []
 
-    def stand_in(cell: Cell, seed: int, *, quick: bool) -> Seen:
+    def stand_in(cell: Cell, seed: int) -> Seen:
         asked.append((cell, seed))
         return seen(cell, seed, 0.1 * seed)
 
@@ -68,6 +68,7 @@ def test_the_table_has_medians_over_bodies(tmp_path: Path, monkeypatch) -> None:
     assert {record["group"] for record in read_json(tmp_path / "records.json")} == {
         cell.sheet for cell in grid(quick=True)
     }
+    monkeypatch.setattr(command, "__version__", "another")
     refused = CliRunner().invoke(app, ["-o", str(tmp_path)])
     assert "--force" in str(refused.exception)
 
@@ -83,7 +84,7 @@ def test_records_say_which_way_is_better() -> None:
 
 @pytest.mark.slow
 def test_a_sheet_is_measured_whole() -> None:
-    found = measure(Cell(4, 1.0, mirrored=False), 0, quick=True)
+    found = measure(Cell(4, 1.0, mirrored=False), 0)
     assert all(0.8 < iou < 0.97 for iou in found.iou)
     assert all(0.01 < flip < 0.2 for flip in found.flip)
     assert found.cameras_deg == ()
