@@ -19,6 +19,7 @@ from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.corrections import PlacedCamera, PointPair
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.errors import CameraError, UsageError
+from toonset.symmetric import SYMMETRIC, Symmetric
 from toonset.view import View
 
 SQUARE = 1e-3  # a pixel may be this much higher than wide: rounding of a file
@@ -37,6 +38,8 @@ class Hints:
         lock: what stays as `init` has it (or yaw as labels have it): yaw, elevation, scale, fov.
         corrections: file of what a person said of single views of a sheet: cameras, locks, labels
             and landmarks; `split_sheet` takes the same file.
+        symmetric: whether left and right are mirror images, for whoever trains on the bundle:
+            "auto" (unless a drawing shows otherwise), "on" or "off".
     """
 
     labels: str = ""
@@ -45,15 +48,21 @@ class Hints:
     init: str | Path | None = None
     lock: tuple[str, ...] = ()
     corrections: str | Path | None = None
+    symmetric: Symmetric = "auto"
 
     def check(self) -> None:
         """Refuse what contradicts itself.
 
         Raises:
-            UsageError: `landmarks_only` without landmarks or beside what it does not use, or a
-                lock that does not exist, or corrections that say what other hints say.
+            UsageError: `symmetric` is not one of the three, `landmarks_only` without landmarks or
+                beside what it does not use, a lock that does not exist, or corrections that say
+                what other hints say.
             SheetError: the file of corrections is broken.
         """
+        if self.symmetric not in SYMMETRIC:
+            raise UsageError(
+                f"symmetric: {self.symmetric!r} is unknown; choose one of {', '.join(SYMMETRIC)}"
+            )
         unknown = [name for name in self.lock if name not in LOCKS]
         if unknown:
             raise UsageError(f"--lock: {unknown[0]!r} is none of {', '.join(LOCKS)}")
@@ -86,6 +95,7 @@ class Hints:
             "views": self.label_text(views) or None,
             "landmarks_only": self.landmarks_only,
             "locked": list(self.lock),
+            "symmetric": self.symmetric,
         }
 
 

@@ -28,6 +28,7 @@ from toonset.cli.common.output import (
     SeedOption,
     VerboseFlag,
 )
+from toonset.symmetric import Symmetric
 from toonset.write import check_output
 
 if TYPE_CHECKING:
@@ -119,6 +120,15 @@ def calibrate(
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = None,
+    symmetric: Annotated[
+        Symmetric,
+        typer.Option(
+            "--symmetric",
+            help="Left and right are mirror images: on, off, or auto (unless a drawing shows "
+            "otherwise). `toonset train` mirrors what nobody drew.",
+            rich_help_panel=KNOWN_PANEL,
+        ),
+    ] = "auto",
     boxes: BoxesOption = None,
     grid: GridOption = "",
     background: BackgroundOption = "",
@@ -148,7 +158,7 @@ def calibrate(
     from toonset.errors import UsageError
 
     lock = tuple(lock.value for lock in locked or ())
-    hints = Hints(labels, landmarks, landmarks_only, init, lock, corrections)
+    hints = Hints(labels, landmarks, landmarks_only, init, lock, corrections, symmetric)
     hints.check()
     if front is not None and (labels or landmarks_only):
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")

@@ -19,6 +19,7 @@ from toonset.cli.common.output import (
 from toonset.cli.common.train_run import Request, run
 from toonset.nerf.options import MOST_STEPS, DeviceName, FieldName, PresetName
 from toonset.nerf.options import preset as preset_options
+from toonset.symmetric import Symmetric
 
 WHILE_PANEL = "While it runs"
 MOST_BUDGET_S = 1e9
@@ -83,13 +84,14 @@ def train(
     no_fairing: Annotated[
         bool, typer.Option("--no-fairing", help="Keep the corners of the drawings' visual hull.")
     ] = False,
-    no_symmetry: Annotated[
-        bool,
+    symmetric: Annotated[
+        Symmetric | None,
         typer.Option(
-            "--no-symmetry",
-            help="Do not take an undrawn side from a symmetric body's mirror image.",
+            "--symmetric",
+            help="Mirror drawings for the side that nobody drew: auto unless a front or back shows "
+            "that left and right differ (default: as the bundle says, else auto).",
         ),
-    ] = False,
+    ] = None,
     no_palette: Annotated[
         bool, typer.Option("--no-palette", help="Colours only: no palette, no labels.")
     ] = False,
@@ -134,8 +136,9 @@ def train(
     finishes the step and writes the run as it stands; a second one leaves at once.
     """
     given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
+    given |= {"symmetric": symmetric}
     switches = {"fairing": no_fairing, "register": no_register}
-    switches |= {"unwarp": no_unwarp, "symmetry": no_symmetry, "mannequin": no_mannequin}
+    switches |= {"unwarp": no_unwarp, "mannequin": no_mannequin}
     given |= {name: False for name, off in switches.items() if off}
     root = bundle.parent if bundle.suffix.lower() == ".json" else bundle
     request = Request(

@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Any, Literal, get_args
 
 from toonset.errors import UsageError
+from toonset.symmetric import SYMMETRIC, Symmetric
 
 
 class Layer(StrEnum):
@@ -34,6 +35,7 @@ FORMATS = ("gif", "webp", "mp4", "sprites", "ora")  # of all views of a turn tog
 LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
 LEAST |= {"smoothness": 0, "palette_weight": 0}
 MOST_STEPS = 10_000_000  # days
+UNSAID = ("symmetric", None)  # the bundle says it
 ORIGINAL = "original"  # of a mesh's variants: the run's own colours
 FACES = 8000  # of a mesh at most: docs/decisions.md
 USUAL_STEPS, STEPS_ON_SHAPE = 600, 300  # by default: without the mannequin's shape, and with it
@@ -66,8 +68,9 @@ class TrainOptions:
             (off: --no-fairing).
         register: let cameras follow drawings that were placed or sized off (off: --no-register).
         unwarp: bend drawings back that disagree with the others' outlines (off: --no-unwarp).
-        symmetry: where drawings show that the body is its own mirror image, flip them for the side
-            that no drawing shows (off: --no-symmetry).
+        symmetric: mirror drawings for the side that no drawing shows: "auto" unless a front or back
+            shows that left and right differ, "on" whatever they show, "off" never; None: as the
+            bundle says, else "auto".
     """
 
     steps: int | None = None
@@ -84,7 +87,7 @@ class TrainOptions:
     fairing: bool = True
     register: bool = True
     unwarp: bool = True
-    symmetry: bool = True
+    symmetric: Symmetric | None = None
 
     def check(self) -> None:
         """Refuse options out of range.
@@ -103,8 +106,9 @@ class TrainOptions:
                 if not number or not LEAST[name] <= value <= most:
                     allowed = f"{LEAST[name]} is the least, {most:.15g} the most"
                     raise UsageError(f"{name}: {value} is out of range; {allowed}")
-        for name, choices in {"field": FIELDS, "device": DEVICES}.items():
-            if getattr(self, name) not in choices:
+        choices_of = {"field": FIELDS, "device": DEVICES, "symmetric": SYMMETRIC}
+        for name, choices in choices_of.items():
+            if getattr(self, name) not in choices and (name, getattr(self, name)) != UNSAID:
                 known = ", ".join(choices)
                 raise UsageError(f"{name}: {getattr(self, name)!r} is none of {known}")
 
@@ -135,5 +139,5 @@ def paper(steps: int = PAPER_STEPS) -> TrainOptions:
         smoothness=0.0,
         register=False,
         unwarp=False,
-        symmetry=False,
+        symmetric="off",
     )

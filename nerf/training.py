@@ -21,7 +21,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import working_threads
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.options import TrainOptions
-from toonset.nerf.prepare.symmetry import mirror_all
+from toonset.nerf.prepare.symmetry import add_mirrored_views, differences, find_symmetry
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.views import baked_of, keep, render
 from toonset.nerf.run.folder import WRITTEN
@@ -154,7 +154,8 @@ def train(
         told.detail(f"{count} CPU thread{'s' * (count > 1)}")
         scene = _with_palette(scene, told) if palette else drop_palette(scene)
         monitor = Monitor(looking or MonitorOptions(test=test))
-        for guess in guesses(mirror_all(scene) if options.symmetry else scene):
+        asked = options.symmetric or scene.symmetric
+        for guess in guesses(add_mirrored_views(scene, find_symmetry(scene, asked))):
             told.say(guess)
         training = fit_field(scene, options, told.progress, monitor)
         told.progress("laying the drawings over the field")
@@ -165,12 +166,12 @@ def train(
 def add_drawings(training: Training, scene: Scene) -> TrainedField:
     """Add the drawings of the drawn look to a field."""
     ready, baked = training.prepared, baked_of(training.result)
-    drawn = [frame.rgba for frame in scene.frames]
 
     def depth_of(camera: Camera) -> Float[np.ndarray, "height width"]:
         return render(baked, camera).depth
 
-    found = drawings_of(ready.scene, drawn, depth_of, ready.shape, bent=ready.bent)
+    seen, drawn = training.seen, add_mirrored_views(scene, training.symmetry)
+    found = drawings_of(seen, drawn, depth_of, ready.shape, differences(seen), bent=ready.bent)
     result = replace(training.result, drawings=found)
     keep(result, baked)
     return result

@@ -56,7 +56,7 @@ METHODS: dict[str, Method] = {
     "without registration": Method(TrainOptions(register=False)),
     "without unwarping": Method(TrainOptions(unwarp=False)),
     "without both": Method(TrainOptions(register=False, unwarp=False)),
-    "without symmetry": Method(TrainOptions(symmetry=False)),
+    "without symmetry": Method(TrainOptions(symmetric="off")),
     "without hull": Method(TrainOptions(carve=False), fewer=False, slow=True),
     "voxel": Method(TrainOptions(), field=voxels),
     "mlp": Method(TrainOptions(), slow=True, field=network),

@@ -14,7 +14,8 @@ RENAMED = {  # switches of before
     "--as-bent": "--no-unwarp",
     "--as-carved": "--no-fairing",
     "--as-placed": "--no-register",
-    "--one-sided": "--no-symmetry",
+    "--one-sided": "--symmetric off",
+    "--no-symmetry": "--symmetric off",
 }
 PLACES_AT_FAULT = (  # what the system says of a place that the user has named, wherever it is used
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP),

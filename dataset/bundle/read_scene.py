@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from jaxtyping import UInt8
 
 from toonset.camera import Camera
+from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.bundle.transforms_read import (
     PosedPicture,
@@ -24,8 +26,9 @@ from toonset.palette.extract import IN_LIGHT, IN_SHADOW
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.symmetric import SYMMETRIC, Symmetric
 
-MANNEQUIN = "mannequin.obj"
+MANNEQUIN, CALIBRATION = "mannequin.obj", "calibration.json"
 Labels = UInt8[np.ndarray, "height width"]
 
 
@@ -37,7 +40,7 @@ def read_scene(path: Path) -> Scene:
 
     Raises:
         BundleError: a file is missing, broken, of another size than its camera says, or outside
-            of the folder.
+            of the folder; calibration.json is broken.
         MeshError: mannequin.obj is broken.
         PaletteError: palette.json is broken.
         PictureError: a picture cannot be read.
@@ -55,8 +58,26 @@ def read_scene(path: Path) -> Scene:
         frames.append(Frame(Path(frame.file_path).name, frame.camera, rgba, labels))
     mannequin = member(root, MANNEQUIN)
     mesh = None if mannequin is None else load_mesh(mannequin)
+    said = symmetric_of(root)
     colors, shadow = (None, None) if palette is None else (palette.rgb, palette.shadow)
-    return Scene(tuple(frames), colors, str(path), mesh, shadow)
+    return Scene(tuple(frames), colors, str(path), mesh, shadow, said)
+
+
+def symmetric_of(root: Path) -> Symmetric:
+    """Return whether left and right are mirror images, as calibration.json says; else "auto".
+
+    Raises:
+        BundleError: it lies elsewhere or is broken.
+    """
+    file = member(root, CALIBRATION)
+    if file is None:
+        return "auto"
+    said = read_calibration(file).options.get("symmetric", "auto")
+    if said not in SYMMETRIC:
+        raise BundleError(
+            f"{file}: options: symmetric: {said!r} is unknown; write {' or '.join(SYMMETRIC)}"
+        )
+    return cast(Symmetric, said)
 
 
 def read_palette_of(root: Path) -> Palette | None:

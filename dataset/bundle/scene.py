@@ -10,6 +10,7 @@ from jaxtyping import UInt8
 from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.palette.palette import Shadow
+from toonset.symmetric import Symmetric
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,12 +22,14 @@ class Frame:
         camera: where it was taken from; `camera.size_wh` is the picture's size.
         rgba: (height, width, 4) sRGB with straight alpha.
         labels: (height, width) palette index per pixel, 255 = unlabelled; None without palette.
+        mirrored: it is the mirror image of a drawing, nobody drew it.
     """
 
     name: str
     camera: Camera
     rgba: UInt8[np.ndarray, "height width 4"]
     labels: UInt8[np.ndarray, "height width"] | None = None
+    mirrored: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +41,7 @@ class Scene:
         palette: (colors, 3) sRGB that `Frame.labels` index; None without palette.
         name: where it came from, for messages.
         mannequin: as calibration fitted it, in the cameras' world; None: there is none.
+        symmetric: whether the artist says that the sides are mirror images: "auto", "on" or "off".
         shadow: of drawings that are shaded in two tones; None: they are flat, or nobody looked.
     """
 
@@ -46,3 +50,4 @@ class Scene:
     name: str
     mannequin: Mesh | None = None
     shadow: Shadow | None = None
+    symmetric: Symmetric = "auto"

@@ -23,7 +23,6 @@ from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
     Drawings,
-    Seen,
     Texture,
     crisp_depth,
     filled,
@@ -52,7 +51,10 @@ STRAY = 4e-4  # of the squared height: smaller patches are no drawing's
 SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
 THIRDS = 2  # further drawings that are asked
 SAME = 1e-9  # radians: seen from one side
-OWN = 0.12  # radians off a drawing's own camera, in which the view becomes the drawing
+# Radians off a drawing's own camera, in which the view becomes the drawing; where the others were
+# made to agree and it was bent or moved for that, the less, the steadier
+OWN, OWN_BENT = 0.12, 0.04
+DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +98,8 @@ class DrawnView:
         ink: (height, width) share of every pixel that lines cover.
         labels: (height, width) of `Drawings.paints`.
         paint: (height, width, 3) straight colour under the lines, in [0, 1].
-        by_field: share of the figure's pixels that have the field's colour: no drawing shows them.
+        source: (height, width) of a pixel's paint: DRAWN; MIRRORED, where only the mirror image of
+            a drawing shows the place; GUESSED, which is the field's colour.
     """
 
     rgb: Float[np.ndarray, "height width 3"]
@@ -104,7 +107,17 @@ class DrawnView:
     ink: Float[np.ndarray, "height width"]
     labels: UInt8[np.ndarray, "height width"]
     paint: Float[np.ndarray, "height width 3"]
-    by_field: float
+    source: UInt8[np.ndarray, "height width"]
+
+    @property
+    def by_field(self) -> float:
+        """Return the share of the figure's pixels that no drawing shows."""
+        return self.share(GUESSED)
+
+    def share(self, source: int) -> float:
+        """Return the share of the figure's pixels whose paint comes from a source."""
+        solid = self.alpha >= SOLID
+        return float((solid & (self.source == source)).sum() / max(solid.sum(), 1))
 
     def palette_labels(self, colors: int) -> UInt8[np.ndarray, "height width"]:
         """Return the labels of a palette's colours; 255 beside the figure and on other ink."""
@@ -153,17 +166,28 @@ def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
         np.zeros((height, width), np.float32),
         np.zeros((height, width), np.uint8),
         np.zeros((height, width, 3), np.float32),
-        0.0,
+        np.zeros((height, width), np.uint8),
     )
+    fitting, border = drawings.fitting(view.camera.scale), _border(drawings, view)
     shape = drawings.shape
     box = _box(view.alpha > 0) if shape is None else shape.box(view.camera)
+    if _own_part(fitting, view.camera)[1] > 0:  # a drawing may show more than the surface has
+        box = (slice(0, height), slice(0, width))
     if box is None:
         return result
-    fitting, border = drawings.fitting(view.camera.scale), _border(drawings, view)
     part = _drawn(fitting, view.crop(*box), border)
-    for name in ("rgb", "alpha", "ink", "labels", "paint"):
+    for name in ("rgb", "alpha", "ink", "labels", "paint", "source"):
         getattr(result, name)[box] = getattr(part, name)
-    return replace(result, by_field=part.by_field)
+    return result
+
+
+def _own_part(drawings: Drawings, camera: Camera) -> tuple[int, np.float32]:
+    """Return the drawing nearest to a view, and how far the view is that drawing itself, 0 to 1."""
+    forward = np.stack([view.camera.rotation[2] for view in drawings.views])
+    turns = np.arccos(np.clip(forward @ camera.rotation[2], -1, 1))
+    nearest_one = int(turns.argmin())
+    reach = OWN if drawings.views[nearest_one].original is None else OWN_BENT
+    return nearest_one, np.float32(_eased(max(0.0, 1 - float(turns[nearest_one]) / reach)))
 
 
 def _box(mask: Bool[np.ndarray, "height width"], room: int = 4) -> tuple[slice, slice] | None:
@@ -186,7 +210,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     figure_px = drawings.height * camera.scale
     cameras = [texture.camera for texture in drawings.textures]
     first, second, share = flanking(cameras, camera)
-    candidates, covered, own = _candidates(
+    candidates, covered, by_drawing = _candidates(
         drawings, view, points, own_color, (first, second, share)
     )
     color, labels = _voted(candidates, view, len(drawings.paints), STRAY * figure_px**2)
@@ -195,19 +219,29 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
             covered, view.depth, STEP * drawings.height, SLIVER * figure_px
         )
         color, labels = color[tuple(source)], labels[tuple(source)]
+        by_drawing = by_drawing[tuple(source)]
+    source = np.where(by_drawing, DRAWN, np.where(covered, MIRRORED, GUESSED)).astype(np.uint8)
     solid = view.alpha > SOLID
-    by_field = float((solid & ~covered).sum() / max(solid.sum(), 1))
     if solid.any():
         at = nearest(solid)
         color, labels = color[at], labels[at]
     if sight is not None and drawings.shade is not None:
         color = color * drawings.shade.tone(smoothed(sight.normal, figure_px), FINER)
     scale = camera.scale / cameras[first].scale
-    turn = float(np.arccos(np.clip(cameras[first].rotation[2] @ camera.rotation[2], -1, 1)))
-    whole = cv2.remap(drawings.textures[first].whole, own.x, own.y, cv2.INTER_CUBIC).clip(0, 1)
-    part = np.float32(_eased(max(0.0, 1 - turn / OWN)))
+    own, part = _own_part(drawings, camera)
+    whole = _as_drawn(drawings.textures[own], points)
     rgb, alpha, ink = _inked(drawings, view, color, border, scale, sight, whole, part)
-    return DrawnView(rgb, alpha, ink, labels, color, by_field)
+    if part == 1:
+        source[...] = MIRRORED if drawings.views[own].mirrored else DRAWN
+    return DrawnView(rgb, alpha, ink, labels, color, source)
+
+
+def _as_drawn(texture: Texture, points: Float[np.ndarray, "h w 3"]) -> Float[np.ndarray, "h w 4"]:
+    """Return a drawing as it is on the sheet where surface points lie in it, premultiplied."""
+    pixels, _, _ = texture.drawn_by.project(points)
+    x, y = (np.nan_to_num(pixels[..., k] - 0.5, nan=-1e4).astype(np.float32) for k in (0, 1))
+    x, y = np.round(x, 3), np.round(y, 3)  # at the drawing's own camera its very pixels
+    return np.asarray(cv2.remap(texture.drawn, x, y, cv2.INTER_CUBIC).clip(0, 1))
 
 
 def _inked(
@@ -229,7 +263,7 @@ def _inked(
         border: opacity at the outline.
         scale: of the view over the nearest drawing's.
         sight: what the view shows of the mannequin's shape, if the field is one.
-        whole: the nearest drawing, premultiplied, moved to the view.
+        whole: the nearest drawing as it is on the sheet, premultiplied, moved to the view.
         part: of it in the result.
     """
     pen = drawings.pen
@@ -244,8 +278,11 @@ def _inked(
     drawn_with = np.array(pen.rgb if pen else (0, 0, 0)) / np.float32(255)
     rgb = paint * (alpha - ink)[..., None] + ink[..., None] * drawn_with
     if pen == drawings.outline:  # the drawing's own line, too
-        rgb = rgb + part * (np.minimum(whole[..., :3], whole[..., 3:]) - rgb)
-        alpha = alpha + part * (whole[..., 3] - alpha)
+        drawn = np.minimum(whole[..., :3], whole[..., 3:])
+        mixed = part * whole[..., 3:] * alpha[..., None]
+        rgb = rgb * (1 - part * whole[..., 3:]) + mixed * drawn / np.maximum(whole[..., 3:], 1e-6)
+        last = max(np.float32(0), 2 * part - 1)  # what the surface lacks is there as a whole or not
+        rgb, alpha = rgb + last * (drawn - rgb), alpha + last * (whole[..., 3] - alpha)
     return rgb, alpha, ink
 
 
@@ -276,8 +313,8 @@ def _candidates(
     points: Float[np.ndarray, "h w 3"],
     own_color: Float[np.ndarray, "h w 3"],
     between: tuple[int, int, float],
-) -> tuple[list[_Candidate], Bool[np.ndarray, "h w"], Seen]:
-    """Return candidates of drawings and field, the pixels shown, and the first's places."""
+) -> tuple[list[_Candidate], Bool[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+    """Return candidates, the pixels that a drawing shows, and those that no mirror image has to."""
     first, second, share = between
     there = np.isfinite(view.depth)
     textures = drawings.textures
@@ -287,19 +324,18 @@ def _candidates(
     if found is not None:
         flow = np.float32(found[1]) * found[0].at(points)
     covered, candidates = np.zeros(there.shape, dtype=bool), []
-    own = None
+    by_drawing = covered.copy()
     for number, part, weight in ((first, -(1 - share), share), (second, share, 1 - share)):
-        if own is not None and weight == 0:
+        if weight == 0:
             continue
         texture = textures[number]
         seen = look_up(texture, points, slack, least)
-        own = own or seen
         mask = seen.mask & there
         places = seen.moved(flow, part)
         trust = _trust(sample_picture(texture.to_edge, places, cv2.INTER_LINEAR)) * _feathered(mask)
         candidates.append(_candidate(texture, places, np.float32(weight) * trust))
         covered |= mask
-    assert own is not None
+        by_drawing |= mask & (not drawings.views[number].mirrored)
     for number in _others(drawings, view.camera, (first, second)):
         if (covered | ~there).all():
             break
@@ -309,8 +345,9 @@ def _candidates(
             weight = SIDE_VOTE * gap.astype(np.float32)
             candidates.append(_candidate(textures[number], (seen.x, seen.y), weight))
             covered |= gap
+            by_drawing |= gap & (not drawings.views[number].mirrored)
     candidates.append(_of_field(own_color, drawings, covered))
-    return candidates, covered, own
+    return candidates, covered, by_drawing
 
 
 def _others(drawings: Drawings, camera: Camera, used: tuple[int, int]) -> list[int]:

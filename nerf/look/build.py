@@ -7,14 +7,15 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 
-from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import has_figure, mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.drawings import Drawing, Drawings, levels_of
+from toonset.nerf.look.drawings import STEP, Drawing, Drawings, Original, levels_of
 from toonset.nerf.look.flat_paint import flat_paint
+from toonset.nerf.look.mirrored import denied_places
 from toonset.nerf.look.outline import outline_of
 from toonset.nerf.look.paint_flow import Depths, pair_flows
 
@@ -23,24 +24,31 @@ COARSE, MOST_COLORS = 32, 12  # levels of a channel that count as one; colours
 
 def drawings_of(
     ready: Scene,
-    drawn: Sequence[UInt8[np.ndarray, "height width 4"]],
+    drawn: Scene,
     depth_of: Depths,
     shape: Shape | None = None,
+    differences: Sequence[Bool[np.ndarray, "height width"] | None] = (),
     *,
     bent: bool,
 ) -> Drawings | None:
     """Build the drawn look's drawings; None if no drawing, or no field, shows a figure.
 
     Args:
-        ready: the drawings as they were trained on.
-        drawn: the same before they were bent, which blurs lines: the outline is measured there.
+        ready: the drawings as they were trained on, mirrored ones behind them.
+        drawn: the same as they are on the sheet. Bending blurs lines: the outline is measured here.
         depth_of: the field's surface as a camera sees it, nan where there is none.
         shape: the mannequin's, where it is the character's: the surface is its own then.
+        differences: per drawing along the mirror plane where it shows that left and right differ,
+            None of others; empty where nothing is mirrored.
         bent: whether they were bent.
     """
-    frames = [frame for frame in ready.frames if has_figure(frame)]
-    if not frames:
+    known = [*differences, *[None] * (len(ready.frames) - len(differences))]
+    rows = [
+        row for row in zip(ready.frames, drawn.frames, known, strict=True) if has_figure(row[0])
+    ]
+    if not rows:
         return None
+    frames = [frame for frame, _, _ in rows]
     sights = None
     if shape is not None:
         sights = [shape.seen(frame.camera, normals=True) for frame in frames]
@@ -52,18 +60,33 @@ def drawings_of(
         return None
     extent = (float(seen.min()), float(seen.max()))
     height = float(np.median([_tall(frame.rgba) / frame.camera.scale for frame in frames]))
-    line = outline_of(drawn)
+    line = outline_of([own.rgba for own in drawn.frames if not own.mirrored])
     flat = flat_paint([frame.rgba for frame in frames], line, sights, height)
+    denied = denied_places(frames, depths, [differs for _, _, differs in rows], STEP * height)
+    shown = [np.where(out, np.nan, depth) for out, depth in zip(denied, depths, strict=True)]
     views = tuple(
         Drawing(
-            frame.camera, frame.rgba, paint, levels_of(depth, extent) if shape is None else None
+            frame.camera,
+            frame.rgba,
+            paint,
+            levels_of(depth, extent) if shape is None else None,
+            frame.mirrored,
+            _original(frame, own),
         )
-        for frame, paint, depth in zip(frames, flat.paints, depths, strict=True)
+        for (frame, own, _), paint, depth in zip(rows, flat.paints, shown, strict=True)
     )
     palette = ready.palette if ready.palette is not None else _common_colors(views)
     found = Drawings(views, (), line, line, palette, height, extent, bent, shape)
     found = replace(found, steps=flat.steps, shade=flat.shade, shadow=ready.shadow)
     return replace(found, flows=pair_flows(found, depth_of))
+
+
+def _original(frame: Frame, own: Frame) -> Original | None:
+    """Return a drawing as it is on the sheet; None where it was neither bent nor moved."""
+    cameras = (frame.camera, own.camera)
+    points = [camera.project(np.eye(3)) for camera in cameras]
+    kept = np.array_equal(frame.rgba, own.rgba) and np.array_equal(points[0][0], points[1][0])
+    return None if kept else Original(own.camera, own.rgba)
 
 
 def _tall(rgba: UInt8[np.ndarray, "height width 4"]) -> int:

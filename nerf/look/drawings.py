@@ -32,6 +32,19 @@ Places = tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]
 
 
 @dataclass(frozen=True, eq=False)
+class Original:
+    """A drawing as it is on the sheet.
+
+    Attributes:
+        camera: that calibration found.
+        rgba: (height, width, 4) sRGB with straight alpha.
+    """
+
+    camera: Camera
+    rgba: UInt8[np.ndarray, "height width 4"]
+
+
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """One drawing, agreeing with the others, and the surface that it shows.
 
@@ -40,13 +53,23 @@ class Drawing:
         rgba: (height, width, 4) sRGB with straight alpha.
         paint: (height, width, 3) of `toonset.nerf.look.flat_paint`.
         levels: (height, width) depth of the field's surface, 1 to 255 over `Drawings.depths`; 0
-            where there is none; None: the surface is the mannequin's.
+            where there is none, or a mirrored drawing does not hold; None: the surface is the
+            mannequin's.
+        mirrored: it is the mirror image of another.
+        original: how it was drawn; None: just so.
     """
 
     camera: Camera
     rgba: UInt8[np.ndarray, "height width 4"]
     paint: UInt8[np.ndarray, "height width 3"]
     levels: UInt8[np.ndarray, "height width"] | None
+    mirrored: bool = False
+    original: Original | None = None
+
+    @property
+    def as_drawn(self) -> Original:
+        """Return the drawing as it is on the sheet."""
+        return self.original or Original(self.camera, self.rgba)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,11 +164,14 @@ class Drawings:
         plain = [_opaque(view.paint) for view in self.views]
         labels = paint_labels(plain, paints, shadow)
         plain = repainted(plain, paints, new, shadow)
-        whole = repainted([view.rgba for view in self.views], paints, new, self.drawn_shadow)
-        parts = zip(self.views, whole, plain, labels, strict=True)
+        whole, drawn = (
+            repainted(pictures, paints, new, self.drawn_shadow)
+            for pictures in ([v.rgba for v in self.views], [v.as_drawn.rgba for v in self.views])
+        )
+        parts = zip(self.views, whole, drawn, plain, labels, strict=True)
         return tuple(
-            _texture(replace(view, rgba=rgba, paint=paint[..., :3]), label, self)
-            for view, rgba, paint, label in parts
+            _texture(replace(view, rgba=rgba, paint=paint[..., :3]), own, label, self)
+            for view, rgba, own, paint, label in parts
         )
 
     def depth(self, view: Drawing) -> Float[np.ndarray, "height width"]:
@@ -196,6 +222,8 @@ class Texture:
     Attributes:
         camera: that saw it.
         whole: (height, width, 4) premultiplied, in [0, 1].
+        drawn_by: the camera that calibration found.
+        drawn: (rows, columns, 4) how it is on the sheet, premultiplied.
         paint: (height, width, 3) straight colour in [0, 1]: see `Drawing`.
         labels: (height, width) of this paint.
         far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it, and
@@ -205,6 +233,8 @@ class Texture:
 
     camera: Camera
     whole: Float[np.ndarray, "height width 4"]
+    drawn_by: Camera
+    drawn: Float[np.ndarray, "rows columns 4"]
     paint: Float[np.ndarray, "height width 3"]
     labels: UInt8[np.ndarray, "height width"]
     far: Float[np.ndarray, "height width"]
@@ -234,14 +264,22 @@ class Seen:
 def _half(view: Drawing) -> Drawing:
     """Return a drawing averaged over blocks of 2 x 2 pixels."""
     even = [(0, size % 2) for size in view.rgba.shape[:2]]
-    rgba = np.pad(view.rgba, [*even, (0, 0)]).astype(np.float32)
     paint = np.pad(view.paint, [*even, (0, 0)], mode="edge").astype(np.float32)
+    levels = None if view.levels is None else np.pad(view.levels, even)[::2, ::2].copy()
+    own = _half_size(Original(view.camera, view.rgba))
+    original = None if view.original is None else _half_size(view.original)
+    flat = _rounded(_in_blocks(paint))
+    return Drawing(own.camera, own.rgba, flat, levels, view.mirrored, original)
+
+
+def _half_size(picture: Original) -> Original:
+    even = [(0, size % 2) for size in picture.rgba.shape[:2]]
+    rgba = np.pad(picture.rgba, [*even, (0, 0)]).astype(np.float32)
     rgba[..., :3] *= rgba[..., 3:] / 255
     mean = _in_blocks(rgba)
     mean[..., :3] *= 255 / np.maximum(mean[..., 3:], 1e-6)
-    levels = None if view.levels is None else np.pad(view.levels, even)[::2, ::2].copy()
-    camera = replace(view.camera, size_wh=(rgba.shape[1], rgba.shape[0])).resized(0.5)
-    return Drawing(camera, _rounded(mean), _rounded(_in_blocks(paint)), levels)
+    camera = replace(picture.camera, size_wh=(rgba.shape[1], rgba.shape[0])).resized(0.5)
+    return Original(camera, _rounded(mean))
 
 
 def _in_blocks(picture: Float[np.ndarray, "height width c"]) -> Float[np.ndarray, "rows columns c"]:
@@ -275,12 +313,13 @@ def _opaque(paint: UInt8[np.ndarray, "height width 3"]) -> UInt8[np.ndarray, "he
 
 
 def _texture(
-    view: Drawing, labels: UInt8[np.ndarray, "height width"], drawings: Drawings
+    view: Drawing,
+    drawn: UInt8[np.ndarray, "rows columns 4"],
+    labels: UInt8[np.ndarray, "height width"],
+    drawings: Drawings,
 ) -> Texture:
     depth, height = drawings.depth(view), drawings.height
     inside = depth_inside(mask_of(view.rgba))
-    whole = view.rgba / np.float32(255)
-    whole[..., :3] *= whole[..., 3:]
     seen, deep = np.isfinite(depth), filled(depth)
     if view.levels is None:
         seen &= deep - cv2.erode(deep, AROUND) <= STEP * height
@@ -289,12 +328,22 @@ def _texture(
     to_edge = np.minimum(inside, to_step).clip(0, FARTHEST_PX)
     return Texture(
         view.camera,
-        whole,
+        _premultiplied(view.rgba),
+        view.as_drawn.camera,
+        _premultiplied(drawn),
         view.paint / np.float32(255),
         labels,
         far.astype(np.float32),
         to_edge.astype(np.float32),
     )
+
+
+def _premultiplied(
+    rgba: UInt8[np.ndarray, "height width 4"],
+) -> Float[np.ndarray, "height width 4"]:
+    whole = rgba / np.float32(255)
+    whole[..., :3] *= whole[..., 3:]
+    return whole
 
 
 def look_up(

@@ -2,7 +2,8 @@
 
 Where the mannequin is the body that was drawn, drawings are bent to show it (`to_mannequin`). Else
 each only where the drawings ask for it: cameras follow drawings that were placed or
-sized off (`registration`), bends are taken out of drawings (`unwarp`).
+sized off (`registration`), bends are taken out of drawings (`unwarp`). Drawings whose shape is made
+of sections are left as they are: so few outlines would be bent to fit each other's errors.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.hull.mannequin_fit import MannequinFit
 from toonset.nerf.hull.mannequin_shape import Shape
+from toonset.nerf.hull.scene_hull import has_sections
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.paint_agreement import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.registration import Registration, register_drawings
@@ -34,6 +36,7 @@ class Prepared:
         paint: what their paint said of bends and colours; None: drawings were not bent.
         mannequin: what speaks for the mannequin's shape; None: there is none, or switched off.
         shape: the mannequin's, where it is the character's; None: it is not.
+        compared: whether outlines were compared; else nobody knows whether they agree.
     """
 
     scene: Scene
@@ -43,6 +46,7 @@ class Prepared:
     paint: PaintAgreement | None = None
     mannequin: MannequinFit | None = None
     shape: Shape | None = None
+    compared: bool = True
 
     @property
     def apart_px(self) -> float:
@@ -62,7 +66,7 @@ class Prepared:
 
         Bent drawings never do: their faces and seams are drawn as wrongly as their outlines.
         """
-        return not self.bent and self.apart_px < AGREE_PX
+        return self.compared and not self.bent and self.apart_px < AGREE_PX
 
     def to_json(self) -> dict[str, Any]:
         """Return what was found and done, for a report."""
@@ -88,9 +92,12 @@ def prepare(scene: Scene, options: TrainOptions) -> Prepared:
     given = posed(scene, unwarp=options.unwarp) if options.mannequin else Posed.left_alone(scene)
     straight, unwarping = given.scene, given.unwarping
     registration = None
-    if given.shape is None:
+    compared = given.shape is not None or not has_sections(scene, options)
+    if given.shape is None and compared:
         straight, registration, unwarping = aligned(scene, options.register, options.unwarp)
-    return Prepared(straight, given.drawn, registration, unwarping, None, given.fit, given.shape)
+    return Prepared(
+        straight, given.drawn, registration, unwarping, None, given.fit, given.shape, compared
+    )
 
 
 def agree_on_paint(ready: Prepared, depth_of: Depths, height: float) -> Prepared:

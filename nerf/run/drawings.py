@@ -1,6 +1,7 @@
 """Write and read the drawn look's files.
 
     drawings.png            the drawings as they were trained on, side by side, tops aligned
+    originals.png           those of them that were bent or moved, as they are on the sheet
     paint.png               the same without outlines and what else new views have drawn anew
     drawings.safetensors    flow.0   (h, w, 2) how far paint lies apart, of the first pair, and on
                             depth    (height, all widths) levels of the field's surface in each; or
@@ -30,7 +31,7 @@ from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
 from toonset.errors import BundleError, CameraError
 from toonset.nerf.hull.mannequin_shape import MOST_FACES, MOST_STEPS, Shape
-from toonset.nerf.look.drawings import Drawing, Drawings, PairFlow
+from toonset.nerf.look.drawings import Drawing, Drawings, Original, PairFlow
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.step_lines import StepLines
@@ -38,6 +39,7 @@ from toonset.palette.palette import Shadow
 from toonset.write import write_bytes
 
 PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
+ORIGINALS = "originals.png"
 MAX_BYTES = 512 * 2**20
 LONGEST_PX = 4096.0  # a displacement, or how wide a line is
 MOST_VIEWS = 4096
@@ -63,6 +65,14 @@ class PairRecord(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     pair: tuple[Count, Count]
+    camera: NativeCamera
+
+
+class OriginalRecord(BaseModel):
+    """A drawing as it is on the sheet: its number among the drawings, and its camera."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    number: Count
     camera: NativeCamera
 
 
@@ -117,6 +127,8 @@ class DrawingsRecord(BaseModel):
     steps: StepsRecord | None
     shade: ShadeRecord | None
     shadow: ShadowRecord | None = None
+    mirrored: list[Count] = Field(default=[], max_length=MOST_VIEWS)
+    originals: list[OriginalRecord] = Field(default=[], max_length=MOST_VIEWS)
 
     @classmethod
     def of(cls, drawings: Drawings) -> DrawingsRecord:
@@ -136,6 +148,12 @@ class DrawingsRecord(BaseModel):
                 "steps": drawings.steps and asdict(drawings.steps),
                 "shade": drawings.shade and asdict(drawings.shade),
                 "shadow": drawings.shadow and asdict(drawings.shadow),
+                "mirrored": [i for i, view in enumerate(drawings.views) if view.mirrored],
+                "originals": [
+                    {"number": i, "camera": NativeCamera.of(view.original.camera)}
+                    for i, view in enumerate(drawings.views)
+                    if view.original
+                ],
             }
         )
 
@@ -149,6 +167,9 @@ def write_drawings(folder: Path, drawings: Drawings) -> None:
     views = drawings.views
     write_bytes(folder / PICTURES, encode_png(_side_by_side([view.rgba for view in views])))
     write_bytes(folder / PAINT, encode_png(_side_by_side([view.paint for view in views])))
+    originals = [view.original.rgba for view in views if view.original]
+    if originals:
+        write_bytes(folder / ORIGINALS, encode_png(_side_by_side(originals)))
     tensors = {f"flow.{i}": flow.flow for i, flow in enumerate(drawings.flows)}
     if drawings.shape is None:
         levels = [view.levels for view in views if view.levels is not None]
@@ -170,10 +191,12 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
     try:
         cameras = [camera.camera() for camera in record.cameras]
         places = [pair.camera.camera() for pair in record.pairs]
+        drawn_by = [original.camera.camera() for original in record.originals]
     except (BundleError, CameraError) as error:
         where = f"{folder / 'config.json'}: field.drawings"
         raise BundleError(f"{where}: {error}; train again") from error
     rgba, paint = (_apart(_picture(folder / name, cameras), cameras) for name in (PICTURES, PAINT))
+    originals = _originals(folder, record, drawn_by)
     file = folder / SURFACES
     found = load_tensors(file)
     _check_tensors(found, record, cameras, places, file)
@@ -191,7 +214,10 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
     if shape is None:
         levels = [*_apart(found["depth"].numpy(), cameras)]
     parts = zip(cameras, rgba, paint, levels, strict=True)
-    views = tuple(Drawing(c, own, flat[..., :3], level) for c, own, flat, level in parts)
+    views = tuple(
+        Drawing(camera, own, flat[..., :3], level, i in record.mirrored, originals.get(i))
+        for i, (camera, own, flat, level) in enumerate(parts)
+    )
     line = None if record.outline is None else Outline(**record.outline.model_dump())
     return Drawings(
         views,
@@ -207,6 +233,17 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         None if record.shade is None else Shade(**record.shade.model_dump()),
         None if record.shadow is None else Shadow(**record.shadow.model_dump()),
     )
+
+
+def _originals(
+    folder: Path, record: DrawingsRecord, cameras: Sequence[Camera]
+) -> dict[int, Original]:
+    """Return the drawings that are kept as they are on the sheet, by number."""
+    if not cameras:
+        return {}
+    pictures = _apart(_picture(folder / ORIGINALS, cameras), cameras)
+    parts = zip(record.originals, cameras, pictures, strict=True)
+    return {own.number: Original(camera, rgba) for own, camera, rgba in parts}
 
 
 def _whole(cameras: Sequence[Camera]) -> tuple[int, int]:

@@ -32,6 +32,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.run.drawings import (
+    ORIGINALS,
     PAINT,
     PICTURES,
     SURFACES,
@@ -47,7 +48,17 @@ from toonset.write import write_bytes
 
 CONFIG, MODEL = "config.json", "model.safetensors"
 WRITTEN = (
-    *(MODEL, CONFIG, "metrics.json", "history.csv", "preview.png", PICTURES, PAINT, SURFACES),
+    *(
+        MODEL,
+        CONFIG,
+        "metrics.json",
+        "history.csv",
+        "preview.png",
+        PICTURES,
+        ORIGINALS,
+        PAINT,
+        SURFACES,
+    ),
     "manifest.json",  # of runs of before, which --force may replace
 )
 FORMAT = 5

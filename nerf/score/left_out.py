@@ -66,7 +66,7 @@ class LeftOut:
     paint: str
 
 
-def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
+def left_out(baked: Baked, seen: Scene, drawn: Scene) -> list[LeftOut]:
     """Return every drawing as the others predict it; empty for fewer than FEWEST drawings.
 
     Where drawings have no outline, the drawing counts as far off as the field's own colours, if
@@ -74,15 +74,16 @@ def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
 
     Args:
         baked: a field with its drawings.
-        prepared: the drawings as they were trained on.
-        drawn: the same as they were drawn.
+        seen: the drawings as they were trained on, mirrored ones behind them.
+        drawn: those that somebody drew, as they were drawn.
     """
     drawings = baked.trained.drawings
     if drawings is None:
         return []
-    compared = prepared if drawings.shape is not None else drawn
-    pairs = zip(prepared.frames, compared.frames, strict=True)
-    frames = [own for ready, own in pairs if has_figure(ready)]
+    ready = [frame for frame in seen.frames if not frame.mirrored]
+    compared = ready if drawings.shape is not None else drawn.frames
+    frames = [own for frame, own in zip(ready, compared, strict=True) if has_figure(frame)]
+    names = [frame.name for frame in seen.frames if has_figure(frame)]
     if len(frames) < FEWEST:
         return []
     drawings = drawings.fitting(TALL_PX / drawings.height)
@@ -92,8 +93,8 @@ def left_out(baked: Baked, prepared: Scene, drawn: Scene) -> list[LeftOut]:
     def one(number: int) -> LeftOut:
         camera = small_camera(drawings, number)
         view = render(baked, camera)
-        seen = Geometry(camera, view.alpha, view.depth, view.rgb, view.shares)
-        return predicted(drawings, number, seen, frames, field=field)
+        shown = Geometry(camera, view.alpha, view.depth, view.rgb, view.shares)
+        return predicted(drawings, number, shown, frames[number], names, field=field)
 
     return side_by_side([partial(one, i) for i in range(len(frames))])
 
@@ -105,7 +106,13 @@ def small_camera(drawings: Drawings, number: int) -> Camera:
 
 
 def predicted(
-    drawings: Drawings, number: int, view: Geometry, frames: Sequence[Frame], *, field: bool = False
+    drawings: Drawings,
+    number: int,
+    view: Geometry,
+    frame: Frame,
+    names: Sequence[str],
+    *,
+    field: bool = False,
 ) -> LeftOut:
     """Return a drawing as the others predict it.
 
@@ -113,11 +120,12 @@ def predicted(
         drawings: of about the size of the view.
         number: of the drawing.
         view: of the field, by `small_camera`.
-        frames: what it is compared with, in the same order.
+        frame: what it is compared with.
+        names: of all drawings, in their order.
         field: the field's own colours count, too.
     """
-    frame, others = frames[number], drawings.without(number)
-    names = [own.name for i, own in enumerate(frames) if i != number]
+    others = drawings.without(number)
+    beside = [name for i, name in enumerate(names) if i != number]
     first, second, _ = flanking([one.camera for one in others.views], view.camera)
     found = blend_view(others, view)
     size = view.camera.size_wh
@@ -132,7 +140,7 @@ def predicted(
     labels = cv2.resize(drawings.textures[number].labels, size, interpolation=cv2.INTER_NEAREST)
     return LeftOut(
         frame.name,
-        tuple(dict.fromkeys((names[first], names[second]))),
+        tuple(dict.fromkeys((beside[first], beside[second]))),
         float(apart.sum()) / max(by_pixel(drawn), 1e-9) / TALL_PX,
         float((apart > PLAIN)[figure].mean()),
         place,

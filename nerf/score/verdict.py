@@ -15,7 +15,6 @@ import numpy as np
 
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS
-from toonset.nerf.prepare.symmetry import mirror_found
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.score.left_out import LeftOut, left_out
@@ -66,11 +65,10 @@ def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> 
         drawn: the drawings as they were drawn.
         baked: its field; None: made here.
     """
-    ready = training.prepared.scene
-    reasons = guesses(mirror_found(ready, training.symmetry))
+    reasons = guesses(training.seen)
     if training.result.drawings is None:
         return Verdict(WEAK, (*reasons, NOTHING), ())
-    views = left_out(baked or Baked.of(training.result), ready, drawn)
+    views = left_out(baked or Baked.of(training.result), training.seen, drawn)
     found = judged(views, training)
     reasons += [found] if found else []
     return Verdict(WEAK if reasons else OK, tuple(reasons), tuple(views))

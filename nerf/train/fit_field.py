@@ -26,14 +26,21 @@ from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.mannequin_volume import hull_of_shape
 from toonset.nerf.hull.march import surface_depth
-from toonset.nerf.hull.scene_hull import VOXELS, VOXELS_PER_PX, as_stored, hull_of, per_px
+from toonset.nerf.hull.scene_hull import (
+    VOXELS,
+    VOXELS_PER_PX,
+    as_stored,
+    has_sections,
+    hull_of,
+    per_px,
+)
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint_agreement import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
-from toonset.nerf.prepare.symmetry import add_mirrored_views, mirror_found
+from toonset.nerf.prepare.symmetry import Symmetry, add_mirrored_views, find_symmetry
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
     BINS,
@@ -97,13 +104,14 @@ def fit_field(
     ready = prepare(scene, options)
     usual = STEPS_ON_SHAPE if ready.shape else USUAL_STEPS
     options = replace(options, steps=usual if options.steps is None else options.steps)
-    whole, symmetry = add_mirrored_views(ready.scene) if options.symmetry else (ready.scene, None)
+    symmetry = find_symmetry(ready.scene, options.symmetric or scene.symmetric)
+    whole = add_mirrored_views(ready.scene, symmetry)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
-    hull, evidence = _hull(whole, options, ready)
+    hull, evidence = _hull(whole, options, ready, symmetry)
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
-    scene = mirror_found(ready.scene, symmetry)
+    scene = add_mirrored_views(ready.scene, symmetry)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
@@ -129,10 +137,16 @@ def fit_field(
     return Training(_finished(start, options), options, tuple(history), stopped, ready, *said)
 
 
-def _hull(scene: Scene, options: TrainOptions, ready: Prepared) -> tuple[Hull, HullEvidence]:
+def _hull(
+    scene: Scene, options: TrainOptions, ready: Prepared, symmetry: Symmetry | None
+) -> tuple[Hull, HullEvidence]:
     """Return the field's hull, and the evidence for how drawings carve it."""
     if not options.carve:
         return open_box(scene), NO_EVIDENCE
+    if ready.shape is None and has_sections(ready.scene, options):
+        # sections mirror what they need by themselves: a side's outline is the other side's
+        plane_x = symmetry.plane_x if symmetry and symmetry.mirrored else None
+        return hull_of(ready.scene, options, plane_x=plane_x)
     if ready.shape is None:
         return hull_of(scene, options, ready.apart_px)
     extent = float(np.ptp(ready.shape.vertices, axis=0).max())

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.prepare.prepare import Prepared
-from toonset.nerf.prepare.symmetry import Symmetry
+from toonset.nerf.prepare.symmetry import Symmetry, add_mirrored_views
 from toonset.nerf.train.plane_choice import FieldChoice
 
 
@@ -68,3 +69,8 @@ class Training:
     counts: dict[str, int]
     symmetry: Symmetry | None = None
     choice: FieldChoice | None = None
+
+    @property
+    def seen(self) -> Scene:
+        """Return what the field was fitted to: the drawings, and the mirror images of some."""
+        return add_mirrored_views(self.prepared.scene, self.symmetry)

@@ -169,7 +169,7 @@ def test_every_switch_switches_its_option(toonset, monkeypatch) -> None:
         ("--no-fairing",): {"fairing": False},
         ("--no-register",): {"register": False},
         ("--no-unwarp",): {"unwarp": False},
-        ("--no-symmetry",): {"symmetry": False},
+        ("--symmetric", "off"): {"symmetric": "off"},
     }
     for words in ((), *switches):
         assert toonset("train", *words).code == 0

@@ -83,7 +83,7 @@ def scene_of(cameras: list[Camera], line_px: float = LINE_PX) -> Scene:
 
 def drawings(cameras: list[Camera] | None = None, line_px: float = LINE_PX) -> Drawings:
     scene = scene_of(cameras or ring(), line_px)
-    found = drawings_of(scene, [frame.rgba for frame in scene.frames], depth_of, bent=False)
+    found = drawings_of(scene, scene, depth_of, bent=False)
     assert found is not None
     return found
 

@@ -8,9 +8,19 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.nerf.look.painted import INK, PALETTE, camera_at, draw, drawings, geometry, ring, unseen
-from toonset.nerf.look.blend import blend_view, flanking
-from toonset.nerf.look.drawings import Drawings
+from tests.nerf.look.painted import (
+    INK,
+    LINE_PX,
+    PALETTE,
+    camera_at,
+    draw,
+    drawings,
+    geometry,
+    ring,
+    unseen,
+)
+from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, blend_view, flanking
+from toonset.nerf.look.drawings import Drawings, Original
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.layers import color_picture
 from toonset.nerf.score.metrics import compare
@@ -173,3 +183,35 @@ def test_bent_drawings_have_a_narrower_figure_between_them_and_their_own_where_d
     assert blend_view(bent, between).alpha.sum() < blend_view(egg, between).alpha.sum() - 20
     own = (blend_view(each, drawn).alpha for each in (bent, egg))
     np.testing.assert_allclose(next(own), next(own), atol=1e-6)
+
+
+@pytest.mark.parametrize("line_px", [0.0, LINE_PX])
+@pytest.mark.parametrize("number", [0, 3])
+def test_at_a_drawings_own_camera_the_view_is_that_drawing_whatever_the_surface(
+    line_px: float, number: int
+) -> None:
+    """Also where the drawing was bent, and where the surface lacks what it shows."""
+    found = drawings(line_px=line_px)
+    own = found.views[number]
+    sheet = own.rgba.copy()
+    sheet[5:15, 2:30] = (200, 30, 90, 255)  # an arm that no surface has
+    view = replace(own, original=Original(own.camera, sheet))
+    found = replace(found, views=(*found.views[:number], view, *found.views[number + 1 :]))
+    bare = geometry(own.camera)
+    smaller = replace(bare, alpha=np.where(np.indices(bare.alpha.shape)[0] < 70, bare.alpha, 0))
+    for surface in (bare, smaller):
+        seen = blend_view(found, surface)
+        shown = np.dstack([seen.rgb, seen.alpha])
+        wanted = sheet / 255 * np.dstack([sheet[..., 3:] / 255] * 3 + [np.ones(sheet.shape[:2])])
+        np.testing.assert_allclose(shown, wanted, atol=1 / 255)
+        assert seen.share(DRAWN) == 1.0
+
+
+def test_what_only_mirror_images_show_is_told() -> None:
+    half = [camera_at(yaw) for yaw in (0.0, 0.8, 1.6)]
+    found = drawings([*half, camera_at(-1.6)])
+    views = (*found.views[:3], replace(found.views[3], mirrored=True))
+    seen = blend_view(replace(found, views=views), geometry(camera_at(-1.5)))
+    assert seen.share(MIRRORED) > 0.3
+    assert seen.share(DRAWN) + seen.share(MIRRORED) + seen.share(GUESSED) == pytest.approx(1)
+    assert blend_view(found, geometry(camera_at(-1.5))).share(MIRRORED) == 0

@@ -113,9 +113,8 @@ def test_paint_that_lies_apart_is_found(shift: tuple[float, float]) -> None:
         Frame("a.png", cameras[0], draw(cameras[0])),
         Frame("b.png", cameras[1], draw(cameras[1], bend=moved)),
     )
-    found = drawings_of(
-        Scene(frames, PALETTE, "egg"), [f.rgba for f in frames], depth_of, bent=False
-    )
+    scene = Scene(frames, PALETTE, "egg")
+    found = drawings_of(scene, scene, depth_of, bent=False)
     assert found is not None
     middle = np.array([[[0.0, 0.35, 0.45]]])  # between the eyes
     flow = found.flows[0].at(middle)[0, 0]
@@ -124,9 +123,10 @@ def test_paint_that_lies_apart_is_found(shift: tuple[float, float]) -> None:
 
 def test_colours_stand_in_for_a_missing_palette() -> None:
     scene = replace(scene_of(ring()), palette=None)
-    found = drawings_of(scene, [frame.rgba for frame in scene.frames], depth_of, bent=False)
+    found = drawings_of(scene, scene, depth_of, bent=False)
     assert found is not None
     near = np.abs(found.palette.astype(int) - (240, 200, 160)).max(axis=1).min()
     assert near <= 16
     empty = replace(scene.frames[0], rgba=np.zeros_like(scene.frames[0].rgba))
-    assert drawings_of(replace(scene, frames=(empty,)), [empty.rgba], depth_of, bent=False) is None
+    nothing = replace(scene, frames=(empty,))
+    assert drawings_of(nothing, nothing, depth_of, bent=False) is None

@@ -22,11 +22,7 @@ from toonset.nerf.score.metrics import compare
 def drawn(hand: Hand, views: int = 8) -> Drawings:
     scene = sheet(body(), hand, views=views)
     found = drawings_of(
-        scene,
-        [frame.rgba for frame in scene.frames],
-        lambda camera: depths(body(), camera),
-        own_shape(views),
-        bent=False,
+        scene, scene, lambda camera: depths(body(), camera), own_shape(views), bent=False
     )
     assert found is not None
     return found

@@ -27,12 +27,14 @@ from toonset.view import over_white
 def left_out(scene: Scene, drawn: Sequence[np.ndarray] | None = None) -> list[LeftOut]:
     """Return every drawing of a perfect field as the others predict it."""
     shown = [frame.rgba for frame in scene.frames] if drawn is None else drawn
-    drawings = drawings_of(scene, shown, depth_of, bent=False)
+    frames = [replace(f, rgba=rgba) for f, rgba in zip(scene.frames, shown, strict=True)]
+    sheet = replace(scene, frames=tuple(frames))
+    drawings = drawings_of(scene, sheet, depth_of, bent=False)
     assert drawings is not None
     drawings = drawings.fitting(TALL_PX / drawings.height)
-    frames = [replace(f, rgba=rgba) for f, rgba in zip(scene.frames, shown, strict=True)]
+    names = [frame.name for frame in frames]
     return [
-        predicted(drawings, i, geometry(small_camera(drawings, i)), frames)
+        predicted(drawings, i, geometry(small_camera(drawings, i)), frames[i], names)
         for i in range(len(frames))
     ]
 

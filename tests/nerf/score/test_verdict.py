@@ -135,7 +135,7 @@ def test_what_no_drawing_shows_makes_a_run_weak(
 def test_an_undrawn_side_that_is_the_mirror_image_of_another_is_no_guess(whole) -> None:
     half = scene(0, 45, 90, 135, 180)
     assert "no drawing in the 180 deg" in whole(training(half)).reasons[0]
-    found = Symmetry((1.0,), 0.0, ("45", "90", "135"))
+    found = Symmetry("auto", (1.0,), 0.0, ("45", "90", "135"))
     assert whole(training(half, symmetry=found)).verdict == OK
 
 
