@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
-from typing import Any
 
 from bench.cases.bodies import random_body
 from bench.look.cases import EYE_RADIUS
@@ -48,8 +47,7 @@ def grid(*, quick: bool) -> list[Cell]:
 
 def train_options(cell: Cell, seed: int) -> TrainOptions:
     """Return the options of a cell's training; mirroring is named here alone."""
-    mirroring: dict[str, Any] = {"symmetry": cell.mirrored}
-    return TrainOptions(steps=STEPS, seed=seed, **mirroring)
+    return TrainOptions(steps=STEPS, seed=seed, symmetric="auto" if cell.mirrored else "off")
 
 
 def draw(cell: Cell, seed: int) -> tuple[Turnaround, Turnaround]:
