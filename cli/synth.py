@@ -48,13 +48,22 @@ def synth(
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],
     condition: Annotated[
-        Literal["plain", "artist"],
+        Literal["plain", "artist", "studio"],
         typer.Option(
-            help="artist: another body in every drawing, shadow, paper, captions, JPEG; "
-            "other options override it."
+            help="artist: another body in every drawing, shadow, paper, captions, JPEG. "
+            "studio: few drawings of one side, another body in each, height lines, title. "
+            "Other options override it."
         ),
     ] = "plain",
-    views: Annotated[int, typer.Option(help="Drawings, evenly round.")] = DEFAULT.views,
+    views: Annotated[
+        int,
+        typer.Option(
+            help="Drawings, evenly round; studio (4, at most 8): front, back, side, 3/4 first."
+        ),
+    ] = DEFAULT.views,
+    pose_difference: Annotated[
+        float, typer.Option(help="Bodies of a condition's drawings differ by this times as much.")
+    ] = 1.0,
     yaw_jitter: Annotated[
         float, typer.Option(help="Each view is turned wrongly by up to this, degrees.")
     ] = DEFAULT.yaw_jitter_deg,
@@ -93,12 +102,14 @@ def synth(
     """Draw a turnaround sheet of a mesh, with errors of a hand as asked, and write its truth.
 
     Writes sheet.png, views/ with transforms.json, labels/, ink/, mannequin.obj and truth.json;
-    with --condition artist sheet.jpg instead, shadows/ and 16 exact views in test/, and
-    MESH.landmarks.json, if there is one, says where head and arms are.
+    with --condition artist sheet.jpg instead, and shadows/. Both other conditions have 16 exact
+    views in test/ (studio: 8 of the drawn side, then 8 of the other), and MESH.landmarks.json, if
+    there is one, says where head and arms are.
     """
-    options = replace(
-        CONDITIONS[condition], **_typed(context), following_parts=tuple(following or ())
-    )
+    chosen = CONDITIONS[condition]
+    artist = replace(chosen.artist, body=chosen.artist.body.scaled(pose_difference))
+    given = {**_typed(context), "following_parts": tuple(following or ())}
+    options = replace(chosen, artist=artist, **given)
     from toonset.dataset.mesh.load import load_mesh
     from toonset.dataset.synthetic.files import write_turnaround
     from toonset.dataset.synthetic.turnaround import make_turnaround

@@ -124,8 +124,9 @@ def test_a_run_and_a_rendering(run: Path) -> None:
     plain = Page(replace(field, palette=None, drawings=None)._repr_html_())
     assert "no colours" in plain.words
     view = ts.render(field, ts.turntable(field, 1)[0])
-    assert view._repr_png_() == small_png(view.picture("rgb"))
-    assert encoded(shown(view._repr_png_())) == view.png("rgb")[0]
+    assert view._repr_png_() == small_png(view.picture("drawn"))
+    assert encoded(shown(view._repr_png_())) == view.png("drawn")[0] == view.png()[0]
+    assert view.png("drawn")[0] != view.png("rgb")[0]
 
 
 def test_a_training_is_four_views_of_it(bundle: Path) -> None:

@@ -67,6 +67,8 @@ PAGES = (
             ("grain", "grain of the paper, levels of 255", (0, 1.3, 4, 8, 16, 32), None),
             ("mannequin", "mannequin", ("own", OTHER, "plain", "none"), None),
             ("no mannequin", "views", (12, 8, 6, 5, 4, 3, 2), None),
+            ("studio views", "drawings of one side", (8, 7, 6, 5, 4, 3, 2), None),
+            ("studio pose", "bodies' differences, times a studio's", (0, 1, 2, 3), None),
         ],
         {
             "views": lambda s, seed: draw_sheet(seed, views=s, yaw_jitter_deg=180 / s),
@@ -103,6 +105,8 @@ PAGES = (
             "grain": lambda s, seed: as_cut_out(artists(seed, grain_levels=float(s))),
             "mannequin": lambda s, seed: sheets.of_mannequin(s, seed),
             "no mannequin": lambda s, seed: sheets.without_mannequin(s, seed),
+            "studio views": lambda s, seed: sheets.of_studio(seed, views=s),
+            "studio pose": lambda s, seed: sheets.of_studio(seed, pose=float(s)),
         },
     ),
     *_pages(

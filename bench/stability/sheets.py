@@ -29,6 +29,7 @@ from toonset.mesh import Mesh
 
 BASE = SynthOptions(views=5, cell_px=200, yaw_jitter_deg=8, elevation_deg=10, outline_px=2)
 ARTIST = replace(CONDITIONS["artist"], cell_px=200, outline_px=2)
+STUDIO = replace(CONDITIONS["studio"], cell_px=200, outline_px=2)
 LOSSLESS, HARD, OTHER = "lossless", "hard", "other body"
 
 Step = float | str
@@ -151,6 +152,19 @@ def artists(seed: int, **habits: Any) -> Turnaround:
     """Return an artist's sheet of the seed's body with changed habits."""
     options = replace(ARTIST, artist=replace(ARTIST.artist, **habits))
     return make_turnaround(random_body(seed), options, seed)
+
+
+def of_studio(seed: int, views: int = 4, pose: float = 1.0) -> DrawnSheet:
+    """Return a studio's sheet of the seed's body, to be calibrated without a mannequin.
+
+    Args:
+        seed: of the body and its drawings.
+        views: drawings of one side.
+        pose: how far their bodies differ, times a studio's.
+    """
+    artist = replace(STUDIO.artist, body=STUDIO.artist.body.scaled(pose))
+    made = make_turnaround(random_body(seed), replace(STUDIO, views=views, artist=artist), seed)
+    return replace(as_cut_out(made), given="none")
 
 
 def as_cut_out(made: Turnaround) -> DrawnSheet:

@@ -75,6 +75,9 @@ class ArtistOptions:
         color_error_fraction: red, green and blue of a view are off by up to this share.
         grain_levels: standard deviation of the paper's grain, of 255.
         captions: "FRONT", "3/4", ... under the figures.
+        height_lines: ruled behind the figures of a row, at equal steps from the soles to the top of
+            the head; 0 = none.
+        title: the character's name, above the figures.
         jpeg_quality: of the sheet's file; 0 = PNG.
     """
 
@@ -85,6 +88,8 @@ class ArtistOptions:
     color_error_fraction: float = 0.0
     grain_levels: float = 0.0
     captions: bool = False
+    height_lines: int = 0
+    title: bool = False
     jpeg_quality: int = 0
 
     def __post_init__(self) -> None:
@@ -101,6 +106,13 @@ class ArtistOptions:
                 "line_width_spread": (0, 0.9),
                 "color_error_fraction": (0, 0.5),
                 "grain_levels": (0, 64),
+                "height_lines": (0, 100),
                 "jpeg_quality": (0, 95),
             },
         )
+
+    @property
+    def on_paper(self) -> bool:
+        """Return whether any of it needs an opaque background."""
+        text = self.captions or self.title or self.height_lines > 0
+        return text or self.grain_levels > 0 or self.jpeg_quality > 0

@@ -19,23 +19,25 @@ class CellGrid:
         columns: cells in a full row.
         cell_px: width and height of a cell.
         caption_px: height of the strip for a caption below every cell.
+        title_px: height of the strip above all cells.
     """
 
     count: int
     columns: int
     cell_px: int
     caption_px: int = 0
+    title_px: int = 0
 
     @property
     def size_wh(self) -> tuple[int, int]:
         """Return width and height of the sheet."""
         rows = math.ceil(self.count / self.columns)
-        return self.columns * self.cell_px, rows * (self.cell_px + self.caption_px)
+        return self.columns * self.cell_px, self.title_px + rows * (self.cell_px + self.caption_px)
 
     def box(self, index: int) -> tuple[int, int, int, int]:
         """Return (x, y, width, height) of a cell in the sheet."""
         row, column = divmod(index, self.columns)
-        y = row * (self.cell_px + self.caption_px)
+        y = self.title_px + row * (self.cell_px + self.caption_px)
         return column * self.cell_px, y, self.cell_px, self.cell_px
 
     def figure_box(
@@ -56,17 +58,17 @@ class CellGrid:
 def paste(
     cells: Sequence[UInt8[np.ndarray, "cell cell 4"]],
     grid: CellGrid,
-    background_rgb: tuple[int, int, int] | None,
+    ground: UInt8[np.ndarray, "height width 3"] | None,
 ) -> UInt8[np.ndarray, "height width 4"]:
-    """Return the sheet: cells over the background; None keeps it transparent."""
+    """Return the sheet: cells over the ground; None keeps it transparent."""
     width, height = grid.size_wh
     sheet = np.zeros((height, width, 4), np.uint8)
     for index, cell in enumerate(cells):
         x, y, w, h = grid.box(index)
         sheet[y : y + h, x : x + w] = cell
-    if background_rgb is None:
+    if ground is None:
         return sheet
     alpha = sheet[..., 3:] / 255
-    rgb = alpha * sheet[..., :3] + (1 - alpha) * np.array(background_rgb)
+    rgb = alpha * sheet[..., :3] + (1 - alpha) * ground
     opaque = np.full((height, width, 1), 255.0)
     return np.rint(np.concatenate([rgb, opaque], axis=-1)).astype(np.uint8)

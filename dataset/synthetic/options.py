@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from toonset.dataset.synthetic.artist_options import ArtistOptions, BodyErrors, check_ranges
+from toonset.dataset.synthetic.directions import MOST_OF_HALF, Turn
 from toonset.errors import SheetError
 
 MAX_SAMPLES = 4096  # px a side of a supersampled cell: what off-screen buffers hold in < 1 GiB
@@ -17,10 +18,13 @@ class SynthOptions:
     """Options of `toonset.dataset.synthetic.turnaround.make_turnaround`.
 
     Attributes:
-        views: drawings, evenly round the character from the front on; 8 is the usual turnaround.
+        views: drawings; 8 is the usual turnaround.
+        turn: which directions they show (`directions`); unless it is even, the seed says whether
+            the character's left or right side is drawn first.
         cell_px: width and height of one drawing's cell; 300 shows every colour of a character.
         columns: drawings in a row of the sheet; 0 = all in one row, as artists mostly draw.
-        yaw_jitter_deg: each view is turned too far or too little by up to this.
+        yaw_jitter_deg: each view is turned too far or too little by up to this; front and back
+            of a half turn are not.
         elevation_deg: all cameras look down by this; 0 is the drawing board's view.
         distance_heights: camera distance in body heights; 0 = orthographic, as sheets mostly are.
         outline_px: width of the silhouette's black line, 0 = no lines; inner lines are 0.6 of it.
@@ -36,6 +40,7 @@ class SynthOptions:
     """
 
     views: int = 8
+    turn: Turn = "even"
     cell_px: int = 300
     columns: int = 0
     yaw_jitter_deg: float = 0.0
@@ -58,7 +63,7 @@ class SynthOptions:
                 paper for what would be on it.
         """
         limits = {
-            "views": (1, 360),
+            "views": (1, MOST_OF_HALF if self.turn == "half" else 360),
             "cell_px": (16, MAX_SAMPLES // max(self.supersample, 1)),
             "columns": (0, self.views),
             "yaw_jitter_deg": (0, 180),
@@ -76,21 +81,22 @@ class SynthOptions:
             raise SheetError(
                 f"synth: background {self.background!r} is none of white, transparent, #rrggbb"
             )
-        on_paper = self.artist.grain_levels or self.artist.captions or self.artist.jpeg_quality
-        if self.background == "transparent" and on_paper:
+        if self.background == "transparent" and self.artist.on_paper:
             raise SheetError(
-                "synth: grain, captions and JPEG need paper, the background is transparent; "
-                "choose white or #rrggbb"
+                "synth: grain, text, ruled lines and JPEG need paper, the background is "
+                "transparent; choose white or #rrggbb"
             )
 
     def without_error(self, views: int) -> SynthOptions:
-        """Return options of `views` exact pictures in the same style, evenly round, on white.
+        """Return options of `views` exact pictures in the same style, all round, on white.
 
-        Lines, shadow, elevation and distance stay; whatever differs from view to view goes.
+        Lines, shadow, elevation and distance stay; whatever differs from view to view goes. Where
+        one side is drawn, the first half shows that side and the second half the other.
         """
         return replace(
             self,
             views=views,
+            turn="even" if self.turn == "even" else "between",
             columns=0,
             yaw_jitter_deg=0.0,
             warp_percent=0.0,
@@ -122,6 +128,14 @@ ARTIST = ArtistOptions(
     captions=True,
     jpeg_quality=88,
 )
+STUDIO = ArtistOptions(
+    body=BodyErrors(
+        head_turn_deg=6.0, arm_swing_deg=8.0, face_turn_deg=4.0, field_height_fraction=0.008
+    ),
+    line_width_spread=0.35,
+    height_lines=6,
+    title=True,
+)
 CONDITIONS: dict[str, SynthOptions] = {
     "plain": SynthOptions(),
     "artist": SynthOptions(
@@ -132,5 +146,14 @@ CONDITIONS: dict[str, SynthOptions] = {
         warp_percent=0.7,  # of the cell: 0.8 % of a figure's height
         background="#f4f1e8",  # off-white paper
         artist=ARTIST,
+    ),
+    "studio": SynthOptions(
+        views=4,
+        turn="half",
+        yaw_jitter_deg=4.0,
+        distance_heights=14.0,  # nearly orthographic
+        label_lines=False,
+        warp_percent=0.5,  # of the cell: 0.6 % of a figure's height
+        artist=STUDIO,
     ),
 }

@@ -21,17 +21,19 @@ from toonset.camera import Camera
 from toonset.dataset.synthetic.body_error import deform
 from toonset.dataset.synthetic.body_parts import find_body_parts
 from toonset.dataset.synthetic.cell import Hand, draw_cell
+from toonset.dataset.synthetic.directions import directions_deg
 from toonset.dataset.synthetic.follow_viewer import part_numbers, turn_parts
 from toonset.dataset.synthetic.layout import CellGrid, paste
 from toonset.dataset.synthetic.options import SynthOptions
-from toonset.dataset.synthetic.paper import with_captions, with_grain
+from toonset.dataset.synthetic.paper import ruled, with_captions, with_grain, with_title
 from toonset.mesh import Mesh
 from toonset.view import View
 
 JUMP = 0.02  # of the body's height: a larger step in depth is drawn as a line
-CAPTION = 0.1  # of the cell: the strip below it
+CAPTION, TITLE = 0.1, 0.16  # of the cell: the strip below it, that above all
 MARGIN = 0.04  # of the cell on every side, beside what outline and bend may need
 BEND_REACH = 3.0  # times the bend's root mean square: as far as a figure's rim is assumed to move
+FACE_ON = 1e-6  # sine of a yaw: a view of front or back
 PLAIN = (204, 204, 204)  # a mesh without colours
 MOST_COLORS = 64  # a textured mesh is reduced to so many
 
@@ -109,8 +111,9 @@ def make_turnaround(
         for posed, camera, hand in zip(drawn, cameras, hands, strict=True)
     ]
     grid, pictures = _grid(options), [cell.drawing.rgba for cell in cells]
+    boxes = [grid.figure_box(i, rgba) for i, rgba in enumerate(pictures)]
     return Turnaround(
-        sheet=_sheet(pictures, grid, options, paper),
+        sheet=_sheet(pictures, boxes, grid, options, mesh.name, paper),
         views=tuple(
             View(cell.drawing.rgba, grid.box(i), cell.line_px, f"{i:03d}.png")
             for i, cell in enumerate(cells)
@@ -121,7 +124,7 @@ def make_turnaround(
         shadows=tuple(cell.shadow for cell in cells),
         palette=paints[0],
         color_factors=tuple(cell.color_factor for cell in cells),
-        figure_boxes=tuple(grid.figure_box(i, rgba) for i, rgba in enumerate(pictures)),
+        figure_boxes=tuple(boxes),
         yaws=tuple(float(yaw) for yaw in yaws),
         mesh=mesh,
         options=options,
@@ -135,11 +138,13 @@ def _errors(
     Float[np.ndarray, " views"], Float[np.ndarray, " views"], list[Hand], np.random.Generator
 ]:
     """Return yaws (radians), factors of size, what draws every view, and the paper's stream."""
-    jitter, sizes, bends, artist = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
+    jitter, sizes, bends, artist, way = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)
     )
-    turns = np.arange(options.views) * (2 * math.pi / options.views)
-    spread = math.radians(options.yaw_jitter_deg)
+    turns = np.radians(directions_deg(options.turn, options.views))
+    turns *= 1 if options.turn == "even" else way.choice([-1, 1])
+    face_on = (options.turn == "half") & (np.abs(np.sin(turns)) < FACE_ON)
+    spread = np.where(face_on, 0.0, math.radians(options.yaw_jitter_deg))
     yaws = (turns + spread * jitter.uniform(-1, 1, options.views)) % (2 * math.pi)
     factors = 1 + options.scale_error_percent / 100 * sizes.uniform(-1, 1, options.views)
     seeds = bends.integers(2**63, size=options.views)
@@ -149,20 +154,32 @@ def _errors(
 
 
 def _sheet(
-    pictures: Sequence[UInt8[np.ndarray, "height width 4"]],
+    pictures: Sequence[UInt8[np.ndarray, "cell cell 4"]],
+    boxes: Sequence[tuple[int, int, int, int]],
     grid: CellGrid,
     options: SynthOptions,
+    name: str,
     paper: np.random.Generator,
 ) -> UInt8[np.ndarray, "height width 4"]:
-    sheet = paste(pictures, grid, options.background_rgb)
+    if options.background_rgb is None:
+        return paste(pictures, grid, None)
+    width, height = grid.size_wh
+    ground = np.full((height, width, 3), options.background_rgb, dtype=np.uint8)
+    if options.artist.height_lines:
+        ground = ruled(ground, grid, boxes, options.artist.height_lines)
+    sheet = paste(pictures, grid, ground)
+    if options.artist.title:
+        sheet = with_title(sheet, grid, name)
     if options.artist.captions:
-        sheet = with_captions(sheet, grid)
+        sheet = with_captions(sheet, grid, directions_deg(options.turn, options.views))
     return with_grain(sheet, options.artist.grain_levels, paper)
 
 
 def _grid(options: SynthOptions) -> CellGrid:
     caption = round(CAPTION * options.cell_px) if options.artist.captions else 0
-    return CellGrid(options.views, options.columns or options.views, options.cell_px, caption)
+    title = round(TITLE * options.cell_px) if options.artist.title else 0
+    columns = options.columns or options.views
+    return CellGrid(options.views, columns, options.cell_px, caption, title)
 
 
 def _cameras(

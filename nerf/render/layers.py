@@ -64,15 +64,17 @@ class Rendering:
         view = Geometry(self.camera, self.alpha, self.depth, self.rgb, self.shares)
         return blend_view(self.field.drawings, view)
 
-    def picture(self, layer: str = "rgb") -> Layer:
+    def picture(self, layer: str | None = None) -> Layer:
         """Return one layer as RGBA with straight alpha, or as a label map.
 
         Args:
-            layer: one of `LAYERS`; "depth" is grey, the nearest point white.
+            layer: one of `LAYERS`; "depth" is grey, the nearest point white; None: what people
+                look at (`default_layer`).
 
         Raises:
             ToonsetError: there is no such layer, or the run has no palette or lines for it.
         """
+        layer = default_layer(self.field) if layer is None else layer
         if layer not in LAYERS:
             raise ToonsetError(f"layer {layer!r} is none of {', '.join(LAYERS)}; choose one")
         made: dict[str, Callable[[], Layer]] = {
@@ -92,12 +94,12 @@ class Rendering:
         return made[layer]()
 
     def png(
-        self, layer: str = "rgb", *, levels: DepthLevels | None = None
+        self, layer: str | None = None, *, levels: DepthLevels | None = None
     ) -> tuple[bytes, Picture]:
         """Return a layer as a PNG file, and as RGBA for a GIF.
 
         Args:
-            layer: one of `LAYERS`. Labels are an indexed PNG, depth is grey of 16 bits.
+            layer: see `picture`. Labels are an indexed PNG, depth is grey of 16 bits.
             levels: scale of depth; None: that of this view alone.
 
         Raises:
@@ -116,9 +118,9 @@ class Rendering:
 
     def _repr_png_(self) -> bytes:
         """Return what people look at, for a notebook."""
-        return small_png(self.picture(default_layer(self.field)))
+        return small_png(self.picture())
 
-    def save(self, path: str | Path, layer: str = "rgb") -> None:
+    def save(self, path: str | Path, layer: str | None = None) -> None:
         """Write a layer as a PNG file; the file appears whole or not at all.
 
         Raises:

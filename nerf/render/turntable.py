@@ -9,9 +9,11 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.camera import Camera
+from toonset.dataset.silhouettes.mask import mask_of
 from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import Hull
+from toonset.nerf.look.drawings import Original
 from toonset.nerf.render.turn_angles import Angles, angles_between, ring_of, turn_angles
 
 FILL = 0.94  # of the picture's side that the figure may take
@@ -62,7 +64,7 @@ def between_drawings(
 
 def drawn_ring(trained: TrainedField) -> Angles:
     """Return yaw, elevation and roll of the drawings that a turn passes through, yaw rising."""
-    return ring_of(_drawn(trained))
+    return ring_of([own.camera for own in _drawn(trained)])
 
 
 def filled_box(hull: Hull) -> tuple[np.ndarray, np.ndarray]:
@@ -78,12 +80,14 @@ def _check(count: int, size: int | None) -> None:
         raise UsageError(f"turntable: {count} views of {size} px; 1 or more of each are needed")
 
 
-def _drawn(trained: TrainedField) -> list[Camera]:
-    return [] if trained.drawings is None else [view.camera for view in trained.drawings.views]
+def _drawn(trained: TrainedField) -> list[Original]:
+    """Return the drawings as they are on the sheet; mirror images do not count."""
+    views = () if trained.drawings is None else trained.drawings.views
+    return [view.as_drawn for view in views if not view.mirrored]
 
 
 def _framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Camera, ...]:
-    """Return cameras at directions, with one scale and size that all the figure fits in."""
+    """Return cameras at directions, with one scale and size that figure and drawings fit in."""
     low, high = filled_box(trained.hull)
     target = (low + high) / 2
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -95,14 +99,25 @@ def _framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Ca
             for yaw, elevation, roll in angles
         )
 
-    reach = max(float(np.abs(c.project(corners)[0] - c.center).max()) for c in placed(1.0, 1))
     drawn = _drawn(trained)
+    around = [float(np.abs(c.project(corners)[0] - c.center).max()) for c in placed(1.0, 1)]
+    reach = max([*around, *(_reach(own, target) for own in drawn)])
     if size is None and drawn:
-        scale = float(np.median([_scale_at(camera, target) for camera in drawn]))
+        scale = float(np.median([_scale_at(own.camera, target) for own in drawn]))
         cameras = placed(scale, math.ceil(2 * reach * scale / FILL))
-        return tuple(_on_its_pixels(camera, drawn) for camera in cameras)
+        return tuple(_on_its_pixels(camera, [own.camera for own in drawn]) for camera in cameras)
     side = size or trained.size_px
     return placed(FILL * side / 2 / reach, side)
+
+
+def _reach(own: Original, target: Float[np.ndarray, " 3"]) -> float:
+    """Return how far from a point a drawing shows the figure, which a surface may lack in part."""
+    rows, columns = (np.flatnonzero(mask_of(own.rgba).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return 0.0
+    corners = np.array([[columns[0], rows[0]], [columns[-1] + 1, rows[-1] + 1]])
+    away = corners - own.camera.project(target[None])[0][0]
+    return float(np.abs(away).max()) / _scale_at(own.camera, target)
 
 
 def _on_its_pixels(camera: Camera, drawn: list[Camera]) -> Camera:

@@ -18,6 +18,8 @@ from bench.records.gate import from_plain
 from bench.split.measure import SplitBench
 from bench.stability import pages
 from bench.stability.trials import Trial
+from bench.studio.grid import Cell
+from bench.studio.measure import Seen
 from bench.train.run import RunResult
 from bench.verdict.measure import Judged
 from tests.bench.records import record
@@ -68,6 +70,7 @@ def measure_nothing(monkeypatch: pytest.MonkeyPatch, folder: Path) -> list[str]:
     stand_in("commands.check.measured", lambda *_: committed, "check")
     stand_in("verdict.__main__._drawn", lambda *_: (SCENE, SCENE, None))
     stand_in("verdict.__main__.judge", _judged, "verdict")
+    stand_in("studio.__main__.measure", _studied, "studio")
     return asked
 
 
@@ -94,3 +97,7 @@ def _trained(job: Any, *_: Any) -> RunResult:
 def _judged(name: str, *_: Any) -> tuple[Judged, bytes]:
     off = 0.001 * len(name)
     return Judged(name, "ok", (), off, (off,)), b""
+
+
+def _studied(cell: Cell, seed: int, **_: Any) -> Seen:
+    return Seen(cell, seed, (0.9, 0.8), (0.1, 0.2), 1.0, (2.0,))

@@ -146,10 +146,29 @@ def test_a_turn_looks_as_the_drawings_do(training: Training) -> None:
     np.testing.assert_allclose([one.angles[1:] for one in asked], [[0.2, 0.0]] * 12, atol=1e-9)
 
 
+def test_what_a_drawing_shows_beside_the_surface_fits_in(training: Training) -> None:
+    trained = drawn_by(training.result, cameras_at([0], [90], scale=20.0))
+    assert trained.drawings is not None
+    usual = turntable(trained, 4)[0]
+    wide = np.zeros((64, 64, 4), np.uint8)
+    wide[30:34, 2:64] = 255  # a pole, held to one side
+    first, *others = trained.drawings.views
+    views = (replace(first, rgba=wide), *others)
+    drawings = replace(trained.drawings, views=views)
+    for image_of in (views[0], replace(views[0], mirrored=True)):
+        own = replace(drawings, views=(image_of, *others))
+        front = turntable(replace(trained, drawings=own), 4)[0]
+        pole_px = first.camera.unproject(np.array([[2.0, 32.0], [64.0, 32.0]]), np.zeros(2))
+        inside = front.project(pole_px)[0]
+        fits = inside.min() >= 0 and inside.max() <= front.size_wh[0]
+        assert fits is not image_of.mirrored
+        assert (front.size_wh == usual.size_wh) is image_of.mirrored
+
+
 def test_without_drawings_turns_are_even_and_level(training: Training) -> None:
     bare = replace(training.result, drawings=None)
     turn = turntable(bare, 4)
     found = np.degrees([one.angles for one in turn]) % 360
     np.testing.assert_allclose(found, [[90 * i, 0, 0] for i in range(4)], atol=1e-9)
     assert turn[0].size_wh == (bare.size_px, bare.size_px)
-    assert len(between_drawings(bare, 4, 24)) == 4
+    assert [len(between_drawings(bare, count, 24)) for count in (1, 4)] == [1, 4]
