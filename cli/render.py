@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.errors import did_you_mean
 from toonset.nerf.options import FORMATS, LAYERS, Layer
-from toonset.suggest import did_you_mean
 from toonset.write import check_output
 
 if TYPE_CHECKING:

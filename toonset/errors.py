@@ -18,6 +18,9 @@ Foreign text in messages (a file's content, a name) is shown on one printable li
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class ToonsetError(Exception):
     """A user's mistake. The message says where, what was found, what is needed, what to do."""
@@ -76,3 +79,9 @@ def as_text(name: str) -> str:
 def one_line(message: object) -> str:
     """Return a message on one printable line, runs of white space as one space."""
     return printable(" ".join(str(message).split()))
+
+
+def did_you_mean(word: str, choices: Iterable[str]) -> str:
+    """Return "did you mean 'front'?" with the nearest choice; "" if none is near."""
+    near = get_close_matches(word, list(choices), 1)
+    return f"did you mean {near[0]!r}?" if near else ""

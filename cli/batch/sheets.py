@@ -261,7 +261,7 @@ def _check_values(where: str, values: Mapping[str, Any]) -> None:
 
 def _check_columns(where: str, names: Iterable[str]) -> None:
     """Refuse a column that means nothing."""
-    from toonset.suggest import did_you_mean
+    from toonset.errors import did_you_mean
 
     known = [*PLAIN, *(f"{stage}{OPTIONS}" for stage in STAGES)]
     for name in names:

@@ -124,7 +124,7 @@ def in_order(names: Sequence[str]) -> tuple[str, ...]:
     Raises:
         UsageError: one is unknown, or takes what none of the others makes.
     """
-    from toonset.suggest import did_you_mean
+    from toonset.errors import did_you_mean
 
     if not names:
         raise UsageError(f"--stages: names no stage; known are {', '.join(STAGES)}")

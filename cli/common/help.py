@@ -11,8 +11,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from toonset.errors import UsageError
-from toonset.suggest import did_you_mean
+from toonset.errors import UsageError, did_you_mean
 
 NOTHING_ASKED = 2  # exit code, as of any wrong use
 HELP = "help"  # the word, for people who do not try -h

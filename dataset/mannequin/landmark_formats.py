@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from toonset.errors import LandmarkError
+from toonset.errors import LandmarkError, did_you_mean
 from toonset.read import read_whole
-from toonset.suggest import did_you_mean
 
 SCHEMA = "toonset-landmarks/1"
 KEYS = ("schema", "units", "pixels", "points", "views")

@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
-from toonset.errors import SheetError
-from toonset.suggest import did_you_mean
+from toonset.errors import SheetError, did_you_mean
 
 Label = tuple[float, ...]  # possible yaws in radians; empty where nothing is said
 

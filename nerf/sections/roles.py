@@ -16,7 +16,7 @@ from toonset.nerf.sections.drawing import Drawing, mirrored, yaw_of
 FACING = math.radians(22)  # from front or back
 ASIDE = math.radians(25)  # from a right angle with the front
 SAME = math.radians(20)  # drawings this near have one silhouette
-GAP = math.radians(55)  # between outlines: where they leave more, a hull is square
+GAP = math.radians(40)  # between outlines: where they leave more, a hull is square
 EYE_LEVEL = math.radians(8)  # from above or below, rows of two drawings show no common height
 
 
