@@ -53,18 +53,14 @@ def sections(grid: Grid, front: Drawing, side: Drawing | None, others: Sequence[
     width = slenderness(face.runs, front.mask)
     depth, middle = depths_of(grid, face, profile, width, lead, others)
 
-    points = grid.centres
-    at_front, at_side = front.pixels(points), side.pixels(points)
-    g_front = sample(signed_distance(face.mask.astype(np.float32)), at_front)
-    g_side = sample(signed_distance(profile.mask.astype(np.float32)), at_side)
+    at_front, at_side = front.pixels(grid.centres), side.pixels(grid.centres)
+    g_front, g_side = sample(face.distance, at_front), sample(profile.distance, at_side)
     f = np.maximum(g_front, g_side)
     near = np.flatnonzero(f < NEAR_PX)  # what lies outside of an outline is as far from the body
     at_front, at_side = at_front[near], at_side[near]
     run = face.runs.number[cells(face.mask.shape, at_front)]
-    place = cells(trunk.mask.shape, at_side)
-    trunk_run = trunk.runs.number[place]
-    led = lead[run]
-    g_trunk = sample(signed_distance(trunk.mask.astype(np.float32)), at_side)
+    trunk_run = trunk.runs.number[cells(trunk.mask.shape, at_side)]
+    led, g_trunk = lead[run], sample(trunk.distance, at_side)
     half = np.where(led, trunk.runs.half[trunk_run], depth[run])
     centre = np.where(led, trunk.runs.middle[trunk_run], middle[run])
     across = (at_front[:, 0] - face.runs.middle[run]) / face.runs.half[run]
@@ -93,7 +89,8 @@ def _round_sections(grid: Grid, front: Drawing) -> Volume:
     depth = (points - grid.middle.astype(np.float32)) @ forward / np.float32(grid.per_px)
     across = pixels[:, 0] - runs.middle[run]
     outline = sample(signed_distance(mask.astype(np.float32)), pixels)
-    return np.maximum(np.hypot(across, depth) - runs.half[run], outline).reshape(grid.shape)
+    f: Volume = np.maximum(np.hypot(across, depth) - runs.half[run], outline).reshape(grid.shape)
+    return f
 
 
 def _some(mask: Mask, whole: Mask) -> Mask:
