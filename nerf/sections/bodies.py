@@ -26,11 +26,13 @@ from toonset.nerf.sections.grid import NEAR_PX, Grid, Volume
 from toonset.nerf.sections.limbs import depths_of, slenderness
 from toonset.nerf.sections.runs import Outline, runs_of
 from toonset.nerf.sections.thin_parts import thin_parts, without_sections
+from toonset.raster import parts
 
 LEAD = 0.7  # of the row's widest run: from here a run is the body's
 FIST_PX = 0.26 * TALL  # what is lower and sticks out of the side drawing is held by limbs
 FIST_OUT_PX = 0.05 * TALL
 LIMB_ROW_PX = 0.02 * TALL  # of limbs in a row of the front drawing, at least
+SHALLOW = 0.5  # times as deep as wide: a body is no shallower
 FIST_ROWS = 5  # by which heights differ between drawings
 
 
@@ -106,6 +108,21 @@ def _without_fists(face: Outline, lead: Bool[np.ndarray, " n"], side: Mask) -> M
     if not rows.any():
         return side
     held = thin_parts(side, FIST_PX, FIST_OUT_PX)
-    return _some(
-        side & ~(held & ndimage.binary_dilation(rows, iterations=FIST_ROWS)[:, None]), side
-    )
+    held &= ndimage.binary_dilation(rows, iterations=FIST_ROWS)[:, None]
+    return _some(side & ~_but_heads(held, side, led), side)
+
+
+def _but_heads(held: Mask, side: Mask, led: Mask) -> Mask:
+    """Return the parts without which a body is still at least SHALLOW times as deep as wide.
+
+    An arm beside a head makes no fist of the face.
+    """
+    labels = parts(held, 4)
+    kept = np.zeros_like(held)
+    for number in range(1, int(labels.max()) + 1):
+        part = labels == number
+        rows = part.any(axis=1)
+        deep, wide = (mask[rows].sum(axis=1).mean() for mask in (side & ~held, led))
+        if deep > SHALLOW * wide:
+            kept |= part
+    return kept
