@@ -26,11 +26,13 @@ from toonset.nerf.sections.grid import NEAR_PX, Grid, Volume
 from toonset.nerf.sections.limbs import depths_of, slenderness
 from toonset.nerf.sections.runs import Outline, runs_of
 from toonset.nerf.sections.thin_parts import thin_parts, without_sections
+from toonset.raster import parts
 
 LEAD = 0.7  # of the row's widest run: from here a run is the body's
 FIST_PX = 0.26 * TALL  # what is lower and sticks out of the side drawing is held by limbs
 FIST_OUT_PX = 0.05 * TALL
 LIMB_ROW_PX = 0.02 * TALL  # of limbs in a row of the front drawing, at least
+SHALLOW = 0.5  # times as deep as wide: a body is no shallower
 FIST_ROWS = 5  # by which heights differ between drawings
 
 
@@ -53,18 +55,14 @@ def sections(grid: Grid, front: Drawing, side: Drawing | None, others: Sequence[
     width = slenderness(face.runs, front.mask)
     depth, middle = depths_of(grid, face, profile, width, lead, others)
 
-    points = grid.centres
-    at_front, at_side = front.pixels(points), side.pixels(points)
-    g_front = sample(signed_distance(face.mask.astype(np.float32)), at_front)
-    g_side = sample(signed_distance(profile.mask.astype(np.float32)), at_side)
+    at_front, at_side = front.pixels(grid.centres), side.pixels(grid.centres)
+    g_front, g_side = sample(face.distance, at_front), sample(profile.distance, at_side)
     f = np.maximum(g_front, g_side)
     near = np.flatnonzero(f < NEAR_PX)  # what lies outside of an outline is as far from the body
     at_front, at_side = at_front[near], at_side[near]
     run = face.runs.number[cells(face.mask.shape, at_front)]
-    place = cells(trunk.mask.shape, at_side)
-    trunk_run = trunk.runs.number[place]
-    led = lead[run]
-    g_trunk = sample(signed_distance(trunk.mask.astype(np.float32)), at_side)
+    trunk_run = trunk.runs.number[cells(trunk.mask.shape, at_side)]
+    led, g_trunk = lead[run], sample(trunk.distance, at_side)
     half = np.where(led, trunk.runs.half[trunk_run], depth[run])
     centre = np.where(led, trunk.runs.middle[trunk_run], middle[run])
     across = (at_front[:, 0] - face.runs.middle[run]) / face.runs.half[run]
@@ -93,7 +91,8 @@ def _round_sections(grid: Grid, front: Drawing) -> Volume:
     depth = (points - grid.middle.astype(np.float32)) @ forward / np.float32(grid.per_px)
     across = pixels[:, 0] - runs.middle[run]
     outline = sample(signed_distance(mask.astype(np.float32)), pixels)
-    return np.maximum(np.hypot(across, depth) - runs.half[run], outline).reshape(grid.shape)
+    f: Volume = np.maximum(np.hypot(across, depth) - runs.half[run], outline).reshape(grid.shape)
+    return f
 
 
 def _some(mask: Mask, whole: Mask) -> Mask:
@@ -109,6 +108,21 @@ def _without_fists(face: Outline, lead: Bool[np.ndarray, " n"], side: Mask) -> M
     if not rows.any():
         return side
     held = thin_parts(side, FIST_PX, FIST_OUT_PX)
-    return _some(
-        side & ~(held & ndimage.binary_dilation(rows, iterations=FIST_ROWS)[:, None]), side
-    )
+    held &= ndimage.binary_dilation(rows, iterations=FIST_ROWS)[:, None]
+    return _some(side & ~_but_heads(held, side, led), side)
+
+
+def _but_heads(held: Mask, side: Mask, led: Mask) -> Mask:
+    """Return the parts without which a body is still at least SHALLOW times as deep as wide.
+
+    An arm beside a head makes no fist of the face.
+    """
+    labels = parts(held, 4)
+    kept = np.zeros_like(held)
+    for number in range(1, int(labels.max()) + 1):
+        part = labels == number
+        rows = part.any(axis=1)
+        deep, wide = (mask[rows].sum(axis=1).mean() for mask in (side & ~held, led))
+        if deep > SHALLOW * wide:
+            kept |= part
+    return kept

@@ -217,5 +217,5 @@ def _blurred(
     picture = np.zeros((*mask.shape, cost.shape[1]), np.float32)
     picture[mask] = cost
     weight = cv2.blur(mask.astype(np.float32), (size, size))[mask]
-    layers = np.moveaxis(picture, -1, 0).copy()
+    layers = (np.ascontiguousarray(picture[..., i]) for i in range(cost.shape[1]))
     return np.stack([cv2.blur(layer, (size, size))[mask] / weight for layer in layers], axis=-1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
@@ -121,7 +121,7 @@ def distance_again(f: Volume) -> Volume:
     inside = f < 0
     if inside.all() or not inside.any():
         return f
-    outer, inner = (ndimage.distance_transform_edt(part) for part in (~inside, inside))
+    outer, inner = (np.asarray(ndimage.distance_transform_edt(part)) for part in (~inside, inside))
     counted = np.where(inside, 0.5 - inner, outer - 0.5) * VOXEL_PX
     slope = np.sqrt(sum(np.square(part) for part in np.gradient(f, VOXEL_PX)))
     most = SURE_VOXELS * VOXEL_PX
@@ -152,12 +152,8 @@ class Solid:
 
     Attributes:
         grid: where its voxels lie.
-        f: (x, y, z) signed distance, px.
+        f: (x, y, z) signed distance, px; exact beside the surface only.
     """
 
     grid: Grid
     f: Volume
-
-    def but(self, f: Volume) -> Solid:
-        """Return another body on the same grid."""
-        return replace(self, f=f)

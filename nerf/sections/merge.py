@@ -98,20 +98,25 @@ def _demons(moving: Picture, fixed: Picture) -> Flow:
     height, width = target.shape
     places = _grid((height, width))
     flow = np.zeros((2, height, width), np.float32)
-    slopes = np.stack(np.gradient(target)[::-1])
+    slopes = _slopes(target)
     near = np.exp(-np.square(target / (NEAR_PX / 2)))
-    weights = {}
+    weights: dict[float, Picture] = {}
     for step in range(ROUNDS):
         width_px = SMOOTH_PX / 2 * (COARSER if step < COARSE_ROUNDS else 1)
         if width_px not in weights:
             weights[width_px] = _smooth(near, width_px) + WEIGHT_FLOOR
         now = sample(source, places + np.moveaxis(flow, 0, -1))
-        mean = (slopes + np.stack(np.gradient(now)[::-1])) / 2
+        mean = (slopes + _slopes(now)) / 2
         pull = (now - target) * near * mean / (np.square(mean).sum(axis=0) + SLOPE_FLOOR)
         flow -= np.stack([_smooth(part, width_px) for part in pull]) / weights[width_px]
         flow = flow.clip(-MOST_PX / 2, MOST_PX / 2)
     size = fixed.shape[::-1]
     return np.stack([cv2.resize(part, size) * 2 for part in flow])
+
+
+def _slopes(picture: Picture) -> Flow:
+    """Return a picture's slopes along x and y."""
+    return np.stack([np.gradient(picture, axis=axis) for axis in (1, 0)])
 
 
 def _halved(distance: Picture) -> Picture:

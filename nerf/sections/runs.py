@@ -7,11 +7,12 @@ depth) can be smoothed along a limb without a look at what lies beside it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.nerf.sections.drawing import Drawing, Mask, Picture
+from toonset.nerf.sections.drawing import Drawing, Mask, Picture, signed_distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +104,11 @@ class Outline:
     def of(cls, drawing: Drawing, mask: Mask) -> Outline:
         """Return a mask's outline."""
         return cls(drawing, mask, runs_of(mask))
+
+    @cached_property
+    def distance(self) -> Picture:
+        """Return the signed distance to the mask's border, px, negative inside."""
+        return signed_distance(self.mask.astype(np.float32))
 
 
 def runs_of(mask: Mask) -> Runs:

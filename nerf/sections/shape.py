@@ -12,6 +12,7 @@ parts as in Igarashi et al., "Teddy", 1999.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -74,7 +75,8 @@ def _merged(drawings: Sequence[Drawing]) -> list[Drawing]:
 
 
 def _without_crumbs(f: Volume) -> Volume:
-    labels, count = ndimage.label(f < 0)
+    numbered: Any = ndimage.label(f < 0)
+    labels, count = numbered
     if count < 2:
         return f
     sizes = np.bincount(labels.reshape(-1))

@@ -25,6 +25,7 @@ SCALE_PX, MOST_PX = 4.0, 6.0  # errors beyond are another pose's
 MIRRORED = 0.35  # weight of a mirrored drawing
 EVERY_PX, MIRRORED_EVERY_PX = 3, 4  # along the outlines
 SPARSE = 0.02  # of the median weight beside the surface: where fewer outlines are, f stays
+LEAST = 1e-4  # of the largest weight, lest nothing is divided by nothing
 NEAR_PX = 3.0
 TRUNCATE = 2.5
 FINAL_VOXELS = 0.8
@@ -36,26 +37,32 @@ def touching(grid: Grid, f: Volume, drawings: Sequence[Drawing]) -> Volume:
     for step in range(ROUNDS):
         share = step / (ROUNDS - 1)
         width = WIDTHS_PX[0] ** (1 - share) * WIDTHS_PX[1] ** share / VOXEL_PX
-        pull, weight = np.zeros((2, *f.shape), np.float32)
-        for points, own in rays:
-            values = grid.at(f, points)
-            lowest = values.argmin(axis=1)[:, None]
-            error = np.take_along_axis(values, lowest, axis=1)[:, 0]
-            place = np.take_along_axis(points, lowest[..., None], axis=1)[:, 0]
-            there = tuple(np.rint(grid.index(place)).astype(int).T)
-            there = tuple(i.clip(0, n - 1) for i, n in zip(there, f.shape, strict=True))
-            trust = own / (1 + np.square(error / SCALE_PX))
-            np.add.at(pull, there, trust * error.clip(-MOST_PX, MOST_PX))
-            np.add.at(weight, there, trust)
-        most = weight.max()
-        pull, weight = (
-            ndimage.gaussian_filter(v, width, truncate=TRUNCATE) for v in (pull, weight)
+        errors, weights = _contacts(grid, f, rays)
+        pull, trust = (
+            ndimage.gaussian_filter(part, width, truncate=TRUNCATE) for part in (errors, weights)
         )
-        usual = np.median(weight[np.abs(f) < NEAR_PX])
-        f = f - pull / (weight + SPARSE * usual + 1e-4 * most)
+        usual = np.median(trust[np.abs(f) < NEAR_PX])
+        f = f - pull / (trust + SPARSE * usual + LEAST * weights.max())
         if (step + 1) % AGAIN == 0:
             f = distance_again(f)
     return blurred(f, FINAL_VOXELS)
+
+
+def _contacts(
+    grid: Grid, f: Volume, rays: Sequence[tuple[Float[np.ndarray, "n steps 3"], float]]
+) -> tuple[Volume, Volume]:
+    """Return the sums of weighted errors and of weights in the voxels where rays come nearest."""
+    errors, weights = np.zeros(f.shape, np.float32), np.zeros(f.shape, np.float32)
+    for points, own in rays:
+        values = grid.at(f, points)
+        lowest = values.argmin(axis=1)[:, None]
+        error = np.take_along_axis(values, lowest, axis=1)[:, 0]
+        place = np.take_along_axis(points, lowest[..., None], axis=1)[:, 0]
+        cells = np.rint(grid.index(place)).astype(int).clip(0, np.array(f.shape) - 1)
+        trust = own / (1 + np.square(error / SCALE_PX))
+        np.add.at(errors, tuple(cells.T), trust * error.clip(-MOST_PX, MOST_PX))
+        np.add.at(weights, tuple(cells.T), trust)
+    return errors, weights
 
 
 def outline(drawing: Drawing) -> Float[np.ndarray, "n 2"]:

@@ -119,6 +119,15 @@ def test_a_diagonal_says_how_deep_a_limb_lies() -> None:
     assert (np.sign(solid.grid.at(solid.f, places)) == [-1, 1]).all()
 
 
+def test_an_arm_beside_the_head_takes_no_depth_from_it() -> None:
+    """A head sticks out over the trunk in the side drawing, as a fist would."""
+    trunk, head = ((0.0, -0.1, 0.0), (0.25, 0.75, 0.1)), ((0.0, 0.8, 0.0), (0.25, 0.22, 0.3))
+    arm = ((0.55, 0.75, 0.0), (0.1, 0.4, 0.1))
+    solid = shape_of(sheet((FRONT, LEFT, BACK), [trunk, head, arm]))
+    ends = np.array([[0.0, 0.8, z] for z in (0.25, -0.25)], np.float32)
+    assert (solid.grid.at(solid.f, ends) < 0).all()
+
+
 def test_the_mirror_plane_is_found() -> None:
     frames = sheet((FRONT, LEFT, BACK), [BODY])
     assert mirror_plane(frames) == pytest.approx(BODY[0][0], abs=0.02)
