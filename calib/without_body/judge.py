@@ -87,6 +87,7 @@ def judge_found(
     judged = apply_checks(JudgedSheet(judged, views, state), OF_DRAWINGS, options.without)
     verdict, reason = judge_sheet(judged, state)
     reason = "" if verdict == "ok" else reason
+    said = _doubts_text(doubt) if verdict != "ok" else ""
     ask = ASK if verdict != "ok" and not any(labels) else ""
     near = cameras[0].k
     return Calibration(
@@ -102,7 +103,7 @@ def judge_found(
         apart,
         np.zeros((0, 3)),
         verdict,
-        "; ".join(part for part in (reason, _doubts_text(doubt), ask) if part),
+        "; ".join(part for part in (reason, said, ask) if part),
         {},
     )
 

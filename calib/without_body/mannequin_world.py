@@ -86,10 +86,9 @@ def best_similarity(cameras: Sequence[Camera], views: Sequence[View], mesh: Mesh
             rows.append([axis @ point, *axis])
             seen.append((pixel - middle) / camera.scale + axis @ camera.target)
     matrix, wanted = np.array(rows), np.array(seen)
-    weight = np.ones(len(wanted))
+    numbers = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
     for _ in range(ROUNDS):
-        root = np.sqrt(weight)[:, None]
-        numbers = np.linalg.lstsq(root * matrix, root[:, 0] * wanted, rcond=None)[0]
         off = matrix @ numbers - wanted
-        weight = 1 / (1 + np.square(off / (NEAR * numbers[0] * mesh.height)))
+        root = 1 / np.sqrt(1 + np.square(off / (NEAR * numbers[0] * mesh.height)))
+        numbers = np.linalg.lstsq(root[:, None] * matrix, root * wanted, rcond=None)[0]
     return Similarity(float(numbers[0]), numbers[1:])

@@ -29,6 +29,7 @@ from toonset.dataset.silhouettes.turned_rays import TurnedRays
 from toonset.view import View
 
 ELEVATIONS = np.radians([0.0, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 37, 45])
+FEW_ELEVATIONS = ELEVATIONS[::3]  # that tell turns apart
 # Elevations of sheets: all of 45 collected ones are drawn at eye level, sprites from anywhere
 LEVEL_SPREAD, P_STEEP, STEEPEST = np.radians(3.0), 0.05, np.radians(50.0)
 # 1 / distance in heights: long lenses, a common one; none of 45 collected sheets has any
@@ -76,7 +77,7 @@ class Figures:
         self.alphas = [view.rgba[..., 3].astype(np.float32) / 255 for view in views]
         level = self.cameras(np.zeros(len(views)), 0.0)
         self.silhouettes = [Silhouette(*pair) for pair in zip(views, level, strict=True)]
-        self._apart: dict[tuple[bytes, float], Float[np.ndarray, " elevations"]] = {}
+        self._apart: dict[tuple[bytes, float], float] = {}
 
     def cameras(
         self, yaws: Float[np.ndarray, " views"], elevation: float, k: float = 0.0
@@ -96,14 +97,16 @@ class Figures:
         ]
 
     def apart(
-        self, yaws: Float[np.ndarray, " views"], k: float = 0.0
-    ) -> Float[np.ndarray, " elevations"]:
-        """Return the contradiction of a turn under every one of `ELEVATIONS`, found once."""
-        key = yaws.tobytes(), k
-        if key not in self._apart:
-            cameras = (self.cameras(yaws, e, k) for e in ELEVATIONS)
-            self._apart[key] = np.array([self.contradiction(own) for own in cameras])
-        return self._apart[key]
+        self, yaws: Float[np.ndarray, " views"], elevations: Float[np.ndarray, " n"] = ELEVATIONS
+    ) -> Float[np.ndarray, " n"]:
+        """Return the contradiction of a turn under every one of `elevations`, found once."""
+        found = []
+        for elevation in elevations.tolist():
+            key = yaws.tobytes(), elevation
+            if key not in self._apart:
+                self._apart[key] = self.contradiction(self.cameras(yaws, elevation))
+            found.append(self._apart[key])
+        return np.array(found)
 
     def contradiction(self, cameras: Sequence[Camera]) -> float:
         """Return how far outlines lie outside of the others' hull, RMS over the height."""

@@ -28,7 +28,7 @@ from toonset.calib.evidence.mirrored_outlines import (
 )
 from toonset.calib.evidence.texture import Paint, paint_evidence, read_paint
 from toonset.calib.without_body.placing import (
-    ELEVATIONS,
+    FEW_ELEVATIONS,
     Figures,
     coherence_log_likelihood,
     elevation_log_prior,
@@ -116,8 +116,9 @@ def outlines_log_likelihood(figures: Figures, turns: TurnHypotheses) -> Float[np
     for pattern in np.unique(turns.pattern):
         rows = turns.pattern == pattern
         yaws = turns.yaws[rows][0]
-        likely = coherence_log_likelihood(figures.apart(yaws), len(yaws), ROUGH)
-        found[rows] = logsumexp(likely + elevation_log_prior(ELEVATIONS))
+        apart = figures.apart(yaws, FEW_ELEVATIONS)
+        likely = coherence_log_likelihood(apart, len(yaws), ROUGH)
+        found[rows] = logsumexp(likely + elevation_log_prior(FEW_ELEVATIONS))
     return found
 
 

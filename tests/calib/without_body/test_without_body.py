@@ -195,3 +195,41 @@ def test_a_body_that_explains_nothing_loses_to_none() -> None:
     tops = [view.camera.project(np.array([[0.0, 1.0, 0.0]]))[0][0] for view in given.views]
     heads = [np.nonzero(view.mask)[0].min() for view in given.drawings]
     np.testing.assert_allclose([top[1] for top in tops], heads, atol=3)
+
+
+@pytest.mark.parametrize("degrees", [(0, 90, 180), (0, 315, 270, 180), (0, 270, 90, 180)])
+def test_what_artists_draw_is_ok_without_a_label_and_no_worse_with_it(degrees) -> None:
+    yaws = np.radians(degrees)
+    views = sheet(yaws, 0.0)
+    found = calibrate_without_body(views, Known())
+    np.testing.assert_allclose(off_from(yaws, found.views), 0, atol=1e-9)  # front 0, back 180
+    labels = parse_labels(",".join(map(str, degrees)), len(yaws))
+    labelled = calibrate_without_body(views, Known(labels=labels))
+    assert found.is_certain
+    assert labelled.is_certain
+    turned = parse_labels(",".join(str((yaw + 180) % 360) for yaw in degrees), len(yaws))
+    assert not calibrate_without_body(views, Known(labels=turned)).is_certain
+
+
+def test_eye_level_and_orthography_unless_drawings_prove_more() -> None:
+    yaws = np.radians([0, 90, 180])
+    spread = [drawing(yaw, 0.0, f"{i}.png") for i, yaw in enumerate(yaws)]
+    arms = spread[1].rgba.copy()
+    arms[70:78, 20:100] = (200, 40, 40, 255)  # held out in the side drawing alone
+    views = [spread[0], View(arms, (0, 0, SIDE, SIDE), 0.0, "1.png"), spread[2]]
+    placed = place(Figures(views), yaws, np.zeros(3))
+    assert placed.elevation < np.radians(6)
+    assert all(camera.is_orthographic for camera in placed.cameras)
+
+
+def test_labels_lock_yaws_without_a_mannequin() -> None:
+    yaws = np.radians([0, 50, 90, 180])
+    hints = Hints(labels="0,50,90,180", lock=("yaw",))
+    found = calibrate(sheet(yaws, 0.0), "none", hints)
+    np.testing.assert_allclose(off_from(yaws, found.views), 0, atol=1e-9)
+
+
+def test_rows_that_repeat_their_directions_are_a_pattern() -> None:
+    yaws = turn_hypotheses(15, in_row=5).yaws
+    repeated = np.tile(np.radians([0, 45, 90, 135, 180]), 3)
+    assert (np.abs(wrapped(yaws - repeated)).max(axis=1) < 1e-6).any()
