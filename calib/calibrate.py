@@ -23,7 +23,8 @@ from toonset.calib.result import Calibration
 from toonset.calib.verdict.checks import check_names
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
-from toonset.calib.without_body.rival import without_body_if_better
+from toonset.calib.without_body.mannequin_world import in_mannequin_world
+from toonset.calib.without_body.rival import tells_directions, without_body_if_better
 from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.mannequin.files import landmarks_path
 from toonset.dataset.mannequin.landmark_file import read_known_points
@@ -54,8 +55,9 @@ def calibrate(
 
     Args:
         views: the drawings, at least one, as `split_sheet` cuts them out.
-        mesh: the posed mannequin; its frame and units become the world's. None: a plain body, where
-            it explains the drawings better than no body does. "none": no body.
+        mesh: the posed mannequin; its frame and units become the world's, even where it is refused
+            as another body and cameras come from the drawings. None: no body where drawings are
+            sure of their cameras, else a plain one if it explains them better. "none": no body.
         hints: what is known of the views.
         seed: recorded with the result; nothing is random.
         progress: called with the step's name and the share of it that is done.
@@ -85,18 +87,28 @@ def calibrate(
         if hints.landmarks_only:
             found = calibrate_by_landmarks(views, body.mesh, known.landmarks, options.thresholds)
         else:
+            first: Calibration | None = None
+            if mesh is None and tells_directions(views, known):
+                first = calibrate_without_body(views, known, progress, cues, options)
+                if first.is_certain:
+                    return _alone(views, first, hints, seed, options)
             found = find_cameras(views, body.mesh, options, progress, known)
             better = without_body_if_better(
                 views,
                 found,
                 known,
-                given=body.looks is None,
+                given=mesh is not None,
                 tell=progress,
                 cues=cues,
                 options=options,
+                alone=first,
             )
-            if better is not None:
+            if better is not None and mesh is None:
                 return _alone(views, better, hints, seed, options)
+            if better is not None:
+                origin = _origin(views, body, hints, seed, options)
+                refused = in_mannequin_world(better, views, body.mesh)
+                return replace(refused, drawings=tuple(views), origin=origin)
     drawings, found = at_cuts(views, found)
     drawings, filled = fill_false_holes(drawings, found.views, found.mannequin)
     return replace(
@@ -110,10 +122,11 @@ def calibrate(
 
 
 def _known_without_body(hints: Hints, views: Sequence[View]) -> Known:
+    size = next((name for name in hints.lock if name != "yaw"), None)
     for name, value in {
         "--landmarks": hints.landmarks,
         "--init": hints.init,
-        "--lock": hints.lock,
+        f"--lock {size}": size,
     }.items():
         if value:
             raise UsageError(f"{name} needs a mannequin; drop it or --mesh none")

@@ -82,6 +82,14 @@ class Known:
             return np.array([angles_from_rotation(pose.rotation)[0] for pose in poses])
         return np.array([label[0] for label in self.labels])
 
+    @property
+    def yaws_of_labels(self) -> Known:
+        """Return the same with every view kept at its label's yaw if labels lock the yaws."""
+        if "yaw" not in self.locked or self.cameras:
+            return self
+        views = len(self.labels)
+        return replace(self, kept=(True,) * views, placed=self.placed or (None,) * views)
+
     def asked_yaws(self, views: int) -> Float[np.ndarray, " views"]:
         """Return the yaws at which a person put single views, radians; nan where nobody did."""
         yaws = np.full(views, np.nan)

@@ -195,7 +195,7 @@ def _style(trained: TrainedField, layers: list[str], *, lines: bool) -> TrainedF
     lined = drawings is not None and drawings.outline is not None
     if "ink" in layers and not (lined and lines):
         raise BundleError(NO_LINES)
-    if "drawn" in layers and drawings is None:
+    if {"drawn", "source"} & set(layers) and drawings is None:
         raise BundleError(NO_DRAWINGS)
     if lines or drawings is None:
         return trained

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -135,8 +135,8 @@ def train(
     was cut short, and with --strict when the run is weak; the files are written then too. Ctrl-C
     finishes the step and writes the run as it stands; a second one leaves at once.
     """
-    given = {"steps": steps, "budget_s": budget, "device": device, "seed": seed, "field": field}
-    given |= {"symmetric": symmetric}
+    given: dict[str, Any] = {"steps": steps, "budget_s": budget, "device": device, "seed": seed}
+    given |= {"field": field, "symmetric": symmetric}
     switches = {"fairing": no_fairing, "register": no_register}
     switches |= {"unwarp": no_unwarp, "mannequin": no_mannequin}
     given |= {name: False for name, off in switches.items() if off}

@@ -20,6 +20,7 @@ class Layer(StrEnum):
     labels = "labels"
     alpha = "alpha"
     ink = "ink"
+    source = "source"
     normal = "normal"
     normal_camera = "normal-camera"
 
@@ -38,7 +39,8 @@ MOST_STEPS = 10_000_000  # days
 UNSAID = ("symmetric", None)  # the bundle says it
 ORIGINAL = "original"  # of a mesh's variants: the run's own colours
 FACES = 8000  # of a mesh at most: docs/decisions.md
-USUAL_STEPS, STEPS_ON_SHAPE = 600, 300  # by default: without the mannequin's shape, and with it
+# By default: on the drawings' hull, on the mannequin's shape, on sections; more gain nothing there
+USUAL_STEPS, STEPS_ON_SHAPE, STEPS_ON_SECTIONS = 600, 300, 100
 PAPER_STEPS = 2000
 
 
@@ -47,7 +49,8 @@ class TrainOptions:
     """Settings of `toonset.train`; `None` means chosen from the scene.
 
     Attributes:
-        steps: optimiser steps; None: 600, or 300 on the mannequin's shape, where more gain nothing.
+        steps: optimiser steps; None: 600, 300 on the mannequin's shape, 100 where few drawings give
+            the shape by sections: more gain nothing there.
         budget_s: stop after this many seconds, drawings and hull included, but not before 30 steps;
             results then depend on the machine.
         seed: of initial weights and ray order. Same seed, same result, bit for bit, on one CPU.

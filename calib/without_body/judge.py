@@ -18,20 +18,22 @@ from toonset.calib.options import CalibrationOptions, VerdictThresholds
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.verdict.checks import OF_DRAWINGS, JudgedSheet, apply_checks
 from toonset.calib.verdict.judge import judge_sheet
-from toonset.calib.without_body.placing import Figures, SheetCameras
+from toonset.calib.without_body.placing import NOT_PLACED, Figures, SheetCameras
 from toonset.calib.without_body.posterior import ErrorProbabilities, doubts, view_doubt
 from toonset.calib.without_body.turns import NEAR, STARTS, TurnHypotheses, wrapped
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.coherence import ViewCoherence, coherence
 from toonset.dataset.split_folder.view_labels import Label
 
-FREE_VIEWS = (5, 6, 7)  # which may be no even ring; four and eight views hardly ever are none
+FREE_VIEWS = (5, 6, 7)  # whose steps may be uneven; those of other numbers hardly ever are
+RING_VIEWS = 8  # from which steps are even ones
 # Of yaws: what artists are off where all coheres, and what more where outlines are apart
 LEAST_YAW_SIGMA, YAW_PER_APART, FREE_SIGMA = np.radians(1.0), np.radians(200.0), np.radians(7.0)
 ROLL_SIGMA, SCALE_SIGMA, SHIFT = np.radians(1.0), 0.01, 0.01  # the last of the height
 FEWEST_TO_CONFIRM = 3  # views
 ASK = "say which view is the front (--front 0)"
 ONE = "are all of one character, in one pose and at one scale?"
+WORTH_SAYING = 0.05  # probability of an error
 MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 4, 0.01
 
 
@@ -44,16 +46,16 @@ class Found:
         posterior: (turns,) their probabilities.
         log_likelihood: (turns,) of the drawings alone, nats.
         chosen: the most probable turn.
-        placed: its cameras.
-        is_even: it is an even ring.
+        placed: its cameras; none until they are placed.
+        is_free: its yaws were measured one by one.
     """
 
     turns: TurnHypotheses
     posterior: Float[np.ndarray, " turns"]
     log_likelihood: Float[np.ndarray, " turns"]
     chosen: int
-    placed: SheetCameras
-    is_even: bool
+    placed: SheetCameras = NOT_PLACED
+    is_free: bool = False
 
 
 def judge_found(
@@ -85,7 +87,7 @@ def judge_found(
     judged = apply_checks(JudgedSheet(judged, views, state), OF_DRAWINGS, options.without)
     verdict, reason = judge_sheet(judged, state)
     reason = "" if verdict == "ok" else reason
-    text = _doubts_text(doubt) + (f"; {ASK}" if verdict != "ok" and not any(labels) else "")
+    ask = ASK if verdict != "ok" and not any(labels) else ""
     near = cameras[0].k
     return Calibration(
         judged,
@@ -100,7 +102,7 @@ def judge_found(
         apart,
         np.zeros((0, 3)),
         verdict,
-        "; ".join(part for part in (reason, text) if part),
+        "; ".join(part for part in (reason, _doubts_text(doubt), ask) if part),
         {},
     )
 
@@ -109,14 +111,13 @@ def _views(
     figures: Figures, found: Found, outlines: Sequence[ViewCoherence]
 ) -> tuple[ViewCalibration, ...]:
     """Return the views as if nothing were doubtful."""
-    sigmas = _sigmas(figures, found)
-    covariance = _covariance(sigmas)
+    each = [_sigmas(figures, found, i) for i in range(len(figures.views))]
     return tuple(
         ViewCalibration(
             view.name,
             camera,
-            sigmas,
-            covariance,
+            each[i],
+            _covariance(each[i]),
             _p_flip(found, i),
             camera.twin(),
             _alternatives(found, i, camera),
@@ -162,8 +163,6 @@ def _apart_verdict(
         if has_label:
             return "weak", "a single drawing: nothing confirms its label, scale and elevation"
         return "ambiguous", "a single drawing without a body shows no direction"
-    if views < FEWEST_TO_CONFIRM and has_label:
-        return "weak", "two drawings: nothing confirms their labels, scale and elevation"
     if apart > limits.failed_apart:
         off = f"{100 * apart:.1f} % of the height"
         return "failed", f"the outlines are {off} from being one turning body's: {ONE}"
@@ -183,15 +182,12 @@ def _turn_verdict(
     limits: VerdictThresholds,
 ) -> tuple[Verdict, str]:
     """Return the verdict of a view by the probability that it is seen from elsewhere."""
-    views = len(found.placed.cameras)
     if wrong > 1 - limits.sure:
         kinds = {"front or back": doubt.front, "which way round": doubt.way}
         kinds["where the axis lies"] = doubt.spacing
         kind, p = max(kinds.items(), key=lambda pair: pair[1])
         return "ambiguous", f"{kind} is open: p = {p:.2f} that it is another"
-    if not any(labels):
-        return "weak", "no body, no label: only faces, paint and layout tell the front"
-    if not all(labels) and (views in FREE_VIEWS or not found.is_even):
+    if found.is_free and not (labels and all(labels)):
         return "weak", "its steps may be uneven: label every view to confirm them"
     against = float(found.log_likelihood.max() - found.log_likelihood[found.chosen])
     if against > limits.most_against:
@@ -202,6 +198,8 @@ def _turn_verdict(
 def _weak_verdict(
     views: int, apart: float, scale: float, limits: VerdictThresholds
 ) -> tuple[Verdict, str]:
+    if views < FEWEST_TO_CONFIRM:
+        return "weak", "two drawings: nothing confirms their directions, scale and elevation"
     if scale > limits.weak_scale:
         return "weak", f"a drawing is {scale:.1f} times larger or smaller than the others: {ONE}"
     if apart > limits.weak_apart and views >= limits.telling_views:
@@ -216,20 +214,25 @@ def scale_apart(cameras: Sequence[Camera]) -> float:
 
 
 def _doubts_text(doubt: ErrorProbabilities) -> str:
-    return (
-        f"without a body; in doubt: front or back {doubt.front:.2f}, which way round "
-        f"{doubt.way:.2f}, spacing {doubt.spacing:.2f}"
-    )
+    """Return in words what may be wrong; empty where nothing is likely to be."""
+    each = {
+        "front or back": doubt.front,
+        "which way round": doubt.way,
+        "where the axis lies": doubt.spacing,
+    }
+    said = [f"{kind} {p:.2f}" for kind, p in each.items() if p > WORTH_SAYING]
+    return f"in doubt: {', '.join(said)}" if said else ""
 
 
-def _sigmas(figures: Figures, found: Found) -> Sigmas:
+def _sigmas(figures: Figures, found: Found, view: int) -> Sigmas:
+    """Return a view's sigmas; what is drawn between front and side may be any such direction."""
     placed = found.placed
     yaw = float(np.hypot(LEAST_YAW_SIGMA, YAW_PER_APART * placed.apart))
-    if not found.is_even:
+    between = abs(np.sin(2 * found.turns.yaws[found.chosen, view])) > np.sin(NEAR)
+    if found.is_free or (between and len(figures.views) < RING_VIEWS):
         yaw = float(np.hypot(yaw, FREE_SIGMA))
-    return Sigmas(
-        yaw, placed.elevation_sigma, float(ROLL_SIGMA), SCALE_SIGMA, SHIFT * figures.height_px
-    )
+    shift = SHIFT * figures.height_px
+    return Sigmas(yaw, placed.elevation_sigma, float(ROLL_SIGMA), SCALE_SIGMA, shift)
 
 
 def _covariance(sigmas: Sigmas) -> Float[np.ndarray, "6 6"]:

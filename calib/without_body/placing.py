@@ -29,12 +29,14 @@ from toonset.dataset.silhouettes.turned_rays import TurnedRays
 from toonset.view import View
 
 ELEVATIONS = np.radians([0.0, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 37, 45])
-# 1 / distance in heights: orthographic, long lenses, a common one; all as likely
-NEARNESS = (0.0, 0.1, 0.2, 0.45)
-USUAL, SPREAD, P_STEEP = np.radians(5.0), np.radians(6.0), 0.3  # of elevations of sheets
-FLOOR = 0.003  # of the height: outlines that are drawn well are this far apart
+# Elevations of sheets: all of 45 collected ones are drawn at eye level, sprites from anywhere
+LEVEL_SPREAD, P_STEEP, STEEPEST = np.radians(3.0), 0.05, np.radians(50.0)
+# 1 / distance in heights: long lenses, a common one; none of 45 collected sheets has any
+NEARNESS, P_PERSPECTIVE = (0.1, 0.2, 0.45), 0.05
+FLOOR = 0.006  # of the height: outlines of faithful drawings, 1 % of it off, are this far apart
 MEASUREMENTS = 2.0  # that count, per view: its outline errs together
-TRIED = 3  # elevations, per nearness, that are fitted
+HUMP = np.radians(10.0)  # half of what one hump of the elevation's likelihood takes
+LEAST_GAIN = 0.5  # nats, by which a nearer camera must be better for a still nearer one to be tried
 COARSE_ROUNDS, ROUNDS = 4, 12  # of Gauss-Newton at most
 TAU = 0.01  # of the figure's square: first guess of how far a drawing is misplaced
 LEAST_SIGMA = np.radians(1.5)  # of the elevation
@@ -57,6 +59,9 @@ class SheetCameras:
     elevation: float
     elevation_sigma: float
     apart: float
+
+
+NOT_PLACED = SheetCameras((), np.zeros(0), 0.0, 0.0, 0.0)
 
 
 class Figures:
@@ -112,9 +117,9 @@ class Figures:
 
 
 def elevation_log_prior(elevations: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Return how usual elevations are, nats: a few degrees, or, of sprites, anything up to 50."""
-    usual = np.exp(-0.5 * ((elevations - USUAL) / SPREAD) ** 2) / (SPREAD * np.sqrt(2 * np.pi))
-    return np.log((1 - P_STEEP) * usual + P_STEEP / np.radians(50.0))
+    """Return how usual elevations >= 0 are, nats: eye level, or, of sprites, anything up to 50."""
+    level = np.exp(-0.5 * (elevations / LEVEL_SPREAD) ** 2) * np.sqrt(2 / np.pi) / LEVEL_SPREAD
+    return np.log((1 - P_STEEP) * level + P_STEEP / STEEPEST)
 
 
 def coherence_log_likelihood(
@@ -135,31 +140,63 @@ def place(
         yaw_sigma: by how much each may leave its place in the turn, radians; 0: not at all.
     """
     views = len(figures.views)
-    prior = elevation_log_prior(ELEVATIONS)
     if views < 3:
-        return SheetCameras(
-            tuple(figures.cameras(yaws, USUAL)), np.zeros(views), float(USUAL), float(SPREAD), 0.0
-        )
-    tried, worth = [], []
-    fitted = None
-    for k in NEARNESS:
-        rough = figures.apart(yaws, k)
-        likely = coherence_log_likelihood(rough, views) + prior
-        for i in np.sort(np.argsort(-likely)[:TRIED]):
-            cameras = _placed_as(fitted, figures.cameras(yaws, float(ELEVATIONS[i]), k))
-            fitted = _fitted(figures, cameras, yaw_sigma, COARSE_ROUNDS)
-            tried.append((float(ELEVATIONS[i]), k))
-            worth.append(coherence_log_likelihood(np.array(fitted.apart), views) + prior[i])
-    shares = np.exp(np.array(worth) - max(worth))
+        level = tuple(figures.cameras(yaws, 0.0))
+        return SheetCameras(level, np.zeros(views), 0.0, float(LEVEL_SPREAD), 0.0)
+    elevation, sigma = _elevation(figures, yaws)
+    flat = _fitted(figures, figures.cameras(yaws, elevation), yaw_sigma, ROUNDS)
+    found = _with_perspective(figures, yaws, yaw_sigma, flat)
+    return replace(found, elevation=elevation, elevation_sigma=sigma)
+
+
+def _elevation(figures: Figures, yaws: Float[np.ndarray, " views"]) -> tuple[float, float]:
+    """Return the elevation of a turn and its sigma, radians: the mean over the likeliest hump.
+
+    Places are not fitted first: from far enough above, moved drawings cohere whatever they show.
+    """
+    worth = coherence_log_likelihood(figures.apart(yaws), len(yaws))
+    worth += elevation_log_prior(ELEVATIONS)
+    near = np.abs(ELEVATIONS - ELEVATIONS[worth.argmax()]) <= HUMP
+    shares = near * np.exp(worth - worth.max()) * np.gradient(ELEVATIONS)
     shares /= shares.sum()
-    elevations = np.array([elevation for elevation, _ in tried])
-    _, k = tried[int(np.argmax(shares))]
-    of_k = np.array([nearness == k for _, nearness in tried]) * shares
-    elevation = float(of_k @ elevations / of_k.sum())
-    spread = float(np.sqrt(shares @ np.square(elevations - elevation)))
-    cameras = _placed_as(fitted, figures.cameras(yaws, elevation, k))
-    found = _fitted(figures, cameras, yaw_sigma, ROUNDS)
-    return replace(found, elevation=elevation, elevation_sigma=max(spread, float(LEAST_SIGMA)))
+    mean = float(shares @ ELEVATIONS)
+    spread = float(np.sqrt(shares @ np.square(ELEVATIONS - mean)))
+    return mean, max(spread, float(LEAST_SIGMA))
+
+
+def _with_perspective(
+    figures: Figures,
+    yaws: Float[np.ndarray, " views"],
+    yaw_sigma: Float[np.ndarray, " views"],
+    flat: SheetCameras,
+) -> SheetCameras:
+    """Return the cameras with perspective where outlines prove it, else the orthographic ones.
+
+    Args:
+        figures: the drawings.
+        yaws: of the turn, radians.
+        yaw_sigma: as for `place`.
+        flat: the orthographic cameras of the turn.
+    """
+    views = len(figures.views)
+    cost = np.log((1 - P_PERSPECTIVE) * len(NEARNESS) / P_PERSPECTIVE)
+
+    def worth(apart: float) -> float:
+        return float(coherence_log_likelihood(np.array(apart), views))
+
+    if worth(0.0) < worth(flat.apart) + cost:
+        return flat
+    nearer: list[SheetCameras] = []
+    for k in NEARNESS:
+        cameras = _placed_as(flat, figures.cameras(yaws, flat.elevation, k))
+        nearer.append(_fitted(figures, cameras, yaw_sigma, COARSE_ROUNDS))
+        last = nearer[-2] if len(nearer) > 1 else flat
+        if worth(nearer[-1].apart) < worth(last.apart) + LEAST_GAIN:
+            break
+    best = min(nearer, key=lambda found: found.apart)
+    if worth(best.apart) < worth(flat.apart) + cost:
+        return flat
+    return _fitted(figures, list(best.cameras), yaw_sigma, ROUNDS)
 
 
 def size_of_figures(views: Sequence[View], cameras: Sequence[Camera]) -> tuple[float, float]:

@@ -20,7 +20,16 @@ from toonset.view import View
 
 FEWEST = 3  # views: fewer say nothing by themselves
 P_ELSEWHERE = 0.05  # that a sheet is not a turn that artists lay out
-WITHOUT = "no body explains the drawings better than the mannequin: cameras are theirs alone"
+REFUSED = "the mannequin is another body; cameras come from the drawings"
+
+
+def tells_directions(views: Sequence[View], known: Known) -> bool:
+    """Return whether cameras may come from the drawings alone.
+
+    Two drawings say too little; landmarks, cameras and what they lock belong to the mannequin.
+    """
+    of_mannequin = known.landmarks or known.cameras or known.locked - {"yaw"}
+    return len(views) >= FEWEST and not of_mannequin
 
 
 def without_body_if_better(
@@ -32,6 +41,7 @@ def without_body_if_better(
     tell: Progress,
     cues: Cues | None = None,
     options: CalibrationOptions = CalibrationOptions(),
+    alone: Calibration | None = None,
 ) -> Calibration | None:
     """Return the calibration without a body if it explains the drawings better, else None.
 
@@ -44,28 +54,24 @@ def without_body_if_better(
         views: the drawings.
         found: with the mannequin.
         known: beforehand.
-        given: somebody chose the mannequin; then no view without it is better than weak.
+        given: somebody chose the mannequin.
         tell: called with the step's name and the share of it that is done.
         cues: of these drawings, if they were looked at before.
         options: what to doubt.
+        alone: the calibration without a body, if it is known.
     """
     fine = found.verdict != "failed" if given or any(known.placed) else found.is_certain
-    if fine or len(views) < FEWEST or known.landmarks or known.cameras or known.locked:
+    if fine or not tells_directions(views, known):
         return None
     cues = cues or Cues(views)
-    alone = calibrate_without_body(views, known, tell, cues, options)
+    alone = alone or calibrate_without_body(views, known, tell, cues, options)
     explains = found.verdict != "failed"
     worse = _odds(cues, alone, found, known) <= 0 if explains else alone.verdict == "failed"
     if worse:
         return None
     if not given:
         return alone
-    weak = tuple(
-        replace(view, verdict="weak", reason=WITHOUT) if view.verdict == "ok" else view
-        for view in alone.views
-    )
-    verdict = "weak" if alone.verdict == "ok" else alone.verdict
-    return replace(alone, views=weak, verdict=verdict, reason=f"{WITHOUT}; {alone.reason}")
+    return replace(alone, reason=f"{REFUSED}; {alone.reason}" if alone.reason else REFUSED)
 
 
 def _odds(cues: Cues, one: Calibration, other: Calibration, known: Known) -> float:

@@ -19,7 +19,7 @@ def summary(run: Path, metrics: dict[str, Any], verbose: bool = False) -> str:
             f"{counts['views']} views{size}; {metrics['steps']} steps in {seconds:.1f} s",
             *_mannequin(metrics["drawings"]["mannequin"], verbose=verbose),
             *_drawings(metrics["drawings"], verbose=verbose),
-            *_symmetry(metrics["symmetry"], verbose=verbose),
+            *_symmetry(metrics["symmetry"]),
             *(_hull(metrics) + _planes(metrics["planes"]) if verbose else []),
             f"fit to the drawings{_set_right(metrics['drawings'])}: {_figures(fit)}",
             *held_out,
@@ -115,14 +115,16 @@ def _set_right(found: dict[str, Any]) -> str:
     return " as set right" if any(step and step["applied"] for step in steps) else ""
 
 
-def _symmetry(found: dict[str, Any] | None, *, verbose: bool) -> list[str]:
-    """Return whether undrawn sides were taken from mirror images."""
+def _symmetry(found: dict[str, Any] | None) -> list[str]:
+    """Return what stands in for the side that nobody drew."""
     if found is None:
         return []
-    alike = f"left and right are {100 * min(found['alike']):.0f} % alike"
+    alike = [f"left and right are {100 * share:.0f} % alike" for share in sorted(found["alike"])]
+    seen = alike[0] if alike else "no drawing shows left and right together"
     if not found["mirrored"]:
-        return [f"{alike}: no mirror images for the undrawn side"] if verbose else []
-    return [f"{alike}: the undrawn side is that of {', '.join(found['mirrored'])}, mirrored"]
+        return [f"{seen}: nothing is mirrored (--symmetric on does it all the same)"]
+    sources = ", ".join(found["mirrored"])
+    return [f"the side that nobody drew is the mirror image of {sources} ({seen})"]
 
 
 def _figures(means: dict[str, float | None]) -> str:

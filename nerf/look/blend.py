@@ -21,6 +21,7 @@ from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.look.drawings import (
     CRUMB,
+    SQUARE,
     STEP,
     Drawings,
     Texture,
@@ -42,8 +43,9 @@ BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a lit
 HOLE_PX = 80  # area, as CRUMB_PX: where bent drawings disagree, hulls of capes are torn
 OPAQUE = 0.6  # opacity from which a field's colour is its own
 FIELD_VOTE = 0.25  # beside 1 of the drawings together
-SOFT_PX = 0.8  # sigma over which votes are shared
-FEATHER_PX = 4.0  # beside an outline or a step, a drawing shows what the next one may not
+LEAD = 0.5  # more votes of the nearer of two drawings that were not made to agree
+SOFT = 0.8 / 260  # sigma over the figure's height, over which votes are shared
+FEATHER = 4.0 / 260  # of the height: so near to outlines and steps drawings show different things
 LEAST_TRUST = 0.1
 SIDE_VOTE, OWN_VOTE = 0.5, 0.3  # of a third drawing, of the field: only where nothing better is
 SLIVER = 0.03  # of the height: places so near to paint have it, too
@@ -55,6 +57,7 @@ SAME = 1e-9  # radians: seen from one side
 # made to agree and it was bent or moved for that, the less, the steadier
 OWN, OWN_BENT = 0.12, 0.04
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
+SOURCES = ("drawn", "mirrored", "guessed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +216,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     candidates, covered, by_drawing = _candidates(
         drawings, view, points, own_color, (first, second, share)
     )
-    color, labels = _voted(candidates, view, len(drawings.paints), STRAY * figure_px**2)
+    color, labels = _voted(candidates, view, len(drawings.paints), figure_px)
     if sight is not None:
         source, covered = _sliver_sources(
             covered, view.depth, STEP * drawings.height, SLIVER * figure_px
@@ -325,14 +328,18 @@ def _candidates(
         flow = np.float32(found[1]) * found[0].at(points)
     covered, candidates = np.zeros(there.shape, dtype=bool), []
     by_drawing = covered.copy()
-    for number, part, weight in ((first, -(1 - share), share), (second, share, 1 - share)):
+    lead = LEAD if drawings.apart else 0.0
+    sides = ((first, -(1 - share), share + lead), (second, share, 1 - share))
+    for number, part, weight in sides:
         if weight == 0:
             continue
         texture = textures[number]
         seen = look_up(texture, points, slack, least)
         mask = seen.mask & there
         places = seen.moved(flow, part)
-        trust = _trust(sample_picture(texture.to_edge, places, cv2.INTER_LINEAR)) * _feathered(mask)
+        edge_px = sample_picture(texture.to_edge, places, cv2.INTER_LINEAR)
+        feather_px = FEATHER * drawings.height * texture.camera.scale
+        trust = _trust(edge_px, feather_px) * _feathered(mask)
         candidates.append(_candidate(texture, places, np.float32(weight) * trust))
         covered |= mask
         by_drawing |= mask & (not drawings.views[number].mirrored)
@@ -346,7 +353,7 @@ def _candidates(
             candidates.append(_candidate(textures[number], (seen.x, seen.y), weight))
             covered |= gap
             by_drawing |= gap & (not drawings.views[number].mirrored)
-    candidates.append(_of_field(own_color, drawings, covered))
+    candidates.append(_of_field(own_color, drawings, covered | ~there))
     return candidates, covered, by_drawing
 
 
@@ -378,15 +385,17 @@ def _of_field(
         tones_of(one, shadow)[: len(one) if shadow is None else None] / np.float32(255)
         for one in (paints, drawings.new_paints)
     )
-    tone = ((color[..., None, :] - tones) ** 2).sum(axis=-1).argmin(axis=-1)
+    tone = np.zeros(covered.shape, dtype=np.intp)  # read only where no drawing shows anything
+    gaps = cv2.dilate((~covered).astype(np.uint8), SQUARE) > 0
+    tone[gaps] = ((color[gaps][:, None] - tones) ** 2).sum(axis=-1).argmin(axis=-1)
     label = (tone % len(paints)).astype(np.uint8)
     if drawings.repaint is not None:
         color = (color + cv2.blur((new - tones)[tone], (3, 3))).clip(0, 1)
     return _Candidate(color, label, np.where(covered, 0, OWN_VOTE).astype(np.float32))
 
 
-def _trust(edge_px: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
-    return 1 - (1 - LEAST_TRUST) * np.exp(-((edge_px / FEATHER_PX) ** 2))
+def _trust(edge_px: Float[np.ndarray, "h w"], feather_px: float) -> Float[np.ndarray, "h w"]:
+    return 1 - (1 - LEAST_TRUST) * np.exp(-((edge_px / feather_px) ** 2))
 
 
 def _feathered(mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
@@ -396,7 +405,7 @@ def _feathered(mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
 
 
 def _voted(
-    candidates: list[_Candidate], view: Geometry, paints: int, least_px: float
+    candidates: list[_Candidate], view: Geometry, paints: int, figure_px: float
 ) -> tuple[Float[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
     """Return the colour and the label that candidates agree on."""
     votes = np.zeros((*view.alpha.shape, paints), np.float32)
@@ -405,7 +414,7 @@ def _voted(
     rows, columns = (np.arange(size) for size in view.alpha.shape)
     for one in candidates:
         votes[rows[:, None], columns, one.label] += one.weight
-    votes = cv2.GaussianBlur(votes, (0, 0), SOFT_PX).reshape(votes.shape)
+    votes = cv2.GaussianBlur(votes, (0, 0), SOFT * figure_px).reshape(votes.shape)
     winner = votes.argmax(axis=-1).astype(np.uint8)
     weights = [one.weight * (one.label == winner) for one in candidates]
     total = np.sum(weights, axis=0)
@@ -415,7 +424,7 @@ def _voted(
     color = np.zeros((*total.shape, 3), np.float32)
     for one, weight in zip(candidates, weights, strict=True):
         color += (weight / total)[..., None] * one.color
-    kept = ~_stray(winner, candidates, paints, least_px) & (view.alpha > SOLID)
+    kept = ~_stray(winner, candidates, paints, STRAY * figure_px**2) & (view.alpha > SOLID)
     if kept.any():
         at = nearest(kept)
         return color[at], winner[at]

@@ -15,7 +15,7 @@ from toonset.nerf.look.strokes import FEWEST_OUTLINED, ink_color, mean_width, ou
 from toonset.raster import depth_inside, nearest
 
 FINER = 3  # samples per pixel and axis
-SMOOTH_PX = 0.7  # sigma: what is finer in a field's opacity is noise
+SMOOTH = 0.7 / 260  # sigma over the figure's height: what is finer in a field's opacity is noise
 CRUMB_PX = 30  # area of parts and holes that are noise, in a figure of CRUMB_AT px
 CRUMB_AT = 260.0
 BAND_PX = 2.0  # beyond the outline, in which its soft side lies
@@ -85,7 +85,7 @@ def crisp_outline(
     height, width = alpha.shape
     size = (FINER * width, FINER * height)
     fine = cv2.resize(alpha.astype(np.float32), size, interpolation=cv2.INTER_CUBIC)
-    inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH_PX * FINER) >= border
+    inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH * figure_px * FINER) >= border
     samples = (figure_px / CRUMB_AT) ** 2 * FINER**2
     inside = without_crumbs(inside, CRUMB_PX * samples, hole_px * samples)
     ink = np.zeros_like(alpha, dtype=np.float32)

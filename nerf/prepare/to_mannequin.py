@@ -24,12 +24,14 @@ from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView, shape_of
 from toonset.nerf.look.step_lines import learn_steps, step_places
 from toonset.nerf.look.strokes import outline_width
 from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
+from toonset.nerf.prepare.smaller import at_most
 from toonset.nerf.prepare.unwarp import MOST, Unwarping, Warp, warped
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED
 
 OUTSIDE = 0.25  # of an outline's width: lines that reach farther beyond the silhouette lie about it
 MOST_OUTSIDE = 1.5  # of its width: what is farther out is not a line
+JUDGED_PX = 400.0  # height of the figure at which a mannequin is refused
 SURE = 2.5  # standard errors, from drawing to drawing
 
 
@@ -70,6 +72,11 @@ def posed(scene: Scene, *, unwarp: bool = True) -> Posed:
     """
     if scene.mannequin is None:
         return Posed.left_alone(scene)
+    small = at_most(scene, JUDGED_PX)
+    if small is not scene:  # most mannequins are refused: cheaper at a smaller size
+        judged = posed(small, unwarp=unwarp)
+        if judged.shape is None:
+            return Posed.left_alone(scene, judged.fit)
     shape = shape_of(scene.mannequin, [frame.camera for frame in scene.frames])
     shape = replace(shape, beyond=_outside(scene, shape))
     fit = mannequin_fit(scene, shape)

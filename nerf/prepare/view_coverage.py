@@ -26,11 +26,13 @@ class Gap:
         after: the drawing at which it begins, seen from above counterclockwise.
         before: the drawing at which it ends.
         radians: its size.
+        begin: the yaw at which it begins, radians.
     """
 
     after: str
     before: str
     radians: float
+    begin: float
 
 
 def guesses(scene: Scene) -> list[str]:
@@ -45,8 +47,8 @@ def guesses(scene: Scene) -> list[str]:
             "figure is: it is of no use from the side; add a drawing from there"
         ]
     said = [
-        f"no drawing in the {math.degrees(gap.radians):.0f} deg from {gap.after} to {gap.before}: "
-        "shape and colours seen from there are a guess"
+        f"{_undrawn(gap)}no drawing in the {math.degrees(gap.radians):.0f} deg from {gap.after} to "
+        f"{gap.before}: shape and colours seen from there are a guess"
         for gap in wide_gaps(scene)
     ]
     if gap > FEW_OUTLINES:
@@ -62,10 +64,18 @@ def wide_gaps(scene: Scene) -> list[Gap]:
     turns = sorted((_yaw(frame.camera), frame.name) for frame in scene.frames)
     following = [*turns[1:], (turns[0][0] + 2 * math.pi, turns[0][1])]
     gaps = [
-        Gap(after, before, end - begin)
+        Gap(after, before, end - begin, begin)
         for (begin, after), (end, before) in zip(turns, following, strict=True)
     ]
     return [gap for gap in gaps if gap.radians > WIDE]
+
+
+def _undrawn(gap: Gap) -> str:
+    """Return which side nobody drew, and what stands in for it; "" of one without a name."""
+    for side, yaw in (("front", 0.0), ("back", math.pi)):
+        if 0 < (yaw - gap.begin) % (2 * math.pi) < gap.radians:
+            return f"nobody drew the {side}, the paint beside it stands in; "
+    return ""
 
 
 def outline_gap(scene: Scene) -> float:

@@ -14,7 +14,7 @@ from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.errors import BundleError, OutputError, PaletteError, ToonsetError
 from toonset.nerf.fields.trained_field import NO_DRAWINGS, NO_LINES, NO_PALETTE, TrainedField
-from toonset.nerf.look.blend import DrawnView, Geometry, blend_view
+from toonset.nerf.look.blend import SOLID, DrawnView, Geometry, blend_view
 from toonset.nerf.options import LAYERS
 from toonset.nerf.render.depth_levels import DepthLevels
 from toonset.nerf.render.normals import normal_picture
@@ -22,6 +22,7 @@ from toonset.palette.pixels.labels import UNLABELLED
 from toonset.view import small_png
 from toonset.write import write_bytes
 
+SOURCE_COLORS = np.array([[190, 190, 190], [60, 110, 220], [220, 60, 50]], dtype=np.uint8)
 Picture = UInt8[np.ndarray, "height width 4"]
 Layer = UInt8[np.ndarray, "height width *channels"]
 
@@ -84,6 +85,7 @@ class Rendering:
             "depth": lambda: depth_picture(self),
             "alpha": lambda: alpha_picture(self),
             "ink": lambda: ink_picture(self),
+            "source": lambda: source_picture(self),
             "normal": lambda: normal_picture(self.depth, self.alpha, self.camera),
             "normal-camera": lambda: normal_picture(
                 self.depth, self.alpha, self.camera, in_camera=True
@@ -169,6 +171,17 @@ def alpha_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
     """Return opacity as opaque grey."""
     alpha = rendering.alpha
     return _bytes(np.dstack([alpha, alpha, alpha, np.ones_like(alpha)]))
+
+
+def source_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
+    """Return where paint comes from: grey of a drawing, blue of a mirror image, red of the field.
+
+    Raises:
+        BundleError: the run holds no drawings.
+    """
+    drawn = rendering.drawn
+    solid = (drawn.alpha >= SOLID)[..., None] * np.uint8(255)
+    return np.concatenate([SOURCE_COLORS[drawn.source], solid], axis=-1)
 
 
 def ink_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:

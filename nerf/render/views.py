@@ -1,7 +1,8 @@
 """Render new views of a trained field.
 
 One ray goes through every pixel that may show the figure, more through pixels on borders: outlines,
-folds, where one colour meets the next. Outlines are soft through the hull's occupancy.
+folds, where one colour meets the next. Outlines are soft through the hull's occupancy. Where a
+voxel covers several pixels the view is rendered smaller and enlarged: it has no finer detail.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.kernels.threads import one_thread
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import cast
@@ -23,10 +25,12 @@ from toonset.nerf.render.labels import NONE, labels_of, palette_shares
 from toonset.nerf.render.layers import Rendering
 from toonset.nerf.render.rays import ViewRays
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.raster import nearest
 
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
 RAYS_PER_SIDE = 2  # of a pixel on a border
 TOLERANCE = 0.15  # difference of neighbours that makes a border
+FINEST = 1.5  # pixels of a voxel's side
 CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 
@@ -43,8 +47,10 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
 @torch.no_grad()
 @one_thread()
 def _render(baked: Baked, camera: Camera) -> Rendering:
-    width, height = camera.size_wh
-    sight = ViewRays.of(baked, camera)
+    detail_px = _detail(baked.trained) * camera.scale
+    small = camera.resized(min(1.0, FINEST / detail_px)) if detail_px > FINEST else camera
+    width, height = small.size_wh
+    sight = ViewRays.of(baked, small)
     seen = cast(sight, _grid(height, width)).view(5, height, width)
     labels, shares = torch.full((height, width), NONE), None
     if baked.labels is not None:
@@ -58,7 +64,50 @@ def _render(baked: Baked, camera: Camera) -> Rendering:
         shares = palette_shares(baked.labels, baked.paints, seen[3], labels, chosen, more)
     seen[:, chosen] = more.mean(dim=2)
     means = seen.numpy(), None if shares is None else shares.numpy()
-    return _rendering(*means, camera, baked)
+    found = _rendering(*means, small, baked)
+    return found if small.size_wh == camera.size_wh else enlarged(found, camera)
+
+
+def _detail(trained: TrainedField) -> float:
+    """Return the finest that a field can show, world units; 0 where nothing is known."""
+    hull, field = trained.hull, trained.field
+    if not isinstance(field, TriplaneField):
+        return 0.0
+    return min(hull.voxel, float(hull.box.size.max()) / field.resolution)
+
+
+def enlarged(view: Rendering, camera: Camera) -> Rendering:
+    """Return a rendering as a larger camera of the same sight has it.
+
+    Args:
+        view: what is enlarged.
+        camera: of the same rotation and middle.
+    """
+    finer = camera.scale / view.camera.scale
+    inverse = np.array([[1 / finer, 0, 0.5 / finer - 0.5], [0, 1 / finer, 0.5 / finer - 0.5]])
+
+    def warped(picture: np.ndarray, how: int) -> np.ndarray:
+        flags = how | cv2.WARP_INVERSE_MAP
+        border = cv2.BORDER_REPLICATE
+        return cv2.warpAffine(picture, inverse, camera.size_wh, flags=flags, borderMode=border)
+
+    alpha = warped(view.alpha, cv2.INTER_CUBIC).clip(0, 1)
+    rgb = warped(view.rgb, cv2.INTER_CUBIC).clip(0, alpha[..., None])
+    shares = labels = None
+    if view.shares is not None:
+        channels = [warped(share, cv2.INTER_LINEAR) for share in np.moveaxis(view.shares, -1, 0)]
+        shares = np.stack(channels, axis=-1)
+    seen = np.isfinite(view.depth)
+    depth = np.full(alpha.shape, np.nan, np.float32)
+    if seen.any():
+        whole = view.depth[nearest(seen)].astype(np.float32)
+        slope, step = (warped(whole, how) for how in (cv2.INTER_LINEAR, cv2.INTER_NEAREST))
+        # across a step in depth no place lies half way
+        near = np.abs(slope - step) < 2 * view.field.hull.voxel
+        depth = np.where(alpha >= SEEN_FROM, np.where(near, slope, step), np.nan)
+    if shares is not None:
+        labels = np.where(alpha >= SEEN_FROM, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
+    return Rendering(rgb, alpha, depth, labels, shares, camera, view.field)
 
 
 def baked_of(field: TrainedField) -> Baked:

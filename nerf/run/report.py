@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
@@ -17,8 +18,9 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.images.picture import encode_png
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import side_by_side, threads_in_use
+from toonset.nerf.look.blend import SOURCES
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.layers import color_picture, default_layer
+from toonset.nerf.render.layers import Rendering, color_picture, default_layer
 from toonset.nerf.render.turntable import between_drawings
 from toonset.nerf.render.views import baked_of, render
 from toonset.nerf.run.folder import write_field
@@ -50,13 +52,15 @@ def write_run(
         held_out: what was seen of them on the way.
     """
     baked = baked_of(training.result)
+    views = between_views(baked)
     metrics = {
         **_course(training, held_out),
         "train": compared(baked, training.prepared.scene),
         "test": None if test is None else compared(baked, test),
+        "sources": None if training.result.drawings is None else _sources(views),
         "verdict": verdict_of(training, scene, baked).to_json(),
     }
-    write_bytes(folder / "preview.png", encode_png(preview(baked)))
+    write_bytes(folder / "preview.png", encode_png(_in_a_row(views)))
     about = {
         "options": asdict(training.options),
         "scene": {"views": [frame.name for frame in scene.frames]},
@@ -110,15 +114,31 @@ def _course(training: Training, held_out: Sequence[HeldOut]) -> dict[str, Any]:
 
 
 def preview(source: TrainedField | Baked) -> np.ndarray:
-    """Return four views side by side over white, (height, 4 height, 3) bytes.
+    """Return the views of `between_views` side by side over white, (height, 4 height, 3) bytes."""
+    return _in_a_row(between_views(source))
 
-    They lie half way between the drawings, where a field may be wrong.
-    """
+
+def between_views(source: TrainedField | Baked) -> list[Rendering]:
+    """Return four views half way between the drawings, where a field may be wrong."""
     baked = source if isinstance(source, Baked) else Baked.of(source)
     side = min(PREVIEW_PX, baked.trained.size_px)
     cameras = between_drawings(baked.trained, PREVIEW_VIEWS, side)
-    views = side_by_side([partial(render, baked, camera) for camera in cameras])
-    layer = default_layer(baked.trained)
+    return side_by_side([partial(render, baked, camera) for camera in cameras])
+
+
+def _sources(views: Sequence[Rendering]) -> list[dict[str, float]]:
+    """Return of each view which share of its paint is drawn, mirrored and guessed."""
+    return [
+        {
+            "yaw_deg": round(math.degrees(view.camera.angles[0]) % 360, 2),
+            **{name: round(view.drawn.share(number), 4) for number, name in enumerate(SOURCES)},
+        }
+        for view in views
+    ]
+
+
+def _in_a_row(views: Sequence[Rendering]) -> np.ndarray:
+    layer = default_layer(views[0].field)
     pictures = [over_white(view.picture(layer)) for view in views]
     return (np.concatenate(pictures, axis=1) * 255 + 0.5).astype(np.uint8)
 

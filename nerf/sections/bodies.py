@@ -25,7 +25,7 @@ from toonset.nerf.sections.drawing import TALL, Drawing, Mask, cells, sample, si
 from toonset.nerf.sections.grid import NEAR_PX, Grid, Volume
 from toonset.nerf.sections.limbs import depths_of, slenderness
 from toonset.nerf.sections.runs import Outline, runs_of
-from toonset.nerf.sections.thin_parts import thin_parts, without_brims
+from toonset.nerf.sections.thin_parts import thin_parts, without_sections
 
 LEAD = 0.7  # of the row's widest run: from here a run is the body's
 FIST_PX = 0.26 * TALL  # what is lower and sticks out of the side drawing is held by limbs
@@ -45,9 +45,7 @@ def sections(grid: Grid, front: Drawing, side: Drawing | None, others: Sequence[
     """
     if side is None:
         return _round_sections(grid, front)
-    front_thin, side_thin = without_brims(
-        front.mask, thin_parts(front.mask), side.mask, thin_parts(side.mask)
-    )
+    front_thin, side_thin = without_sections(front.mask, side.mask)
     face = Outline.of(front, _some(front.mask & ~front_thin, front.mask))
     profile = Outline.of(side, _some(side.mask & ~side_thin, side.mask))
     lead = face.runs.half >= LEAD * face.runs.widest()

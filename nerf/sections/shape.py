@@ -53,9 +53,10 @@ def shape_of(frames: Sequence[Frame], plane_x: float | None = None) -> Solid:
     f = carved(f, grid, diagonals, CARVE_PX)
     f = distance_again(blurred(f, SMOOTH_VOXELS))
     everything = [*facing, *aside, *diagonals]
-    f = completed(grid, f, [facing[0], *aside[:1], *roles.between], everything)
-    f = touching(grid, f, everything)
-    return Solid(grid, _without_crumbs(f))
+    covered = [facing[0], *aside[:1], *roles.between]
+    f = distance_again(completed(grid, f, covered, everything, plane_x))
+    f = _without_crumbs(touching(grid, f, everything))
+    return Solid(grid, completed(grid, f, covered, everything))  # tips that smoothing lost
 
 
 def mirror_plane(frames: Sequence[Frame]) -> float:

@@ -13,6 +13,7 @@ from jaxtyping import Bool
 from scipy import ndimage
 
 from toonset.nerf.sections.drawing import TALL, Mask
+from toonset.nerf.sections.runs import runs_of
 from toonset.raster import parts
 
 OUT = 0.7  # of the limit: parts that stick out less are the body's
@@ -23,6 +24,7 @@ BRIM_SHARE = 0.6  # of a part's rows
 EVEN = 0.35  # lesser over larger reach of a brim in the front drawing
 EVEN_ASIDE = EVEN / 2  # in the side drawing, where faces and hair stick out
 REACH = 0.5  # of the body's width: what reaches less to either side is no brim
+FLAT = 2.0  # times a part's height: a section as wide is no part's
 AROUND_BODY, AROUND_PART = 31, 7  # rows in which a part's body is looked for
 
 
@@ -50,19 +52,19 @@ def thin_parts(mask: Mask, low_px: float = LOW_PX, out_px: float | None = None) 
     return found
 
 
-def without_brims(
-    front: Mask, front_parts: Mask, side: Mask, side_parts: Mask
-) -> tuple[Mask, Mask]:
-    """Return the thin parts of both drawings that are not a disc's, such as a hat's brim.
+def without_sections(front: Mask, side: Mask) -> tuple[Mask, Mask]:
+    """Return the thin parts of two drawings that have no section in common.
 
-    A disc sticks out to both sides alike, in both drawings and at one height, and its sections are
-    ellipses. Both drawings have their rows in common.
+    Two kinds have one: discs, such as a hat's brim, stick out to both sides alike, in both drawings
+    and at one height; and where the other drawing's figure is narrow, as at toes, a section is no
+    wider than the part. Both drawings have their rows in common.
     """
+    front_parts, side_parts = thin_parts(front), thin_parts(side)
     both = np.logical_and(
         _brim_rows(front_parts, front & ~front_parts, EVEN),
         _brim_rows(side_parts, side & ~side_parts, EVEN_ASIDE),
     )
-    return _off(front_parts, both), _off(side_parts, both)
+    return _chosen(front_parts, both, side), _chosen(side_parts, both, front)
 
 
 def _opened(mask: Mask, size: tuple[int, int]) -> Mask:
@@ -70,12 +72,18 @@ def _opened(mask: Mask, size: tuple[int, int]) -> Mask:
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
 
 
-def _off(thin: Mask, brim_rows: Bool[np.ndarray, " height"]) -> Mask:
+def _chosen(thin: Mask, brim_rows: Bool[np.ndarray, " height"], other: Mask) -> Mask:
+    """Return the parts that are no brim's and are thinner than another drawing's figure is wide."""
+    widths = np.zeros(len(other))
+    runs = runs_of(other)
+    np.maximum.at(widths, runs.row, runs.end - runs.start)
     labels = parts(thin, 4)
     kept = np.zeros_like(thin)
     for number in range(1, int(labels.max()) + 1):
         part = labels == number
-        if brim_rows[part.any(axis=1)].mean() <= BRIM_SHARE:
+        rows = part.any(axis=1)
+        flat = np.median(widths[rows]) > FLAT * np.median(part.sum(axis=0)[part.any(axis=0)])
+        if flat and brim_rows[rows].mean() <= BRIM_SHARE:
             kept |= part
     return kept
 

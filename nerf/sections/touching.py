@@ -55,7 +55,7 @@ def touching(grid: Grid, f: Volume, drawings: Sequence[Drawing]) -> Volume:
         f = f - pull / (weight + SPARSE * usual + 1e-4 * most)
         if (step + 1) % AGAIN == 0:
             f = distance_again(f)
-    return distance_again(blurred(f, FINAL_VOXELS))
+    return blurred(f, FINAL_VOXELS)
 
 
 def outline(drawing: Drawing) -> Float[np.ndarray, "n 2"]:

@@ -37,9 +37,10 @@ from toonset.nerf.hull.scene_hull import (
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.threads import SIDES
-from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
+from toonset.nerf.options import STEPS_ON_SECTIONS, STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
 from toonset.nerf.prepare.paint_agreement import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
+from toonset.nerf.prepare.smaller import at_most
 from toonset.nerf.prepare.symmetry import Symmetry, add_mirrored_views, find_symmetry
 from toonset.nerf.train.batches import make_batches
 from toonset.nerf.train.box_rays import (
@@ -59,6 +60,7 @@ from toonset.nerf.train.result import Training
 
 CHANNELS, HIDDEN = 16, 32
 CELLS_PER_PX, CELLS = 1.0, (48, 256)
+FITTED_PX = 1.5 * CELLS[1]  # height of the largest figure: the planes are no finer
 STEPS_ALONG = 200  # samples that the longest side of the hull would take
 MOST_SAMPLES = 30  # per ray, from its first inside the hull; twice as deep, surfaces turn to mist
 TRIAL_STRIDE = 2  # times the samples' distance: the order of fields is the same, in half the time
@@ -103,6 +105,8 @@ def fit_field(
     tell("comparing the drawings")
     ready = prepare(scene, options)
     usual = STEPS_ON_SHAPE if ready.shape else USUAL_STEPS
+    if ready.shape is None and has_sections(ready.scene, options):
+        usual = STEPS_ON_SECTIONS
     options = replace(options, steps=usual if options.steps is None else options.steps)
     symmetry = find_symmetry(ready.scene, options.symmetric or scene.symmetric)
     whole = add_mirrored_views(ready.scene, symmetry)
@@ -111,7 +115,7 @@ def fit_field(
     hull, evidence = _hull(whole, options, ready, symmetry)
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
-    scene = add_mirrored_views(ready.scene, symmetry)
+    scene = at_most(add_mirrored_views(ready.scene, symmetry), FITTED_PX)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
@@ -170,7 +174,7 @@ def _choice(
     ready: Prepared, hull: Hull, weights: Weights, options: TrainOptions, device: torch.device
 ) -> FieldChoice:
     """Return how fine the planes are that this scene needs; the seed is set anew."""
-    scene, samples = ready.scene, MOST_SAMPLES // TRIAL_STRIDE
+    scene, samples = at_most(ready.scene, FITTED_PX), MOST_SAMPLES // TRIAL_STRIDE
     step = TRIAL_STRIDE * float(hull.box.size.max()) / STEPS_ALONG
     ground = Ground(scene, hull, step, samples, weights, options, device)
     planes = partial(planes_of, hull)

@@ -10,7 +10,7 @@ import pytest
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.prepare.symmetry import mirror_all
+from toonset.nerf.prepare.symmetry import add_mirrored_views, find_symmetry
 from toonset.nerf.prepare.view_coverage import FEW_OUTLINES, guesses, outline_gap, wide_gaps
 
 NOTHING = np.zeros((8, 8, 4), dtype=np.uint8)
@@ -66,5 +66,17 @@ def test_what_mirror_images_may_show_is_no_guess_yet() -> None:
         for some in (scene(0, 45, 90, 135, 180), scene(0, 180))
     )
     assert guesses(half)
-    assert not guesses(mirror_all(half))
-    assert guesses(mirror_all(ends)) == guesses(ends)
+    assert not guesses(add_mirrored_views(half, find_symmetry(half)))
+    assert find_symmetry(ends) is None
+
+
+@pytest.mark.parametrize(
+    ("yaws", "side"), [((270, 0, 90), "back"), ((90, 180, 270), "front"), ((0, 90, 180), "")]
+)
+def test_a_front_or_back_that_nobody_drew_is_named(yaws: tuple[float, ...], side: str) -> None:
+    drawn = np.full_like(NOTHING, 255)
+    some = scene(*yaws)
+    whole = replace(some, frames=tuple(replace(frame, rgba=drawn) for frame in some.frames))
+    said = "\n".join(guesses(whole))
+    assert (f"nobody drew the {side}, " in said) == bool(side)
+    assert "nobody drew" in said or not side
