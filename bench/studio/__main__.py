@@ -22,7 +22,8 @@ from toonset import __version__
 from toonset.write import write_json
 
 SHEETS, RECORDS = "sheets.json", "records.json"
-HEAD = ("sheet", "cameras, deg", "mirror images", f"{IOU}, drawn / other side", f"{FLIP}", "CPU s")
+BOTH = " / ".join(SIDES).replace("side /", "/")
+HEAD = ("sheet", "cameras, deg", "mirror images", f"{IOU}, {BOTH}", f"{FLIP}, {BOTH}", "CPU s")
 
 
 def main(
