@@ -16,7 +16,10 @@ from toonset.nerf.sections.drawing import Drawing, mirrored, yaw_of
 FACING = math.radians(22)  # from front or back
 ASIDE = math.radians(25)  # from a right angle with the front
 SAME = math.radians(20)  # drawings this near have one silhouette
-GAP = math.radians(40)  # between outlines: where they leave more, a hull is square
+# Between outlines, of half a turn: where they leave more a hull is square; of a sheet that leaves a
+# side undrawn less is enough, since each of its outlines was drawn but once
+GAP, GAP_OF_HALF = math.radians(55), math.radians(40)
+UNDRAWN = math.radians(119)  # between neighbouring drawings, of the whole turn
 EYE_LEVEL = math.radians(8)  # from above or below, rows of two drawings show no common height
 
 
@@ -58,13 +61,15 @@ def mirror_images(
 def wants_sections(cameras: Sequence[Camera]) -> bool:
     """Return whether drawings from here have sections, and a hull of them would be square."""
     level = all(abs(camera.angles[1]) < EYE_LEVEL for camera in cameras)
-    return level and outline_gap([yaw_of(camera) for camera in cameras]) > GAP
+    yaws = [yaw_of(camera) for camera in cameras]
+    half = largest_gap(yaws, 2 * math.pi) > UNDRAWN
+    return level and largest_gap(yaws, math.pi) > (GAP_OF_HALF if half else GAP)
 
 
-def outline_gap(yaws: Sequence[float]) -> float:
-    """Return the largest gap between outlines, of half a turn; radians."""
-    turns = sorted(yaw % math.pi for yaw in yaws)
-    following = [*turns[1:], turns[0] + math.pi]
+def largest_gap(yaws: Sequence[float], turn: float) -> float:
+    """Return the largest gap between directions that repeat after a turn; radians."""
+    turns = sorted(yaw % turn for yaw in yaws)
+    following = [*turns[1:], turns[0] + turn]
     return max(end - begin for begin, end in zip(turns, following, strict=True))
 
 
