@@ -114,8 +114,14 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
 
 
 def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
-    """Return lines across the sheet whose pieces figures interrupt."""
+    """Return lines across the sheet whose pieces figures interrupt.
+
+    They go on wherever there is paper, but behind clothes in the paper's colour, unless they begin
+    and end where a whole line does: height lines are ruled together, and hems end earlier.
+    """
     found = []
+    across = [line for line in lines if line.stop - line.start >= CROSSING * paint.shape[1]]
+    whole = [line for line in across if _is_open(paint, line)]
     for first in sorted({line.first for line in lines}):
         own = [line for line in lines if line.first == first]
         length = sum(line.stop - line.start for line in own)
@@ -128,7 +134,11 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
             open_ = np.asarray(~above & ~below)
             drawn = np.all(paint[first : last + 1, start:stop], axis=0)
             crossed = np.count_nonzero(drawn & open_)
-            if crossed and crossed >= THROUGHOUT * np.count_nonzero(open_):  # hems end earlier
+            ruled = any(
+                max(abs(other.start - start), abs(other.stop - stop)) <= BROKEN_PX
+                for other in whole
+            )
+            if crossed and (ruled or crossed >= THROUGHOUT * np.count_nonzero(open_)):
                 found.append(line)
     return found
 
