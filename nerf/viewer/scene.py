@@ -23,8 +23,10 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import PLANES, TriplaneField
 from toonset.nerf.look.blend import (
     BORDER,
+    FEATHER,
     FIELD_VOTE,
     HOLE_PX,
+    LEAD,
     OWN,
     OWN_VOTE,
     SIDE,
@@ -199,6 +201,8 @@ def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
         "fieldVote": FIELD_VOTE,
         "sideVote": SIDE_VOTE,
         "ownVote": OWN_VOTE,
+        "lead": LEAD if drawings.apart else 0.0,
+        "featherPx": FEATHER * drawings.height * max(view.camera.scale for view in drawings.views),
         "softNormals": SOFT,
         "own": OWN,
         "side": SIDE,

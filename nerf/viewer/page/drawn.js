@@ -150,8 +150,8 @@ void main() {
     if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, sizes[tap]))) continue;
     vec4 known = texelFetch(about, ivec3(cell, layers[tap]), 0);
     if (known.b <= 0.5 || seen.z > far_in(known.r) + slack) continue;
-    float edge = known.g * 255.0 / edge_steps / 4.0;
-    float weight = (tap == 0 ? share : tap == 1 ? 1.0 - share : 1.0) * (1.0 - 0.9 * exp(-edge * edge));
+    float edge = known.g * 255.0 / edge_steps / FEATHER_PX;
+    float weight = (tap == 0 ? share + LEAD : tap == 1 ? 1.0 - share : 1.0) * (1.0 - 0.9 * exp(-edge * edge));
     if (weight <= heaviest) continue;
     heaviest = weight;
     best = vec3(seen.xy - 0.5 + (tap == 0 ? share - 1.0 : tap == 1 ? share : 0.0) * apart, float(tap));
@@ -274,7 +274,7 @@ vec4 feathered(ivec2 at, vec4 mask) {
   return (clamp(2.0 * sum / total - 1.0, 0.0, 1.0) + 0.02) * mask;
 }
 float trust(int tap, vec2 place) {
-  float edge = smooth_at(about, tap, place).g * 255.0 / edge_steps / 4.0;
+  float edge = smooth_at(about, tap, place).g * 255.0 / edge_steps / FEATHER_PX;
   return 1.0 - 0.9 * exp(-edge * edge);
 }
 int label_at(int tap, vec2 place) {
@@ -301,7 +301,7 @@ void main() {
   vec2 moved = places[0] - (1.0 - share) * apart;
   first = vec4(sharp_at(paint, 0, moved).rgb, 1.0);
   said.x = float(label_at(0, moved)) / 255.0;
-  weights.x = share * trust(0, moved) * soft.x;
+  weights.x = (share + LEAD) * trust(0, moved) * soft.x;
   if (share < 1.0) {
     moved = places[1] + share * apart;
     second = vec4(sharp_at(paint, 1, moved).rgb, 1.0);
@@ -586,7 +586,7 @@ export class DrawnLook {
       const flow = makeTexture(gl, gl.TEXTURE_2D, gl.RG16F, [width, height], arrayOf(blob, one.flow), true);
       return { pair: one.pair, camera: one.camera, flow };
     });
-    const votes = `#define SIDE_VOTE ${record.sideVote}\n#define OWN_VOTE ${record.ownVote}\n#define FIELD_VOTE ${record.fieldVote}\n`;
+    const votes = `#define SIDE_VOTE ${record.sideVote}\n#define OWN_VOTE ${record.ownVote}\n#define FIELD_VOTE ${record.fieldVote}\n#define LEAD ${record.lead.toFixed(4)}\n#define FEATHER_PX ${record.featherPx.toFixed(4)}\n`;
     this.none = makeTexture(gl, gl.TEXTURE_2D, gl.RGBA8, [1, 1], null, false);
     this.surface = new Program(gl, SURFACE);
     this.masks = new Program(gl, MASKS);
@@ -600,7 +600,7 @@ export class DrawnLook {
     this.flood = new Program(gl, FLOOD);
     this.compose = new Program(gl, COMPOSE);
     this.coarse = new Program(gl, `#define CELL ${CELL}\n${COARSE}`);
-    this.colors = new Program(gl, COLORS);
+    this.colors = new Program(gl, votes + COLORS);
     this.fast = new Program(gl, `#define CELL ${CELL}\n${FAST}`);
     /** @type {Record<string, Target> | null} */
     this.targets = null;
