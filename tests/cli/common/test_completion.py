@@ -48,7 +48,7 @@ def test_verbs_are_completed(completed: Callable[[str], set[str]]) -> None:
 
 def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
     assert {"--mesh", "--views", "--force"} <= completed("toonset calibrate sheet.png --")
-    steps = ("mannequin", "palette", "register", "unwarp", "fairing", "symmetry")
+    steps = ("mannequin", "palette", "register", "unwarp", "fairing")
     assert completed("toonset train --no-") == {f"--no-{step}" for step in steps}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from base64 import b64encode
 from dataclasses import dataclass, field
@@ -90,7 +91,7 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
             "reach": 1.0,
             "fill": 0.94,
             "k": 0.0,
-            "turn": [[0.0, 0.0, 0.0]],
+            "turn": [[math.radians(45 * i), 0.0, 0.0] for i in range(8)],
         },
         "palette": [
             {"name": name, "rgb": rgb, "share": share}
