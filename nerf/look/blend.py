@@ -43,7 +43,9 @@ BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a lit
 HOLE_PX = 80  # area, as CRUMB_PX: where bent drawings disagree, hulls of capes are torn
 OPAQUE = 0.6  # opacity from which a field's colour is its own
 FIELD_VOTE = 0.25  # beside 1 of the drawings together
-LEAD = 0.5  # more votes of the nearer of two drawings that were not made to agree
+# Of two drawings that were not made to agree: more votes of the nearer, and the power of shares in
+# the colour of one label, or eyes without a paint of their own are there twice
+LEAD, SHARP = 0.5, 6
 SOFT = 0.8 / 260  # sigma over the figure's height, over which votes are shared
 FEATHER = 4.0 / 260  # of the height: so near to outlines and steps drawings show different things
 LEAST_TRUST = 0.1
@@ -216,7 +218,9 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     candidates, covered, by_drawing = _candidates(
         drawings, view, points, own_color, (first, second, share)
     )
-    color, labels = _voted(candidates, view, len(drawings.paints), figure_px)
+    color, labels = _voted(
+        candidates, view, len(drawings.paints), figure_px, SHARP if drawings.apart else 1
+    )
     if sight is not None:
         source, covered = _sliver_sources(
             covered, view.depth, STEP * drawings.height, SLIVER * figure_px
@@ -405,7 +409,7 @@ def _feathered(mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
 
 
 def _voted(
-    candidates: list[_Candidate], view: Geometry, paints: int, figure_px: float
+    candidates: list[_Candidate], view: Geometry, paints: int, figure_px: float, sharp: int
 ) -> tuple[Float[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
     """Return the colour and the label that candidates agree on."""
     votes = np.zeros((*view.alpha.shape, paints), np.float32)
@@ -416,7 +420,7 @@ def _voted(
         votes[rows[:, None], columns, one.label] += one.weight
     votes = cv2.GaussianBlur(votes, (0, 0), SOFT * figure_px).reshape(votes.shape)
     winner = votes.argmax(axis=-1).astype(np.uint8)
-    weights = [one.weight * (one.label == winner) for one in candidates]
+    weights = [one.weight**sharp * (one.label == winner) for one in candidates]
     total = np.sum(weights, axis=0)
     for one, weight in zip(candidates, weights, strict=True):  # none of the label: all of them
         weight += 1e-4 * one.weight * (total < 1e-4)

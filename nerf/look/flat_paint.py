@@ -36,7 +36,7 @@ WIDER = 1.2  # times a line's width, from its middle or its step: ink that is th
 GAP_PX = 0.5  # between places at which lines are looked for
 ROUNDS = 24  # pixels that paint goes under a line
 EDGE_PX = 1.0  # beside an edge, colours are mixed
-GRAINY = 0.3  # levels: less is not grain
+GRAINY, TEXTURE = 0.3, 2.5  # levels: less is not grain; more is fur, gouache or print
 STRENGTH, WINDOW = 10.0, 5  # times the grain: what is smoothed; pixels about each
 LAPLACE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 AROUND = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -162,7 +162,9 @@ def _same_surface(
 
 
 def _without_grain(paint: Paint, inside: Mask) -> Float[np.ndarray, "height width 3"]:
-    """Return colours in [0, 1] without the grain of paper and JPEG; clean drawings as they are.
+    """Return colours in [0, 1] without the grain of paper and JPEG.
+
+    Clean drawings and those with a texture are left as they are.
 
     Sources: noise, Immerkaer 1996; guided filter, He, Sun and Tang 2010.
     """
@@ -170,7 +172,7 @@ def _without_grain(paint: Paint, inside: Mask) -> Float[np.ndarray, "height widt
     noise = np.abs(cv2.filter2D(light, -1, LAPLACE))[inside]
     grain = float(np.median(noise)) / 0.6745 / 6 if len(noise) else 0.0
     clean = paint.astype(np.float32)
-    if grain >= GRAINY:
+    if GRAINY <= grain < TEXTURE:
         clean = cv2.ximgproc.guidedFilter(clean, clean, WINDOW, (STRENGTH * grain) ** 2)
     return (clean / 255).clip(0, 1)
 

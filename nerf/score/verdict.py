@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from toonset.dataset.bundle.scene import Scene
-from toonset.nerf.options import STEPS_ON_SHAPE, USUAL_STEPS
+from toonset.nerf.options import STEPS_ON_SECTIONS, STEPS_ON_SHAPE, USUAL_STEPS
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.score.left_out import LeftOut, left_out
@@ -97,6 +97,7 @@ def _remedy(training: Training, worst: LeftOut, *, stands_out: bool) -> str:
     """Return advice, by the most likely cause."""
     done = len(training.history)
     usual = STEPS_ON_SHAPE if training.prepared.shape else USUAL_STEPS
+    usual = usual if training.prepared.compared else STEPS_ON_SECTIONS
     ended = training.stopped in ("steps", "budget")
     if ended and done < usual // 2:
         return f"these were {done} steps: train longer"

@@ -354,7 +354,7 @@ void main() {
   }
   int best = 0;
   for (int i = 1; i < ${MOST_PAINTS}; i++) if (votes[i] > votes[best]) best = i;
-  vec3 w = texelFetch(weights, at, 0).rgb;
+  vec3 w = pow(texelFetch(weights, at, 0).rgb, vec3(SHARP));
   ivec3 l = ivec3(round(texelFetch(said, at, 0).rgb * 255.0));
   vec3 kept = w * vec3(equal(l, ivec3(best)));
   if (kept.x + kept.y + kept.z < 1e-4) kept += 1e-4 * w;
@@ -586,12 +586,12 @@ export class DrawnLook {
       const flow = makeTexture(gl, gl.TEXTURE_2D, gl.RG16F, [width, height], arrayOf(blob, one.flow), true);
       return { pair: one.pair, camera: one.camera, flow };
     });
-    const votes = `#define SIDE_VOTE ${record.sideVote}\n#define OWN_VOTE ${record.ownVote}\n#define FIELD_VOTE ${record.fieldVote}\n#define LEAD ${record.lead.toFixed(4)}\n#define FEATHER_PX ${record.featherPx.toFixed(4)}\n`;
+    const votes = `#define SIDE_VOTE ${record.sideVote}\n#define OWN_VOTE ${record.ownVote}\n#define FIELD_VOTE ${record.fieldVote}\n#define LEAD ${record.lead.toFixed(4)}\n#define SHARP ${record.sharp.toFixed(1)}\n#define FEATHER_PX ${record.featherPx.toFixed(4)}\n`;
     this.none = makeTexture(gl, gl.TEXTURE_2D, gl.RGBA8, [1, 1], null, false);
     this.surface = new Program(gl, SURFACE);
     this.masks = new Program(gl, MASKS);
     this.candidates = new Program(gl, votes + CANDIDATES);
-    this.vote = new Program(gl, VOTE);
+    this.vote = new Program(gl, votes + VOTE);
     this.recolor = new Program(gl, RECOLOR);
     this.inside = new Program(gl, INSIDE);
     this.slivers = new Program(gl, SLIVERS);
