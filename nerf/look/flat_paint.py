@@ -36,7 +36,7 @@ WIDER = 1.2  # times a line's width, from its middle or its step: ink that is th
 GAP_PX = 0.5  # between places at which lines are looked for
 ROUNDS = 24  # pixels that paint goes under a line
 EDGE_PX = 1.0  # beside an edge, colours are mixed
-GRAINY, TEXTURE = 0.3, 2.5  # levels: less is not grain; more is fur, gouache or print
+GRAINY, TEXTURE = 0.3, 4.0  # levels: less is not grain; more is fur, gouache or print
 STRENGTH, WINDOW = 10.0, 5  # times the grain: what is smoothed; pixels about each
 LAPLACE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 AROUND = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
