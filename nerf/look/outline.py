@@ -14,7 +14,7 @@ from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.look.strokes import FEWEST_OUTLINED, ink_color, mean_width, outline_width
 from toonset.raster import depth_inside, nearest
 
-FINER = 3  # samples per pixel and axis
+FINER, COARSER, LARGE_PX = 3, 2, 520.0  # samples per pixel and axis; of figures from this height on
 SMOOTH = 0.7 / 260  # sigma over the figure's height: what is finer in a field's opacity is noise
 CRUMB_PX = 30  # area of parts and holes that are noise, in a figure of CRUMB_AT px
 CRUMB_AT = 260.0
@@ -83,15 +83,16 @@ def crisp_outline(
         hole_px: smaller holes are noise: area in a figure of CRUMB_AT px.
     """
     height, width = alpha.shape
-    size = (FINER * width, FINER * height)
+    finer = FINER if figure_px < LARGE_PX else COARSER
+    size = (finer * width, finer * height)
     fine = cv2.resize(alpha.astype(np.float32), size, interpolation=cv2.INTER_CUBIC)
-    inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH * figure_px * FINER) >= border
-    samples = (figure_px / CRUMB_AT) ** 2 * FINER**2
+    inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH * figure_px * finer) >= border
+    samples = (figure_px / CRUMB_AT) ** 2 * finer**2
     inside = without_crumbs(inside, CRUMB_PX * samples, hole_px * samples)
     ink = np.zeros_like(alpha, dtype=np.float32)
     if width_px > 0:
         depth = depth_inside(inside).astype(np.float32)
-        line = np.clip(FINER * width_px + 0.5 - depth, 0, 1) * inside
+        line = np.clip(finer * width_px + 0.5 - depth, 0, 1) * inside
         ink = cv2.resize(line, (width, height), interpolation=cv2.INTER_AREA)
     cover = cv2.resize(inside.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
     return cover, np.minimum(ink, cover)
