@@ -26,8 +26,8 @@ from toonset.symmetric import Symmetric
 
 FACING = math.radians(12)  # between the mirror plane and a drawing that shows both sides
 NEW = math.radians(20)  # a mirrored drawing this near to a drawn one adds nothing
-# Of what both halves of a facing drawing cover; 82 fronts and backs have .89 and more, halves in
-# two colours .5 (docs/decisions.md)
+# Of what both halves of a facing drawing cover; 35 fronts and backs have .90 and more, halves in
+# two colours less than .3 (docs/decisions.md)
 LEAST_ALIKE = 0.75
 WORKING_PX = 96  # height of the figure at which halves are compared
 BLUR_PX = 0.7  # there: lines and grain are no paint
