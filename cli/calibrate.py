@@ -65,8 +65,8 @@ def calibrate(
         typer.Option(
             "--mesh",
             metavar="FILE",
-            help="Posed mannequin: obj, ply, stl, glb, off; none: no body (default: a plain body, "
-            "or none where that explains the drawings better).",
+            help="Posed mannequin: obj, ply, stl, glb, off; none: no body (default: the drawings "
+            "alone, or a plain body where they are not sure).",
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = None,
@@ -240,8 +240,8 @@ def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Prin
     body = "no mannequin"
     if mesh is None:
         body = (
-            f"no --mesh: the default mannequin, {looks.heads_tall:g} heads tall, {looks.pose} pose "
-            "(`toonset mannequin` makes others)"
+            "no --mesh: the drawings alone or, where they are not sure, the default mannequin, "
+            f"{looks.heads_tall:g} heads tall, {looks.pose} pose (`toonset mannequin` makes others)"
         )
     elif not isinstance(mesh, str):
         body = f"mannequin of {len(mesh.faces)} faces"

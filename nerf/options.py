@@ -36,7 +36,6 @@ FORMATS = ("gif", "webp", "mp4", "sprites", "ora")  # of all views of a turn tog
 LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
 LEAST |= {"smoothness": 0, "palette_weight": 0}
 MOST_STEPS = 10_000_000  # days
-UNSAID = ("symmetric", None)  # the bundle says it
 ORIGINAL = "original"  # of a mesh's variants: the run's own colours
 FACES = 8000  # of a mesh at most: docs/decisions.md
 # By default: on the drawings' hull, on the mannequin's shape, on sections; more gain nothing there
@@ -109,10 +108,10 @@ class TrainOptions:
                 if not number or not LEAST[name] <= value <= most:
                     allowed = f"{LEAST[name]} is the least, {most:.15g} the most"
                     raise UsageError(f"{name}: {value} is out of range; {allowed}")
-        choices_of = {"field": FIELDS, "device": DEVICES, "symmetric": SYMMETRIC}
+        choices_of = {"field": FIELDS, "device": DEVICES, "symmetric": (None, *SYMMETRIC)}
         for name, choices in choices_of.items():
-            if getattr(self, name) not in choices and (name, getattr(self, name)) != UNSAID:
-                known = ", ".join(choices)
+            if getattr(self, name) not in choices:
+                known = ", ".join(map(str, choices))
                 raise UsageError(f"{name}: {getattr(self, name)!r} is none of {known}")
 
 

@@ -35,7 +35,7 @@ from toonset.view import View
 
 FREE_YAW = np.radians(3.0)  # sigma of a view about the yaw that was measured
 LEAST_GAIN = 2.0  # nats, of free yaws over an even ring
-P_UNEVEN = 0.05  # that yaws are none of the listed turns: none of 22 half turns
+P_UNEVEN = 0.05  # that yaws are none of the listed turns
 LISTED_APART = 0.01  # over the height: what is farther apart may be another turn than those listed
 
 

@@ -1,8 +1,8 @@
 """List the turns that a sheet's views may show, with their prior.
 
 A turn is a pattern of yaws, where it starts, which way round it goes and from which side the sheet
-is read. `PATTERNS` are what 45 collected sheets show, counted by eye; a half turn goes to the left
-as often as to the right. Labels that a person gave count for more than all of that.
+is read. Weights of `PATTERNS` follow what collected sheets show; a half turn goes to the left as
+often as to the right. Labels that a person gave count for more than all of that.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from toonset.dataset.split_folder.view_labels import Label, label_rows
 from toonset.view import View
 
 STARTS = 8  # in a circle
-P_FRONT_FIRST = 0.85  # of 43 sheets 39 begin where their pattern does; other starts share the rest
-P_LEFT = 0.5  # that views run to the character's left: 5 of 11 half turns do
-P_FROM_RIGHT = 0.05  # that a sheet is to be read from the right: none of 43
+P_FRONT_FIRST = 0.85  # that views begin where their pattern does; other starts share the rest
+P_LEFT = 0.5  # that views run to the character's left
+P_FROM_RIGHT = 0.05  # that a sheet is to be read from the right
 P_LABEL_WRONG = 0.01  # of each label
 P_AS_LABELLED = 0.5  # that views labelled one and all are seen from just there
 NEAR = np.radians(22.5)  # half of what neighbouring directions lie apart
 P_REPEATED = 0.5  # that rows of equal length show the same directions
-# Yaws in degrees in sheet order, and how many of the collected sheets show them; what is thinkable
-# and was not seen counts as a third or half of a sheet
+# Yaws in degrees in sheet order, and their weights: of three and four drawings how many collected
+# sheets show them (docs/decisions.md); what is thinkable and was not seen weighs a third or half of
+# a sheet; of other numbers a judgement
 PATTERNS: dict[int, tuple[tuple[tuple[float, ...], float], ...]] = {
     1: (((0,), 1),),
     2: (((0, 180), 5), ((0, 90), 3), ((0, 45), 1), ((45, 225), 0.5)),

@@ -22,6 +22,7 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.camera import Camera, rotation_distance
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import mask_of
+from toonset.nerf.sections.drawing import mirrored_camera
 from toonset.symmetric import Symmetric
 
 FACING = math.radians(12)  # between the mirror plane and a drawing that shows both sides
@@ -118,14 +119,10 @@ def differences(scene: Scene) -> list[Bool[np.ndarray, "height width"] | None]:
 
 def mirrored(frame: Frame, plane_x: float) -> Frame:
     """Return the drawing as one of the body's mirror image."""
-    camera, flip = frame.camera, np.diag([-1.0, 1.0, 1.0])
-    target = np.array([2 * plane_x - camera.target[0], *camera.target[1:]])
-    center = np.array([camera.size_wh[0] - camera.center[0], camera.center[1]])
-    rotation = flip @ camera.rotation @ flip
     return replace(
         frame,
         name=f"{frame.name}, mirrored",
-        camera=replace(camera, rotation=rotation, target=target, center=center),
+        camera=mirrored_camera(frame.camera, plane_x),
         rgba=np.ascontiguousarray(frame.rgba[:, ::-1]),
         labels=None if frame.labels is None else np.ascontiguousarray(frame.labels[:, ::-1]),
         mirrored=True,

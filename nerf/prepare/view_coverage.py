@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.silhouettes.mask import figure_px
+from toonset.nerf.sections.drawing import yaw_of
+from toonset.nerf.sections.roles import largest_gap
 
 WIDE = math.radians(119)  # between neighbouring drawings, a third of the turn (docs/decisions.md)
 FEW_OUTLINES = math.radians(75)  # of half a turn without one: four even views lose 5 dB by that
@@ -61,7 +62,7 @@ def guesses(scene: Scene) -> list[str]:
 
 def wide_gaps(scene: Scene) -> list[Gap]:
     """Return the turns of more than WIDE that no drawing looks from, about the upright axis."""
-    turns = sorted((_yaw(frame.camera), frame.name) for frame in scene.frames)
+    turns = sorted((yaw_of(frame.camera), frame.name) for frame in scene.frames)
     following = [*turns[1:], (turns[0][0] + 2 * math.pi, turns[0][1])]
     gaps = [
         Gap(after, before, end - begin, begin)
@@ -80,12 +81,4 @@ def _undrawn(gap: Gap) -> str:
 
 def outline_gap(scene: Scene) -> float:
     """Return the largest gap in yaw between outlines, of half a turn; radians."""
-    turns = sorted(_yaw(frame.camera) % math.pi for frame in scene.frames)
-    following = [*turns[1:], turns[0] + math.pi]
-    return max(end - begin for begin, end in zip(turns, following, strict=True))
-
-
-def _yaw(camera: Camera) -> float:
-    """Return where a camera stands, counterclockwise from +Z."""
-    x, _, z = camera.rotation[2].tolist()
-    return math.atan2(-x, -z)
+    return largest_gap([yaw_of(frame.camera) for frame in scene.frames], math.pi)

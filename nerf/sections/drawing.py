@@ -121,14 +121,19 @@ def working_drawings(frames: Sequence[Frame]) -> tuple[tuple[Drawing, ...], floa
 
 def mirrored(drawing: Drawing, plane_x: float) -> Drawing:
     """Return the drawing as one of the other side, for a body symmetric about x = `plane_x`."""
-    camera, flip = drawing.camera, np.diag([-1.0, 1.0, 1.0])
-    moved = replace(
+    camera = mirrored_camera(drawing.camera, plane_x)
+    return Drawing(camera, np.ascontiguousarray(drawing.rgba[:, ::-1]), mirrored=True)
+
+
+def mirrored_camera(camera: Camera, plane_x: float) -> Camera:
+    """Return the camera that sees the mirror image about x = `plane_x` as the flipped picture."""
+    flip = np.diag([-1.0, 1.0, 1.0])
+    return replace(
         camera,
         rotation=flip @ camera.rotation @ flip,
         target=np.array([2 * plane_x - camera.target[0], *camera.target[1:]]),
         center=np.array([camera.size_wh[0] - camera.center[0], camera.center[1]]),
     )
-    return Drawing(moved, np.ascontiguousarray(drawing.rgba[:, ::-1]), mirrored=True)
 
 
 def yaw_of(camera: Camera) -> float:

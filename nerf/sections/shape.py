@@ -23,7 +23,6 @@ from toonset.nerf.sections.completion import completed
 from toonset.nerf.sections.drawing import Drawing, working_drawings
 from toonset.nerf.sections.grid import Solid, Volume, blurred, distance_again, grid_of
 from toonset.nerf.sections.merge import merged
-from toonset.nerf.sections.mirror_plane import mirror_plane_of
 from toonset.nerf.sections.roles import mirror_images, roles_of
 from toonset.nerf.sections.touching import touching
 
@@ -58,12 +57,6 @@ def shape_of(frames: Sequence[Frame], plane_x: float | None = None) -> Solid:
     f = distance_again(completed(grid, f, covered, everything, plane_x))
     f = _without_crumbs(touching(grid, f, everything))
     return Solid(grid, completed(grid, f, covered, everything))  # tips that smoothing lost
-
-
-def mirror_plane(frames: Sequence[Frame]) -> float:
-    """Return the x of the mirror plane that the drawing most from the front or back suggests."""
-    drawings, _ = working_drawings(frames)
-    return mirror_plane_of(roles_of(drawings).facing[0])
 
 
 def _merged(drawings: Sequence[Drawing]) -> list[Drawing]:

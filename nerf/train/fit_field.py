@@ -26,14 +26,7 @@ from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.mannequin_volume import hull_of_shape
 from toonset.nerf.hull.march import surface_depth
-from toonset.nerf.hull.scene_hull import (
-    VOXELS,
-    VOXELS_PER_PX,
-    as_stored,
-    has_sections,
-    hull_of,
-    per_px,
-)
+from toonset.nerf.hull.scene_hull import VOXELS, VOXELS_PER_PX, as_stored, hull_of, per_px
 from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.threads import SIDES
@@ -105,7 +98,7 @@ def fit_field(
     tell("comparing the drawings")
     ready = prepare(scene, options)
     usual = STEPS_ON_SHAPE if ready.shape else USUAL_STEPS
-    if ready.shape is None and has_sections(ready.scene, options):
+    if not ready.compared:
         usual = STEPS_ON_SECTIONS
     options = replace(options, steps=usual if options.steps is None else options.steps)
     symmetry = find_symmetry(ready.scene, options.symmetric or scene.symmetric)
@@ -147,7 +140,7 @@ def _hull(
     """Return the field's hull, and the evidence for how drawings carve it."""
     if not options.carve:
         return open_box(scene), NO_EVIDENCE
-    if ready.shape is None and has_sections(ready.scene, options):
+    if not ready.compared:
         # sections mirror what they need by themselves: a side's outline is the other side's
         plane_x = symmetry.plane_x if symmetry and symmetry.mirrored else None
         return hull_of(ready.scene, options, plane_x=plane_x)

@@ -65,7 +65,7 @@ def test_no_mesh_takes_the_default_mannequin_and_says_so(drawn: Path, toonset, t
     out = tmp_path / "b"
     done = toonset("calibrate", drawn / "single.png", "-o", out, "--json")
     assert done.code in (0, 3)
-    assert "no --mesh: the default mannequin, 3 heads tall, relaxed pose" in done.err
+    assert "not sure, the default mannequin, 3 heads tall, relaxed pose" in done.err
     looks = {"head_scale": 1.0, "torso_scale": 1.0, "limb_scale": 1.0}
     assert done.json["options"]["mannequin"] == {"heads_tall": 3.0, "pose": "relaxed", **looks}
     assert [given["role"] for given in done.json["inputs"]] == ["sheet"]

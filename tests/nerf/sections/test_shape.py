@@ -15,7 +15,7 @@ from toonset.dataset.bundle.scene import Frame
 from toonset.errors import BundleError
 from toonset.nerf.sections.drawing import working_drawings
 from toonset.nerf.sections.grid import VOXEL_PX, Solid, silhouette
-from toonset.nerf.sections.shape import mirror_plane, shape_of
+from toonset.nerf.sections.shape import shape_of
 
 SIDE, FINE = 80, 3
 FRONT, DIAGONAL, LEFT, BACK = 0.0, 45.0, 90.0, 180.0
@@ -126,12 +126,6 @@ def test_an_arm_beside_the_head_takes_no_depth_from_it() -> None:
     solid = shape_of(sheet((FRONT, LEFT, BACK), [trunk, head, arm]))
     ends = np.array([[0.0, 0.8, z] for z in (0.25, -0.25)], np.float32)
     assert (solid.grid.at(solid.f, ends) < 0).all()
-
-
-def test_the_mirror_plane_is_found() -> None:
-    frames = sheet((FRONT, LEFT, BACK), [BODY])
-    assert mirror_plane(frames) == pytest.approx(BODY[0][0], abs=0.02)
-    assert mirror_plane(frames[1:]) == pytest.approx(BODY[0][0], abs=0.02)
 
 
 def test_fewer_than_two_figures_are_refused() -> None:
