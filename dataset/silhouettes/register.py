@@ -108,7 +108,7 @@ def common(
     """
     columns, weighed = [], []
     for outline in outlines.views:
-        figure = outline.camera.pixel_grid()[outline.distance[0].numpy() > 0][::FEWER]
+        figure = outline.camera.pixel_grid()[outline.distance[0] > 0][::FEWER]
         jacobian = moves.jacobian(outline.square.unit(figure)).reshape(-1, len(moves.covariance))
         ends = outlines.middle + outlines.radius * np.concatenate([np.eye(3), -np.eye(3)])
         ends_px = pixels_of(outline.camera, ends) / outlines.size_px
