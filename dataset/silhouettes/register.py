@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import get_lapack_funcs
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.displacement import Moves
@@ -204,6 +203,8 @@ def energy(
     tau: float,
 ) -> float:
     """Return the expected energy of the numbers, in variances of the prior."""
+    from scipy.linalg import get_lapack_funcs
+
     potrf, potri = get_lapack_funcs(("potrf", "potri"), (matrix,))
     factor, _ = potrf(matrix + precision / tau**2, lower=True)
     spread, _ = potri(factor, lower=True)  # its lower half: half the work of an inverse
