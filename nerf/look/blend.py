@@ -36,7 +36,7 @@ from toonset.nerf.look.shade import smoothed
 from toonset.nerf.look.step_lines import draw_steps
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.recolor import tones_of
-from toonset.raster import nearest
+from toonset.raster import nearest, sized_parts
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
@@ -457,20 +457,18 @@ def _stray(
     """Return small patches of one label that no single drawing shows as such."""
     drop = np.zeros(winner.shape, dtype=bool)
     for label in range(paints):
-        count, part, about, _ = cv2.connectedComponentsWithStats(
-            (winner == label).astype(np.uint8), connectivity=8
-        )
-        small = about[:, cv2.CC_STAT_AREA] < least_px
+        part, areas = sized_parts(winner == label)
+        small = areas < least_px
         small[0] = False
         if not small.any():
             continue
-        known = np.zeros(count, dtype=bool)
+        places = np.flatnonzero(small[part])
+        own = part.ravel()[places]
+        known = np.zeros(len(areas), dtype=bool)
         for one in candidates[:2]:
-            _, other, theirs, _ = cv2.connectedComponentsWithStats(
-                (one.label == label).astype(np.uint8), connectivity=8
-            )
-            alike = (other > 0) & (theirs[other, cv2.CC_STAT_AREA] <= 3 * least_px)
-            share = np.bincount(part.ravel(), alike.ravel(), count) / about[:, cv2.CC_STAT_AREA]
-            known |= share > SOLID
-        drop |= (small & ~known)[part]
+            other, theirs = sized_parts(one.label == label)
+            alike = (theirs <= 3 * least_px)[other.ravel()[places]]
+            alike &= one.label.ravel()[places] == label
+            known |= np.bincount(own, alike, len(areas)) > SOLID * areas
+        drop.ravel()[places] = ~known[own]
     return drop
