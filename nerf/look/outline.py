@@ -107,5 +107,5 @@ def without_crumbs(
         small = areas < least
         small[0] = False
         if small.any():
-            mask = mask ^ small[part]
+            mask = mask ^ np.take(small, part)
     return mask
