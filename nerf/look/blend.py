@@ -61,6 +61,7 @@ SAME = 1e-9  # radians: seen from one side
 OWN, OWN_BENT = 0.12, 0.04
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
 SOURCES = ("drawn", "mirrored", "guessed")
+Box = tuple[slice, slice]  # rows and columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +198,7 @@ def _own_part(drawings: Drawings, camera: Camera) -> tuple[int, np.float32]:
     return nearest_one, np.float32(_eased(max(0.0, 1 - float(turns[nearest_one]) / reach)))
 
 
-def _own_box(drawings: Drawings, number: int, camera: Camera) -> tuple[slice, slice]:
+def _own_box(drawings: Drawings, number: int, camera: Camera) -> Box | None:
     """Return the rows and columns of a view in which a drawing near it shows something."""
     own = drawings.views[number].as_drawn
     found = _box(own.rgba[..., 3] > 0, 0)
@@ -211,20 +212,20 @@ def _own_box(drawings: Drawings, number: int, camera: Camera) -> tuple[slice, sl
     low, high = np.floor(pixels.min(axis=0)) - ROOM, np.ceil(pixels.max(axis=0)) + ROOM
     left, right = np.clip([low[0], high[0]], 0, width).astype(int).tolist()
     top, bottom = np.clip([low[1], high[1]], 0, height).astype(int).tolist()
-    return slice(top, bottom), slice(left, right)
+    return (slice(top, bottom), slice(left, right)) if top < bottom and left < right else None
 
 
-def _joined(box: tuple[slice, slice] | None, other: tuple[slice, slice]) -> tuple[slice, slice]:
+def _joined(box: Box | None, other: Box | None) -> Box | None:
     """Return the least box around two."""
-    if box is None:
-        return other
+    if box is None or other is None:
+        return box or other
     rows, columns = (
         slice(min(a.start, b.start), max(a.stop, b.stop)) for a, b in zip(box, other, strict=True)
     )
     return rows, columns
 
 
-def _box(mask: Bool[np.ndarray, "height width"], room: int = ROOM) -> tuple[slice, slice] | None:
+def _box(mask: Bool[np.ndarray, "height width"], room: int = ROOM) -> Box | None:
     if not mask.any():
         return None
     sides = []
