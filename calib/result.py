@@ -185,3 +185,8 @@ class Calibration:
     def is_certain(self) -> bool:
         """Return whether every view and the sheet as a whole are ok."""
         return all(verdict == "ok" for verdict in (self.verdict, *(v.verdict for v in self.views)))
+
+    @property
+    def doubtfulness(self) -> tuple[int, int]:
+        """Return how severe the sheet's verdict is, and how many views are not ok; to compare."""
+        return SEVERITY.index(self.verdict), sum(view.verdict != "ok" for view in self.views)

@@ -19,7 +19,7 @@ from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, View
 from toonset.calib.verdict.checks import OF_DRAWINGS, JudgedSheet, apply_checks
 from toonset.calib.verdict.judge import judge_sheet
 from toonset.calib.without_body.placing import NOT_PLACED, Figures, SheetCameras
-from toonset.calib.without_body.posterior import ErrorProbabilities, doubts, view_doubt
+from toonset.calib.without_body.posterior import ErrorProbabilities, doubts, label_doubt, view_doubt
 from toonset.calib.without_body.turns import NEAR, STARTS, TurnHypotheses, wrapped
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.coherence import ViewCoherence, coherence
@@ -143,10 +143,11 @@ def _doubted(
     scale = scale_apart(found.placed.cameras)
     sheet_verdict = _apart_verdict(len(views), any(labels), apart, scale, state.thresholds)
     wrong = view_doubt(found.turns, found.posterior, found.chosen)
+    misread = label_doubt(found.turns, found.log_likelihood, found.chosen, labels)
     judged = []
     for i, view in enumerate(views):
         verdict, reason = sheet_verdict or _turn_verdict(
-            found, labels, float(wrong[i]), doubt, state.thresholds
+            found, labels, float(wrong[i]), float(misread[i]), doubt, state.thresholds
         )
         if verdict == "ok":
             verdict, reason = _weak_verdict(len(views), apart, scale, state.thresholds)
@@ -179,6 +180,7 @@ def _turn_verdict(
     found: Found,
     labels: Sequence[Label],
     wrong: float,
+    misread: float,
     doubt: ErrorProbabilities,
     limits: VerdictThresholds,
 ) -> tuple[Verdict, str]:
@@ -190,8 +192,7 @@ def _turn_verdict(
         return "ambiguous", f"{kind} is open: p = {p:.2f} that it is another"
     if found.is_free and not (labels and all(labels)):
         return "weak", "its steps may be uneven: label every view to confirm them"
-    against = float(found.log_likelihood.max() - found.log_likelihood[found.chosen])
-    if against > limits.most_against:
+    if misread > 1 - limits.sure:
         return "weak", "what is drawn speaks for another direction: is a label wrong?"
     return "ok", ""
 
