@@ -32,7 +32,7 @@ P_REPEATED = 0.5  # that rows of equal length show the same directions
 # a sheet; of other numbers a judgement
 PATTERNS: dict[int, tuple[tuple[tuple[float, ...], float], ...]] = {
     1: (((0,), 1),),
-    2: (((0, 180), 5), ((0, 90), 3), ((0, 45), 1), ((45, 225), 0.5)),
+    2: (((0, 180), 5), ((0, 90), 3), ((0, 45), 1), ((45, 225), 0.5), ((90, 270), 0.5)),
     3: (
         ((0, 90, 180), 10),
         ((90, 0, 180), 0.5),
