@@ -188,5 +188,5 @@ class Calibration:
 
     @property
     def doubtfulness(self) -> tuple[int, int]:
-        """Return how severe the sheet's verdict is, and how many views are not ok; to compare."""
-        return SEVERITY.index(self.verdict), sum(view.verdict != "ok" for view in self.views)
+        """Return how severe the verdicts of the sheet and of its views are; to compare."""
+        return SEVERITY.index(self.verdict), sum(SEVERITY.index(v.verdict) for v in self.views)
