@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from toonset.calib.find_cameras import find_cameras
@@ -21,7 +22,7 @@ from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import Calibration
-from toonset.calib.verdict.checks import check_names
+from toonset.calib.verdict.checks import check_names, off_labels
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.mannequin_world import in_mannequin_world
@@ -36,6 +37,7 @@ from toonset.mesh import Mesh
 from toonset.view import InputFile, View
 
 LEAST_HEIGHT = 0.01  # of the width; flatter, nothing can be told from its outline
+AS_LABELLED = np.radians(12.0)  # artists draw what they call a side up to so far off it
 PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless")
 
 
@@ -94,6 +96,8 @@ def calibrate(
                 if first.is_certain:
                     return _alone(views, first, hints, seed, options)
             found = find_cameras(views, body.mesh, options, progress, known)
+            if mesh is not None and known.is_labels and not found.is_certain:
+                found = _unlabelled_if_better(views, body.mesh, found, known, options, progress)
             better = without_body_if_better(
                 views,
                 found,
@@ -120,6 +124,23 @@ def calibrate(
         mesh=body.mesh,
         origin=_origin(views, body, hints, seed, options),
     )
+
+
+def _unlabelled_if_better(
+    views: Sequence[View],
+    mesh: Mesh,
+    labelled: Calibration,
+    known: Known,
+    options: CalibrationOptions,
+    progress: Progress,
+) -> Calibration:
+    """Return the cameras found without the labels if those say the same and lower the verdict.
+
+    A label pulls cameras to round angles, and what is an alternative by 5 % is one by 6 % then.
+    """
+    found = find_cameras(views, mesh, options, progress)
+    agree = off_labels(found.views, known.labels).max() <= AS_LABELLED
+    return found if agree and found.doubtfulness < labelled.doubtfulness else labelled
 
 
 def _known_without_body(hints: Hints, views: Sequence[View]) -> Known:

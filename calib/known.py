@@ -47,6 +47,12 @@ class Known:
         """Return whether an angle or a size is locked, of the sheet or of a view."""
         return bool(self.locked - {"fov"}) or any(self.kept)
 
+    @property
+    def is_labels(self) -> bool:
+        """Return whether labels are all that is known."""
+        more = self.landmarks or self.cameras or self.locked or self.placed or self.kept
+        return any(self.labels) and not more
+
     def check(self, views: Sequence[View]) -> None:
         """Refuse what does not belong to the views or cannot be locked.
 

@@ -31,8 +31,6 @@ class VerdictThresholds:
             a mannequin.
         weak_scale, failed_scale: times the other drawings' scale, without a mannequin: another
             size, or another body.
-        most_against: nats by which drawings may speak against a label, without a mannequin; 10
-            to 1.
         most_landmarks_off: of a view's landmarks, over the height; farther, they are another's.
     """
 
@@ -54,7 +52,6 @@ class VerdictThresholds:
     failed_apart: float = 0.06
     weak_scale: float = 1.25
     failed_scale: float = 1.5
-    most_against: float = 2.3
     most_landmarks_off: float = 0.05
 
 

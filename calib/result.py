@@ -185,3 +185,8 @@ class Calibration:
     def is_certain(self) -> bool:
         """Return whether every view and the sheet as a whole are ok."""
         return all(verdict == "ok" for verdict in (self.verdict, *(v.verdict for v in self.views)))
+
+    @property
+    def doubtfulness(self) -> tuple[int, int]:
+        """Return how severe the verdicts of the sheet and of its views are; to compare."""
+        return SEVERITY.index(self.verdict), sum(SEVERITY.index(v.verdict) for v in self.views)

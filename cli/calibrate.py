@@ -250,7 +250,7 @@ def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Prin
 
 
 def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
-    from toonset.calib.verdict.report import evidence_line, model_line, view_line
+    from toonset.calib.verdict.report import evidence_line, model_line, undrawn_line, view_line
 
     for fit in found.landmarks:
         if fit.misplaced:
@@ -262,6 +262,8 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
     printer.detail(evidence_line(found))
     for view in found.views:
         printer.say(view_line(view))
+    if undrawn := undrawn_line(found):
+        printer.say(undrawn)
     verdict = f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else "")
     (printer.say if found.is_certain else printer.doubt)(verdict)
     after = shlex.join(["toonset", "palette", str(out)])

@@ -79,13 +79,23 @@ def check_elevations(sheet: JudgedSheet) -> Views | None:
 
 def check_labels(sheet: JudgedSheet) -> Views | None:
     """Doubt views that ended far from what their label says."""
-    reasons = []
-    for view, label in zip(sheet.views, sheet.labels, strict=False):
-        off = np.degrees([_turn(view.camera.angles[0], yaw) for yaw in label])
-        far = len(off) > 0 and off.min() > sheet.state.thresholds.far_from_label_deg
-        which = "degrees from its label: which of them is right?"
-        reasons.append(f"{off.min():.0f} {which}" if far else "")
-    return _weakened(sheet.views, [*reasons, *[""] * (len(sheet.views) - len(reasons))])
+    most = np.radians(sheet.state.thresholds.far_from_label_deg)
+    which = "degrees from its label: which of them is right?"
+    off = off_labels(sheet.views, sheet.labels)
+    return _weakened(
+        sheet.views, (f"{np.degrees(own):.0f} {which}" if own > most else "" for own in off)
+    )
+
+
+def off_labels(views: Views, labels: Sequence[Label]) -> Float[np.ndarray, " views"]:
+    """Return by how much views are turned off the nearest yaw of their label, radians; else 0."""
+    labels = labels or ((),) * len(views)
+    return np.array(
+        [
+            min((_turn(view.camera.angles[0], yaw) for yaw in label), default=0.0)
+            for view, label in zip(views, labels, strict=True)
+        ]
+    )
 
 
 def check_locks(sheet: JudgedSheet) -> Views | None:

@@ -10,6 +10,7 @@ from toonset.calib.result import Calibration, ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION
 
+FACING = math.radians(60.0)  # of yaw: what is turned away farther shows hardly any of a side
 STRETCHED_BY = 0.005  # of height over width: less is how pictures are rounded to pixels
 
 
@@ -103,6 +104,23 @@ def view_line(view: ViewCalibration) -> str:
     if abs(view.camera.pixel_aspect - 1) >= STRETCHED_BY:
         text += f" (drawn {view.camera.pixel_aspect:.2f} times as high)"
     return f"{text}: {view.reason}" if view.reason else text
+
+
+def undrawn_line(calibration: Calibration) -> str:
+    """Return which of front and back no drawing shows, and what stands in, for people; or ""."""
+    yaws = [view.camera.angles[0] for view in calibration.views]
+    sides = {"front": 0.0, "back": math.pi}
+    missing = [
+        name
+        for name, to in sides.items()
+        if all(abs(math.remainder(yaw - to, 2 * math.pi)) > FACING for yaw in yaws)
+    ]
+    if not missing:
+        return ""
+    return (
+        f"nobody drew the {' and the '.join(missing)}: `toonset train` goes on with the paint "
+        "beside it; add a drawing from there to have it your way"
+    )
 
 
 def _view_dict(view: ViewCalibration) -> dict[str, Any]:

@@ -19,11 +19,12 @@ from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, View
 from toonset.calib.verdict.checks import OF_DRAWINGS, JudgedSheet, apply_checks
 from toonset.calib.verdict.judge import judge_sheet
 from toonset.calib.without_body.placing import NOT_PLACED, Figures, SheetCameras
-from toonset.calib.without_body.posterior import ErrorProbabilities, doubts, view_doubt
+from toonset.calib.without_body.posterior import ErrorProbabilities, doubts, label_doubt, view_doubt
 from toonset.calib.without_body.turns import NEAR, STARTS, TurnHypotheses, wrapped
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.coherence import ViewCoherence, coherence
 from toonset.dataset.split_folder.view_labels import Label
+from toonset.view import View
 
 FREE_VIEWS = (5, 6, 7)  # whose steps may be uneven; those of other numbers hardly ever are
 RING_VIEWS = 8  # from which steps are even ones
@@ -83,7 +84,7 @@ def judge_found(
     doubt = doubts(found.turns, found.posterior, found.chosen)
     outlines = cohering.views if cohering else ()
     each = _views(figures, found, outlines)
-    judged = _doubted(each, found, labels, apart, doubt, state)
+    judged = _doubted(each, views, found, labels, apart, doubt, state)
     judged = apply_checks(JudgedSheet(judged, views, state), OF_DRAWINGS, options.without)
     verdict, reason = judge_sheet(judged, state)
     reason = "" if verdict == "ok" else reason
@@ -133,6 +134,7 @@ def _views(
 
 def _doubted(
     views: Sequence[ViewCalibration],
+    drawings: Sequence[View],
     found: Found,
     labels: Sequence[Label],
     apart: float,
@@ -141,15 +143,17 @@ def _doubted(
 ) -> tuple[ViewCalibration, ...]:
     """Return the views with their own verdicts."""
     scale = scale_apart(found.placed.cameras)
+    stretch = stretch_apart(drawings, found.turns.yaws[found.chosen])
     sheet_verdict = _apart_verdict(len(views), any(labels), apart, scale, state.thresholds)
     wrong = view_doubt(found.turns, found.posterior, found.chosen)
+    misread = label_doubt(found.turns, found.log_likelihood, found.chosen, labels)
     judged = []
     for i, view in enumerate(views):
         verdict, reason = sheet_verdict or _turn_verdict(
-            found, labels, float(wrong[i]), doubt, state.thresholds
+            found, labels, float(wrong[i]), float(misread[i]), doubt, state.thresholds
         )
         if verdict == "ok":
-            verdict, reason = _weak_verdict(len(views), apart, scale, state.thresholds)
+            verdict, reason = _weak_verdict(len(views), apart, scale, stretch, state.thresholds)
         if verdict == "ok" and i == state.odd_view:
             verdict, reason = "weak", "disagrees with the other drawings"
         judged.append(replace(view, verdict=verdict, reason=reason))
@@ -179,6 +183,7 @@ def _turn_verdict(
     found: Found,
     labels: Sequence[Label],
     wrong: float,
+    misread: float,
     doubt: ErrorProbabilities,
     limits: VerdictThresholds,
 ) -> tuple[Verdict, str]:
@@ -190,19 +195,20 @@ def _turn_verdict(
         return "ambiguous", f"{kind} is open: p = {p:.2f} that it is another"
     if found.is_free and not (labels and all(labels)):
         return "weak", "its steps may be uneven: label every view to confirm them"
-    against = float(found.log_likelihood.max() - found.log_likelihood[found.chosen])
-    if against > limits.most_against:
+    if misread > 1 - limits.sure:
         return "weak", "what is drawn speaks for another direction: is a label wrong?"
     return "ok", ""
 
 
 def _weak_verdict(
-    views: int, apart: float, scale: float, limits: VerdictThresholds
+    views: int, apart: float, scale: float, stretch: float, limits: VerdictThresholds
 ) -> tuple[Verdict, str]:
     if views < FEWEST_TO_CONFIRM:
         return "weak", "two drawings: nothing confirms their directions, scale and elevation"
     if scale > limits.weak_scale:
         return "weak", f"a drawing is {scale:.1f} times larger or smaller than the others: {ONE}"
+    if stretch > limits.weak_scale:
+        return "weak", f"a figure is {stretch:.1f} times as high or as wide as the others: {ONE}"
     if apart > limits.weak_apart and views >= limits.telling_views:
         return "weak", f"the outlines are {100 * apart:.1f} % of the height apart: {ONE}"
     return "ok", ""
@@ -212,6 +218,21 @@ def scale_apart(cameras: Sequence[Camera]) -> float:
     """Return how many times larger or smaller than usual the farthest view is drawn, >= 1."""
     logs = np.log([camera.scale for camera in cameras])
     return float(np.exp(np.abs(logs - np.median(logs)).max()))
+
+
+def stretch_apart(views: Sequence[View], yaws: Float[np.ndarray, " views"]) -> float:
+    """Return by what factor heights differ, or mean widths seen from opposite sides, >= 1.
+
+    At eye level figures are of one height, and opposite outlines mirror each other. How wide a
+    figure is from a side that no other drawing faces may be anything.
+    """
+    boxes = [view.mask.any(axis=1) for view in views]
+    heights = np.array([np.ptp(np.flatnonzero(rows)) + 1 for rows in boxes])
+    widths = np.log([view.mask.sum() for view in views]) - np.log(heights)
+    opposite = np.abs(wrapped(yaws[:, None] - yaws + np.pi)) <= NEAR
+    off = np.abs(np.log(heights / np.median(heights))).max()
+    across = np.abs(widths[:, None] - widths)[opposite].max(initial=0.0)
+    return float(np.exp(max(off, across)))
 
 
 def _doubts_text(doubt: ErrorProbabilities) -> str:

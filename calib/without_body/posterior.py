@@ -33,7 +33,15 @@ from toonset.calib.without_body.placing import (
     coherence_log_likelihood,
     elevation_log_prior,
 )
-from toonset.calib.without_body.turns import NEAR, TurnHypotheses, wrapped
+from toonset.calib.without_body.turns import (
+    NEAR,
+    P_MISPLACED,
+    P_MISREAD,
+    TurnHypotheses,
+    misread,
+    wrapped,
+)
+from toonset.dataset.split_folder.view_labels import Label
 from toonset.view import View
 
 HEIGHT_PX = 160  # working height of a figure
@@ -160,6 +168,37 @@ def view_doubt(
     """Return the probability of every view that it is seen from elsewhere."""
     away = np.abs(wrapped(turns.yaws - turns.yaws[chosen])) > NEAR
     return np.asarray(posterior @ away)
+
+
+def label_doubt(
+    turns: TurnHypotheses,
+    log_likelihood: Float[np.ndarray, " turns"],
+    chosen: int,
+    labels: Sequence[Label],
+) -> Float[np.ndarray, " views"]:
+    """Return the probability of every view that the labels are wrong together, and it with them.
+
+    They may be half a turn off, or mirrored, as whoever takes the picture's left for the
+    character's gives them, or belong to the turn that the drawings speak for. Cameras stay where a
+    person says; the drawings only say whether to believe it.
+
+    Args:
+        turns: alternatives.
+        log_likelihood: of the drawings alone, nats.
+        chosen: the turn that agrees with the labels.
+        labels: which yaws a person named, per view; () for none.
+    """
+    yaws, doubt = turns.yaws[chosen], np.zeros(len(turns.yaws[chosen]))
+    named = np.array([bool(label) for label in labels] or [False] * len(yaws))
+    better = log_likelihood - log_likelihood[chosen]
+    likeliest = turns.yaws[better.argmax()]
+    for other, p in [*((row, P_MISREAD) for row in misread(yaws)), (likeliest, P_MISPLACED)]:
+        away = np.abs(wrapped(other - yaws)) > NEAR
+        there = (np.abs(wrapped(turns.yaws - other)) <= NEAR).all(axis=1)
+        if there.any() and (away & named).any():
+            odds = p * float(np.exp(better[there].max()))
+            doubt = np.maximum(doubt, away * odds / (1 + odds))
+    return doubt
 
 
 def _doubted(

@@ -18,7 +18,7 @@ from toonset.calib.without_body.posterior import ROUGH
 from toonset.calib.without_body.turns import NEAR, STARTS, turn_hypotheses, wrapped
 from toonset.view import View
 
-FEWEST = 3  # views: fewer say nothing by themselves
+FEWEST = 2  # views: one says nothing by itself
 P_ELSEWHERE = 0.05  # that a sheet is not a turn that artists lay out
 REFUSED = "the mannequin is another body; cameras come from the drawings"
 

@@ -23,6 +23,8 @@ P_LEFT = 0.5  # that views run to the character's left
 P_FROM_RIGHT = 0.05  # that a sheet is to be read from the right
 P_LABEL_WRONG = 0.01  # of each label
 P_AS_LABELLED = 0.5  # that views labelled one and all are seen from just there
+P_MISREAD = 0.02  # that all labels are half a turn off; as often mirrored; as often both
+P_MISPLACED = 0.005  # that labels were meant for the turn that the drawings speak for
 NEAR = np.radians(22.5)  # half of what neighbouring directions lie apart
 P_REPEATED = 0.5  # that rows of equal length show the same directions
 # Yaws in degrees in sheet order, and their weights: of three and four drawings how many collected
@@ -30,7 +32,7 @@ P_REPEATED = 0.5  # that rows of equal length show the same directions
 # a sheet; of other numbers a judgement
 PATTERNS: dict[int, tuple[tuple[tuple[float, ...], float], ...]] = {
     1: (((0,), 1),),
-    2: (((0, 180), 5), ((0, 90), 3), ((0, 45), 1), ((45, 225), 0.5)),
+    2: (((0, 180), 5), ((0, 90), 3), ((0, 45), 1), ((45, 225), 0.5), ((90, 270), 0.5)),
     3: (
         ((0, 90, 180), 10),
         ((90, 0, 180), 0.5),
@@ -167,11 +169,27 @@ def labelled(turns: TurnHypotheses, labels: Sequence[Label]) -> TurnHypotheses:
     whole = np.isfinite(rows).all(axis=1)
     rows, odds = rows[whole], odds[whole] + np.log(P_AS_LABELLED)
     own = turns.pattern.max() + 1 + np.arange(len(rows))
-    return TurnHypotheses(
+    read = TurnHypotheses(
         np.concatenate([turns.yaws, rows]),
         np.concatenate([log_prior, odds]),
         np.concatenate([turns.pattern, own]),
     )
+    return _with_misread(read, len(labels)) if len(rows) == 1 else read
+
+
+def _with_misread(turns: TurnHypotheses, labels: int) -> TurnHypotheses:
+    """Return the turns with what their last is, misread; too unlikely to be chosen."""
+    last = turns.pattern[-1]  # half a turn off, its outlines are the same
+    return TurnHypotheses(
+        np.concatenate([turns.yaws, misread(turns.yaws[-1])]),
+        np.concatenate([turns.log_prior, np.full(3, labels * np.log(P_LABEL_WRONG))]),
+        np.concatenate([turns.pattern, [last, last + 1, last + 1]]),
+    )
+
+
+def misread(yaws: Float[np.ndarray, " views"]) -> Float[np.ndarray, "3 views"]:
+    """Return what a turn is if its labels are half a turn off, mirrored, or both."""
+    return np.stack([yaws + np.pi, -yaws, np.pi - yaws])
 
 
 def held(

@@ -117,6 +117,8 @@ def _set_right(found: dict[str, Any]) -> str:
 
 def _symmetry(found: dict[str, Any] | None) -> list[str]:
     """Return what stands in for the side that nobody drew."""
+    from toonset.nerf.prepare.symmetry import LEAST_ALIKE
+
     if found is None:
         return []
     alike = [f"left and right are {100 * share:.0f} % alike" for share in sorted(found["alike"])]
@@ -124,7 +126,10 @@ def _symmetry(found: dict[str, Any] | None) -> list[str]:
     if not found["mirrored"]:
         return [f"{seen}: nothing is mirrored (--symmetric on does it all the same)"]
     sources = ", ".join(found["mirrored"])
-    return [f"the side that nobody drew is the mirror image of {sources} ({seen})"]
+    said = [f"the side that nobody drew is the mirror image of {sources} ({seen})"]
+    if min(found["alike"], default=1.0) < LEAST_ALIKE:
+        said.append("left and right are drawn differently: --symmetric off mirrors nothing")
+    return said
 
 
 def _figures(means: dict[str, float | None]) -> str:

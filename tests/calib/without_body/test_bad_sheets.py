@@ -15,6 +15,7 @@ from toonset.calib.hints import Hints
 from toonset.calib.result import Calibration
 from toonset.calib.verdict.one_character import other_character
 from toonset.calib.verdict.repeated import repeated_drawings
+from toonset.calib.verdict.report import undrawn_line
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.view_labels import front_label
 from toonset.dataset.synthetic.options import SynthOptions
@@ -137,6 +138,26 @@ def test_views_at_several_scales_are_not_ok(views, sizes, verdict):
     assert "larger or smaller than the others" in found.views[0].reason
 
 
+@pytest.mark.parametrize(("view", "side", "seen"), [(1, 0, True), (2, 1, True), (1, 1, False)])
+def test_a_squashed_drawing_is_doubted_where_the_others_tell(views, view, side, seen):
+    """Of heights all drawings tell, of widths the one from the opposite side."""
+    size = list(views[view].rgba.shape[1::-1])
+    size[1 - side] = round(0.7 * size[1 - side])
+    picture = Image.fromarray(views[view].rgba).resize(tuple(size))
+    squashed = replace(views[view], rgba=np.array(picture), box=(0, 0, *size))
+    half_turn = [views[0], views[1], views[2]]
+    half_turn[view] = squashed
+    found = alone(half_turn, "front,left,back")
+    assert found.is_certain != seen
+    assert any("times" in own.reason or "disagrees" in own.reason for own in found.views) == seen
+
+
+def test_nobody_drew_the_back(views: list[View]) -> None:
+    found = alone([views[0], views[1]], "front,left")
+    assert "nobody drew the back" in undrawn_line(found)
+    assert undrawn_line(alone([views[0], views[2]], "front,back")) == ""
+
+
 def test_views_without_feet_keep_their_directions_or_are_not_ok(views: list[View]) -> None:
     cropped = [
         replace(view, rgba=view.rgba[: int(0.85 * len(view.rgba))]) if i % 2 else view
@@ -163,6 +184,14 @@ def test_too_few_drawings_say_what_is_missing(count: int, views: list[View]) -> 
     labelled = alone(views[:count], front_label(0, count))
     assert {view.verdict for view in labelled.views} == {"weak"}
     assert "nothing confirms" in labelled.views[0].reason
+
+
+def test_two_drawings_are_no_other_bodys(views: list[View]) -> None:
+    """Without a mannequin two drawings got the default one's cameras, fitting or not."""
+    found = calibrate([views[0], views[2]])
+    assert not found.is_certain
+    assert found.mesh is None
+    assert off_ring(found, np.array([0, np.pi])) < np.radians(5)
 
 
 @pytest.mark.parametrize("chosen", [[0, 1], [0, 2]])

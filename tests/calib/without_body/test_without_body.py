@@ -14,6 +14,7 @@ from toonset.calib.known import Known
 from toonset.calib.options import VerdictThresholds
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
+from toonset.calib.without_body.posterior import label_doubt
 from toonset.calib.without_body.rival import REFUSED
 from toonset.calib.without_body.turns import is_even, turn_hypotheses, wrapped
 from toonset.calib.write_bundle import write_bundle
@@ -207,8 +208,28 @@ def test_what_artists_draw_is_ok_without_a_label_and_no_worse_with_it(degrees) -
     labelled = calibrate_without_body(views, Known(labels=labels))
     assert found.is_certain
     assert labelled.is_certain
-    turned = parse_labels(",".join(str((yaw + 180) % 360) for yaw in degrees), len(yaws))
-    assert not calibrate_without_body(views, Known(labels=turned)).is_certain
+    for wrong in ([yaw + 180 for yaw in degrees], [-yaw for yaw in degrees]):
+        turned = parse_labels(",".join(str(yaw % 360) for yaw in wrong), len(yaws))
+        assert not calibrate_without_body(views, Known(labels=turned)).is_certain
+
+
+def test_labels_are_doubted_together_and_only_where_the_doubt_moves_a_view() -> None:
+    """Half a turn off at 3 to 1, mirrored likewise: front and back stay where they are, then."""
+    labels = parse_labels("front,left,back", 3)
+    yaws = np.radians([0.0, 90.0, 180.0])
+    turns = turn_hypotheses(3, labels)
+
+    def doubt(other: np.ndarray, nats: float) -> np.ndarray:
+        there = np.abs(wrapped(turns.yaws - other)).max(axis=1) < 1e-6
+        assert there.any()
+        chosen = int((turns.log_prior - there * 100).argmax())
+        assert np.abs(wrapped(turns.yaws[chosen] - yaws)).max() < 1e-6
+        return label_doubt(turns, there * nats, chosen, labels) > 0.05
+
+    assert doubt(yaws + np.pi, np.log(3)).tolist() == [True, True, True]
+    assert doubt(-yaws, np.log(3)).tolist() == [False, True, False]
+    assert not doubt(yaws + np.pi, 0.0).any()
+    assert not label_doubt(turns, np.zeros(len(turns.yaws)), 0, ()).any()
 
 
 def test_eye_level_and_orthography_unless_drawings_prove_more() -> None:
