@@ -14,9 +14,8 @@ import numpy as np
 from toonset.calib.evidence.coherence_state import state_of
 from toonset.calib.fit.align import measure
 from toonset.calib.fit.drawing_error import Noise
-from toonset.calib.fit.landmark_models import MARGIN
 from toonset.calib.fit.landmarks import LandmarkFit, solve_landmarks
-from toonset.calib.fit.model_selection import ORTHOGRAPHIC, PER_VIEW, ModelChoice, ModelTest
+from toonset.calib.fit.model_selection import BIC_MARGIN, ORTHOGRAPHIC, SHARED, ModelChoice, ModelTest
 from toonset.calib.options import VerdictThresholds
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
@@ -31,7 +30,6 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 OUTLINE_HEIGHT_PX, OUTLINE_POINTS = 250.0, 200  # scale at which outlines are compared
-TYPICAL = "perspective in the typical view"
 
 
 def calibrate_by_landmarks(
@@ -54,7 +52,7 @@ def calibrate_by_landmarks(
     start = time.perf_counter()
     surface = prepare_surface(mesh)
     pairs = landmarks_of_every_view(views, landmarks)
-    fits = [solve_landmarks(own, surface) for own in pairs]
+    fits = solve_landmarks(pairs, surface)
     solved = time.perf_counter()
     drawings = [Drawing(drawn_contour(v), OUTLINE_HEIGHT_PX, OUTLINE_POINTS) for v in views]
     each = zip(views, drawings, fits, strict=True)
@@ -76,6 +74,7 @@ def calibrate_by_landmarks(
         verdict,
         reason,
         {"landmarks": solved - start, "judge": time.perf_counter() - solved},
+        landmarks=fits,
     )
 
 
@@ -147,10 +146,11 @@ def _verdict(
 def _model(
     fits: Sequence[LandmarkFit], pairs: Sequence[Landmarks], surface: Surface
 ) -> ModelChoice:
-    nearness = [fit.poses[0].k * surface.height for fit in fits]
+    k = fits[0].poses[0].k
+    distance = 1 / (k * surface.height) if k > 0 else float("inf")
     return ModelChoice(
-        PER_VIEW if any(nearness) else ORTHOGRAPHIC,
-        tuple(1 / near if near > 0 else float("inf") for near in nearness),
-        (ModelTest(TYPICAL, float(np.median([fit.bic_gain for fit in fits])), 1, MARGIN),),
+        SHARED if k > 0 else ORTHOGRAPHIC,
+        (distance,) * len(fits),
+        (ModelTest(SHARED, fits[0].bic_gain, 1, BIC_MARGIN),),
         float(2 * sum(len(own.names) for own in pairs)),
     )

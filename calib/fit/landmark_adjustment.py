@@ -1,0 +1,382 @@
+"""Adjust the cameras of all views to their landmarks by Levenberg-Marquardt in torch.
+
+Projection, increments and Jacobians are `toonset.projection`'s (kornia's So3); views, and starts of
+one view, are a batch. A pair's error is a Student t in two dimensions of one width for the sheet,
+
+    energy = sum (TAIL + 2) log(1 + |r|^2 / (TAIL sigma^2)),
+
+so that a wrong pair pulls little. What views share (elevation, scale, no roll) is tied as in the
+adjustment to outlines (`toonset.calib.fit.sheet_prior`), and sigma and the ties' spreads are
+estimated along the way. Eye level is where sheets are drawn: the sheet's elevation is N(0, 3 deg)
+or, rarely, anything.
+
+Source: the t distribution as reweighted least squares: Lange, Little and Taylor, Robust statistical
+modeling using the t distribution, JASA 84 (1989).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from toonset.calib.fit.align import ROLL_SIGMA, ElevationPrior, tilt
+from toonset.calib.fit.landmark_starts import Pixels, Points
+from toonset.calib.fit.sheet_prior import SharedPrior, Spreads, anchors, sheet_priors
+from toonset.calib.outline.pose import PARAMETERS, Pose
+from toonset.projection import CameraTensors, project, project_with_jacobian, rotate
+
+TAIL = 4.0  # degrees of freedom of a pair's error
+CLICK_OF_HEIGHT = 0.01  # error of a click or of the mannequin's proportions, before looking
+CLICK_WEIGHT = 2.0  # of that knowledge, in coordinates
+ROUNDING_PX = 1e-3  # no pixel is given more exactly
+NEAREST = 0.6  # largest k times the points' radius: all points lie well before the camera
+LARGEST_STEP = 0.5  # radians, log scale: beyond it the linearisation means nothing
+MOST_STEPS, MOST_JOINT_STEPS = 20, 40
+SETTLED = 2  # steps before sigma and the spreads are estimated
+CONVERGED = 1e-6  # radians, log scale
+# Elevations of sheets: all of 45 collected ones are drawn at eye level, sprites from anywhere
+LEVEL, ANYWHERE, P_STEEP = ElevationPrior(0.0, np.radians(3.0)), ElevationPrior(), 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """The pairs of several views, padded to the most that one has.
+
+    Attributes:
+        points: (views, n, 3) relative to the surface's middle.
+        pixels: (views, n, 2).
+        given: (views, n) 1 for a pair, 0 for padding.
+    """
+
+    points: Float[Tensor, "views n 3"]
+    pixels: Float[Tensor, "views n 2"]
+    given: Float[Tensor, "views n"]
+
+    @classmethod
+    def of(cls, views: Sequence[tuple[Points, Pixels]]) -> Pairs:
+        """Return the pairs of several views."""
+        most = max(len(points) for points, _ in views)
+        points, pixels = np.zeros((len(views), most, 3)), np.zeros((len(views), most, 2))
+        given = np.zeros((len(views), most))
+        for i, (own, seen) in enumerate(views):
+            points[i, : len(own)], pixels[i, : len(own)], given[i, : len(own)] = own, seen, 1
+        return cls(*map(torch.from_numpy, (points, pixels, given)))
+
+    def at(self, views: Sequence[int]) -> Pairs:
+        """Return the pairs of views that may repeat."""
+        which = list(views)
+        return Pairs(self.points[which], self.pixels[which], self.given[which])
+
+    @property
+    def radius(self) -> float:
+        """Return how far the points are from the middle at most."""
+        return float(torch.linalg.norm(self.points, dim=-1).max())
+
+
+@dataclass(frozen=True, eq=False)
+class ViewPrior:
+    """What is known of roll, elevation (radians) and log scale of a batch's cameras."""
+
+    mean: Float[np.ndarray, " 3"]
+    sigma: Float[np.ndarray, " 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Adjusted:
+    """The cameras of a sheet, adjusted together.
+
+    Attributes:
+        poses: one per view.
+        sigma: of a pixel coordinate, over the figure's height.
+        spreads: of what the views share.
+        elevation: prior of the sheet's mean.
+        covariance: (u, u) of (w, shift, log scale) per view and, where it is free, k.
+        squared: (views, n) squared error of every pair over sigma squared, 0 for padding.
+        energy: -2 log likelihood and prior at sigma.
+    """
+
+    poses: tuple[Pose, ...]
+    sigma: float
+    spreads: Spreads
+    elevation: ElevationPrior
+    covariance: Float[np.ndarray, "u u"]
+    squared: Float[np.ndarray, "views n"]
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """A batch's energies and normal equations of (w, shift, log scale, k)."""
+
+    normal: Float[np.ndarray, "views 7 7"]
+    gradient: Float[np.ndarray, "views 7"]
+    squared: Float[np.ndarray, "views n"]
+
+    @property
+    def energy(self) -> Float[np.ndarray, " views"]:
+        return np.asarray(_energy(self.squared))
+
+
+def refine(
+    starts: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " cameras"], prior: ViewPrior
+) -> tuple[list[Pose], Float[np.ndarray, " cameras"]]:
+    """Return the optimum that every start reaches, k as it is, and its energy.
+
+    Args:
+        starts: a batch of poses, of any views.
+        pairs: of every start.
+        sigma_px: of a pixel coordinate.
+        prior: of all of them.
+    """
+    poses, damping = list(starts), np.full(len(starts), 1e-3)
+    moving = np.ones(len(starts), dtype=bool)
+    energy = _energy(_squared(poses, pairs, sigma_px)) + _upright(poses, prior)[0]
+    for _ in range(MOST_STEPS):
+        which = np.flatnonzero(moving)
+        own = [poses[i] for i in which]
+        system = _equations(own, pairs.at(which.tolist()), sigma_px[which])
+        _, normal, gradient = _upright(own, prior)
+        normal += system.normal[:, :PARAMETERS, :PARAMETERS]
+        gradient += system.gradient[:, :PARAMETERS]
+        diagonal = np.einsum("bii->bi", normal)
+        diagonal *= 1 + damping[which, None]
+        diagonal += 1e-12 * diagonal.max(axis=1, keepdims=True)
+        steps = _limited(-np.linalg.solve(normal, gradient[..., None])[..., 0])
+        moved = [pose.moved(step) for pose, step in zip(own, steps, strict=True)]
+        squared = _squared(moved, pairs.at(which.tolist()), sigma_px[which])
+        trial = _energy(squared) + _upright(moved, prior)[0]
+        better = trial <= energy[which]
+        for i in np.flatnonzero(better):
+            poses[which[i]], energy[which[i]] = moved[i], trial[i]
+        damping[which] *= np.where(better, 0.1, 10.0)
+        turned = np.abs(steps[:, [0, 1, 2, 5]]).max(axis=1)
+        moving[which] = np.where(better, turned > CONVERGED, damping[which] < 1e6)
+        if not moving.any():
+            break
+    return poses, energy
+
+
+def adjust(
+    starts: Sequence[Pose], pairs: Pairs, height: float, *, perspective: bool
+) -> Adjusted:
+    """Return the cameras of all views that fit the pairs and each other best.
+
+    Args:
+        starts: one per view; their k is where the search for perspective begins.
+        pairs: of every view.
+        height: of the mannequin.
+        perspective: free k, one for the sheet; else k stays as it is.
+    """
+    poses, sigma, spreads, level = tuple(starts), CLICK_OF_HEIGHT, Spreads(), ANYWHERE
+    most_k, damping = NEAREST / pairs.radius, 1e-3
+    for number in range(MOST_JOINT_STEPS):
+        sigma_px = pixel_sigmas(poses, sigma * height)
+        energy, normal, gradient, points, _ = _system(
+            poses, pairs, sigma_px, spreads, level, perspective=perspective
+        )
+        while True:
+            damped = normal + damping * np.diag(np.diag(normal))
+            step = _limited(-np.linalg.solve(damped, gradient)[None])[0]
+            moved = _moved(poses, step, most_k, perspective=perspective)
+            trial = _system(moved, pairs, sigma_px, spreads, level, perspective=perspective)[0]
+            if trial <= energy or damping > 1e6:
+                break
+            damping *= 10
+        if trial <= energy:
+            poses, damping = moved, max(damping / 10, 1e-9)
+        before = sigma
+        if number >= SETTLED - 1:
+            sigma, spreads, level = _learned(poses, pairs, height, sigma, spreads, level, perspective)
+        if trial > energy or (
+            np.abs(step).max() < CONVERGED and abs(np.log(sigma / before)) < 1e-3
+        ):
+            if number > SETTLED:
+                break
+    sigma_px = pixel_sigmas(poses, sigma * height)
+    energy, normal, _, points, _ = _system(
+        poses, pairs, sigma_px, spreads, level, perspective=perspective
+    )
+    return Adjusted(
+        poses, sigma, spreads, level, np.linalg.inv(normal), points.squared, energy
+    )
+
+
+def pixel_sigmas(poses: Sequence[Pose], sigma: float) -> Float[np.ndarray, " views"]:
+    """Return an error in world units as pixels of every view."""
+    return np.maximum(sigma * _scales(poses), ROUNDING_PX)
+
+
+def _learned(
+    poses: Sequence[Pose],
+    pairs: Pairs,
+    height: float,
+    sigma: float,
+    spreads: Spreads,
+    level: ElevationPrior,
+    perspective: bool,
+) -> tuple[float, Spreads, ElevationPrior]:
+    """Return sigma, the spreads and the prior of the mean elevation as the sheet tells them.
+
+    Sigma is a geometric mean of what is left and what is expected, so that exact clicks count as
+    exact.
+    """
+    sigma_px = pixel_sigmas(poses, sigma * height)
+    _, normal, _, points, priors = _system(
+        poses, pairs, sigma_px, spreads, level, perspective=perspective
+    )
+    covariance = np.linalg.inv(normal)
+    told = float(np.trace(covariance @ _spread_out(points, len(normal))[0]))
+    free = max(2 * float(pairs.given.sum()) - told, 0.0)
+    left = (_weights(points.squared) * points.squared).sum() * sigma**2 / max(free, 1e-6)
+    expected = CLICK_OF_HEIGHT
+    sigma = np.exp(
+        (free * np.log(max(left, 1e-14)) + CLICK_WEIGHT * np.log(expected**2))
+        / (2 * (free + CLICK_WEIGHT))
+    )
+    usual = Spreads()
+    spreads = replace(
+        spreads, **{n: p.spread(covariance, getattr(usual, n)) for n, p in priors.items()}
+    )
+    mean = float(priors["elevation"].values.mean())
+    odds = P_STEEP * _density(mean, ANYWHERE) / ((1 - P_STEEP) * _density(mean, LEVEL))
+    near = 1 / (1 + odds)
+    precision = near / LEVEL.sigma**2 + (1 - near) / ANYWHERE.sigma**2
+    at = (1 - near) * ANYWHERE.mean / ANYWHERE.sigma**2 / precision
+    return float(sigma), spreads, ElevationPrior(at, precision**-0.5)
+
+
+def _density(value: float, prior: ElevationPrior) -> float:
+    return float(np.exp(-0.5 * ((value - prior.mean) / prior.sigma) ** 2)) / prior.sigma
+
+
+def _system(
+    poses: Sequence[Pose],
+    pairs: Pairs,
+    sigma_px: Float[np.ndarray, " views"],
+    spreads: Spreads,
+    level: ElevationPrior,
+    *,
+    perspective: bool,
+) -> tuple[
+    float,
+    Float[np.ndarray, "u u"],
+    Float[np.ndarray, " u"],
+    _Equations,
+    dict[str, SharedPrior],
+]:
+    """Return energy, normal matrix and gradient of the sheet, the pairs' part and the priors."""
+    size = PARAMETERS * len(poses) + perspective
+    points = _equations(poses, pairs, sigma_px)
+    normal, gradient = _spread_out(points, size)
+    energy = float(points.energy.sum())
+    priors = sheet_priors(poses, None, spreads.yaw, size)
+    terms = [(shared, getattr(spreads, name)) for name, shared in priors.items()]
+    for shared, sigma in [*terms, *anchors(priors, None, level)]:
+        matrix, slope = shared.equations(sigma)
+        normal += matrix
+        gradient += slope
+        off = shared.centre @ shared.values / sigma
+        energy += float((shared.weights * off**2).sum())
+    normal += 1e-12 * np.diag(np.diag(normal))
+    return energy, normal, gradient, points, priors
+
+
+def _spread_out(
+    points: _Equations, size: int
+) -> tuple[Float[np.ndarray, "u u"], Float[np.ndarray, " u"]]:
+    """Return the views' equations as the sheet's, k last where it is free."""
+    normal, gradient = np.zeros((size, size)), np.zeros(size)
+    for i, (own, slope) in enumerate(zip(points.normal, points.gradient, strict=True)):
+        where = np.arange(PARAMETERS * i, PARAMETERS * (i + 1))
+        if size % PARAMETERS:
+            where = np.append(where, size - 1)
+        normal[np.ix_(where, where)] += own[: len(where), : len(where)]
+        gradient[where] += slope[: len(where)]
+    return normal, gradient
+
+
+def _moved(
+    poses: Sequence[Pose], step: Float[np.ndarray, " u"], most_k: float, *, perspective: bool
+) -> tuple[Pose, ...]:
+    own = step[: PARAMETERS * len(poses)].reshape(-1, PARAMETERS)
+    moved = (pose.moved(each) for pose, each in zip(poses, own, strict=True))
+    if not perspective:
+        return tuple(moved)
+    k = float(np.clip(poses[0].k + step[-1], 0.0, most_k))
+    return tuple(replace(pose, k=k) for pose in moved)
+
+
+def _equations(
+    poses: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " views"]
+) -> _Equations:
+    pixels, slopes = project_with_jacobian(_tensors(poses), pairs.points)
+    seen = pairs.given[..., None] * torch.from_numpy(1 / sigma_px)[:, None, None]
+    off = (pixels - pairs.pixels) * seen
+    rows = slopes * seen[..., None]
+    squared = off.square().sum(-1)
+    weighted = rows * ((TAIL + 2) / (TAIL + squared))[..., None, None]
+    normal = torch.einsum("vncp,vncq->vpq", weighted, rows)
+    gradient = torch.einsum("vncp,vnc->vp", weighted, off)
+    return _Equations(normal.numpy(), gradient.numpy(), squared.numpy())
+
+
+def _squared(
+    poses: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " views"]
+) -> Float[np.ndarray, "views n"]:
+    off = (project(_tensors(poses), pairs.points) - pairs.pixels).square().sum(-1) * pairs.given
+    return off.nan_to_num(nan=torch.inf).numpy() / sigma_px[:, None] ** 2
+
+
+def _weights(squared: Float[np.ndarray, "views n"]) -> Float[np.ndarray, "views n"]:
+    return (TAIL + 2) / (TAIL + squared)
+
+
+def _energy(squared: Float[np.ndarray, "views n"]) -> Float[np.ndarray, " views"]:
+    return np.asarray((TAIL + 2) * np.log1p(squared / TAIL).sum(axis=1))
+
+
+def _upright(
+    poses: Sequence[Pose], prior: ViewPrior
+) -> tuple[
+    Float[np.ndarray, " views"], Float[np.ndarray, "views 6 6"], Float[np.ndarray, "views 6"]
+]:
+    """Return energy, normal matrices and gradients of the views' priors."""
+    tilts = [tilt(pose) for pose in poses]
+    values = np.array([[*angles, np.log(p.scale)] for (angles, _), p in zip(tilts, poses)])
+    slopes = np.zeros((len(poses), 3, PARAMETERS))
+    slopes[:, :2, :3] = [by_turn for _, by_turn in tilts]
+    slopes[:, 2, 5] = 1
+    rows, off = slopes / prior.sigma[:, None], (values - prior.mean) / prior.sigma
+    return (
+        (off**2).sum(axis=1),
+        np.einsum("vij,vik->vjk", rows, rows),
+        np.einsum("vij,vi->vj", rows, off),
+    )
+
+
+def _limited(steps: Float[np.ndarray, "n u"]) -> Float[np.ndarray, "n u"]:
+    """Return steps shortened to `LARGEST_STEP` in turns and log scales."""
+    views = steps.shape[1] // PARAMETERS
+    own = steps[:, : PARAMETERS * views].reshape(len(steps), views, PARAMETERS)
+    largest = np.abs(own[..., [0, 1, 2, 5]]).max(axis=(1, 2))
+    return steps * np.minimum(1.0, LARGEST_STEP / np.maximum(largest, 1e-12))[:, None]
+
+
+def _tensors(poses: Sequence[Pose]) -> CameraTensors:
+    scales = _scales(poses)
+    return CameraTensors(
+        torch.from_numpy(np.array([pose.rotation for pose in poses])),
+        torch.zeros((len(poses), 3), dtype=torch.float64),
+        torch.from_numpy(np.array([pose.shift for pose in poses])),
+        torch.from_numpy(np.stack([scales, scales], axis=1)),
+        torch.from_numpy(np.array([pose.k for pose in poses])),
+    )
+
+
+def _scales(poses: Sequence[Pose]) -> Float[np.ndarray, " views"]:
+    return np.array([pose.scale for pose in poses])
