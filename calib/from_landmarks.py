@@ -128,6 +128,9 @@ def _judged(
 def _verdict(
     fit: LandmarkFit, sigmas: Sigmas, height_px: float, limits: VerdictThresholds
 ) -> tuple[Verdict, str]:
+    if len(fit.misplaced) > limits.most_landmarks_misplaced * fit.pairs:
+        named = ", ".join(fit.misplaced)
+        return "failed", f"too many landmarks do not fit the others: {named}; another body's?"
     if fit.rms_px > limits.most_landmarks_off * height_px:
         off = f"{100 * fit.rms_px / height_px:.0f} % of the height"
         return "failed", f"the landmarks are {off} off: other points, or another body's"

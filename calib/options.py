@@ -33,6 +33,7 @@ class VerdictThresholds:
             size, or another body.
         most_against: nats by which drawings may speak against a label, without a mannequin; 10
             to 1.
+        most_landmarks_misplaced: of a view's; more do not tell which of them are.
         most_landmarks_off: of a view's landmarks, over the height; farther, they are another's.
     """
 
@@ -55,6 +56,7 @@ class VerdictThresholds:
     weak_scale: float = 1.25
     failed_scale: float = 1.5
     most_against: float = 2.3
+    most_landmarks_misplaced: float = 0.34
     most_landmarks_off: float = 0.05
 
 

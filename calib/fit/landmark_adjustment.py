@@ -17,20 +17,21 @@ modeling using the t distribution, JASA 84 (1989).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from toonset.calib.fit.align import ROLL_SIGMA, ElevationPrior, tilt
 from toonset.calib.fit.landmark_starts import Pixels, Points
 from toonset.calib.fit.sheet_prior import SharedPrior, Spreads, anchors, sheet_priors
 from toonset.calib.outline.pose import PARAMETERS, Pose
-from toonset.projection import CameraTensors, project, project_with_jacobian, rotate
+from toonset.projection import CameraTensors, project, project_with_jacobian
 
 TAIL = 4.0  # degrees of freedom of a pair's error
+NORMAL = 1.2018  # makes sigma the standard deviation of normal errors: 2 / E[weight |r|^2]
 CLICK_OF_HEIGHT = 0.01  # error of a click or of the mannequin's proportions, before looking
 CLICK_WEIGHT = 2.0  # of that knowledge, in coordinates
 ROUNDING_PX = 1e-3  # no pixel is given more exactly
@@ -38,7 +39,9 @@ NEAREST = 0.6  # largest k times the points' radius: all points lie well before 
 LARGEST_STEP = 0.5  # radians, log scale: beyond it the linearisation means nothing
 MOST_STEPS, MOST_JOINT_STEPS = 20, 40
 SETTLED = 2  # steps before sigma and the spreads are estimated
-CONVERGED = 1e-6  # radians, log scale
+CONVERGED, SIGMA_CONVERGED = 1e-5, 0.01  # radians or log scale; relative
+MOST_DAMPING, LEAST_DAMPING = 1e6, 1e-9  # of Levenberg-Marquardt
+LEAST_FREE = 1e-6  # coordinates beyond what cameras and priors explain
 # Elevations of sheets: all of 45 collected ones are drawn at eye level, sprites from anywhere
 LEVEL, ANYWHERE, P_STEEP = ElevationPrior(0.0, np.radians(3.0)), ElevationPrior(), 0.05
 
@@ -97,7 +100,8 @@ class Adjusted:
         elevation: prior of the sheet's mean.
         covariance: (u, u) of (w, shift, log scale) per view and, where it is free, k.
         squared: (views, n) squared error of every pair over sigma squared, 0 for padding.
-        energy: -2 log likelihood and prior at sigma.
+        misplaced: (views, n) which pairs do not fit the others.
+        evidence: for perspective: k in its own uncertainty, squared; 0 where it is not free.
     """
 
     poses: tuple[Pose, ...]
@@ -106,11 +110,12 @@ class Adjusted:
     elevation: ElevationPrior
     covariance: Float[np.ndarray, "u u"]
     squared: Float[np.ndarray, "views n"]
-    energy: float
+    misplaced: Bool[np.ndarray, "views n"]
+    evidence: float
 
 
 @dataclass(frozen=True, eq=False)
-class _Equations:
+class Equations:
     """A batch's energies and normal equations of (w, shift, log scale, k)."""
 
     normal: Float[np.ndarray, "views 7 7"]
@@ -139,7 +144,7 @@ def refine(
     for _ in range(MOST_STEPS):
         which = np.flatnonzero(moving)
         own = [poses[i] for i in which]
-        system = _equations(own, pairs.at(which.tolist()), sigma_px[which])
+        system = equations(own, pairs.at(which.tolist()), sigma_px[which])
         _, normal, gradient = _upright(own, prior)
         normal += system.normal[:, :PARAMETERS, :PARAMETERS]
         gradient += system.gradient[:, :PARAMETERS]
@@ -155,15 +160,13 @@ def refine(
             poses[which[i]], energy[which[i]] = moved[i], trial[i]
         damping[which] *= np.where(better, 0.1, 10.0)
         turned = np.abs(steps[:, [0, 1, 2, 5]]).max(axis=1)
-        moving[which] = np.where(better, turned > CONVERGED, damping[which] < 1e6)
+        moving[which] = np.where(better, turned > CONVERGED, damping[which] < MOST_DAMPING)
         if not moving.any():
             break
     return poses, energy
 
 
-def adjust(
-    starts: Sequence[Pose], pairs: Pairs, height: float, *, perspective: bool
-) -> Adjusted:
+def adjust(starts: Sequence[Pose], pairs: Pairs, height: float, *, perspective: bool) -> Adjusted:
     """Return the cameras of all views that fit the pairs and each other best.
 
     Args:
@@ -172,38 +175,53 @@ def adjust(
         height: of the mannequin.
         perspective: free k, one for the sheet; else k stays as it is.
     """
-    poses, sigma, spreads, level = tuple(starts), CLICK_OF_HEIGHT, Spreads(), ANYWHERE
+    size = PARAMETERS * len(starts) + perspective
     most_k, damping = NEAREST / pairs.radius, 1e-3
+    poses, shared = tuple(starts), _Shared()
     for number in range(MOST_JOINT_STEPS):
-        sigma_px = pixel_sigmas(poses, sigma * height)
-        energy, normal, gradient, points, _ = _system(
-            poses, pairs, sigma_px, spreads, level, perspective=perspective
-        )
+        sigma_px = pixel_sigmas(poses, shared.sigma * height)
+        system = _System.of(poses, pairs, sigma_px, shared, size)
         while True:
-            damped = normal + damping * np.diag(np.diag(normal))
-            step = _limited(-np.linalg.solve(damped, gradient)[None])[0]
-            moved = _moved(poses, step, most_k, perspective=perspective)
-            trial = _system(moved, pairs, sigma_px, spreads, level, perspective=perspective)[0]
-            if trial <= energy or damping > 1e6:
+            damped = system.normal + damping * np.diag(np.diag(system.normal))
+            step = _limited(-np.linalg.solve(damped, system.gradient)[None])[0]
+            moved = _moved(poses, step, most_k)
+            if better := _total(moved, pairs, sigma_px, shared) <= system.energy:
                 break
             damping *= 10
-        if trial <= energy:
-            poses, damping = moved, max(damping / 10, 1e-9)
-        before = sigma
-        if number >= SETTLED - 1:
-            sigma, spreads, level = _learned(poses, pairs, height, sigma, spreads, level, perspective)
-        if trial > energy or (
-            np.abs(step).max() < CONVERGED and abs(np.log(sigma / before)) < 1e-3
-        ):
-            if number > SETTLED:
+            if damping > MOST_DAMPING:
                 break
-    sigma_px = pixel_sigmas(poses, sigma * height)
-    energy, normal, _, points, _ = _system(
-        poses, pairs, sigma_px, spreads, level, perspective=perspective
-    )
+        if better:
+            poses, damping = moved, max(damping / 10, LEAST_DAMPING)
+        before = shared
+        if number >= SETTLED:
+            shared = shared.learned(system, _squared(poses, pairs, sigma_px), pairs)
+            still = abs(np.log(shared.sigma / before.sigma)) < SIGMA_CONVERGED
+            if still and (not better or np.abs(step).max() < CONVERGED):
+                break
+    sigma_px = pixel_sigmas(poses, shared.sigma * height)
+    wrong = misplaced(_squared(poses, pairs, sigma_px), pairs)
+    fitted = _System.of(poses, pairs, sigma_px, shared, size)
+    evidence = poses[0].k ** 2 / float(np.linalg.inv(fitted.normal)[-1, -1])
+    sigma_px = pixel_sigmas(poses, shared.honest_sigma * height)
+    honest = _System.of(poses, pairs, sigma_px, shared, size)
     return Adjusted(
-        poses, sigma, spreads, level, np.linalg.inv(normal), points.squared, energy
+        poses,
+        shared.honest_sigma,
+        shared.spreads,
+        shared.elevation,
+        np.linalg.inv(honest.normal),
+        _squared(poses, pairs, sigma_px),
+        wrong,
+        evidence if perspective else 0.0,
     )
+
+
+def misplaced(
+    squared: Float[np.ndarray, "views n"], pairs: Pairs
+) -> Bool[np.ndarray, "views n"]:
+    """Return which pairs are wrong, at 1 % significance over a view's; squared as in `Adjusted`."""
+    counts = pairs.given.sum(1, keepdim=True).numpy()
+    return np.asarray(squared > 2 * np.log(100 * counts))
 
 
 def pixel_sigmas(poses: Sequence[Pose], sigma: float) -> Float[np.ndarray, " views"]:
@@ -211,83 +229,109 @@ def pixel_sigmas(poses: Sequence[Pose], sigma: float) -> Float[np.ndarray, " vie
     return np.maximum(sigma * _scales(poses), ROUNDING_PX)
 
 
-def _learned(
-    poses: Sequence[Pose],
-    pairs: Pairs,
-    height: float,
-    sigma: float,
-    spreads: Spreads,
-    level: ElevationPrior,
-    perspective: bool,
-) -> tuple[float, Spreads, ElevationPrior]:
-    """Return sigma, the spreads and the prior of the mean elevation as the sheet tells them.
+@dataclass(frozen=True)
+class _Shared:
+    """What is estimated of the sheet beside its cameras; see `Adjusted`.
 
-    Sigma is a geometric mean of what is left and what is expected, so that exact clicks count as
-    exact.
+    Two sigmas: the fit takes the geometric mean of what is left and what is expected of clicks, so
+    that exact clicks count as exact; the arithmetic one says how sure the cameras are.
     """
-    sigma_px = pixel_sigmas(poses, sigma * height)
-    _, normal, _, points, priors = _system(
-        poses, pairs, sigma_px, spreads, level, perspective=perspective
+
+    sigma: float = CLICK_OF_HEIGHT
+    honest_sigma: float = CLICK_OF_HEIGHT
+    spreads: Spreads = field(default_factory=Spreads)
+    elevation: ElevationPrior = ANYWHERE
+
+    def learned(
+        self, system: _System, squared: Float[np.ndarray, "views n"], pairs: Pairs
+    ) -> _Shared:
+        """Return it as the sheet tells it."""
+        covariance = np.linalg.inv(system.normal)
+        told = float(np.trace(covariance @ system.of_pairs))
+        kept = pairs.given.numpy().astype(bool) & ~misplaced(squared, pairs)
+        free = max(2 * int(kept.sum()) - told, LEAST_FREE)
+        weighted = float((_weights(squared) * squared)[kept].sum())
+        left = NORMAL * weighted * self.sigma**2 / free
+        share, usual = free / (free + CLICK_WEIGHT), Spreads()
+        logs = share * np.log(max(left, 1e-14)) + (1 - share) * np.log(CLICK_OF_HEIGHT**2)
+        honest = np.sqrt(share * left + (1 - share) * CLICK_OF_HEIGHT**2)
+        spreads = {
+            name: prior.spread(covariance, getattr(usual, name))
+            for name, prior in system.priors.items()
+        }
+        level = _level(float(system.priors["elevation"].values.mean()))
+        return _Shared(float(np.exp(logs / 2)), float(honest), replace(usual, **spreads), level)
+
+
+def _level(mean: float) -> ElevationPrior:
+    """Return the prior of a sheet's elevation: eye level, as far as its mean is likely to be that.
+
+    The mixture of both as one normal distribution of their mean precision (expectation step).
+    """
+    level, steep = (
+        p * np.exp(-0.5 * ((mean - prior.mean) / prior.sigma) ** 2) / prior.sigma
+        for p, prior in ((1 - P_STEEP, LEVEL), (P_STEEP, ANYWHERE))
     )
-    covariance = np.linalg.inv(normal)
-    told = float(np.trace(covariance @ _spread_out(points, len(normal))[0]))
-    free = max(2 * float(pairs.given.sum()) - told, 0.0)
-    left = (_weights(points.squared) * points.squared).sum() * sigma**2 / max(free, 1e-6)
-    expected = CLICK_OF_HEIGHT
-    sigma = np.exp(
-        (free * np.log(max(left, 1e-14)) + CLICK_WEIGHT * np.log(expected**2))
-        / (2 * (free + CLICK_WEIGHT))
-    )
-    usual = Spreads()
-    spreads = replace(
-        spreads, **{n: p.spread(covariance, getattr(usual, n)) for n, p in priors.items()}
-    )
-    mean = float(priors["elevation"].values.mean())
-    odds = P_STEEP * _density(mean, ANYWHERE) / ((1 - P_STEEP) * _density(mean, LEVEL))
-    near = 1 / (1 + odds)
-    precision = near / LEVEL.sigma**2 + (1 - near) / ANYWHERE.sigma**2
-    at = (1 - near) * ANYWHERE.mean / ANYWHERE.sigma**2 / precision
-    return float(sigma), spreads, ElevationPrior(at, precision**-0.5)
+    near = level / (level + steep)
+    precisions = near / LEVEL.sigma**2, (1 - near) / ANYWHERE.sigma**2
+    middle = precisions[1] * ANYWHERE.mean / sum(precisions)
+    return ElevationPrior(float(middle), float(sum(precisions) ** -0.5))
 
 
-def _density(value: float, prior: ElevationPrior) -> float:
-    return float(np.exp(-0.5 * ((value - prior.mean) / prior.sigma) ** 2)) / prior.sigma
+@dataclass(frozen=True, eq=False)
+class _System:
+    """The linearised problem: energy, normal equations, the pairs' part of them, the priors."""
+
+    energy: float
+    normal: Float[np.ndarray, "u u"]
+    gradient: Float[np.ndarray, " u"]
+    of_pairs: Float[np.ndarray, "u u"]
+    priors: dict[str, SharedPrior]
+
+    @classmethod
+    def of(
+        cls,
+        poses: Sequence[Pose],
+        pairs: Pairs,
+        sigma_px: Float[np.ndarray, " views"],
+        shared: _Shared,
+        size: int,
+    ) -> _System:
+        points = equations(poses, pairs, sigma_px)
+        of_pairs, gradient = _spread_out(points, size)
+        normal, energy = of_pairs.copy(), float(points.energy.sum())
+        priors = sheet_priors(poses, None, shared.spreads.yaw, size)
+        for prior, sigma in _with_sigmas(priors, shared):
+            matrix, slope = prior.equations(sigma)
+            normal += matrix
+            gradient += slope
+            energy += _off(prior, sigma)
+        normal += 1e-12 * np.diag(np.diag(normal))
+        return cls(energy, normal, gradient, of_pairs, priors)
 
 
-def _system(
-    poses: Sequence[Pose],
-    pairs: Pairs,
-    sigma_px: Float[np.ndarray, " views"],
-    spreads: Spreads,
-    level: ElevationPrior,
-    *,
-    perspective: bool,
-) -> tuple[
-    float,
-    Float[np.ndarray, "u u"],
-    Float[np.ndarray, " u"],
-    _Equations,
-    dict[str, SharedPrior],
-]:
-    """Return energy, normal matrix and gradient of the sheet, the pairs' part and the priors."""
-    size = PARAMETERS * len(poses) + perspective
-    points = _equations(poses, pairs, sigma_px)
-    normal, gradient = _spread_out(points, size)
-    energy = float(points.energy.sum())
-    priors = sheet_priors(poses, None, spreads.yaw, size)
-    terms = [(shared, getattr(spreads, name)) for name, shared in priors.items()]
-    for shared, sigma in [*terms, *anchors(priors, None, level)]:
-        matrix, slope = shared.equations(sigma)
-        normal += matrix
-        gradient += slope
-        off = shared.centre @ shared.values / sigma
-        energy += float((shared.weights * off**2).sum())
-    normal += 1e-12 * np.diag(np.diag(normal))
-    return energy, normal, gradient, points, priors
+def _total(
+    poses: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " views"], shared: _Shared
+) -> float:
+    """Return the energy of pairs and priors."""
+    priors = sheet_priors(poses, None, shared.spreads.yaw, PARAMETERS * len(poses))
+    own = (_off(prior, sigma) for prior, sigma in _with_sigmas(priors, shared))
+    return float(_energy(_squared(poses, pairs, sigma_px)).sum()) + sum(own)
+
+
+def _with_sigmas(
+    priors: dict[str, SharedPrior], shared: _Shared
+) -> list[tuple[SharedPrior, float]]:
+    own = [(prior, getattr(shared.spreads, name)) for name, prior in priors.items()]
+    return [*own, *anchors(priors, None, shared.elevation)]
+
+
+def _off(prior: SharedPrior, sigma: float) -> float:
+    return float((prior.weights * (prior.centre @ prior.values / sigma) ** 2).sum())
 
 
 def _spread_out(
-    points: _Equations, size: int
+    points: Equations, size: int
 ) -> tuple[Float[np.ndarray, "u u"], Float[np.ndarray, " u"]]:
     """Return the views' equations as the sheet's, k last where it is free."""
     normal, gradient = np.zeros((size, size)), np.zeros(size)
@@ -301,19 +345,19 @@ def _spread_out(
 
 
 def _moved(
-    poses: Sequence[Pose], step: Float[np.ndarray, " u"], most_k: float, *, perspective: bool
+    poses: Sequence[Pose], step: Float[np.ndarray, " u"], most_k: float
 ) -> tuple[Pose, ...]:
     own = step[: PARAMETERS * len(poses)].reshape(-1, PARAMETERS)
-    moved = (pose.moved(each) for pose, each in zip(poses, own, strict=True))
-    if not perspective:
+    moved = [pose.moved(each) for pose, each in zip(poses, own, strict=True)]
+    if not len(step) % PARAMETERS:
         return tuple(moved)
     k = float(np.clip(poses[0].k + step[-1], 0.0, most_k))
     return tuple(replace(pose, k=k) for pose in moved)
 
 
-def _equations(
+def equations(
     poses: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " views"]
-) -> _Equations:
+) -> Equations:
     pixels, slopes = project_with_jacobian(_tensors(poses), pairs.points)
     seen = pairs.given[..., None] * torch.from_numpy(1 / sigma_px)[:, None, None]
     off = (pixels - pairs.pixels) * seen
@@ -322,7 +366,7 @@ def _equations(
     weighted = rows * ((TAIL + 2) / (TAIL + squared))[..., None, None]
     normal = torch.einsum("vncp,vncq->vpq", weighted, rows)
     gradient = torch.einsum("vncp,vnc->vp", weighted, off)
-    return _Equations(normal.numpy(), gradient.numpy(), squared.numpy())
+    return Equations(normal.numpy(), gradient.numpy(), squared.numpy())
 
 
 def _squared(

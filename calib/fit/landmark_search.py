@@ -32,7 +32,6 @@ from toonset.camera import rotation_distance
 
 OTHER = np.radians(10.0)  # a camera nearer than this is the same, found from another start
 FIRST_K = 0.02  # k times radius where the search for perspective begins
-NEARNESS = 0.3  # k times radius of its second start: a camera about two body heights away
 BETTER = 1.0  # nats times two, by which another camera takes a view's place
 MOST_ROUNDS = 3  # of joint adjustments
 FREE = 1e3  # sigma of a log scale of which nothing is known
@@ -64,21 +63,22 @@ def search_cameras(views: Sequence[tuple[Points, Pixels]], height: float) -> Fou
         height: of the mannequin.
     """
     search = _Search(views, Pairs.of(views), height)
-    flat = search.cameras(0.0)
+    optima = search.optima()
+    chosen = [own[0][1] for own in optima]
+    if len(views) > 1:
+        chosen = [own[0][1] for own in search.ranked(_poses(optima), _prior_about(chosen))]
+    flat = search.adjusted(chosen, perspective=False)
     samples = 2 * float(search.pairs.given.sum())
     if samples <= PARAMETERS * len(views) + 1:
-        return FoundCameras(*flat, 0.0)
-    near = search.cameras(NEARNESS / search.pairs.radius)[0]
-    starts = [replace(pose, k=FIRST_K / search.pairs.radius) for pose in flat[0].poses], near.poses
-    deep = min(
-        (search.adjusted(start, perspective=True) for start in starts),
-        key=lambda found: found.energy,
+        return FoundCameras(*search.settled(flat, optima, perspective=False), 0.0)
+    first_k = FIRST_K / search.pairs.radius
+    near = [replace(pose, k=first_k) for pose in flat.poses]
+    deep = search.adjusted(near, perspective=True)
+    gain = float(deep.evidence - np.log(samples))
+    proven = gain > BIC_MARGIN
+    return FoundCameras(
+        *search.settled(deep if proven else flat, optima, perspective=proven), gain
     )
-    k = deep.poses[0].k
-    gain = float(k**2 / deep.covariance[-1, -1] - np.log(samples))
-    if gain <= BIC_MARGIN:
-        return FoundCameras(*flat, gain)
-    return FoundCameras(*search.settled(deep, perspective=True), gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,38 +87,29 @@ class _Search:
     pairs: Pairs
     height: float
 
-    def cameras(self, k: float) -> tuple[Adjusted, tuple[Ranked, ...]]:
-        """Return all views' cameras at a given k, and their alternatives."""
-        starts = [
-            [replace(pose, k=k) for pose in start_poses(*own, k * self.pairs.radius)]
-            for own in self.views
-        ]
-        sigma_px = CLICK_OF_HEIGHT * self.height * np.array([_scale(*own) for own in self.views])
-        ranked = self._ranked(starts, _prior([ROLL_SIGMA, ANYWHERE.sigma, FREE]), sigma_px)
-        if len(self.views) > 1:
-            best = [own[0][1] for own in ranked]
-            ranked = self._ranked(
-                [[pose for _, pose in own] for own in ranked], _prior_about(best), sigma_px
-            )
-        joint = self.adjusted([own[0][1] for own in ranked], perspective=False)
-        return self.settled(joint, perspective=False)
+    def optima(self) -> list[Ranked]:
+        """Return every view's orthographic cameras, each view by itself."""
+        return self.ranked(
+            [start_poses(*own) for own in self.views], _prior([ROLL_SIGMA, ANYWHERE.sigma, FREE])
+        )
 
     def adjusted(self, starts: Sequence[Pose], *, perspective: bool) -> Adjusted:
+        """Return all views' cameras, adjusted together."""
         return adjust(starts, self.pairs, self.height, perspective=perspective)
 
     def settled(
-        self, joint: Adjusted, *, perspective: bool
+        self, joint: Adjusted, optima: Sequence[Ranked], *, perspective: bool
     ) -> tuple[Adjusted, tuple[Ranked, ...]]:
         """Return a joint adjustment no view of which has a better camera, and the alternatives."""
         for left in reversed(range(MOST_ROUNDS)):
-            k = joint.poses[0].k
             starts = [
-                [pose, depth_reversed(pose, points)]
-                + [replace(start, k=k) for start in start_poses(points, pixels, k * self.pairs.radius)]
-                for pose, (points, pixels) in zip(joint.poses, self.views, strict=True)
+                [pose, depth_reversed(pose, points), *(replace(own, k=pose.k) for own in others)]
+                for pose, (points, _), others in zip(
+                    joint.poses, self.views, _poses(optima), strict=True
+                )
             ]
             sigma_px = pixel_sigmas(joint.poses, joint.sigma * self.height)
-            ranked = self._ranked(starts, _prior_of(joint), sigma_px)
+            ranked = self.ranked(starts, _prior_of(joint), sigma_px)
             own = [_energy_of(pose, found) for pose, found in zip(joint.poses, ranked, strict=True)]
             better = [found[0][0] < here - BETTER for here, found in zip(own, ranked, strict=True)]
             if not any(better) or not left:
@@ -134,13 +125,16 @@ class _Search:
         )
         return joint, others
 
-    def _ranked(
+    def ranked(
         self,
         starts: Sequence[Sequence[Pose]],
         prior: ViewPrior,
-        sigma_px: Float[np.ndarray, " views"],
+        sigma_px: Float[np.ndarray, " views"] | None = None,
     ) -> list[Ranked]:
-        """Return every view's distinct optima."""
+        """Return every view's distinct optima; sigma as it is before looking, or as given."""
+        if sigma_px is None:
+            scales = np.array([_scale(*own) for own in self.views])
+            sigma_px = CLICK_OF_HEIGHT * self.height * scales
         which = np.repeat(np.arange(len(starts)), [len(own) for own in starts])
         poses, energies = refine(
             [pose for own in starts for pose in own],
@@ -154,6 +148,10 @@ class _Search:
             if all(_apart(poses[i], other) for _, other in own):
                 own.append((float(energies[i]), poses[i]))
         return found
+
+
+def _poses(ranked: Sequence[Ranked]) -> list[list[Pose]]:
+    return [[pose for _, pose in own] for own in ranked]
 
 
 def _apart(pose: Pose, other: Pose) -> bool:

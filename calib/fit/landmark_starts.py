@@ -28,13 +28,12 @@ Points = Float[np.ndarray, "n 3"]
 Pixels = Float[np.ndarray, "n 2"]
 
 
-def start_poses(points: Points, pixels: Pixels, nearness: float = 0.0) -> list[Pose]:
-    """Return poses near every optimum, also where one of four pairs or more is wrong.
+def start_poses(points: Points, pixels: Pixels) -> list[Pose]:
+    """Return orthographic poses near every optimum, also where one of four pairs or more is wrong.
 
     Args:
         points: at least three, not on a line, relative to the surface's middle.
         pixels: where they appear.
-        nearness: radius of the points over the camera's distance; 0: orthographic.
     """
     everything = np.ones(len(points), dtype=bool)
     subsets = [everything]
@@ -44,7 +43,7 @@ def start_poses(points: Points, pixels: Pixels, nearness: float = 0.0) -> list[P
         pose
         for kept in subsets
         if not on_a_line(points[kept])
-        for pose in _solved(points[kept], pixels[kept], nearness)
+        for pose in _solved(points[kept], pixels[kept])
     ]
 
 
@@ -66,10 +65,10 @@ def on_a_line(points: Points) -> bool:
     return bool(sizes[1] <= LINE * sizes[0])
 
 
-def _solved(points: Points, pixels: Pixels, nearness: float) -> list[Pose]:
+def _solved(points: Points, pixels: Pixels) -> list[Pose]:
     """Return SQPnP's poses before the camera and their depth reversals."""
     middle, seen = points.mean(axis=0), pixels.mean(axis=0)
-    focal = np.linalg.norm(pixels - seen, axis=1).max() / (nearness or 1 / FAR)
+    focal = np.linalg.norm(pixels - seen, axis=1).max() * FAR
     K = np.array([[focal, 0, seen[0]], [0, focal, seen[1]], [0, 0, 1.0]])
     centred = points - middle
     try:
@@ -84,7 +83,7 @@ def _solved(points: Points, pixels: Pixels, nearness: float) -> list[Pose]:
         if not np.isfinite([turn, offset]).all() or depth <= 0:
             continue
         rotation = cv2.Rodrigues(turn)[0]
-        pose = Pose(rotation, np.zeros(2), focal / depth, 1 / depth if nearness else 0.0)
+        pose = Pose(rotation, np.zeros(2), focal / depth)
         pose = replace(pose, shift=seen - project(pose, middle[None])[0])
         found += [pose, depth_reversed(pose, points)]
     return found

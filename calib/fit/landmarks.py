@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 LEAST_PROBABILITY = 0.01  # of a camera that is worth returning
 REACH = 3.0  # times the mannequin's radius: farther points have other units
 LEAST_SPREAD_PX = 1.0  # of the pixels
-MISPLACED = 2 * float(np.log(100))  # a pair is called misplaced at 1 % significance over a view's
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +43,7 @@ class LandmarkFit:
         poses: relative to the surface's middle, pixels of the crop; the most probable first. Others
             are, say, the depth reversal of pairs nearly in a plane.
         probabilities: of each pose, given the landmarks alone.
+        pairs: how many there are.
         rms_px: root mean square of the pairs' pixel distances (both axes), misplaced ones aside.
         sigma_px: estimated error of one pixel coordinate.
         covariance: (6, 6) of the first pose's (w, shift, log scale); free k is integrated out.
@@ -55,6 +55,7 @@ class LandmarkFit:
     view: str
     poses: tuple[Pose, ...]
     probabilities: tuple[float, ...]
+    pairs: int
     rms_px: float
     sigma_px: float
     covariance: Float[np.ndarray, "6 6"]
@@ -105,7 +106,7 @@ def _fit_of(
     joint, others = found.joint, found.others[index]
     pose, squared = joint.poses[index], joint.squared[index, : len(landmarks.names)]
     sigma_px = joint.sigma * height * pose.scale
-    misplaced = squared > MISPLACED + 2 * np.log(len(squared))
+    misplaced = joint.misplaced[index, : len(squared)]
     weights = np.array([1.0, *(float(np.exp(-0.5 * more)) for more, _ in others)])
     probable = weights / weights.sum()
     kept = [0, *(i for i in range(1, len(probable)) if probable[i] >= LEAST_PROBABILITY)]
@@ -115,6 +116,7 @@ def _fit_of(
         landmarks.view,
         tuple([pose, *(other for _, other in others)][i] for i in kept),
         tuple(float(probable[i]) for i in kept),
+        len(squared),
         float(sigma_px * np.sqrt(squared[~misplaced].mean())),
         sigma_px,
         np.linalg.inv(np.linalg.inv(joint.covariance[own, own]) + turns),
