@@ -15,14 +15,19 @@ from toonset.calib.evidence.coherence_state import state_of
 from toonset.calib.fit.align import measure
 from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.landmarks import LandmarkFit, solve_landmarks
-from toonset.calib.fit.model_selection import BIC_MARGIN, ORTHOGRAPHIC, SHARED, ModelChoice, ModelTest
+from toonset.calib.fit.model_selection import (
+    BIC_MARGIN,
+    ORTHOGRAPHIC,
+    SHARED,
+    ModelChoice,
+    ModelTest,
+)
 from toonset.calib.options import VerdictThresholds
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
 from toonset.calib.search.candidates import is_twin
 from toonset.calib.verdict.judge import angle_sigmas, judge_sheet, outlines_apart
-from toonset.camera import angles_from_rotation
 from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import LandmarkError
@@ -128,16 +133,9 @@ def _judged(
 def _verdict(
     fit: LandmarkFit, sigmas: Sigmas, height_px: float, limits: VerdictThresholds
 ) -> tuple[Verdict, str]:
-    if len(fit.misplaced) > limits.most_landmarks_misplaced * fit.pairs:
-        named = ", ".join(fit.misplaced)
-        return "failed", f"too many landmarks do not fit the others: {named}; another body's?"
-    if fit.rms_px > limits.most_landmarks_off * height_px:
-        off = f"{100 * fit.rms_px / height_px:.0f} % of the height"
-        return "failed", f"the landmarks are {off} off: other points, or another body's"
-    if sum(fit.probabilities[1:]) > 1 - limits.sure:
-        yaw = np.degrees(angles_from_rotation(fit.poses[1].rotation)[0]) % 360
-        p = fit.probabilities[1]
-        return "ambiguous", f"yaw {yaw:.0f} fits as well (p = {p:.2f}): add a point off their plane"
+    doubt = fit.doubt(height_px, limits)
+    if doubt:
+        return doubt
     if fit.misplaced:
         return "weak", f"landmarks that do not fit the others: {', '.join(fit.misplaced)}"
     if max(sigmas.yaw, sigmas.elevation) > np.radians(limits.weak_sigma_deg):

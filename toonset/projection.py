@@ -75,8 +75,8 @@ def project_with_jacobian(
 ) -> tuple[Float[Tensor, "views points 2"], Float[Tensor, "views points 2 7"]]:
     """Return pixels and their derivatives by (turn, center, log scale, k).
 
-    The turn is the increment of `rotate`: d X_c = turn x X_c = -hat(X_c) turn. Points at or behind a
-    pinhole's centre are NaN, derivatives too.
+    The turn is the increment of `rotate`: d X_c = turn x X_c = -hat(X_c) turn. Points at or behind
+    a pinhole's centre are NaN, derivatives too.
 
     Args:
         cameras: one per view.

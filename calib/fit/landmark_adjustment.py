@@ -26,8 +26,9 @@ from torch import Tensor
 
 from toonset.calib.fit.align import ROLL_SIGMA, ElevationPrior, tilt
 from toonset.calib.fit.landmark_starts import Pixels, Points
+from toonset.calib.fit.proportions import Body
 from toonset.calib.fit.sheet_prior import SharedPrior, Spreads, anchors, sheet_priors
-from toonset.calib.outline.pose import PARAMETERS, Pose
+from toonset.calib.outline.pose import PARAMETERS, Pose, pixel_slopes
 from toonset.projection import CameraTensors, project, project_with_jacobian
 
 TAIL = 4.0  # degrees of freedom of a pair's error
@@ -127,6 +128,45 @@ class Equations:
         return np.asarray(_energy(self.squared))
 
 
+@dataclass(frozen=True, eq=False)
+class LandmarkRows:
+    """The pairs of a sheet as rows of its adjustment to outlines; views may have none.
+
+    Attributes:
+        pairs: pixels of the working pictures, points of the mannequin as it is.
+        sigma_px: (views,) of a coordinate, working pixels.
+    """
+
+    pairs: Pairs
+    sigma_px: Float[np.ndarray, " views"]
+
+    def at(
+        self, poses: Sequence[Pose], body: Body
+    ) -> list[tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m 7"], Float[np.ndarray, "m p"]]]:
+        """Return every view's errors and their slopes by (w, shift, log scale, k) and proportions.
+
+        In units of sigma, weighed; points move with the body.
+        """
+        rest = self.pairs.points.numpy()
+        moves = body.slopes(rest.reshape(-1, 3)).reshape(*rest.shape, -1)
+        bent = rest + moves @ body.theta
+        pairs = replace(self.pairs, points=torch.from_numpy(bent))
+        off, slopes, weights = (part.numpy() for part in _rows(poses, pairs, self.sigma_px))
+        root = np.sqrt(weights)[..., None]
+        found = []
+        for i, pose in enumerate(poses):
+            by_point = pixel_slopes(pose, bent[i]) * (root[i] / self.sigma_px[i])[..., None]
+            by_point *= self.pairs.given[i].numpy()[:, None, None]
+            found.append(
+                (
+                    (off[i] * root[i]).ravel(),
+                    (slopes[i] * root[i][..., None]).reshape(-1, 7),
+                    np.einsum("ncj,njp->ncp", by_point, moves[i]).reshape(-1, moves.shape[-1]),
+                )
+            )
+        return found
+
+
 def refine(
     starts: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " cameras"], prior: ViewPrior
 ) -> tuple[list[Pose], Float[np.ndarray, " cameras"]]:
@@ -216,9 +256,7 @@ def adjust(starts: Sequence[Pose], pairs: Pairs, height: float, *, perspective: 
     )
 
 
-def misplaced(
-    squared: Float[np.ndarray, "views n"], pairs: Pairs
-) -> Bool[np.ndarray, "views n"]:
+def misplaced(squared: Float[np.ndarray, "views n"], pairs: Pairs) -> Bool[np.ndarray, "views n"]:
     """Return which pairs are wrong, at 1 % significance over a view's; squared as in `Adjusted`."""
     counts = pairs.given.sum(1, keepdim=True).numpy()
     return np.asarray(squared > 2 * np.log(100 * counts))
@@ -344,9 +382,7 @@ def _spread_out(
     return normal, gradient
 
 
-def _moved(
-    poses: Sequence[Pose], step: Float[np.ndarray, " u"], most_k: float
-) -> tuple[Pose, ...]:
+def _moved(poses: Sequence[Pose], step: Float[np.ndarray, " u"], most_k: float) -> tuple[Pose, ...]:
     own = step[: PARAMETERS * len(poses)].reshape(-1, PARAMETERS)
     moved = [pose.moved(each) for pose, each in zip(poses, own, strict=True)]
     if not len(step) % PARAMETERS:
@@ -358,15 +394,22 @@ def _moved(
 def equations(
     poses: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " views"]
 ) -> Equations:
+    """Return the reweighted normal equations of every view."""
+    off, slopes, weights = _rows(poses, pairs, sigma_px)
+    weighted = slopes * weights[..., None, None]
+    normal = torch.einsum("vncp,vncq->vpq", weighted, slopes)
+    gradient = torch.einsum("vncp,vnc->vp", weighted, off)
+    return Equations(normal.numpy(), gradient.numpy(), off.square().sum(-1).numpy())
+
+
+def _rows(
+    poses: Sequence[Pose], pairs: Pairs, sigma_px: Float[np.ndarray, " views"]
+) -> tuple[Float[Tensor, "views n 2"], Float[Tensor, "views n 2 7"], Float[Tensor, "views n"]]:
+    """Return errors and slopes in units of sigma, 0 for padding, and the pairs' weights."""
     pixels, slopes = project_with_jacobian(_tensors(poses), pairs.points)
     seen = pairs.given[..., None] * torch.from_numpy(1 / sigma_px)[:, None, None]
     off = (pixels - pairs.pixels) * seen
-    rows = slopes * seen[..., None]
-    squared = off.square().sum(-1)
-    weighted = rows * ((TAIL + 2) / (TAIL + squared))[..., None, None]
-    normal = torch.einsum("vncp,vncq->vpq", weighted, rows)
-    gradient = torch.einsum("vncp,vnc->vp", weighted, off)
-    return Equations(normal.numpy(), gradient.numpy(), squared.numpy())
+    return off, slopes * seen[..., None], (TAIL + 2) / (TAIL + off.square().sum(-1))
 
 
 def _squared(
@@ -391,7 +434,9 @@ def _upright(
 ]:
     """Return energy, normal matrices and gradients of the views' priors."""
     tilts = [tilt(pose) for pose in poses]
-    values = np.array([[*angles, np.log(p.scale)] for (angles, _), p in zip(tilts, poses)])
+    values = np.array(
+        [[*angles, np.log(p.scale)] for (angles, _), p in zip(tilts, poses, strict=True)]
+    )
     slopes = np.zeros((len(poses), 3, PARAMETERS))
     slopes[:, :2, :3] = [by_turn for _, by_turn in tilts]
     slopes[:, 2, 5] = 1

@@ -59,7 +59,7 @@ def search_cameras(views: Sequence[tuple[Points, Pixels]], height: float) -> Fou
     """Return the cameras of a sheet's views.
 
     Args:
-        views: points relative to the surface's middle and their pixels; three or more not on a line.
+        views: three points or more, not on a line, relative to the surface's middle; pixels.
         height: of the mannequin.
     """
     search = _Search(views, Pairs.of(views), height)
@@ -76,9 +76,7 @@ def search_cameras(views: Sequence[tuple[Points, Pixels]], height: float) -> Fou
     deep = search.adjusted(near, perspective=True)
     gain = float(deep.evidence - np.log(samples))
     proven = gain > BIC_MARGIN
-    return FoundCameras(
-        *search.settled(deep if proven else flat, optima, perspective=proven), gain
-    )
+    return FoundCameras(*search.settled(deep if proven else flat, optima, perspective=proven), gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +186,9 @@ def _prior_about(poses: Sequence[Pose]) -> ViewPrior:
 def _prior_of(joint: Adjusted) -> ViewPrior:
     """Return what a view shares with the others of its sheet."""
     if len(joint.poses) == 1:
-        return _prior([joint.spreads.roll, joint.elevation.sigma, FREE], [0, joint.elevation.mean, 0])
+        return _prior(
+            [joint.spreads.roll, joint.elevation.sigma, FREE], [0, joint.elevation.mean, 0]
+        )
     values = np.array([[tilt(pose)[0][1], np.log(pose.scale)] for pose in joint.poses])
     spreads = joint.spreads
     return _prior([spreads.roll, spreads.elevation, spreads.scale], [0.0, *values.mean(axis=0)])

@@ -1,9 +1,9 @@
 """Start a view's camera from its landmarks by OpenCV's perspective-n-point solver.
 
-An orthographic camera is a pinhole `FAR` radii away. SQPnP wants three points, in a plane or not, and
-its solution comes with its depth reversal: seen from far away, points near a plane and their mirror
-image behind it project alike, and which of the two fits better is told by refinement. Every pair is
-left out once, so that one start is free of a wrong one.
+An orthographic camera is a pinhole `FAR` radii away. SQPnP needs three points, in a plane or not.
+Its solution comes with its depth reversal: seen from far away, points near a plane and their mirror
+image in depth project alike, and refinement tells which of the two fits better. Every pair is left
+out once, so that one start is free of a wrong one.
 
 Source: Terzakis and Lourakis, A consistently fast and globally optimal solution to the
 perspective-n-point problem, ECCV 2020; two poses of a plane: Oberkampf, DeMenthon and Davis, CVIU

@@ -1,4 +1,4 @@
-"""Solve a sheet's cameras from landmarks: pairs of a point of the mannequin and its pixel, per view.
+"""Solve a sheet's cameras from landmarks: points of the mannequin and their pixels, per view.
 
 1. OpenCV's PnP starts every view (`landmark_starts`), all starts are refined as one batch
 2. views are refined again as one sheet's: of its scale and elevation, upright
@@ -14,15 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.fit.landmark_starts import Points, on_a_line
 from toonset.calib.fit.model_selection import BIC_MARGIN
+from toonset.calib.options import VerdictThresholds
 from toonset.calib.outline.occluding_contour import Surface
 from toonset.calib.outline.pose import PARAMETERS, Pose
+from toonset.camera import angles_from_rotation
 from toonset.dataset.mannequin.landmark_file import LEAST_POINTS, Landmarks
 from toonset.errors import LandmarkError
 
@@ -48,8 +50,8 @@ class LandmarkFit:
         sigma_px: estimated error of one pixel coordinate.
         covariance: (6, 6) of the first pose's (w, shift, log scale); free k is integrated out.
         misplaced: names of pairs that do not fit the others.
-        bic_gain: of perspective over orthography, for the sheet; above `BIC_MARGIN` all poses have one
-            k, else k = 0.
+        bic_gain: of perspective over orthography, for the sheet; above `BIC_MARGIN` all poses have
+            one k, else k = 0.
     """
 
     view: str
@@ -66,6 +68,27 @@ class LandmarkFit:
     def model(self) -> str:
         """Return "orthographic" or "perspective"."""
         return "perspective" if self.bic_gain > BIC_MARGIN else "orthographic"
+
+    def doubt(
+        self, height_px: float, limits: VerdictThresholds
+    ) -> tuple[Literal["failed", "ambiguous"], str] | None:
+        """Return why the landmarks do not tell one camera: a verdict and its reason.
+
+        Args:
+            height_px: of the figure.
+            limits: where to begin to doubt.
+        """
+        if len(self.misplaced) > limits.most_landmarks_misplaced * self.pairs:
+            named = ", ".join(self.misplaced)
+            return "failed", f"too many landmarks do not fit the others: {named}; another body's?"
+        if self.rms_px > limits.most_landmarks_off * height_px:
+            off = f"{100 * self.rms_px / height_px:.0f} % of the height"
+            return "failed", f"the landmarks are {off} off: other points, or another body's"
+        if sum(self.probabilities[1:]) > 1 - limits.sure:
+            yaw, p = angles_from_rotation(self.poses[1].rotation)[0], self.probabilities[1]
+            also = f"yaw {np.degrees(yaw) % 360:.0f} fits as well (p = {p:.2f})"
+            return "ambiguous", f"{also}: add a point off their plane"
+        return None
 
 
 def landmark_starts(
@@ -100,9 +123,7 @@ def solve_landmarks(landmarks: Sequence[Landmarks], surface: Surface) -> tuple[L
     return tuple(_fit_of(i, own, found, surface.height) for i, own in enumerate(landmarks))
 
 
-def _fit_of(
-    index: int, landmarks: Landmarks, found: FoundCameras, height: float
-) -> LandmarkFit:
+def _fit_of(index: int, landmarks: Landmarks, found: FoundCameras, height: float) -> LandmarkFit:
     joint, others = found.joint, found.others[index]
     pose, squared = joint.poses[index], joint.squared[index, : len(landmarks.names)]
     sigma_px = joint.sigma * height * pose.scale
