@@ -63,7 +63,7 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 if TYPE_CHECKING:
-    from toonset.calib.fit.landmark_adjustment import LandmarkRows
+    from toonset.calib.fit.landmark_residuals import LandmarkRows
 
 COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
 COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
@@ -187,7 +187,7 @@ class Problem:
         """Return the landmarks in the drawings' working pixels."""
         if not self.known.landmarks:
             return None
-        from toonset.calib.fit.landmark_adjustment import LandmarkRows, Pairs  # torch
+        from toonset.calib.fit.landmark_residuals import LandmarkRows, Pairs  # torch
 
         own, sigmas = [], []
         for landmarks, fit, drawing in zip(self.known.landmarks, self.marks, drawings, strict=True):

@@ -1,4 +1,4 @@
-"""Click landmarks on drawings with true cameras, and measure the cameras that come of them.
+"""Click landmarks on drawings with true cameras, and measure the cameras that are found.
 
 A click shows a vertex of the mesh that the true camera sees, chosen far from the others; it is off
 by Gaussian noise, and a wrong one lies anywhere in the figure's box, a tenth of the height away at
@@ -16,6 +16,7 @@ from zlib import crc32
 import numpy as np
 from jaxtyping import Float, Int
 
+from bench.calib.baselines import HEIGHTS, solved
 from bench.cases.bodies import random_body
 from bench.cases.cases import CONDITIONS, MANNEQUIN_FILE, case_folders
 from bench.records.record import CPU_SECONDS, Record, Recorder
@@ -32,7 +33,7 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 ROTATION, PLACE, NAMED = "rotation error", "placing error", "wrong clicks named"
-ALONE, OUTLINES = "points", "points and outlines"
+PNP, ALONE, OUTLINES = "PnP, the lens known", "points", "points and outlines"
 SEEN = 0.01  # of the height: a vertex this little behind the surface is on it
 LEAST_WRONG = 0.1  # of the height, that a wrong click is off
 
@@ -80,7 +81,8 @@ class Outcome:
         case: its name.
         clicks: as they were made.
         rotation_deg: per view.
-        place_px: per view, root mean square over the mesh's vertices, pixels of the drawing.
+        place_px: per view, root mean square over the mesh's vertices, pixels of the drawing; empty
+            where only rotations are found.
         named: wrong clicks that are called misplaced.
         wrong: how many there were.
         slandered: good clicks that are called misplaced.
@@ -123,13 +125,10 @@ def measure(case: ClickCase, clicks: Clicks, seed: int, *, outlines: bool) -> Ou
     began = time.process_time()
     if outlines:
         found = find_cameras(case.views, case.mesh, known=Known(landmarks=marks))
-        called: set[tuple[int, int]] = set()
     else:
         found = calibrate_by_landmarks(case.views, case.mesh, marks)
-        called = {
-            (i, int(name[1:])) for i, fit in enumerate(found.landmarks) for name in fit.misplaced
-        }
     spent = time.process_time() - began
+    called = {(i, int(name[1:])) for i, fit in enumerate(found.landmarks) for name in fit.misplaced}
     pairs = [(view.camera, true) for view, true in zip(found.views, case.cameras, strict=True)]
     off = [
         np.linalg.norm(a.project(case.mesh.vertices)[0] - b.project(case.mesh.vertices)[0], axis=1)
@@ -146,6 +145,20 @@ def measure(case: ClickCase, clicks: Clicks, seed: int, *, outlines: bool) -> Ou
         len(called - wrong),
         spent,
     )
+
+
+def measure_pnp(case: ClickCase, clicks: Clicks, seed: int) -> Outcome:
+    """Return how far SQPnP and its refinement are off, view by view, with the true lens."""
+    marks, wrong = click(case, clicks, seed)
+    began = time.process_time()
+    found = []
+    for own, camera in zip(marks, case.cameras, strict=True):
+        lens = camera.as_pinhole(HEIGHTS * case.mesh.height) if camera.is_orthographic else camera
+        rotation = solved(own.world, own.pixels, lens.K)
+        found.append(np.pi if rotation is None else rotation_distance(rotation, camera.rotation))
+    spent = time.process_time() - began
+    degrees = tuple(np.degrees(found).tolist())
+    return Outcome(case.group, case.name, clicks, degrees, (), 0, len(wrong), 0, spent)
 
 
 def click(
@@ -176,10 +189,12 @@ def records_of(found: Sequence[Outcome], method: str, seed: int) -> list[Record]
         recorder = Recorder(method, f"{key[0]}: {key[1]}", seed)
         records += [
             recorder.samples(ROTATION, _joined(each.rotation_deg for each in own)),
-            recorder.samples(PLACE, _joined(each.place_px for each in own), "px"),
             recorder.samples(CPU_SECONDS, [each.cpu_s for each in own], "s"),
         ]
-        if key[1].wrong and method == ALONE:
+        if method == PNP:
+            continue
+        records.append(recorder.samples(PLACE, _joined(each.place_px for each in own), "px"))
+        if key[1].wrong:
             share = sum(each.named for each in own) / sum(each.wrong for each in own)
             records.append(recorder.samples(NAMED, [share], "1", "higher"))
     return records

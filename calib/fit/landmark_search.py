@@ -18,12 +18,11 @@ from toonset.calib.fit.landmark_adjustment import (
     ANYWHERE,
     CLICK_OF_HEIGHT,
     Adjusted,
-    Pairs,
     ViewPrior,
     adjust,
-    pixel_sigmas,
     refine,
 )
+from toonset.calib.fit.landmark_residuals import Pairs, pixel_sigmas
 from toonset.calib.fit.landmark_starts import Pixels, Points, depth_reversed, start_poses
 from toonset.calib.fit.model_selection import BIC_MARGIN
 from toonset.calib.fit.sheet_prior import Spreads
@@ -106,7 +105,7 @@ class _Search:
                     joint.poses, self.views, _poses(optima), strict=True
                 )
             ]
-            sigma_px = pixel_sigmas(joint.poses, joint.sigma * self.height)
+            sigma_px = pixel_sigmas(joint.poses, joint.shared.honest_sigma * self.height)
             ranked = self.ranked(starts, _prior_of(joint), sigma_px)
             own = [_energy_of(pose, found) for pose, found in zip(joint.poses, ranked, strict=True)]
             better = [found[0][0] < here - BETTER for here, found in zip(own, ranked, strict=True)]
@@ -185,10 +184,8 @@ def _prior_about(poses: Sequence[Pose]) -> ViewPrior:
 
 def _prior_of(joint: Adjusted) -> ViewPrior:
     """Return what a view shares with the others of its sheet."""
+    spreads, level = joint.shared.spreads, joint.shared.elevation
     if len(joint.poses) == 1:
-        return _prior(
-            [joint.spreads.roll, joint.elevation.sigma, FREE], [0, joint.elevation.mean, 0]
-        )
+        return _prior([spreads.roll, level.sigma, FREE], [0.0, level.mean, 0.0])
     values = np.array([[tilt(pose)[0][1], np.log(pose.scale)] for pose in joint.poses])
-    spreads = joint.spreads
     return _prior([spreads.roll, spreads.elevation, spreads.scale], [0.0, *values.mean(axis=0)])

@@ -126,7 +126,7 @@ def solve_landmarks(landmarks: Sequence[Landmarks], surface: Surface) -> tuple[L
 def _fit_of(index: int, landmarks: Landmarks, found: FoundCameras, height: float) -> LandmarkFit:
     joint, others = found.joint, found.others[index]
     pose, squared = joint.poses[index], joint.squared[index, : len(landmarks.names)]
-    sigma_px = joint.sigma * height * pose.scale
+    sigma_px = joint.shared.honest_sigma * height * pose.scale
     misplaced = joint.misplaced[index, : len(squared)]
     weights = np.array([1.0, *(float(np.exp(-0.5 * more)) for more, _ in others)])
     probable = weights / weights.sum()

@@ -38,7 +38,7 @@ from toonset.calib.outline.correspondences import Drawing, Matches, match
 from toonset.calib.outline.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
 
 if TYPE_CHECKING:
-    from toonset.calib.fit.landmark_adjustment import LandmarkRows
+    from toonset.calib.fit.landmark_residuals import LandmarkRows
 
 OFFSET_OF_HEIGHT = 0.006  # prior of the outline offset: a line's half width
 MAX_K_RADIUS = 0.6  # nearest camera: the mesh's radius is 0.6 of the distance

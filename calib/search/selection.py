@@ -27,7 +27,7 @@ from toonset.calib.search.turntable_starts import TurnStart
 from toonset.camera import rotation_distance
 
 if TYPE_CHECKING:
-    from toonset.calib.fit.landmark_adjustment import LandmarkRows
+    from toonset.calib.fit.landmark_residuals import LandmarkRows
 
 RECHECK_WIDTHS = np.geomspace(0.03, 0.015, 3)
 RECHECKED = 4  # best candidates of a view that are tried again at another camera distance

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from toonset.calib.fit.landmark_residuals import LandmarkRows, Pairs
 from toonset.calib.fit.landmark_starts import depth_reversed, start_poses
 from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts, solve_landmarks
+from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
 from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance, rotation_from_angles
@@ -213,6 +215,25 @@ def test_starts_are_near_the_camera(count, depth):
         starts = start_poses(points, project(pose, points))
         assert all(start.k == 0 and start.scale > 0 for start in starts)
         assert min(turned_deg(start, pose) for start in starts) < 10
+
+
+def test_rows_beside_outlines_have_the_right_slopes(surface):
+    rng = np.random.default_rng(10)
+    poses = [random_pose(rng, 4), random_pose(rng, 4)]
+    own = [(random_points(rng, n), rng.uniform(100, 300, (n, 2))) for n in (5, 3)]
+    rows = LandmarkRows(Pairs.of(own), np.array([1e4, 2e4]))  # weights hardly change
+    body = as_it_is(surface).moved(rng.normal(0, 0.01, len(as_it_is(surface).theta)))
+    for view, (off, slopes, by_body) in enumerate(rows.at(poses, body)):
+        assert off.shape == (10,)  # padded
+        assert np.allclose(off[2 * len(own[view][0]) :], 0)
+        for axis in range(6):
+            step = 1e-6 * np.eye(6)[axis]
+            moved = [rows.at([p.moved(d) for p in poses], body)[view][0] for d in (step, -step)]
+            np.testing.assert_allclose(slopes[:, axis], (moved[0] - moved[1]) / 2e-6, atol=1e-4)
+        for axis in range(len(body.theta)):
+            step = 1e-6 * np.eye(len(body.theta))[axis]
+            bent = [rows.at(poses, body.moved(d))[view][0] for d in (step, -step)]
+            np.testing.assert_allclose(by_body[:, axis], (bent[0] - bent[1]) / 2e-6, atol=1e-4)
 
 
 @pytest.mark.parametrize(
