@@ -22,6 +22,7 @@ from bench.landmarks.measure import (
     PNP,
     QUICK,
     ROTATION,
+    SILENT,
     Outcome,
     click_cases,
     measure,
@@ -38,6 +39,7 @@ COLUMNS = (
     Column(PLACE, "px", "{:.2f}", "median"),
     Column(PLACE, "p95", "{:.1f}", "p95"),
     Column(NAMED, "named", "{:.0f}", scale=100),
+    Column(SILENT, "bad", "{:.0f}"),
     Column(CPU_SECONDS, "CPU", "{:.2f}"),
 )
 

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from bench.calib.baselines import HEIGHTS, solved
+from bench.calib.figures import WRONG
 from bench.cases.bodies import random_body
 from bench.cases.cases import CONDITIONS, MANNEQUIN_FILE, case_folders
 from bench.records.record import CPU_SECONDS, Record, Recorder
@@ -33,6 +34,7 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 ROTATION, PLACE, NAMED = "rotation error", "placing error", "wrong clicks named"
+SILENT = "wrong but ok"
 PNP, ALONE, OUTLINES = "PnP, the lens known", "points", "points and outlines"
 SEEN = 0.01  # of the height: a vertex this little behind the surface is on it
 LEAST_WRONG = 0.1  # of the height, that a wrong click is off
@@ -86,6 +88,7 @@ class Outcome:
         named: wrong clicks that are called misplaced.
         wrong: how many there were.
         slandered: good clicks that are called misplaced.
+        silent: views over 15 degrees off with verdict ok; -1: nothing was judged.
         cpu_s: of the sheet.
     """
 
@@ -97,6 +100,7 @@ class Outcome:
     named: int
     wrong: int
     slandered: int
+    silent: int
     cpu_s: float
 
 
@@ -143,6 +147,10 @@ def measure(case: ClickCase, clicks: Clicks, seed: int, *, outlines: bool) -> Ou
         len(called & wrong),
         len(wrong),
         len(called - wrong),
+        sum(
+            rotation_distance(view.camera.rotation, true.rotation) > WRONG and view.verdict == "ok"
+            for view, true in zip(found.views, case.cameras, strict=True)
+        ),
         spent,
     )
 
@@ -158,7 +166,7 @@ def measure_pnp(case: ClickCase, clicks: Clicks, seed: int) -> Outcome:
         found.append(np.pi if rotation is None else rotation_distance(rotation, camera.rotation))
     spent = time.process_time() - began
     degrees = tuple(np.degrees(found).tolist())
-    return Outcome(case.group, case.name, clicks, degrees, (), 0, len(wrong), 0, spent)
+    return Outcome(case.group, case.name, clicks, degrees, (), 0, len(wrong), 0, -1, spent)
 
 
 def click(
@@ -194,6 +202,9 @@ def records_of(found: Sequence[Outcome], method: str, seed: int) -> list[Record]
         if method == PNP:
             continue
         records.append(recorder.samples(PLACE, _joined(each.place_px for each in own), "px"))
+        silent = sum(each.silent for each in own)
+        views = sum(len(each.rotation_deg) for each in own)
+        records.append(recorder.total(SILENT, [True] * silent + [False] * (views - silent)))
         if key[1].wrong:
             share = sum(each.named for each in own) / sum(each.wrong for each in own)
             records.append(recorder.samples(NAMED, [share], "1", "higher"))

@@ -138,7 +138,7 @@ def _fit_of(index: int, landmarks: Landmarks, found: FoundCameras, height: float
         tuple([pose, *(other for _, other in others)][i] for i in kept),
         tuple(float(probable[i]) for i in kept),
         len(squared),
-        float(sigma_px * np.sqrt(squared[~misplaced].mean())),
+        float(sigma_px * np.sqrt((squared if misplaced.all() else squared[~misplaced]).mean())),
         sigma_px,
         np.linalg.inv(np.linalg.inv(joint.covariance[own, own]) + turns),
         tuple(name for name, off in zip(landmarks.names, misplaced, strict=True) if off),
