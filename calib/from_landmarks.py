@@ -34,6 +34,8 @@ from toonset.errors import LandmarkError
 from toonset.mesh import Mesh
 from toonset.view import View
 
+# Of four pairs with a wrong one, another camera may fit all: 4 of 432 views were 110 degrees off
+FEWEST_SURE = 5
 OUTLINE_HEIGHT_PX, OUTLINE_POINTS = 250.0, 200  # scale at which outlines are compared
 
 
@@ -61,7 +63,8 @@ def calibrate_by_landmarks(
     solved = time.perf_counter()
     drawings = [Drawing(drawn_contour(v), OUTLINE_HEIGHT_PX, OUTLINE_POINTS) for v in views]
     each = zip(views, drawings, fits, strict=True)
-    judged = tuple(_judged(*one, surface, thresholds) for one in each)
+    wrong = any(fit.misplaced for fit in fits)
+    judged = tuple(_judged(*one, surface, thresholds, others_wrong=wrong) for one in each)
     state = state_of(views, [view.camera for view in judged], thresholds)
     # one drawing's landmarks confirm its scale and elevation; its outline would not
     only = judged[0]
@@ -101,7 +104,13 @@ def landmarks_of_every_view(
 
 
 def _judged(
-    view: View, drawing: Drawing, fit: LandmarkFit, surface: Surface, limits: VerdictThresholds
+    view: View,
+    drawing: Drawing,
+    fit: LandmarkFit,
+    surface: Surface,
+    limits: VerdictThresholds,
+    *,
+    others_wrong: bool,
 ) -> ViewCalibration:
     size_wh = (view.rgba.shape[1], view.rgba.shape[0])
     pose, *others = fit.poses
@@ -112,6 +121,8 @@ def _judged(
     outline = measure(drawing, surface, drawing.pose_in(pose))
     sigmas = angle_sigmas(pose, fit.covariance)
     verdict, reason = _verdict(fit, sigmas, drawing.height / drawing.factor, limits)
+    if verdict == "ok" and others_wrong and fit.pairs < FEWEST_SURE:
+        verdict, reason = "weak", f"{fit.pairs} landmarks, and other views have wrong ones: add one"
     if verdict == "ok" and outline.coverage < limits.failed_coverage:
         apart = outlines_apart(outline.coverage)
         verdict, reason = "weak", f"{apart}: are these the points of this mannequin?"
