@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
@@ -26,7 +27,7 @@ from toonset.calib.without_body.rival import tells_directions, without_body_if_b
 from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.mannequin.files import landmarks_path
 from toonset.dataset.mannequin.landmark_file import read_known_points
-from toonset.dataset.mannequin.make import default_mannequin
+from toonset.dataset.mannequin.make import Mannequin, default_mannequin
 from toonset.dataset.mannequin.options import MannequinOptions
 from toonset.errors import MeshError, UsageError
 from toonset.mesh import Mesh
@@ -141,32 +142,37 @@ def _alone(
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """The mannequin to fit.
+    """The mannequin to fit; `given` is the user's, None for the default, made when first used."""
 
-    Attributes:
-        mesh: its surface.
-        looks: proportions and pose of one made by code; None for a user's.
-        points: named points of one made by code.
-    """
-
-    mesh: Mesh
-    looks: MannequinOptions | None
-    points: Mapping[str, Sequence[float]]
+    given: Mesh | None
 
     @classmethod
     def of(cls, mesh: Mesh | None) -> _Body:
         if mesh is not None:
             _check_upright(mesh)
-            return cls(mesh, None, {})
-        made = default_mannequin()
-        points = {name: tuple(point.tolist()) for name, point in made.landmarks.items()}
-        return cls(made.mesh, MannequinOptions(), points)
+        return cls(mesh)
+
+    @cached_property
+    def _default(self) -> Mannequin:
+        return default_mannequin()
+
+    @property
+    def mesh(self) -> Mesh:
+        """Return its surface."""
+        return self._default.mesh if self.given is None else self.given
+
+    @property
+    def looks(self) -> MannequinOptions | None:
+        """Return proportions and pose of one made by code; None for a user's."""
+        return MannequinOptions() if self.given is None else None
 
     def points_for(self, hints: Hints) -> Mapping[str, Sequence[float]]:
         """Return the named points that a landmark file may speak of."""
-        if hints.landmarks is None or self.mesh.path is None:
-            return self.points
-        return read_known_points(self.mesh.path)
+        if hints.landmarks is None:
+            return {}
+        if self.given is None:
+            return {name: tuple(at.tolist()) for name, at in self._default.landmarks.items()}
+        return {} if self.given.path is None else read_known_points(self.given.path)
 
 
 def _check_upright(mesh: Mesh) -> None:

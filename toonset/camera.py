@@ -184,13 +184,19 @@ class Camera:
         """
         local = (np.asarray(points_world, dtype=np.float64) - self.target) @ self.rotation.T
         depth = local[..., 2]
+        pixels = np.empty((*depth.shape, 2))
+        for axis in range(2):  # each by itself: NumPy is slow where the last axis is short
+            np.multiply(local[..., axis], self.scale_uv[axis], out=pixels[..., axis])
         if self.is_orthographic:
-            pixels = self.center + self.scale_uv * local[..., :2]
+            for axis in range(2):
+                pixels[..., axis] += self.center[axis]
             return pixels, depth, np.ones(depth.shape, dtype=bool)
         relative = 1 + self.k * depth
         in_front = relative > MIN_RELATIVE_DEPTH
         divisor = np.where(in_front, relative, np.nan)
-        pixels = self.center + self.scale_uv * local[..., :2] / divisor[..., None]
+        for axis in range(2):
+            pixels[..., axis] /= divisor
+            pixels[..., axis] += self.center[axis]
         return pixels, depth, in_front
 
     def unproject(
@@ -198,9 +204,17 @@ class Camera:
     ) -> Float[np.ndarray, "*n 3"]:
         """Return the world points seen at `pixels` with `depth` past the target's plane."""
         depth = np.asarray(depth, dtype=np.float64)
-        plane = (np.asarray(pixels, dtype=np.float64) - self.center) / self.scale_uv
-        local = np.concatenate([plane * (1 + self.k * depth)[..., None], depth[..., None]], axis=-1)
-        return local @ self.rotation + self.target
+        pixels = np.asarray(pixels, dtype=np.float64)
+        relative = 1 + self.k * depth
+        local = np.empty((*depth.shape, 3))
+        for axis in range(2):  # each by itself: NumPy is slow where the last axis is short
+            plane = (pixels[..., axis] - self.center[axis]) / self.scale_uv[axis]
+            np.multiply(plane, relative, out=local[..., axis])
+        local[..., 2] = depth
+        points = local @ self.rotation
+        for axis in range(3):
+            points[..., axis] += self.target[axis]
+        return points
 
     def rays(
         self, pixels: Float[np.ndarray, "*n 2"]

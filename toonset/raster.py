@@ -73,5 +73,17 @@ def parts(marked: Mask, connectivity: int = 8) -> Places:
     return np.asarray(numbers, dtype=np.int64)
 
 
+def sized_parts(marked: Mask, connectivity: int = 8) -> tuple[Places, Int[np.ndarray, " parts"]]:
+    """Return the number of every pixel's connected part, from 1, 0 where unmarked; and the areas.
+
+    Areas are summed run by run: OpenCV's statistics take three times as long as the parts.
+    """
+    count, numbers = cv2.connectedComponents(marked.view(np.uint8), connectivity=connectivity)
+    flat = numbers.ravel()
+    starts = np.flatnonzero(np.concatenate([[True], flat[1:] != flat[:-1]]))
+    lengths = np.diff(starts, append=len(flat))
+    return numbers, np.bincount(flat[starts], lengths, count).astype(np.int64)
+
+
 def _square(by: int) -> np.ndarray:
     return np.ones((2 * by + 1, 2 * by + 1), np.uint8)

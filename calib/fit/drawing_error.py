@@ -24,7 +24,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.linalg import cho_factor, cho_solve
 
 from toonset.calib.outline.correspondences import Drawing
 
@@ -130,6 +129,8 @@ def marginalise(
         width: robust width over the height, for the energy.
         samples: how many independent samples the outline is worth.
     """
+    from scipy.linalg import cho_factor, cho_solve
+
     weighed = off.shares * off.robust
     weights = weighed * samples / (noise.white * height_px) ** 2
     per_point = np.bincount(off.target_index, weights, len(modes))

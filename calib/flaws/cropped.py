@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, UInt8
-from scipy.ndimage import binary_erosion
 
 from toonset.calib.outline.occluding_contour import Surface, mask_at
 from toonset.calib.outline.pose import Pose, project
@@ -42,6 +41,8 @@ def flat_sides(view: View) -> tuple[FlatSide, ...]:
 
 
 def _flat(view: View) -> Iterator[FlatSide]:
+    from scipy.ndimage import binary_erosion
+
     alpha = view.rgba[..., 3]
     mixed = (alpha >= VISIBLE) & (alpha < OPAQUE)
     inner: Bool[np.ndarray, "height width"] = binary_erosion(view.mask)

@@ -11,8 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.cluster.hierarchy import fcluster, linkage
-from scipy.ndimage import gaussian_filter
 
 from toonset.palette.colors import oklab_from_rgb
 from toonset.raster import depth_inside
@@ -36,13 +34,18 @@ def other_character(drawings: Sequence[View]) -> list[int]:
     colors = [_colors(view) for view in drawings]
     pairs = np.triu_indices(len(colors), 1)
     shared = [np.minimum(colors[i], colors[j]).sum() for i, j in zip(*pairs, strict=True)]
-    apart = np.maximum(1 - np.array(shared), 0.0)
-    group = fcluster(linkage(apart, "single"), MOST_APART, "distance")
-    return np.flatnonzero(group != group[0]).tolist()
+    linked = np.eye(len(colors), dtype=bool)
+    linked[pairs] = linked.T[pairs] = 1 - np.array(shared) <= MOST_APART
+    group = linked[0]
+    for _ in colors:
+        group = linked[group].any(axis=0)
+    return np.flatnonzero(~group).tolist()
 
 
 def _colors(view: View) -> Float[np.ndarray, "lightness a b"]:
     """Return how much of a drawing has which colour, its contour's ink aside; 1 in all."""
+    from scipy.ndimage import gaussian_filter
+
     opaque = view.rgba[..., 3] > OPAQUE
     deep = depth_inside(opaque) > view.line_width_px + 0.5
     if deep.sum() < FEWEST_PIXELS:

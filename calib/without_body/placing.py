@@ -1,8 +1,9 @@
 """Place a turn's cameras by the drawings' boxes, then make the silhouettes coherent.
 
 World frame: +Y up, the axis of the turn; +Z the front; the origin in the middle of the figure,
-which is about 1 high. All cameras of a sheet have one elevation, one perspective and one scale;
-then each is shifted, sized and turned until the outlines are those of one body
+which is about 1 high. All cameras of a sheet have one elevation, one perspective and one scale,
+and stand where the middles of the drawings' rows have the axis (`sideways`); then each is shifted,
+sized and turned until the outlines are those of one body
 (`toonset.dataset.silhouettes.turn_fit`).
 
 The elevation is the one under which outlines come nearest to each other. That tells which way
@@ -16,11 +17,13 @@ camera positions", IEEE TIP 2004.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
+from toonset.calib.without_body.sideways import axis_columns
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.hull_rays import Silhouette
 from toonset.dataset.silhouettes.outlines import Square, outlines_of
@@ -96,6 +99,17 @@ class Figures:
             for view, yaw, middle in zip(self.views, yaws, self.middles, strict=True)
         ]
 
+    def sideways(self, yaws: Float[np.ndarray, " views"]) -> Figures:
+        """Return the drawings, the axis of the turn where the middles of their rows have it."""
+        placed = copy(self)
+        placed._apart = {}
+        columns = axis_columns([view.mask for view in self.views], yaws)
+        placed.middles = [
+            np.array([column, middle[1]])
+            for column, middle in zip(columns, self.middles, strict=True)
+        ]
+        return placed
+
     def apart(
         self, yaws: Float[np.ndarray, " views"], elevations: Float[np.ndarray, " n"] = ELEVATIONS
     ) -> Float[np.ndarray, " n"]:
@@ -147,6 +161,7 @@ def place(
         level = tuple(figures.cameras(yaws, 0.0))
         return SheetCameras(level, np.zeros(views), 0.0, float(LEVEL_SPREAD), 0.0)
     elevation, sigma = _elevation(figures, yaws)
+    figures = figures.sideways(yaws)
     flat = _fitted(figures, figures.cameras(yaws, elevation), yaw_sigma, ROUNDS)
     found = _with_perspective(figures, yaws, yaw_sigma, flat)
     return replace(found, elevation=elevation, elevation_sigma=sigma)

@@ -60,17 +60,23 @@ class Silhouette:
         camera = self.camera
         start = ((origins - camera.target) @ camera.rotation.T).astype(np.float32)
         slope = (directions @ camera.rotation.T).astype(np.float32)
-        x, y = (start[:, a, None] + along * slope[:, a, None] for a in range(2))
+        u, v = (along * slope[:, a, None] for a in range(2))
+        u += start[:, 0, None]
+        v += start[:, 1, None]
         scale = np.float32(camera.scale)
         if not camera.is_orthographic:
             z = start[:, 2, None] + along * slope[:, 2, None]
             scale = scale / np.maximum(1 + np.float32(camera.k) * z, 1e-6)
         left, top = camera.center.astype(np.float32) - 0.5 + self.pad
-        u = np.clip(left + scale * x, 0, self.distance.shape[1] - 1)
-        v = np.clip(
-            top + np.float32(camera.pixel_aspect) * scale * y, 0, self.distance.shape[0] - 1
-        )
-        return cv2.remap(self.distance, u, v, cv2.INTER_LINEAR) / np.float32(self.height)
+        u *= scale
+        u += left
+        v *= np.float32(camera.pixel_aspect) * scale
+        v += top
+        np.clip(u, 0, self.distance.shape[1] - 1, out=u)
+        np.clip(v, 0, self.distance.shape[0] - 1, out=v)
+        found = cv2.remap(self.distance, u, v, cv2.INTER_LINEAR)
+        found /= np.float32(self.height)
+        return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import get_lapack_funcs
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.displacement import Moves
@@ -108,7 +107,7 @@ def common(
     """
     columns, weighed = [], []
     for outline in outlines.views:
-        figure = outline.camera.pixel_grid()[outline.distance[0].numpy() > 0][::FEWER]
+        figure = outline.camera.pixel_grid()[outline.distance[0] > 0][::FEWER]
         jacobian = moves.jacobian(outline.square.unit(figure)).reshape(-1, len(moves.covariance))
         ends = outlines.middle + outlines.radius * np.concatenate([np.eye(3), -np.eye(3)])
         ends_px = pixels_of(outline.camera, ends) / outlines.size_px
@@ -204,6 +203,8 @@ def energy(
     tau: float,
 ) -> float:
     """Return the expected energy of the numbers, in variances of the prior."""
+    from scipy.linalg import get_lapack_funcs
+
     potrf, potri = get_lapack_funcs(("potrf", "potri"), (matrix,))
     factor, _ = potrf(matrix + precision / tau**2, lower=True)
     spread, _ = potri(factor, lower=True)  # its lower half: half the work of an inverse

@@ -18,9 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from jaxtyping import Float
-from torch import Tensor
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.displacement import Moves
@@ -46,8 +44,8 @@ class Placed:
     outlines: Outlines
     moves: Moves
     numbers: Float[np.ndarray, "views k"]
-    displaced: tuple[Float[Tensor, "2 height width"], ...]
-    distances: tuple[Float[Tensor, "1 height width"], ...]
+    displaced: tuple[Float[np.ndarray, "2 height width"], ...]
+    distances: tuple[Float[np.ndarray, "1 height width"], ...]
 
     @classmethod
     def of(cls, outlines: Outlines, moves: Moves, numbers: Float[np.ndarray, "views k"]) -> Placed:
@@ -58,8 +56,8 @@ class Placed:
             move = outline.square.size * moves.on_grid(*axes, own)
             places = outline.camera.pixel_grid() + move
             values = sample(outline.distance[:1], places.reshape(-1, 2))
-            displaced.append(torch.as_tensor(np.moveaxis(move, -1, 0).astype(np.float32)))
-            distances.append(torch.as_tensor(values).view(1, *move.shape[:2]))
+            displaced.append(np.ascontiguousarray(np.moveaxis(move, -1, 0), np.float32))
+            distances.append(values.reshape(1, *move.shape[:2]))
         return cls(outlines, moves, numbers, tuple(displaced), tuple(distances))
 
     def source(self, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:

@@ -36,7 +36,7 @@ from toonset.nerf.look.shade import smoothed
 from toonset.nerf.look.step_lines import draw_steps
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.recolor import tones_of
-from toonset.raster import nearest
+from toonset.raster import nearest, sized_parts
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
@@ -54,12 +54,14 @@ SLIVER = 0.03  # of the height: places so near to paint have it, too
 STRAY = 4e-4  # of the squared height: smaller patches are no drawing's
 SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
 THIRDS = 2  # further drawings that are asked
+ROOM = 4  # pixels round what is blended
 SAME = 1e-9  # radians: seen from one side
 # Radians off a drawing's own camera, in which the view becomes the drawing; where the others were
 # made to agree and it was bent or moved for that, the less, the steadier
 OWN, OWN_BENT = 0.12, 0.04
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
 SOURCES = ("drawn", "mirrored", "guessed")
+Box = tuple[slice, slice]  # rows and columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +178,9 @@ def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
     fitting, border = drawings.fitting(view.camera.scale), _border(drawings, view)
     shape = drawings.shape
     box = _box(view.alpha > 0) if shape is None else shape.box(view.camera)
-    if _own_part(fitting, view.camera)[1] > 0:  # a drawing may show more than the surface has
-        box = (slice(0, height), slice(0, width))
+    own, share = _own_part(fitting, view.camera)
+    if share > 0:  # a drawing may show more than the surface has
+        box = _joined(box, _own_box(fitting, own, view.camera))
     if box is None:
         return result
     part = _drawn(fitting, view.crop(*box), border)
@@ -195,7 +198,34 @@ def _own_part(drawings: Drawings, camera: Camera) -> tuple[int, np.float32]:
     return nearest_one, np.float32(_eased(max(0.0, 1 - float(turns[nearest_one]) / reach)))
 
 
-def _box(mask: Bool[np.ndarray, "height width"], room: int = 4) -> tuple[slice, slice] | None:
+def _own_box(drawings: Drawings, number: int, camera: Camera) -> Box | None:
+    """Return the rows and columns of a view in which a drawing near it shows something."""
+    own = drawings.views[number].as_drawn
+    found = _box(own.rgba[..., 3] > 0, 0)
+    assert found is not None
+    rows, columns = ((side.start, side.stop) for side in found)
+    near, far = drawings.depths
+    slack = STEP * drawings.height
+    at = np.array([(u, v, z) for u in columns for v in rows for z in (near - slack, far + slack)])
+    pixels, _, _ = camera.project(own.camera.unproject(at[:, :2], at[:, 2]))
+    width, height = camera.size_wh
+    low, high = np.floor(pixels.min(axis=0)) - ROOM, np.ceil(pixels.max(axis=0)) + ROOM
+    left, right = np.clip([low[0], high[0]], 0, width).astype(int).tolist()
+    top, bottom = np.clip([low[1], high[1]], 0, height).astype(int).tolist()
+    return (slice(top, bottom), slice(left, right)) if top < bottom and left < right else None
+
+
+def _joined(box: Box | None, other: Box | None) -> Box | None:
+    """Return the least box around two."""
+    if box is None or other is None:
+        return box or other
+    rows, columns = (
+        slice(min(a.start, b.start), max(a.stop, b.stop)) for a, b in zip(box, other, strict=True)
+    )
+    return rows, columns
+
+
+def _box(mask: Bool[np.ndarray, "height width"], room: int = ROOM) -> Box | None:
     if not mask.any():
         return None
     sides = []
@@ -282,7 +312,7 @@ def _inked(
     alpha, ink = crisp_outline(soft, border, line_px, figure_px, hole_px)
     if sight is not None:
         ink = np.maximum(ink, np.minimum(_inner_lines(drawings, sight, scale), alpha))
-    drawn_with = np.array(pen.rgb if pen else (0, 0, 0)) / np.float32(255)
+    drawn_with = np.array(pen.rgb if pen else (0, 0, 0), np.float32) / np.float32(255)
     rgb = paint * (alpha - ink)[..., None] + ink[..., None] * drawn_with
     if pen == drawings.outline:  # the drawing's own line, too
         drawn = np.minimum(whole[..., :3], whole[..., 3:])
@@ -457,20 +487,18 @@ def _stray(
     """Return small patches of one label that no single drawing shows as such."""
     drop = np.zeros(winner.shape, dtype=bool)
     for label in range(paints):
-        count, part, about, _ = cv2.connectedComponentsWithStats(
-            (winner == label).astype(np.uint8), connectivity=8
-        )
-        small = about[:, cv2.CC_STAT_AREA] < least_px
+        part, areas = sized_parts(winner == label)
+        small = areas < least_px
         small[0] = False
         if not small.any():
             continue
-        known = np.zeros(count, dtype=bool)
+        places = np.flatnonzero(np.take(small, part))
+        own = part.ravel()[places]
+        known = np.zeros(len(areas), dtype=bool)
         for one in candidates[:2]:
-            _, other, theirs, _ = cv2.connectedComponentsWithStats(
-                (one.label == label).astype(np.uint8), connectivity=8
-            )
-            alike = (other > 0) & (theirs[other, cv2.CC_STAT_AREA] <= 3 * least_px)
-            share = np.bincount(part.ravel(), alike.ravel(), count) / about[:, cv2.CC_STAT_AREA]
-            known |= share > SOLID
-        drop |= (small & ~known)[part]
+            other, theirs = sized_parts(one.label == label)
+            alike = (theirs <= 3 * least_px)[other.ravel()[places]]
+            alike &= one.label.ravel()[places] == label
+            known |= np.bincount(own, alike, len(areas)) > SOLID * areas
+        drop.ravel()[places] = ~known[own]
     return drop

@@ -80,7 +80,7 @@ def drawings_of(
     palette = ready.palette if ready.palette is not None else _common_colors(views)
     found = Drawings(views, (), line, line, palette, height, extent, bent, apart, shape)
     found = replace(found, steps=flat.steps, shade=flat.shade, shadow=ready.shadow)
-    return replace(found, flows=pair_flows(found, depth_of))
+    return found.with_flows(pair_flows(found, depth_of))
 
 
 def _original(frame: Frame, own: Frame) -> Original | None:

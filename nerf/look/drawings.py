@@ -210,6 +210,12 @@ class Drawings:
         left.__dict__["textures"] = tuple(self.textures[i] for i in others)  # not made again
         return left
 
+    def with_flows(self, flows: tuple[PairFlow, ...]) -> Drawings:
+        """Return the same with the flows of its pairs."""
+        found = replace(self, flows=flows)
+        found.__dict__["textures"] = self.textures  # they do not depend on flows
+        return found
+
     def flow(self, i: int, j: int) -> tuple[PairFlow, float] | None:
         """Return the flow of two drawings and its sign; None where none was measured."""
         for found in self.flows:

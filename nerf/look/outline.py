@@ -12,7 +12,7 @@ from skimage.measure import find_contours
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.look.strokes import FEWEST_OUTLINED, ink_color, mean_width, outline_width
-from toonset.raster import depth_inside, nearest
+from toonset.raster import depth_inside, nearest, sized_parts
 
 FINER, COARSER, LARGE_PX = 3, 2, 520.0  # samples per pixel and axis; of figures from this height on
 SMOOTH = 0.7 / 260  # sigma over the figure's height: what is finer in a field's opacity is noise
@@ -103,9 +103,9 @@ def without_crumbs(
 ) -> Bool[np.ndarray, "height width"]:
     """Return a mask without patches of fewer pixels, and holes of fewer than `hole_px`."""
     for value, least in ((True, least_px), (False, least_px if hole_px is None else hole_px)):
-        side = (mask == value).astype(np.uint8)
-        _, part, about, _ = cv2.connectedComponentsWithStats(side, connectivity=4)
-        small = about[:, cv2.CC_STAT_AREA] < least
+        part, areas = sized_parts(mask if value else ~mask, connectivity=4)
+        small = areas < least
         small[0] = False
-        mask = np.where(small[part], not value, mask)
+        if small.any():
+            mask = mask ^ np.take(small, part)
     return mask

@@ -192,7 +192,7 @@ def _missed_in(
     placed: Placed, view: int, outlines: Outlines, frame: Frame, ratio: float
 ) -> Float[np.ndarray, "height width"]:
     outline = outlines.views[view]
-    inside = outline.distance[0].numpy() > 0
+    inside = outline.distance[0] > 0
     found = touch(placed, view, outline.camera.pixel_grid()[inside])
     small = np.zeros(inside.shape, dtype=np.float32)
     small[inside] = found.apart / ratio

@@ -140,9 +140,11 @@ def color_picture(
     premultiplied: Float[np.ndarray, "height width 3"], alpha: Float[np.ndarray, "height width"]
 ) -> UInt8[np.ndarray, "height width 4"]:
     """Return premultiplied colour as 8-bit RGBA with straight alpha."""
+    picture = np.zeros((*alpha.shape, 4), np.uint8)
     visible = alpha > 0
-    color = premultiplied / np.where(visible, alpha, 1)[..., None]
-    return _bytes(np.concatenate([color * visible[..., None], alpha[..., None]], axis=-1))
+    cover = alpha[visible][:, None]
+    picture[visible] = _bytes(np.concatenate([premultiplied[visible] / cover, cover], axis=-1))
+    return picture
 
 
 def palette_picture(
@@ -208,7 +210,7 @@ def label_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width"]:
     return rendering.labels
 
 
-def _bytes(values: Float[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
+def _bytes(values: Float[np.ndarray, "*n 4"]) -> UInt8[np.ndarray, "*n 4"]:
     return (values.clip(0, 1) * 255 + 0.5).astype(np.uint8)
 
 

@@ -31,6 +31,8 @@ SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
 RAYS_PER_SIDE = 2  # of a pixel on a border
 TOLERANCE = 0.15  # difference of neighbours that makes a border
 FINEST = 1.5  # pixels of a voxel's side
+ROOM = 4  # pixels round a figure: enlarging by cubic curves reaches two pixels
+CHANNELS = 4  # that OpenCV warps at a time
 CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 
@@ -84,30 +86,65 @@ def enlarged(view: Rendering, camera: Camera) -> Rendering:
         camera: of the same rotation and middle.
     """
     finer = camera.scale / view.camera.scale
-    inverse = np.array([[1 / finer, 0, 0.5 / finer - 0.5], [0, 1 / finer, 0.5 / finer - 0.5]])
+    small, large = _figure_boxes(view.alpha > 0, finer, camera.size_wh)
+    corner = np.array([one.start for one in large[::-1]])
+    start = np.array([one.start for one in small[::-1]])
+    size = tuple(one.stop - one.start for one in large[::-1])
+    shift = (corner + 0.5) / finer - 0.5 - start
+    inverse = np.array([[1 / finer, 0, shift[0]], [0, 1 / finer, shift[1]]])
 
     def warped(picture: np.ndarray, how: int) -> np.ndarray:
         flags = how | cv2.WARP_INVERSE_MAP
         border = cv2.BORDER_REPLICATE
-        return cv2.warpAffine(picture, inverse, camera.size_wh, flags=flags, borderMode=border)
+        found = cv2.warpAffine(
+            np.ascontiguousarray(picture[small]), inverse, size, flags=flags, borderMode=border
+        )
+        return found
+
+    def placed(part: np.ndarray, beyond: float = 0) -> np.ndarray:
+        whole = np.full((*camera.size_wh[::-1], *part.shape[2:]), beyond, part.dtype)
+        whole[large] = part
+        return whole
 
     alpha = warped(view.alpha, cv2.INTER_CUBIC).clip(0, 1)
     rgb = warped(view.rgb, cv2.INTER_CUBIC).clip(0, alpha[..., None])
     shares = labels = None
     if view.shares is not None:
-        channels = [warped(share, cv2.INTER_LINEAR) for share in np.moveaxis(view.shares, -1, 0)]
-        shares = np.stack(channels, axis=-1)
-    seen = np.isfinite(view.depth)
+        shares = np.empty((*alpha.shape, view.shares.shape[-1]), np.float32)
+        for first in range(0, shares.shape[-1], CHANNELS):
+            part = slice(first, first + CHANNELS)
+            shares[..., part] = warped(view.shares[..., part], cv2.INTER_LINEAR).reshape(
+                *alpha.shape, -1
+            )
+    seen = np.isfinite(view.depth[small])
     depth = np.full(alpha.shape, np.nan, np.float32)
     if seen.any():
-        whole = view.depth[nearest(seen)].astype(np.float32)
+        whole = view.depth.copy().astype(np.float32)
+        whole[small] = whole[small][nearest(seen)]
         slope, step = (warped(whole, how) for how in (cv2.INTER_LINEAR, cv2.INTER_NEAREST))
         # across a step in depth no place lies half way
         near = np.abs(slope - step) < 2 * view.field.hull.voxel
         depth = np.where(alpha >= SEEN_FROM, np.where(near, slope, step), np.nan)
     if shares is not None:
-        labels = np.where(alpha >= SEEN_FROM, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
-    return Rendering(rgb, alpha, depth, labels, shares, camera, view.field)
+        found = np.where(alpha >= SEEN_FROM, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
+        shares, labels = placed(shares), placed(found, UNLABELLED)
+    parts = (placed(rgb), placed(alpha), placed(depth, np.nan), labels, shares)
+    return Rendering(*parts, camera, view.field)
+
+
+def _figure_boxes(
+    there: Bool[np.ndarray, "height width"], finer: float, size_wh: tuple[int, int]
+) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Return a picture's rows and columns that are not empty, with room; and the enlarged ones."""
+    small, large = [], []
+    for axis, size in ((1, size_wh[1]), (0, size_wh[0])):
+        filled = np.flatnonzero(there.any(axis=axis))
+        first, last = (int(filled[0]), int(filled[-1]) + 1) if len(filled) else (0, 1)
+        first, last = max(0, first - ROOM), min(there.shape[1 - axis], last + ROOM)
+        small.append(slice(first, last))
+        end = size if last == there.shape[1 - axis] else min(size, int(finer * last))
+        large.append(slice(int(finer * first), end))
+    return (small[0], small[1]), (large[0], large[1])
 
 
 def baked_of(field: TrainedField) -> Baked:

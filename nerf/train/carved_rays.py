@@ -19,6 +19,7 @@ from toonset.nerf.train.batches import Batch
 from toonset.nerf.train.loss import Model
 
 PRUNE_AFTER = 50  # steps: by then surfaces are where they will stay
+WORTH_IT = 2.0  # times that rays are asked for afterwards: dropping and laying out takes longer
 HIDDEN_BELOW = 0.01  # light that reaches a sample which nobody sees any more
 
 
@@ -44,14 +45,19 @@ class FixedRays:
     most of a training's memory, and longer than the few steps with them gain by it.
     """
 
-    def __init__(self, steps: Sequence[tuple[Batch, ...]], field: Field | None = None) -> None:
+    def __init__(
+        self, steps: Sequence[tuple[Batch, ...]], field: Field | None = None, asked: int = 0
+    ) -> None:
         """Take the batches of `make_batches`, and the field for which they are laid out.
 
         Args:
             steps: of each its batches.
             field: None: nothing is dropped nor laid out.
+            asked: how many steps the training takes; too few: nothing is, either.
         """
-        self._steps, self._field = list(steps), field
+        self._steps = list(steps)
+        again = (asked - PRUNE_AFTER) / max(1, len(steps))
+        self._field = field if again >= WORTH_IT else None
 
     def __len__(self) -> int:
         """Return how many steps go through all rays once."""

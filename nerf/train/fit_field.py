@@ -53,7 +53,7 @@ from toonset.nerf.train.result import Training
 
 CHANNELS, HIDDEN = 16, 32
 CELLS_PER_PX, CELLS = 1.0, (48, 256)
-FITTED_PX = 1.5 * CELLS[1]  # height of the largest figure: the planes are no finer
+FITTED_PX = float(CELLS[1])  # height of the largest figure: the planes are no finer
 STEPS_ALONG = 200  # samples that the longest side of the hull would take
 MOST_SAMPLES = 30  # per ray, from its first inside the hull; twice as deep, surfaces turn to mist
 TRIAL_STRIDE = 2  # times the samples' distance: the order of fields is the same, in half the time
@@ -208,7 +208,8 @@ def _rays(
         "samples": sum(len(batch.ray) for batch in batches),
     }
     there = [tuple(batch.to(device) for batch in step) for step in steps]
-    return FixedRays(there, start.field), counts
+    assert options.steps is not None
+    return FixedRays(there, start.field, options.steps), counts
 
 
 def _weights(options: TrainOptions, views: int, *, agree: bool) -> Weights:

@@ -76,7 +76,12 @@ def _groups(boxes: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, " n"]:
 
 
 def _components(near: Bool[np.ndarray, "n n"]) -> Int[np.ndarray, " n"]:
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    return np.asarray(connected_components(csr_matrix(near), directed=False)[1], dtype=np.int64)
+    """Return the number of every node's connected component (SciPy's is slower to import)."""
+    groups, number = np.full(len(near), -1), 0
+    while (rest := groups < 0).any():
+        front = np.arange(len(near)) == rest.argmax()
+        while front.any():
+            groups[front] = number
+            front = near[front].any(axis=0) & (groups < 0)
+        number += 1
+    return groups

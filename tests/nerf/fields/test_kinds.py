@@ -174,7 +174,7 @@ def test_only_hidden_samples_are_dropped() -> None:
     with torch.no_grad():
         field.tables()[0][:, 0] = 40.0  # opaque
     model, batch = Model(field, None), batch_of(field, [6, 8, 1, 7], placed=True)
-    rays = FixedRays([(batch,)], field)
+    rays = FixedRays([(batch,)], field, 3 * PRUNE_AFTER)
     for step in range(PRUNE_AFTER):
         assert rays.batches(0, step)[0] is batch
         rays.after(step, model)
