@@ -13,14 +13,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from toonset.calib.find_cameras import find_cameras
-from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.flaws.cropped import at_cuts
 from toonset.calib.flaws.false_holes import fill_false_holes
 from toonset.calib.from_landmarks import calibrate_by_landmarks
 from toonset.calib.hints import Hints, known_of
 from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
-from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import Calibration
 from toonset.calib.verdict.checks import check_names, off_labels
 from toonset.calib.without_body.cues import Cues
@@ -86,7 +84,6 @@ def calibrate(
     body = _Body.of(mesh)
     known = known_of(hints, views, body.points_for(hints))
     with threadpool_limits(1, user_api="blas"):  # more only wait, and change the last digits
-        marks = _landmark_fits(known, body)
         if hints.landmarks_only:
             found = calibrate_by_landmarks(views, body.mesh, known.landmarks, options.thresholds)
         else:
@@ -119,7 +116,6 @@ def calibrate(
     return replace(
         found,
         filled_holes=filled,
-        landmarks=tuple(marks),
         drawings=drawings,
         mesh=body.mesh,
         origin=_origin(views, body, hints, seed, options),
@@ -218,13 +214,6 @@ def _check_view_names(names: Sequence[str]) -> None:
             f"calibrate: two views are called {double}; split all sheets in one call of "
             "`split_sheet`, which numbers them through"
         )
-
-
-def _landmark_fits(known: Known, body: _Body) -> list[LandmarkFit]:
-    """Return what the landmarks say of the views that have any."""
-    if not known.landmarks:
-        return []
-    return [fit for fit in landmark_starts(known.landmarks, prepare_surface(body.mesh)) if fit]
 
 
 def _origin(

@@ -139,6 +139,7 @@ def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, floa
         reason,
         seconds,
         fitted.cuts,
+        landmarks=tuple(fit for fit in problem.marks if fit),
     )
 
 

@@ -31,6 +31,7 @@ class VerdictThresholds:
             a mannequin.
         weak_scale, failed_scale: times the other drawings' scale, without a mannequin: another
             size, or another body.
+        most_landmarks_misplaced: of a view's; more do not tell which of them are.
         most_landmarks_off: of a view's landmarks, over the height; farther, they are another's.
     """
 
@@ -52,6 +53,7 @@ class VerdictThresholds:
     failed_apart: float = 0.06
     weak_scale: float = 1.25
     failed_scale: float = 1.5
+    most_landmarks_misplaced: float = 0.34
     most_landmarks_off: float = 0.05
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -17,7 +18,7 @@ from toonset.calib.evidence.face import read_faces
 from toonset.calib.evidence.texture import read_paint
 from toonset.calib.fit.align import ElevationPrior
 from toonset.calib.fit.drawing_error import ROUGH_POINTS, WHITE_POINTS
-from toonset.calib.fit.landmarks import landmark_starts
+from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.fit.model_selection import (
     BODY_WIDTHS,
     MODELS,
@@ -35,7 +36,7 @@ from toonset.calib.fit.turned_bodies import account_for_turned_bodies
 from toonset.calib.flaws.cropped import ending_at
 from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, prove_cuts
 from toonset.calib.flaws.stretched import Stretches, find_stretches, nothing_stretched
-from toonset.calib.known import Known, weighed_by_landmarks
+from toonset.calib.known import PAIR_OF_HEIGHT, Known, weighed_by_landmarks
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
@@ -60,6 +61,9 @@ from toonset.camera import Camera, rotation_distance
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.mesh import Mesh
 from toonset.view import View
+
+if TYPE_CHECKING:
+    from toonset.calib.fit.landmark_residuals import LandmarkRows
 
 COARSE_POINTS, FINE_POINTS = 160, 200  # of a drawn outline
 COARSE_WIDTHS = np.geomspace(0.08, 0.02, 6)
@@ -101,6 +105,7 @@ class Problem:
         fine: the drawings as they are fitted.
         sheet: the turns they may be of, their faces and paint.
         known: what the user gave.
+        marks: what the landmarks of every view say alone; None without.
         options: how hard to look.
         progress: is told the step and the share of it that is done.
     """
@@ -112,6 +117,7 @@ class Problem:
     fine: Sequence[Drawing]
     sheet: SheetPosterior
     known: Known
+    marks: Sequence[LandmarkFit | None]
     options: CalibrationOptions
     progress: Progress
 
@@ -139,19 +145,19 @@ class Problem:
                 turns, read_faces(views), read_paint(views), known.asked_yaws(len(views))
             ),
             known,
+            landmark_starts(known.landmarks or (None,) * len(views), surface),
             options,
             progress,
         )
 
     def search(self) -> tuple[list[Candidates], list[TurnStart]]:
         """Return every view's candidates, and the turns that explain the whole sheet."""
-        given = self.known.start_poses(self.surface.middle)
+        given = self.known.start_poses(self.surface.middle) or self._marked()
         if given:
             return [
                 refine(drawing, self.surface, [pose], FINE_WIDTHS)
                 for drawing, pose in zip(self.coarse, given, strict=True)
             ], [TurnStart(given, 0.0)]
-        marked = landmark_starts(self.known.landmarks, self.surface)
         together = likely_turns(self.views, self.templates, self.sheet.turns)
         candidates = []
         for i, view in enumerate(self.views):
@@ -159,13 +165,39 @@ class Problem:
             found = find_hypotheses(view, self.templates, self.options.starts)
             starts = [h.pose for h in found]
             starts = [*starts, starts[0].twin(), *(turn.poses[i] for turn in together)]
-            own = marked[i] if marked else None
+            own = self.marks[i]
             starts += set_distance(own.poses, 0.0) if own else []
             placed = self.known.placed[i] if self.known.placed else None
             starts += [placed] if placed else []
             reached = refine(self.coarse[i], self.surface, starts, COARSE_WIDTHS)
             candidates.append(self._informed(reached, i))
         return candidates, together
+
+    def _marked(self) -> tuple[Pose, ...]:
+        """Return the cameras of the landmarks where all views have some that leave no doubt."""
+        limits = self.options.thresholds
+        sure = [
+            fit
+            for fit, drawing in zip(self.marks, self.coarse, strict=True)
+            if fit and not fit.doubt(drawing.height / drawing.factor, limits)
+        ]
+        return tuple(fit.poses[0] for fit in sure) if len(sure) == len(self.views) else ()
+
+    def _landmark_rows(self, drawings: Sequence[Drawing]) -> LandmarkRows | None:
+        """Return the landmarks in the drawings' working pixels."""
+        if not self.known.landmarks:
+            return None
+        from toonset.calib.fit.landmark_residuals import LandmarkRows, Pairs  # torch
+
+        own, sigmas = [], []
+        for landmarks, fit, drawing in zip(self.known.landmarks, self.marks, drawings, strict=True):
+            if landmarks is None:
+                own.append((np.zeros((0, 3)), np.zeros((0, 2))))
+            else:
+                pixels = landmarks.pixels * drawing.factor - drawing.offset
+                own.append((landmarks.world - self.surface.middle, pixels))
+            sigmas.append(fit.sigma_px * drawing.factor if fit else PAIR_OF_HEIGHT * drawing.height)
+        return LandmarkRows(Pairs.of(own), np.array(sigmas))
 
     def together(
         self, candidates: list[Candidates], starts: list[TurnStart]
@@ -179,7 +211,8 @@ class Problem:
                 body, starts[0].poses, RANKING_WIDTHS[-1:], model
             )
             return replace(fit, poses=starts[0].poses), turn, candidates
-        search = TogetherSearch(self.coarse, body, self.sheet, self._informed)
+        rows = self._landmark_rows(self.coarse)
+        search = TogetherSearch(self.coarse, body, self.sheet, self._informed, rows)
         return search.run(candidates, starts, self.options.rounds)
 
     def rigid(self, coarse_fit: JointFit, turn: Turn, *, differs: bool | None = None) -> SheetFit:
@@ -193,7 +226,8 @@ class Problem:
         if differs is None:
             differs = typical_coverage(self.fine, coarse_fit) < SAME_BODY_COVERAGE
         samples = ROUGH_POINTS if differs else WHITE_POINTS
-        problem = JointProblem(self.fine, turn, self.known.locks(self.surface.middle), samples)
+        locks, rows = self.known.locks(self.surface.middle), self._landmark_rows(self.fine)
+        problem = JointProblem(self.fine, turn, locks, samples, rows)
         keep_fov = "fov" in self.known.locked
         starts = self.known.at_locks(coarse_fit.poses, self.surface.middle)
         joint, model = select_model(
@@ -307,7 +341,7 @@ class Problem:
         """Return how far every view would turn without the locks, radians; None: there are none."""
         if not self.known.holds:
             return None
-        problem = JointProblem(self.fine, turn)
+        problem = JointProblem(self.fine, turn, landmarks=self._landmark_rows(self.fine))
         free = problem.fit(
             joint.body, joint.poses, FREE_WIDTHS, MODELS[model.model], offset=joint.offset
         )

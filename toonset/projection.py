@@ -70,6 +70,30 @@ def project(
     return project_offsets(cameras.rotation, cameras.center, cameras.scale_uv, cameras.k, offsets)
 
 
+def project_with_jacobian(
+    cameras: CameraTensors, points: Float[Tensor, "views points 3"]
+) -> tuple[Float[Tensor, "views points 2"], Float[Tensor, "views points 2 7"]]:
+    """Return pixels and their derivatives by (turn, center, log scale, k).
+
+    The turn is the increment of `rotate`: d X_c = turn x X_c = -hat(X_c) turn. Points at or behind
+    a pinhole's centre are NaN, derivatives too.
+
+    Args:
+        cameras: one per view.
+        points: (views, points, 3) world coordinates.
+    """
+    local = (points - cameras.target[:, None]) @ cameras.rotation.transpose(-1, -2)
+    pixels = project(cameras, points)
+    flat = pixels - cameras.center[:, None]
+    relative_depth = (1 + cameras.k[:, None] * local[..., 2])[..., None, None]
+    pull = -cameras.k[:, None, None, None] * flat[..., None]  # d (u, v) / d z_c, times the depth
+    by_local = torch.cat([torch.diag_embed(cameras.scale_uv[:, None].expand_as(flat)), pull], -1)
+    by_turn = -(by_local / relative_depth) @ So3.hat(local.reshape(-1, 3)).view(*local.shape, 3)
+    by_center = torch.eye(2).to(flat).expand(*flat.shape, 2)
+    by_k = -(local[..., 2:] * flat / relative_depth[..., 0])[..., None]
+    return pixels, torch.cat([by_turn, by_center, flat[..., None], by_k], dim=-1)
+
+
 def rotate(
     rotation: Float[Tensor, "views 3 3"], turn: Float[Tensor, "views 3"]
 ) -> Float[Tensor, "views 3 3"]:

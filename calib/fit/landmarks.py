@@ -1,27 +1,36 @@
-"""Solve cameras from landmarks: pairs of a point of the mannequin and its pixel, per view.
+"""Solve a sheet's cameras from landmarks: points of the mannequin and their pixels, per view.
 
-Landmarks determine a camera alone, or start the contour fit where the outline is ambiguous. Pairs
-nearly in a plane have two cameras that fit alike; both are returned with their probabilities
-(likelihoods with the noise integrated out).
+1. OpenCV's PnP starts every view (`landmark_starts`), all starts are refined as one batch
+2. views are refined again as one sheet's: of its scale and elevation, upright
+3. all views are adjusted together (`landmark_adjustment`), orthographic unless the pairs of all
+   views prove one camera distance
+4. what else every view could be under what the sheet says: pairs nearly in a plane have two
+   cameras, few pairs of which one is wrong have several
+
+Landmarks determine cameras alone, or start the fit of outlines and take part in it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.landmark_models import MARGIN, Explanation, choose
-from toonset.calib.fit.landmark_pose import Points, on_a_line, squared_error
+from toonset.calib.fit.landmark_starts import Points, on_a_line
+from toonset.calib.fit.model_selection import BIC_MARGIN
+from toonset.calib.options import VerdictThresholds
 from toonset.calib.outline.occluding_contour import Surface
-from toonset.calib.outline.pose import PARAMETERS, Pose, project_with_jacobian
+from toonset.calib.outline.pose import PARAMETERS, Pose
+from toonset.camera import angles_from_rotation
 from toonset.dataset.mannequin.landmark_file import LEAST_POINTS, Landmarks
 from toonset.errors import LandmarkError
 
-CLICK_OF_HEIGHT = 0.01  # error of a click or of the mannequin's proportions, before looking
-CLICK_WEIGHT = 2.0  # of that knowledge, in coordinates
+if TYPE_CHECKING:
+    from toonset.calib.fit.landmark_search import FoundCameras
+
 LEAST_PROBABILITY = 0.01  # of a camera that is worth returning
 REACH = 3.0  # times the mannequin's radius: farther points have other units
 LEAST_SPREAD_PX = 1.0  # of the pixels
@@ -33,20 +42,22 @@ class LandmarkFit:
 
     Attributes:
         view: file name of the view.
-        poses: relative to the surface's middle, pixels of the crop; the most probable first. A
-            second one is the depth reversal of pairs nearly in a plane.
+        poses: relative to the surface's middle, pixels of the crop; the most probable first. Others
+            are, say, the depth reversal of pairs nearly in a plane.
         probabilities: of each pose, given the landmarks alone.
+        pairs: how many there are.
         rms_px: root mean square of the pairs' pixel distances (both axes), misplaced ones aside.
         sigma_px: estimated error of one pixel coordinate.
         covariance: (6, 6) of the first pose's (w, shift, log scale); free k is integrated out.
-        misplaced: names of pairs that were given up.
-        bic_gain: of perspective over orthography, 0 for three pairs; above `MARGIN` the poses have
-            their own k, else k = 0.
+        misplaced: names of pairs that do not fit the others.
+        bic_gain: of perspective over orthography, for the sheet; above `BIC_MARGIN` all poses have
+            one k, else k = 0.
     """
 
     view: str
     poses: tuple[Pose, ...]
     probabilities: tuple[float, ...]
+    pairs: int
     rms_px: float
     sigma_px: float
     covariance: Float[np.ndarray, "6 6"]
@@ -56,70 +67,83 @@ class LandmarkFit:
     @property
     def model(self) -> str:
         """Return "orthographic" or "perspective"."""
-        return "perspective" if self.bic_gain > MARGIN else "orthographic"
+        return "perspective" if self.bic_gain > BIC_MARGIN else "orthographic"
+
+    def doubt(
+        self, height_px: float, limits: VerdictThresholds
+    ) -> tuple[Literal["failed", "ambiguous"], str] | None:
+        """Return why the landmarks do not tell one camera: a verdict and its reason.
+
+        Args:
+            height_px: of the figure.
+            limits: where to begin to doubt.
+        """
+        if len(self.misplaced) > limits.most_landmarks_misplaced * self.pairs:
+            named = ", ".join(self.misplaced)
+            return "failed", f"too many landmarks do not fit the others: {named}; another body's?"
+        if self.rms_px > limits.most_landmarks_off * height_px:
+            off = f"{100 * self.rms_px / height_px:.0f} % of the height"
+            return "failed", f"the landmarks are {off} off: other points, or another body's"
+        if sum(self.probabilities[1:]) > 1 - limits.sure:
+            yaw, p = angles_from_rotation(self.poses[1].rotation)[0], self.probabilities[1]
+            also = f"yaw {np.degrees(yaw) % 360:.0f} fits as well (p = {p:.2f})"
+            return "ambiguous", f"{also}: add a point off their plane"
+        return None
 
 
 def landmark_starts(
     landmarks: Sequence[Landmarks | None], surface: Surface
 ) -> tuple[LandmarkFit | None, ...]:
-    """Fit a camera to the landmarks of every view; None if they are too few.
+    """Return the cameras of all views with landmarks enough, solved together; None for the others.
 
     Raises:
         LandmarkError: a view's pairs lie on a line or in one place, or far from the mannequin.
     """
-    return tuple(
-        None if view is None or len(view.names) < LEAST_POINTS else solve_landmarks(view, surface)
-        for view in landmarks
-    )
+    enough = [own for own in landmarks if own is not None and len(own.names) >= LEAST_POINTS]
+    found = {fit.view: fit for fit in solve_landmarks(enough, surface)} if enough else {}
+    return tuple(found.get(own.view) if own else None for own in landmarks)
 
 
-def solve_landmarks(landmarks: Landmarks, surface: Surface) -> LandmarkFit:
-    """Return the camera of one view from its landmarks alone.
+def solve_landmarks(landmarks: Sequence[Landmarks], surface: Surface) -> tuple[LandmarkFit, ...]:
+    """Return the cameras of a sheet's views from their landmarks alone.
 
     Args:
-        landmarks: at least three pairs; four that do not lie in a plane have one camera, five
-            and more can show perspective, six and more a misplaced pair.
+        landmarks: of every view, at least three pairs.
         surface: the mannequin.
 
     Raises:
-        LandmarkError: the pairs lie on a line or in one place, or far from the mannequin.
+        LandmarkError: a view's pairs lie on a line or in one place, or far from the mannequin.
     """
-    points, pixels = landmarks.world - surface.middle, landmarks.pixels
-    _check_spread(landmarks, points, surface.radius)
-    kept, best, gain = choose(points, pixels)
-    freedom = max(best.freedom, 1)  # three pairs: what does not fit exactly is not an optimum
-    weights = np.exp(-0.5 * freedom * np.log(np.array(best.errors) / best.errors[0]))
+    from toonset.calib.fit.landmark_search import search_cameras  # torch: a second of importing
+
+    views = [(own.world - surface.middle, own.pixels) for own in landmarks]
+    for own, (points, _) in zip(landmarks, views, strict=True):
+        _check_spread(own, points, surface.radius)
+    found = search_cameras(views, surface.height)
+    return tuple(_fit_of(i, own, found, surface.height) for i, own in enumerate(landmarks))
+
+
+def _fit_of(index: int, landmarks: Landmarks, found: FoundCameras, height: float) -> LandmarkFit:
+    joint, others = found.joint, found.others[index]
+    pose, squared = joint.poses[index], joint.squared[index, : len(landmarks.names)]
+    sigma_px = joint.shared.honest_sigma * height * pose.scale
+    misplaced = joint.misplaced[index, : len(squared)]
+    weights = np.array([1.0, *(float(np.exp(-0.5 * more)) for more, _ in others)])
     probable = weights / weights.sum()
-    count = int((probable >= LEAST_PROBABILITY).sum())
-    pose = best.poses[0]
-    sigma = _sigma_px(best, CLICK_OF_HEIGHT * surface.height * pose.scale)
+    kept = [0, *(i for i in range(1, len(probable)) if probable[i] >= LEAST_PROBABILITY)]
+    own = slice(PARAMETERS * index, PARAMETERS * (index + 1))
+    turns = np.diag([1.0, 1, 1, 0, 0, 0]) / np.pi**2  # no angle is less certain than a turn
     return LandmarkFit(
         landmarks.view,
-        best.poses[:count],
-        tuple(float(p) for p in probable[:count]),
-        float(np.sqrt(squared_error(pose, points[kept], pixels[kept]) / best.pairs)),
-        sigma,
-        _covariance(pose, points[kept], sigma, perspective=best.perspective),
-        tuple(name for name, keep in zip(landmarks.names, kept, strict=True) if not keep),
-        float(gain),
+        tuple([pose, *(other for _, other in others)][i] for i in kept),
+        tuple(float(probable[i]) for i in kept),
+        len(squared),
+        float(sigma_px * np.sqrt((squared if misplaced.all() else squared[~misplaced]).mean())),
+        sigma_px,
+        np.linalg.inv(np.linalg.inv(joint.covariance[own, own]) + turns),
+        tuple(name for name, off in zip(landmarks.names, misplaced, strict=True) if off),
+        found.bic_gain,
     )
-
-
-def _sigma_px(best: Explanation, expected_px: float) -> float:
-    """Return the error of a pixel coordinate: what is left over, and what clicks are like."""
-    total = best.errors[0] + CLICK_WEIGHT * expected_px**2
-    return float(np.sqrt(total / (best.freedom + CLICK_WEIGHT)))
-
-
-def _covariance(
-    pose: Pose, points: Points, sigma_px: float, *, perspective: bool
-) -> Float[np.ndarray, "6 6"]:
-    """Return the covariance of (w, shift, log scale); no angle is less certain than a turn."""
-    free = PARAMETERS + perspective
-    rows = project_with_jacobian(pose, points)[1][..., :free].reshape(-1, free)
-    normal = rows.T @ rows / sigma_px**2
-    normal[:3, :3] += np.eye(3) / np.pi**2
-    return np.linalg.inv(normal)[:PARAMETERS, :PARAMETERS]
 
 
 def _check_spread(landmarks: Landmarks, points: Points, radius: float) -> None:

@@ -1,5 +1,7 @@
 """Adjust all cameras of a sheet jointly by Gauss-Newton, with shared parameters and the body.
 
+Landmarks take part with their own errors, where there are any.
+
 Unknowns: per view a rotation increment, shift and log scale; then k = 1 / distance (none, one for
 the sheet, or one per view), the outline offset (a drawn contour line lies outside of the
 silhouette) and, if asked, the mannequin's proportions. A drawing's own error is integrated out
@@ -14,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -34,6 +36,9 @@ from toonset.calib.fit.proportions import Body
 from toonset.calib.fit.sheet_prior import Spreads, Turn, anchors, locks, sheet_priors
 from toonset.calib.outline.correspondences import Drawing, Matches, match
 from toonset.calib.outline.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
+
+if TYPE_CHECKING:
+    from toonset.calib.fit.landmark_residuals import LandmarkRows
 
 OFFSET_OF_HEIGHT = 0.006  # prior of the outline offset: a line's half width
 MAX_K_RADIUS = 0.6  # nearest camera: the mesh's radius is 0.6 of the distance
@@ -120,6 +125,7 @@ class JointProblem:
         turn: Turn | None = None,
         kept: Mapping[str, Float[np.ndarray, " views"]] = MappingProxyType({}),
         samples: float = ROUGH_POINTS,
+        landmarks: LandmarkRows | None = None,
     ) -> None:
         """Prepare the drawings' error modes.
 
@@ -128,12 +134,14 @@ class JointProblem:
             turn: where the views are meant to be seen from.
             kept: yaw, elevation (radians) or scale (log, px of the views) that stay as given.
             samples: how many independent samples an outline is worth.
+            landmarks: that are fitted beside the outlines.
         """
         self.drawings = tuple(drawings)
         self.modes = [error_modes(drawing) for drawing in drawings]
         self.turn = turn
         self.elevation = ElevationPrior()
         self.samples = samples
+        self.landmarks = landmarks
         self.kept = {
             name: values + np.log([d.factor for d in drawings]) if name == "scale" else values
             for name, values in kept.items()
@@ -225,6 +233,7 @@ class JointProblem:
             normal[np.ix_(where, where)] += view.normal
             gradient[where] += view.gradient
             views.append(view)
+        self._add_landmarks(state, normal, gradient, model)
         spreads = self._add_priors(state, normal, gradient, model.spreads if settled else None)
         first = _first_shared(model, len(views))
         normal[first, first] += OFFSET_OF_HEIGHT**-2
@@ -241,6 +250,26 @@ class JointProblem:
         energy = sum(view.energy for view in views)
         noise = next_noise(views, least_white(self.drawings), width)
         return _System(normal, gradient, energy, noise, spreads)
+
+    def _add_landmarks(
+        self,
+        state: _State,
+        normal: Float[np.ndarray, "u u"],
+        gradient: Float[np.ndarray, " u"],
+        model: SheetModel,
+    ) -> None:
+        views = len(state.poses)
+        found = self.landmarks.at(state.poses, state.body) if self.landmarks else []
+        for index, (off, slopes, by_body) in enumerate(found):
+            where = _own_unknowns(model, index, views)
+            parts = [slopes[:, : len(where)]]
+            if model.proportions:
+                first = _first_shared(model, views) + 1
+                where.extend(range(first, first + by_body.shape[1]))
+                parts.append(by_body)
+            rows = np.hstack(parts)
+            normal[np.ix_(where, where)] += rows.T @ rows
+            gradient[where] += rows.T @ off
 
     def _add_priors(
         self,
@@ -303,6 +332,14 @@ def _first_shared(model: SheetModel, views: int) -> int:
     return PARAMETERS * views + distances + views * model.stretches
 
 
+def _own_unknowns(model: SheetModel, index: int, views: int) -> list[int]:
+    """Return where a view's pose is among the unknowns, and its k where it is free."""
+    where = list(range(PARAMETERS * index, PARAMETERS * (index + 1)))
+    if model.perspective in ("shared", "per view"):
+        where.append(PARAMETERS * views + (index if model.perspective == "per view" else 0))
+    return where
+
+
 def _derivatives(
     state: _State, model: SheetModel, index: int, drawing: Drawing, found: Matches
 ) -> tuple[list[int], Float[np.ndarray, "n 2"], Float[np.ndarray, "n u"]]:
@@ -310,11 +347,8 @@ def _derivatives(
     pose, views = state.poses[index], len(state.poses)
     pixels, jacobian = project_with_jacobian(pose, found.points)
     across = np.einsum("ni,nij->nj", found.normals, jacobian)
-    where = list(range(PARAMETERS * index, PARAMETERS * (index + 1)))
-    parts = [across[:, :PARAMETERS]]
-    if model.perspective in ("shared", "per view"):
-        where.append(PARAMETERS * views + (index if model.perspective == "per view" else 0))
-        parts.append(across[:, PARAMETERS:])
+    where = _own_unknowns(model, index, views)
+    parts = [across[:, : len(where)]]
     first = _first_shared(model, views)
     if model.stretches:
         where.append(first - views + index)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from toonset.calib.search.candidates import SAME_POSE, Candidates, add_twins, re
 from toonset.calib.search.sheet_posterior import SheetPosterior
 from toonset.calib.search.turntable_starts import TurnStart
 from toonset.camera import rotation_distance
+
+if TYPE_CHECKING:
+    from toonset.calib.fit.landmark_residuals import LandmarkRows
 
 RECHECK_WIDTHS = np.geomspace(0.03, 0.015, 3)
 RECHECKED = 4  # best candidates of a view that are tried again at another camera distance
@@ -41,6 +45,7 @@ class TogetherSearch:
     body: Body
     sheet: SheetPosterior
     informed: Callable[[Candidates, int], Candidates]
+    landmarks: LandmarkRows | None = None
 
     def run(
         self, candidates: Sequence[Candidates], starts: Sequence[TurnStart], rounds: int
@@ -85,7 +90,7 @@ class TogetherSearch:
     def _sketched(self, poses: Sequence[Pose]) -> JointFit:
         """Return a joint fit that only has to rank a selection."""
         _, turns = self.sheet.weigh([poses])
-        problem = JointProblem(self.drawings, turns[0])
+        problem = JointProblem(self.drawings, turns[0], landmarks=self.landmarks)
         return problem.fit(self.body, poses, RANKING_WIDTHS, SheetModel("shared"), RANKING_NOISE)
 
     def _selected(self, candidates: Sequence[Candidates]) -> list[Pose]:

@@ -6,7 +6,7 @@ import torch
 
 from toonset import frames
 from toonset.camera import Camera, rotation_from_angles
-from toonset.projection import CameraTensors, project, rotate
+from toonset.projection import CameraTensors, project, project_with_jacobian, rotate
 
 POINTS = np.random.default_rng(0).uniform(-0.8, 0.8, (60, 3))
 
@@ -53,3 +53,20 @@ def test_torch_projection_is_differentiable_in_cameras_and_points_through_k_zero
     parts += [torch.rand(1, 5, 3, generator=torch.Generator().manual_seed(0))]
     free = [part.double().clone().requires_grad_() for part in parts]
     assert torch.autograd.gradcheck(pixels, tuple(free), atol=1e-5)
+
+
+def test_torch_jacobian_is_the_derivative_by_turn_centre_log_scale_and_k():
+    held, points = CameraTensors.of(cameras()), torch.from_numpy(POINTS)[None].expand(3, -1, -1)
+
+    def pixels(step):
+        turned, moved = rotate(held.rotation, step[:, :3]), held.center + step[:, 3:5]
+        scales = held.scale_uv * step[:, 5:6].exp()
+        return project(
+            CameraTensors(turned, held.target, moved, scales, held.k + step[:, 6]), points
+        )
+
+    expected = torch.func.jacfwd(pixels)(torch.zeros(3, 7, dtype=torch.float64))
+    seen, slopes = project_with_jacobian(held, points)
+    assert torch.equal(seen, project(held, points))
+    own = torch.stack([expected[view, ..., view, :] for view in range(3)])
+    torch.testing.assert_close(slopes, own)

@@ -1,0 +1,1 @@
+"""Measure how well clicked landmarks give cameras, alone and together with outlines."""
