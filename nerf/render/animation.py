@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 from jaxtyping import Int, UInt8
 from PIL import Image
-from scipy.spatial.distance import cdist
 
 from toonset.errors import OutputError, SetupError
 from toonset.view import over_white, premultiply, straight
@@ -60,7 +59,9 @@ def encode_gif(pictures: Pictures) -> bytes:
     colors = np.stack([used >> 16, used >> 8 & 255, used & 255], axis=1).astype(np.uint8)
     shared = _shared_palette(colors, counts)
     nearest = np.zeros(1 << 24, dtype=np.uint8)
-    nearest[used] = cdist(colors, shared, "sqeuclidean").argmin(axis=1)
+    palette, paints = shared.astype(np.float64), colors.astype(np.float64)
+    off = np.square(palette).sum(axis=1) - 2 * paints @ palette.T  # less the paint's own square
+    nearest[used] = off.argmin(axis=1)
     frames = [Image.fromarray(nearest[one]) for one in codes]
     for frame in frames:
         frame.putpalette(shared.tobytes())
