@@ -160,8 +160,8 @@ def place(
     if views < 3:
         level = tuple(figures.cameras(yaws, 0.0))
         return SheetCameras(level, np.zeros(views), 0.0, float(LEVEL_SPREAD), 0.0)
-    elevation, sigma = _elevation(figures, yaws)
     figures = figures.sideways(yaws)
+    elevation, sigma = _elevation(figures, yaws)
     flat = _fitted(figures, figures.cameras(yaws, elevation), yaw_sigma, ROUNDS)
     found = _with_perspective(figures, yaws, yaw_sigma, flat)
     return replace(found, elevation=elevation, elevation_sigma=sigma)
@@ -170,7 +170,8 @@ def place(
 def _elevation(figures: Figures, yaws: Float[np.ndarray, " views"]) -> tuple[float, float]:
     """Return the elevation of a turn and its sigma, radians: the mean over the likeliest hump.
 
-    Places are not fitted first: from far enough above, moved drawings cohere whatever they show.
+    Places up and down are not fitted first: from far enough above, moved drawings cohere whatever
+    they show.
     """
     worth = coherence_log_likelihood(figures.apart(yaws), len(yaws))
     worth += elevation_log_prior(ELEVATIONS)
