@@ -134,7 +134,7 @@ def adjust(starts: Sequence[Pose], pairs: Pairs, height: float, *, perspective: 
     poses, shared, damping = tuple(starts), Shared(), 1e-3
     for number in range(MOST_JOINT_STEPS):
         system = _System(poses, pairs, height, shared, perspective)
-        better = False
+        better, moved, step = False, poses, np.zeros(0)
         while not better and damping < MOST_DAMPING:
             step = system.step(damping)
             moved = _moved(poses, step, NEAREST / pairs.radius)
@@ -145,7 +145,7 @@ def adjust(starts: Sequence[Pose], pairs: Pairs, height: float, *, perspective: 
             continue
         before, shared = shared.sigma, system.learned(poses)
         still = abs(np.log(shared.sigma / before)) < SIGMA_CONVERGED
-        if still and (not better or np.abs(step).max() < CONVERGED):
+        if still and (not better or np.abs(step).max(initial=0) < CONVERGED):
             break
         damping = min(damping, 1.0)
     wrong = pairs.misplaced(pairs.squared(poses, pixel_sigmas(poses, shared.sigma * height)))

@@ -98,6 +98,8 @@ class _Search:
         self, joint: Adjusted, optima: Sequence[Ranked], *, perspective: bool
     ) -> tuple[Adjusted, tuple[Ranked, ...]]:
         """Return a joint adjustment no view of which has a better camera, and the alternatives."""
+        own: list[float] = []
+        ranked: list[Ranked] = []
         for left in reversed(range(MOST_ROUNDS)):
             starts = [
                 [pose, depth_reversed(pose, points), *(replace(own, k=pose.k) for own in others)]
