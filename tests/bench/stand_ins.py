@@ -13,6 +13,7 @@ import pytest
 
 from bench.cases.cases import TrainCase
 from bench.commands import check
+from bench.landmarks.measure import Clicks, Outcome
 from bench.look.measure import METRICS, LookResult
 from bench.records.gate import from_plain
 from bench.split.measure import SplitBench
@@ -71,6 +72,9 @@ def measure_nothing(monkeypatch: pytest.MonkeyPatch, folder: Path) -> list[str]:
     stand_in("verdict.__main__._drawn", lambda *_: (SCENE, SCENE, None))
     stand_in("verdict.__main__.judge", _judged, "verdict")
     stand_in("studio.__main__.measure", _studied, "studio")
+    stand_in("landmarks.__main__.click_cases", lambda *_: [SimpleNamespace(name="body 0")])
+    stand_in("landmarks.__main__.measure", _clicked, "landmarks")
+    stand_in("landmarks.__main__.measure_pnp", _clicked, "landmarks")
     return asked
 
 
@@ -97,6 +101,10 @@ def _trained(job: Any, *_: Any) -> RunResult:
 def _judged(name: str, *_: Any) -> tuple[Judged, bytes]:
     off = 0.001 * len(name)
     return Judged(name, "ok", (), off, (off,)), b""
+
+
+def _clicked(case: Any, clicks: Clicks, *_: Any, **__: Any) -> Outcome:
+    return Outcome("exact", case.name, clicks, (1.0,), (2.0,), 1, 1, 0, 0, 1.0)
 
 
 def _studied(cell: Cell, seed: int, **_: Any) -> Seen:
