@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
-from skimage.morphology import skeletonize
 
 from toonset.palette.pixels.ink_lines import find_contour, lightness_of, outline_line_px
 from toonset.raster import depth_inside, nearest, parts
@@ -81,6 +80,8 @@ class Strokes:
 
 def strokes_of(lines: Lines) -> Strokes:
     """Return the strokes within the figure."""
+    from skimage.morphology import skeletonize  # 0.3 s, which pictures of a run do not need
+
     skeleton = skeletonize(lines.inner)
     neighbours = cv2.filter2D(skeleton.astype(np.uint8), -1, SQUARE)
     middle = skeleton & (neighbours <= 3)  # itself and the two beside it

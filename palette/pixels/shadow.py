@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
+from scipy.special import log_ndtr
 
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.antialias import OPAQUE
@@ -181,8 +182,6 @@ def _direction_bits(
 
     The chance of sides so uneven by coin flips, each piece weighed by its length.
     """
-    from scipy.stats import norm
-
     lengths: list[int] = []
     for shape, found in borders:
         for each in (one for one in found if one.way == (0, 1)):
@@ -196,7 +195,7 @@ def _direction_bits(
     if not lengths:
         return 0.0
     uneven = abs(sum(lengths)) / np.sqrt(float(np.square(lengths).sum()))
-    return float(-norm.logsf(uneven) / np.log(2) - 1)
+    return float(-log_ndtr(-uneven) / np.log(2) - 1)
 
 
 def find_tones(pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow) -> list[Mask]:
