@@ -261,7 +261,7 @@ def test_benches_run_as_they_stand(
     subject = {"--check": "check", "--renew": "check"}.get((words or [""])[0], (words or [""])[0])
     assert set(asked) <= {subject if module == "bench" else module.removeprefix("bench.")}
     assert asked or words == ["palette", "--quick"]
-    assert subject == "check" or list(tmp_path.glob("bench-results/**/*.*"))
+    assert subject == "check" or len(list(tmp_path.glob("bench-results/**/*.*"))) > 1
 
 
 @pytest.mark.slow

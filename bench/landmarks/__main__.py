@@ -15,6 +15,7 @@ import typer
 
 from bench.landmarks.measure import (
     ALONE,
+    FALSE,
     GRID,
     NAMED,
     OUTLINES,
@@ -32,13 +33,14 @@ from bench.landmarks.measure import (
 from bench.records.record import CPU_SECONDS, Column, Record, as_dicts, methods_table
 from toonset.write import write_json
 
-RECORDS = "records.json"
+RECORDS, TABLE = "records.json", "table.txt"
 COLUMNS = (
     Column(ROTATION, "deg", "{:.2f}", "median"),
     Column(ROTATION, "p95", "{:.1f}", "p95"),
     Column(PLACE, "px", "{:.2f}", "median"),
     Column(PLACE, "p95", "{:.1f}", "p95"),
     Column(NAMED, "named", "{:.0f}", scale=100),
+    Column(FALSE, "false", "{:.3f}"),
     Column(SILENT, "bad", "{:.0f}"),
     Column(CPU_SECONDS, "CPU", "{:.2f}"),
 )
@@ -55,7 +57,7 @@ def main(
     outlines: Annotated[bool, typer.Option("--outlines", help="Fit outlines, too.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Six pairs, 1 % off.")] = False,
 ) -> None:
-    """Measure all sheets, then print the table and write the records."""
+    """Measure all sheets, then print the table and write it with the records."""
     found: dict[str, list[Outcome]] = {PNP: [], ALONE: [], OUTLINES: []}
     for case in (case for case in click_cases(cases, seed, count) if only in case.name):
         typer.echo(case.name, err=True)
@@ -69,7 +71,9 @@ def main(
     ]
     out.mkdir(parents=True, exist_ok=True)
     write_json(out / RECORDS, as_dicts(records))
-    typer.echo(methods_table(records, COLUMNS))
+    table = methods_table(records, COLUMNS)
+    (out / TABLE).write_text(table + "\n", encoding="utf-8")
+    typer.echo(table)
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 ROTATION, PLACE, NAMED = "rotation error", "placing error", "wrong clicks named"
-SILENT = "wrong but ok"
+SILENT, FALSE = "wrong but ok", "good clicks named, a view"
 PNP, ALONE, OUTLINES = "PnP, the lens known", "points", "points and outlines"
 SEEN = 0.01  # of the height: a vertex this little behind the surface is on it
 LEAST_WRONG = 0.1  # of the height, that a wrong click is off
@@ -87,7 +87,7 @@ class Outcome:
             where only rotations are found.
         named: wrong clicks that are called misplaced.
         wrong: how many there were.
-        slandered: good clicks that are called misplaced.
+        false_alarms: good clicks that are called misplaced.
         silent: views over 15 degrees off with verdict ok; -1: nothing was judged.
         cpu_s: of the sheet.
     """
@@ -99,7 +99,7 @@ class Outcome:
     place_px: tuple[float, ...]
     named: int
     wrong: int
-    slandered: int
+    false_alarms: int
     silent: int
     cpu_s: float
 
@@ -205,6 +205,8 @@ def records_of(found: Sequence[Outcome], method: str, seed: int) -> list[Record]
         silent = sum(each.silent for each in own)
         views = sum(len(each.rotation_deg) for each in own)
         records.append(recorder.total(SILENT, [True] * silent + [False] * (views - silent)))
+        alarms = sum(each.false_alarms for each in own) / views
+        records.append(recorder.samples(FALSE, [alarms], "1"))
         if key[1].wrong:
             share = sum(each.named for each in own) / sum(each.wrong for each in own)
             records.append(recorder.samples(NAMED, [share], "1", "higher"))

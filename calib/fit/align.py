@@ -30,6 +30,9 @@ MERGED = np.radians(3.0)  # starts this near to each other go to the same optimu
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
 EFFECTIVE_POINTS = 40.0  # weight of a view's outline against the priors, in points
+# Elevations of sheets without an outline fitted to a mannequin: all of 45 collected ones are drawn
+# at eye level, sprites from anywhere (docs/decisions.md)
+LEVEL_SPREAD, P_STEEP = np.radians(3.0), 0.05
 INDEPENDENT_POINTS = 10.0  # outline errors of a view when alternative poses are compared
 
 

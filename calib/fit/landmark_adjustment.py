@@ -13,23 +13,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from toonset.calib.fit.align import ElevationPrior, tilt
+from toonset.calib.fit.align import LEVEL_SPREAD, P_STEEP, ElevationPrior, tilt
 from toonset.calib.fit.landmark_residuals import Pairs, energy_of, normal_equations, pixel_sigmas
+from toonset.calib.fit.sheet_adjustment import MAX_K_RADIUS
 from toonset.calib.fit.sheet_prior import SharedPrior, Spreads, anchors, sheet_priors
 from toonset.calib.outline.pose import PARAMETERS, Pose
 
 NORMAL = 1.2018  # makes sigma the standard deviation of normal errors: 2 / E[weight |r|^2]
 CLICK_OF_HEIGHT = 0.01  # error of a click or of the mannequin's proportions, before looking
 CLICK_WEIGHT = 2.0  # of that knowledge, in coordinates
-NEAREST = 0.6  # largest k times the points' radius: all points lie well before the camera
 LARGEST_STEP = 0.5  # radians, log scale: beyond it the linearisation means nothing
 MOST_STEPS, MOST_JOINT_STEPS = 20, 40
 SETTLED = 2  # steps before sigma and the spreads are estimated
 CONVERGED, SIGMA_CONVERGED = 1e-5, 0.01  # radians or log scale; relative
 MOST_DAMPING, LEAST_DAMPING = 1e6, 1e-9  # of Levenberg-Marquardt
 LEAST_FREE = 1e-6  # coordinates beyond what cameras and priors explain
-# Elevations of sheets: all of 45 collected ones are drawn at eye level, sprites from anywhere
-LEVEL, ANYWHERE, P_STEEP = ElevationPrior(0.0, np.radians(3.0)), ElevationPrior(), 0.05
+LEVEL, ANYWHERE = ElevationPrior(0.0, LEVEL_SPREAD), ElevationPrior()
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +136,7 @@ def adjust(starts: Sequence[Pose], pairs: Pairs, height: float, *, perspective: 
         better, moved, step = False, poses, np.zeros(0)
         while not better and damping < MOST_DAMPING:
             step = system.step(damping)
-            moved = _moved(poses, step, NEAREST / pairs.radius)
+            moved = _moved(poses, step, MAX_K_RADIUS / pairs.radius)
             better = system.energy_at(moved) <= system.energy
             damping = max(damping / 10, LEAST_DAMPING) if better else 10 * damping
         poses = moved if better else poses

@@ -25,12 +25,12 @@ from toonset.calib.fit.landmark_adjustment import (
 from toonset.calib.fit.landmark_residuals import Pairs, pixel_sigmas
 from toonset.calib.fit.landmark_starts import Pixels, Points, depth_reversed, start_poses
 from toonset.calib.fit.model_selection import BIC_MARGIN
+from toonset.calib.fit.sheet_adjustment import FIRST_K_RADIUS
 from toonset.calib.fit.sheet_prior import Spreads
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.camera import rotation_distance
 
 OTHER = np.radians(10.0)  # a camera nearer than this is the same, found from another start
-FIRST_K = 0.02  # k times radius where the search for perspective begins
 BETTER = 1.0  # nats times two, by which another camera takes a view's place
 MOST_ROUNDS = 3  # of joint adjustments
 FREE = 1e3  # sigma of a log scale of which nothing is known
@@ -70,7 +70,7 @@ def search_cameras(views: Sequence[tuple[Points, Pixels]], height: float) -> Fou
     samples = 2 * float(search.pairs.given.sum())
     if samples <= PARAMETERS * len(views) + 1:
         return FoundCameras(*search.settled(flat, optima, perspective=False), 0.0)
-    first_k = FIRST_K / search.pairs.radius
+    first_k = FIRST_K_RADIUS / search.pairs.radius
     near = [replace(pose, k=first_k) for pose in flat.poses]
     deep = search.adjusted(near, perspective=True)
     gain = float(deep.evidence - np.log(samples))

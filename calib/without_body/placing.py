@@ -1,4 +1,4 @@
-"""Place a turn's cameras by the drawings' boxes, then make the silhouettes coherent.
+"""Place a turn's cameras by boxes and rows of the drawings, then make silhouettes coherent.
 
 World frame: +Y up, the axis of the turn; +Z the front; the origin in the middle of the figure,
 which is about 1 high. All cameras of a sheet have one elevation, one perspective and one scale,
@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from toonset.calib.fit.align import LEVEL_SPREAD, P_STEEP
 from toonset.calib.without_body.sideways import axis_columns
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.hull_rays import Silhouette
@@ -33,8 +34,7 @@ from toonset.view import View
 
 ELEVATIONS = np.radians([0.0, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 37, 45])
 FEW_ELEVATIONS = ELEVATIONS[::3]  # that tell turns apart
-# Elevations of sheets: all of 45 collected ones are drawn at eye level, sprites from anywhere
-LEVEL_SPREAD, P_STEEP, STEEPEST = np.radians(3.0), 0.05, np.radians(50.0)
+STEEPEST = np.radians(50.0)  # elevation that sprites are drawn from
 # 1 / distance in heights: long lenses, a common one; none of 45 collected sheets has any
 NEARNESS, P_PERSPECTIVE = (0.1, 0.2, 0.45), 0.05
 FLOOR = 0.006  # of the height: outlines of faithful drawings, 1 % of it off, are this far apart

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from toonset.calib.fit.landmark_adjustment import ViewPrior, refine
 from toonset.calib.fit.landmark_residuals import LandmarkRows, Pairs
 from toonset.calib.fit.landmark_starts import depth_reversed, start_poses
 from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts, solve_landmarks
@@ -64,6 +65,31 @@ def test_orthographic_camera_is_recovered_exactly(surface, count, seed):
     np.testing.assert_allclose(found.poses[0].shift, pose.shift, atol=1e-5)
     assert found.poses[0].scale == pytest.approx(pose.scale, rel=1e-7)
     assert found.rms_px < 1e-5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_four_pairs_at_eye_level_tell_the_camera(surface, seed):
+    rng = np.random.default_rng([seed, 4])
+    pose, points = random_pose(rng, level=True), random_points(rng, 4)
+    found = solved(clicked(pose, points, surface), surface)
+    assert turned_deg(found.poses[0], pose) < 1e-3
+
+
+@pytest.mark.parametrize("count", [4, 6, 9])
+def test_no_other_start_reaches_a_better_camera(surface, count):
+    rng = np.random.default_rng(count)
+    pose, points = random_pose(rng), random_points(rng, count)
+    pixels = project(pose, points) + rng.normal(0, 0.03 * HEIGHT_PX, (count, 2))
+    pairs, sigma_px = Pairs.of([(points, pixels)]), np.array([0.01 * HEIGHT_PX])
+    prior = ViewPrior(np.zeros(3), np.array([0.1, 0.4, 1e3]))
+
+    def least(starts):
+        mine = pairs.at([0] * len(starts))
+        return refine(starts, mine, np.repeat(sigma_px, len(starts)), prior)[1].min()
+
+    turns = Rotation.random(60, np.random.default_rng(count)).as_matrix()
+    others = [Pose(turn, pixels.mean(axis=0), 200.0) for turn in turns]
+    assert least(start_poses(points, pixels)) <= least(others) * (1 + 1e-3)
 
 
 @pytest.mark.parametrize("heights", [1.5, 2, 5, 20, 100, 500])
