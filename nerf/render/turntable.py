@@ -42,7 +42,7 @@ def turntable(
     angles = turn_angles(drawn_ring(trained), count)
     if elevation is not None:
         angles[:, 1:] = (elevation, 0.0)
-    return _framed(trained, angles, size)
+    return framed(trained, angles, size)
 
 
 def between_drawings(
@@ -59,7 +59,7 @@ def between_drawings(
         UsageError: no view, or pictures without a pixel.
     """
     _check(count, size)
-    return _framed(trained, angles_between(drawn_ring(trained), count), size)
+    return framed(trained, angles_between(drawn_ring(trained), count), size)
 
 
 def drawn_ring(trained: TrainedField) -> Angles:
@@ -86,8 +86,11 @@ def _drawn(trained: TrainedField) -> list[Original]:
     return [view.as_drawn for view in views if not view.mirrored]
 
 
-def _framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Camera, ...]:
-    """Return cameras at directions, with one scale and size that figure and drawings fit in."""
+def framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Camera, ...]:
+    """Return cameras at directions, with one scale and size that figure and drawings fit in.
+
+    See `turntable`; `angles` are yaw, elevation and roll, radians.
+    """
     low, high = filled_box(trained.hull)
     target = (low + high) / 2
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])

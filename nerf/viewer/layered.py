@@ -1,0 +1,194 @@
+"""Take a drawn view apart into what a page puts together again in any colours.
+
+    colour = ((1 - t) a + t b + rest) (1 - ink) + pen ink
+
+a and b are paints; most pixels have one, those along borders are mixtures of two. `rest` is what
+paints do not explain: tones, grain, features without a paint of their own. When a paint changes, a
+colour moves by `moved` times the change of its mixture, as in `toonset.palette.pixels.recolor`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, Int16, UInt8
+
+from toonset.nerf.look.blend import DrawnView
+from toonset.palette.pixels.recolor import share_moved
+
+LEVELS = 31  # of alpha and ink, from nothing to all
+PARTS = 16  # of a mixture
+WHOLE = 12  # of `moved`: as far as the mixture itself
+LIKE = 6.0  # levels of 255: a colour so near to its paint is that paint
+EXACT = 1.5 / 255  # so well do paint and ink make up a pixel, or it is a drawing's own
+INKED = 16 / 255  # so near to a mixture of paint and pen a drawing's pixel is one
+MOST_INK = 0.9  # of a drawing's pixel, under which its paint is seen
+AROUND = 5  # pixels, a window's side: paints in it may be in a mixture, the commonest COMMON
+COMMON = 3
+BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is none
+
+Map = UInt8[np.ndarray, "height width"]
+Mask = Bool[np.ndarray, "height width"]
+Colors = UInt8[np.ndarray, "paints 3"]
+Rgb = tuple[int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Layered:
+    """A drawn view in layers, cut to the figure.
+
+    Attributes:
+        corner: x, y of the first pixel in the view.
+        alpha: (height, width) coverage, 0 to LEVELS.
+        ink: (height, width) share of the coverage that lines have, 0 to LEVELS.
+        first, second: (height, width) paints.
+        part: (height, width) of the second, 0 to PARTS - 1.
+        moved: (height, width) how far a colour moves with its paints; WHOLE is as far as they.
+        rest: (height, width, 3) what paints do not explain, levels of 255.
+    """
+
+    corner: tuple[int, int]
+    alpha: Map
+    ink: Map
+    first: Map
+    second: Map
+    part: Map
+    moved: Map
+    rest: Int16[np.ndarray, "height width 3"]
+
+
+def layered(view: DrawnView, paints: Colors, pen: Rgb | None) -> Layered | None:
+    """Return a view's layers; None where it shows nothing.
+
+    Args:
+        view: in the colours of `paints`.
+        paints: that its labels name.
+        pen: colour of the lines; None: there are none.
+    """
+    there = view.alpha >= 0.5 / LEVELS
+    if not there.any():
+        return None
+    rows, columns = (np.flatnonzero(there.any(axis=axis)) for axis in (1, 0))
+    box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+    there, alpha = there[box], view.alpha[box].clip(0, 1)
+    paint, ink = _under_lines(view, box, there, pen)
+    labels = np.where(there, view.labels[box], 0).astype(np.uint8)
+    color = np.rint(paint * 255).clip(0, 255).astype(np.uint8)
+    share = np.divide(ink, alpha, out=np.zeros_like(alpha), where=there).clip(0, 1)
+    levels = [np.rint(np.where(there, one, 0) * LEVELS).astype(np.uint8) for one in (alpha, share)]
+    corner = (int(columns[0]), int(rows[0]))
+    return Layered(corner, *levels, *_unmixed(color, labels, there, paints))
+
+
+def layered_shares(
+    shares: Float[np.ndarray, "height width paints"], alpha: Float[np.ndarray, "height width"]
+) -> Layered | None:
+    """Return a view of pure paints in layers, from the share of every pixel that each covers."""
+    there = alpha >= 0.5 / LEVELS
+    if not there.any():
+        return None
+    two = np.argsort(-shares, axis=2, kind="stable")[..., :2]
+    first, second = (two[..., i].astype(np.uint8) for i in (0, two.shape[2] - 1))
+    one, other = (np.take_along_axis(shares, i[..., None].astype(int), 2)[..., 0] for i in (first, second))
+    part = np.rint(PARTS * other / np.maximum(one + other, 1e-6)).astype(np.uint8)
+    part[second == first] = 0
+    none = np.zeros(alpha.shape, np.uint8)
+    cover = np.rint(alpha.clip(0, 1) * LEVELS).astype(np.uint8)
+    rest = np.zeros((*alpha.shape, 3), np.int16)
+    return Layered((0, 0), cover, none, first, second, part, none + np.uint8(WHOLE), rest)
+
+
+def _under_lines(
+    view: DrawnView, box: tuple[slice, slice], there: Mask, pen: Rgb | None
+) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w"]]:
+    """Return straight colour and ink that make up exactly what the view shows.
+
+    Near a drawing the view is that drawing, whose pixels are not made of the view's paint and ink.
+    """
+    rgb, alpha, ink, paint = (part[box] for part in (view.rgb, view.alpha, view.ink, view.paint))
+    line = np.array(pen or (0, 0, 0), np.float32) / np.float32(255)
+    made = paint * (alpha - ink)[..., None] + ink[..., None] * line
+    own = there & (_largest(made - rgb) > EXACT)
+    if not own.any():
+        return paint, ink
+    paint, ink, before = paint.copy(), ink.copy(), paint[own]
+    shown = (rgb[own] / alpha[own][:, None]).clip(0, 1)
+    way = line - before
+    share = (_dot(shown - before, way) / np.maximum(_dot(way, way), 1e-6)).clip(0, 1)
+    off = _largest(shown - before - share[:, None] * way)
+    share = np.where((off < INKED) & (pen is not None), share, 0)
+    left = (shown - share[:, None] * line) / np.maximum(1 - share, 1 - MOST_INK)[:, None]
+    paint[own] = np.where((share < MOST_INK)[:, None], left.clip(0, 1), before)
+    ink[own] = share * alpha[own]
+    return paint, ink
+
+
+def _unmixed(
+    color: UInt8[np.ndarray, "h w 3"], labels: Map, there: Mask, paints: Colors
+) -> tuple[Map, Map, Map, Map, Int16[np.ndarray, "h w 3"]]:
+    """Return the two paints of every pixel, the second one's part, how it moves, and the rest."""
+    known = paints.astype(np.float32)
+    first, part = labels.copy(), np.zeros_like(labels)
+    moved = np.full_like(labels, WHOLE)
+    rest = np.where(there[..., None], color - paints[labels].astype(np.int16), 0).astype(np.int16)
+    at = np.flatnonzero(_largest(rest) > LIKE)
+    second = first.copy()
+    own = color.reshape(-1, 3)[at]
+    a, b, t = _best(own.astype(np.float32), labels, there, at, known)
+    steps = np.rint(t * PARTS)
+    a, steps = np.where(steps == PARTS, b, a), steps % PARTS
+    cover = known[a] + (steps / PARTS).astype(np.float32)[:, None] * (known[b] - known[a])
+    left = own - cover
+    found = np.rint(share_moved(own, cover) * WHOLE)
+    for whole, values in (
+        *((first, a), (second, b), (part, steps)),
+        (moved, np.where(_largest(left) > LIKE, found, WHOLE)),
+    ):
+        whole.reshape(-1)[at] = values
+    rest.reshape(-1, 3)[at] = np.rint(left)
+    return first, second, part, moved, rest
+
+
+def _best(
+    color: Float[np.ndarray, "n 3"],
+    labels: Map,
+    there: Mask,
+    at: Int[np.ndarray, " n"],
+    known: Float[np.ndarray, "paints 3"],
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return the two paints that explain each colour best, and the second one's share.
+
+    Of one paint: the label's, or the one that the colour is like. Of two: both are seen around.
+    """
+    apart = np.stack([_dot(color - paint, color - paint) for paint in known], axis=1)
+    own, like = labels.reshape(-1)[at].astype(np.int64), apart.argmin(axis=1)
+    rows = np.arange(len(at))
+    a = np.where(apart[rows, like] <= LIKE**2, like, own)
+    least, b, t = apart[rows, a], a.copy(), np.zeros(len(at), np.float32)
+    seen = np.unique(labels[there])
+    masks = ((there & (labels == one)).astype(np.float32) for one in seen)
+    window = (AROUND, AROUND)
+    around = np.stack([cv2.boxFilter(one, -1, window).reshape(-1)[at] for one in masks])
+    order = np.argsort(-around, axis=0, kind="stable")[:COMMON]
+    for i, j in itertools.combinations(order, 2):
+        one, other = known[seen[i]], known[seen[j]]
+        way = other - one
+        share = (_dot(color - one, way) / np.maximum(_dot(way, way), 1)).clip(0, 1)
+        off = color - one - share[:, None] * way
+        away = _dot(off, off)
+        better = (around[j, rows] > 0) & (BETTER * away < least)
+        a, b = np.where(better, seen[i], a), np.where(better, seen[j], b)
+        t, least = np.where(better, share, t), np.where(better, away, least)
+    return a, b, t
+
+
+def _largest(values: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
+    red, green, blue = (np.abs(values[..., i]) for i in range(3))
+    return np.maximum(np.maximum(red, green), blue)
+
+
+def _dot(a: Float[np.ndarray, "n 3"], b: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+    return np.einsum("nk,nk->n", a, b)
