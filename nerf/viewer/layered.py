@@ -19,9 +19,9 @@ from jaxtyping import Bool, Float, Int, Int16, UInt8
 from toonset.nerf.look.blend import DrawnView
 from toonset.palette.pixels.recolor import share_moved
 
-LEVELS = 31  # of alpha and ink, from nothing to all
-PARTS = 16  # of a mixture
-WHOLE = 12  # of `moved`: as far as the mixture itself
+LEVELS = 15  # of alpha and ink, from nothing to all
+PARTS = 8  # of a mixture
+WHOLE = 4  # of `moved`: as far as the mixture itself
 LIKE = 6.0  # levels of 255: a colour so near to its paint is that paint
 EXACT = 1.5 / 255  # so well do paint and ink make up a pixel, or it is a drawing's own
 INKED = 16 / 255  # so near to a mixture of paint and pen a drawing's pixel is one
@@ -34,6 +34,7 @@ Map = UInt8[np.ndarray, "height width"]
 Mask = Bool[np.ndarray, "height width"]
 Colors = UInt8[np.ndarray, "paints 3"]
 Rgb = tuple[int, int, int]
+Box = tuple[slice, slice]  # rows and columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ class Layered:
         alpha: (height, width) coverage, 0 to LEVELS.
         ink: (height, width) share of the coverage that lines have, 0 to LEVELS.
         first, second: (height, width) paints.
-        part: (height, width) of the second, 0 to PARTS - 1.
+        part: (height, width) of the second, 0 to PARTS / 2.
         moved: (height, width) how far a colour moves with its paints; WHOLE is as far as they.
         rest: (height, width, 3) what paints do not explain, levels of 255.
     """
@@ -71,15 +72,13 @@ def layered(view: DrawnView, paints: Colors, pen: Rgb | None) -> Layered | None:
     there = view.alpha >= 0.5 / LEVELS
     if not there.any():
         return None
-    rows, columns = (np.flatnonzero(there.any(axis=axis)) for axis in (1, 0))
-    box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+    box, corner = _box(there)
     there, alpha = there[box], view.alpha[box].clip(0, 1)
     paint, ink = _under_lines(view, box, there, pen)
     labels = np.where(there, view.labels[box], 0).astype(np.uint8)
     color = np.rint(paint * 255).clip(0, 255).astype(np.uint8)
     share = np.divide(ink, alpha, out=np.zeros_like(alpha), where=there).clip(0, 1)
     levels = [np.rint(np.where(there, one, 0) * LEVELS).astype(np.uint8) for one in (alpha, share)]
-    corner = (int(columns[0]), int(rows[0]))
     return Layered(corner, *levels, *_unmixed(color, labels, there, paints))
 
 
@@ -90,6 +89,8 @@ def layered_shares(
     there = alpha >= 0.5 / LEVELS
     if not there.any():
         return None
+    box, corner = _box(there)
+    shares, alpha = shares[box], alpha[box]
     two = np.argsort(-shares, axis=2, kind="stable")[..., :2]
     first, second = (two[..., i].astype(np.uint8) for i in (0, two.shape[2] - 1))
     one, other = (np.take_along_axis(shares, i[..., None].astype(int), 2)[..., 0] for i in (first, second))
@@ -98,11 +99,18 @@ def layered_shares(
     none = np.zeros(alpha.shape, np.uint8)
     cover = np.rint(alpha.clip(0, 1) * LEVELS).astype(np.uint8)
     rest = np.zeros((*alpha.shape, 3), np.int16)
-    return Layered((0, 0), cover, none, first, second, part, none + np.uint8(WHOLE), rest)
+    return Layered(corner, cover, none, first, second, part, none + np.uint8(WHOLE), rest)
+
+
+def _box(there: Mask) -> tuple[Box, tuple[int, int]]:
+    """Return the rows and columns that hold all of a mask, and the first column and row."""
+    rows, columns = (np.flatnonzero(there.any(axis=axis)) for axis in (1, 0))
+    box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+    return box, (int(columns[0]), int(rows[0]))
 
 
 def _under_lines(
-    view: DrawnView, box: tuple[slice, slice], there: Mask, pen: Rgb | None
+    view: DrawnView, box: Box, there: Mask, pen: Rgb | None
 ) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w"]]:
     """Return straight colour and ink that make up exactly what the view shows.
 
@@ -139,7 +147,8 @@ def _unmixed(
     own = color.reshape(-1, 3)[at]
     a, b, t = _best(own.astype(np.float32), labels, there, at, known)
     steps = np.rint(t * PARTS)
-    a, steps = np.where(steps == PARTS, b, a), steps % PARTS
+    less = steps > PARTS / 2
+    a, b, steps = np.where(less, b, a), np.where(less, a, b), np.where(less, PARTS - steps, steps)
     cover = known[a] + (steps / PARTS).astype(np.float32)[:, None] * (known[b] - known[a])
     left = own - cover
     found = np.rint(share_moved(own, cover) * WHOLE)

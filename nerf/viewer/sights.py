@@ -84,12 +84,12 @@ def _layer(view: Rendering, layer: str, shrink: int) -> Record | None:
         pen = drawings.pen and drawings.pen.rgb
         return layered_record(layered(view.drawn, drawings.paints, pen))
     if layer == "palette" and view.shares is not None:
-        size = tuple(side // shrink for side in view.camera.size_wh)
-        shares = cv2.resize(view.shares, size, interpolation=cv2.INTER_AREA)
-        alpha = cv2.resize(view.alpha, size, interpolation=cv2.INTER_AREA)
-        return layered_record(layered_shares(shares.reshape(*alpha.shape, -1), alpha), shrink)
-    picture = view.picture(layer)
-    return picture_record(picture, shrink)
+        parts = np.dstack([view.shares, view.alpha])
+        height, width, count = (side // by for side, by in zip(parts.shape, (shrink, shrink, 1)))
+        blocks = parts[: height * shrink, : width * shrink]
+        mean = blocks.reshape(height, shrink, width, shrink, count).mean(axis=(1, 3))
+        return layered_record(layered_shares(mean[..., :-1], mean[..., -1]), shrink)
+    return picture_record(view.picture(layer), shrink)
 
 
 def _body_sight(mesh: Mesh, camera: Camera) -> Record:
