@@ -24,7 +24,7 @@ def view(
             "--size",
             min=8,
             max=4096,
-            help="Side in px of the views' pictures (default: the figure is 420 px high).",
+            help="Side in px of the views' pictures (default: the figure is 400 px high).",
             show_default=False,
         ),
     ] = None,

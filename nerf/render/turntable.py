@@ -64,7 +64,7 @@ def between_drawings(
 
 def drawn_ring(trained: TrainedField) -> Angles:
     """Return yaw, elevation and roll of the drawings that a turn passes through, yaw rising."""
-    return ring_of([own.camera for own in _drawn(trained)])
+    return ring_of([own.camera for own in drawn_on_sheet(trained)])
 
 
 def filled_box(hull: Hull) -> tuple[np.ndarray, np.ndarray]:
@@ -80,7 +80,7 @@ def _check(count: int, size: int | None) -> None:
         raise UsageError(f"turntable: {count} views of {size} px; 1 or more of each are needed")
 
 
-def _drawn(trained: TrainedField) -> list[Original]:
+def drawn_on_sheet(trained: TrainedField) -> list[Original]:
     """Return the drawings as they are on the sheet; mirror images do not count."""
     views = () if trained.drawings is None else trained.drawings.views
     return [view.as_drawn for view in views if not view.mirrored]
@@ -102,7 +102,7 @@ def framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Cam
             for yaw, elevation, roll in angles
         )
 
-    drawn = _drawn(trained)
+    drawn = drawn_on_sheet(trained)
     around = [float(np.abs(c.project(corners)[0] - c.center).max()) for c in placed(1.0, 1)]
     reach = max([*around, *(_reach(own, target) for own in drawn)])
     if size is None and drawn:

@@ -27,17 +27,17 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import LEVEL, carve
 from toonset.nerf.kernels.threads import working_threads
 from toonset.nerf.look.drawings import Original
-from toonset.nerf.render.turntable import FILL, filled_box, framed
+from toonset.nerf.render.turntable import FILL, drawn_on_sheet, filled_box, framed
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
-from toonset.nerf.viewer.scene import Blob, camera_record, webp
+from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, webp
 from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of
 from toonset.palette.names import name_of
 from toonset.palette.palette import Palette
 
-FIGURE_PX = 420  # height of the figure, unless told otherwise
+FIGURE_PX = 400  # height of the figure, unless told otherwise
 HULL_VOXELS = 72  # along the longest side of a bundle's hull
 METRICS = "metrics.json"
 TRIAL_PX = 1000  # of pictures that the figure is measured in
@@ -99,9 +99,7 @@ def _run_html(run: Path, size: int | None) -> str:
         "verdict": verdict and {"state": verdict["verdict"], "reasons": verdict["reasons"]},
         "palette": _paints(trained.palette, palette),
     }
-    views = () if trained.drawings is None else trained.drawings.views
-    drawn = [view.as_drawn for view in views if not view.mirrored]
-    return run_page(trained, about, SheetDrawings.of(drawn, beside), size)
+    return run_page(trained, about, SheetDrawings.of(drawn_on_sheet(trained), beside), size)
 
 
 def run_page(
@@ -121,11 +119,7 @@ def run_page(
         views: of a ring.
     """
     ring = ring_through(sheet.cameras, views)
-    cameras = framed(trained, ring.angles, size or TRIAL_PX)
-    if size is None:
-        low, high = filled_box(trained.hull)
-        size = _side(float(high[1] - low[1]) * cameras[0].scale)
-        cameras = framed(trained, ring.angles, size)
+    cameras = cameras_of(trained, ring, size)
     layers, drawings = layers_of(trained), trained.drawings
     scene = {
         **about,
@@ -135,6 +129,14 @@ def run_page(
     }
     poster = render(trained, cameras[ring.start]).picture(layers[0])
     return _page(scene, ring, cameras, figure_sights(trained, cameras, ring.layered), sheet, poster)
+
+
+def cameras_of(trained: TrainedField, ring: Ring, size: int | None = None) -> tuple[Camera, ...]:
+    """Return the cameras of a figure's ring, as `toonset render --size` has them."""
+    if size is None:
+        low, high = filled_box(trained.hull)
+        size = _side(float(high[1] - low[1]) * framed(trained, ring.angles, TRIAL_PX)[0].scale)
+    return framed(trained, ring.angles, size)
 
 
 def _bundle_html(bundle: Bundle, size: int | None) -> str:
@@ -197,7 +199,7 @@ def _page(
             )
         ],
     }
-    return page_html(whole, blob.deflated(), webp(poster))
+    return page_html(whole, blob.deflated(), webp(poster, **SMALL))
 
 
 def _hull_mesh(cameras: Sequence[Camera], alphas: Sequence[np.ndarray]) -> Mesh:

@@ -38,12 +38,12 @@ part("home", HTMLElement).addEventListener("click", orbit.home);
 addEventListener("pointerdown", ({ target }) => target !== part("message", HTMLElement) && say(""));
 
 const blob = await readBlob().catch(() => null);
+if (blob) start(blob);
+else sayNothingMoves();
 const drawings = await Promise.all(scene.views.map(({ picture }) => drawingAt(picture)));
 createTimeline(scene, store, drawings);
 createCompare(scene, store, drawings);
 createFrusta(scene, store);
-if (blob) start(blob);
-else sayNothingMoves();
 
 /** @param {Uint8Array} blob */
 function start(blob) {

@@ -10,7 +10,8 @@ export function readScene() {
 /** @returns {Promise<Uint8Array>} the blob, inflated */
 export async function readBlob() {
   const text = atob(textOf("blob"));
-  const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
