@@ -68,7 +68,10 @@ def _pictures(page: Page, trained: TrainedField, seconds: float) -> None:
     print(f"  {seconds:.1f} CPU s, of which drawing {time.process_time() - began:.1f}")
     layer = page.evaluate("toonset.scene.layers[0]")
     some = range(0, len(cameras), EVERY)
-    _say(layer, [psnr(shown(page, i, layer), render(trained, cameras[i]).picture(layer)) for i in some])
+    _say(
+        layer,
+        [psnr(shown(page, i, layer), render(trained, cameras[i]).picture(layer)) for i in some],
+    )
     if trained.palette is None:
         return
     old = trained.palette.tolist()
@@ -77,7 +80,10 @@ def _pictures(page: Page, trained: TrainedField, seconds: float) -> None:
     other = [shown(page, i, layer, colors=now) for i in some]
     _say(
         "recoloured",
-        [psnr(one, render(changed, cameras[i]).picture(layer)) for i, one in zip(some, other, strict=True)],
+        [
+            psnr(one, render(changed, cameras[i]).picture(layer))
+            for i, one in zip(some, other, strict=True)
+        ],
     )
 
 

@@ -214,9 +214,7 @@ def _hull_mesh(cameras: Sequence[Camera], alphas: Sequence[np.ndarray]) -> Mesh:
     )
 
 
-def _paints(
-    colors: UInt8[np.ndarray, "colors 3"] | None, palette: Palette | None
-) -> list[Record]:
+def _paints(colors: UInt8[np.ndarray, "colors 3"] | None, palette: Palette | None) -> list[Record]:
     """Return the colours of a run with the names and shares that a bundle gives them."""
     if colors is None:
         return []

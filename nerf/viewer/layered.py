@@ -92,8 +92,9 @@ def layered_shares(
     box, corner = _box(there)
     shares, alpha = shares[box], alpha[box]
     two = np.argsort(-shares, axis=2, kind="stable")[..., :2]
-    first, second = (two[..., i].astype(np.uint8) for i in (0, two.shape[2] - 1))
-    one, other = (np.take_along_axis(shares, i[..., None].astype(int), 2)[..., 0] for i in (first, second))
+    covered = np.take_along_axis(shares, two, axis=2)
+    one, other = covered[..., 0], covered[..., -1]
+    first, second = (two[..., i].astype(np.uint8) for i in (0, -1))
     part = np.rint(PARTS * other / np.maximum(one + other, 1e-6)).astype(np.uint8)
     part[second == first] = 0
     none = np.zeros(alpha.shape, np.uint8)

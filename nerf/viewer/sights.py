@@ -85,9 +85,9 @@ def _layer(view: Rendering, layer: str, shrink: int) -> Record | None:
         return layered_record(layered(view.drawn, drawings.paints, pen))
     if layer == "palette" and view.shares is not None:
         parts = np.dstack([view.shares, view.alpha])
-        height, width, count = (side // by for side, by in zip(parts.shape, (shrink, shrink, 1)))
+        height, width = (side // shrink for side in view.alpha.shape)
         blocks = parts[: height * shrink, : width * shrink]
-        mean = blocks.reshape(height, shrink, width, shrink, count).mean(axis=(1, 3))
+        mean = blocks.reshape(height, shrink, width, shrink, -1).mean(axis=(1, 3))
         return layered_record(layered_shares(mean[..., :-1], mean[..., -1]), shrink)
     return picture_record(view.picture(layer), shrink)
 

@@ -11,7 +11,7 @@ import { createPainter } from "./painter.js";
 import { createPalettePanel } from "./palette_panel.js";
 import { createSave } from "./save.js";
 import { newCanvas, pictureAt, readBlob, readScene } from "./scene.js";
-import { createStage } from "./stage.js";
+import { createStage, shotOf } from "./stage.js";
 import { createStore, startState } from "./state.js";
 import { createTimeline } from "./timeline.js";
 import { showVerdict } from "./verdict.js";
@@ -68,7 +68,8 @@ function start(blob) {
     };
   };
   const read = (/** @type {Partial<Shot>} */ shot) => painter.read(filled(shot));
-  Object.assign(globalThis, { toonset: { scene, store, read } });
+  const shot = () => shotOf(scene, store.state);
+  Object.assign(globalThis, { toonset: { scene, store, shot, read } });
 }
 
 /** @param {import("./types.js").Range} range @returns {Promise<HTMLCanvasElement | null>} */
