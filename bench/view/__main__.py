@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from playwright.sync_api import Page
 
 from bench.view.compare import chromium, psnr, shown
+from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.recolor import recolor_run
 from toonset.nerf.render.turntable import drawn_on_sheet
@@ -67,27 +69,22 @@ def _pictures(page: Page, trained: TrainedField, seconds: float) -> None:
         view.picture()
     print(f"  {seconds:.1f} CPU s, of which drawing {time.process_time() - began:.1f}")
     layer = page.evaluate("toonset.scene.layers[0]")
-    some = range(0, len(cameras), EVERY)
-    _say(
-        layer,
-        [psnr(shown(page, i, layer), render(trained, cameras[i]).picture(layer)) for i in some],
-    )
+    _compare(page, trained, cameras, layer)
     if trained.palette is None:
         return
     old = trained.palette.tolist()
     changed = recolor_run(trained, [f"{hex_of(tuple(old[0]))}={hex_of(NEW)}"])
-    now = [list(NEW), *old[1:]]
-    other = [shown(page, i, layer, colors=now) for i in some]
-    _say(
-        "recoloured",
-        [
-            psnr(one, render(changed, cameras[i]).picture(layer))
-            for i, one in zip(some, other, strict=True)
-        ],
-    )
+    _compare(page, changed, cameras, layer, colors=[list(NEW), *old[1:]])
 
 
-def _say(name: str, found: list[float]) -> None:
+def _compare(
+    page: Page, trained: TrainedField, cameras: Sequence[Camera], layer: str, **more: Any
+) -> None:
+    found = []
+    for i in range(0, len(cameras), EVERY):
+        own = render(trained, cameras[i]).picture(layer)
+        found.append(psnr(shown(page, i, layer, **more), own))
+    name = "recoloured" if more else layer
     print(f"  {name}: mean {sum(found) / len(found):.1f} dB, least {min(found):.1f}")
 
 

@@ -166,8 +166,9 @@ class Viewer:
         return self.page.evaluate(
             """([u, v]) => {
               const canvas = document.getElementById("view");
-              const context = canvas.getContext("2d");
-              return [...context.getImageData(u * canvas.width, v * canvas.height, 1, 1).data];
+              const copy = new OffscreenCanvas(1, 1).getContext("2d");
+              copy.drawImage(canvas, -Math.floor(u * canvas.width), -Math.floor(v * canvas.height));
+              return [...copy.getImageData(0, 0, 1, 1).data];
             }""",
             [u, v],
         )
