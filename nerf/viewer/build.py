@@ -32,7 +32,7 @@ from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
-from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, webp
+from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding, webp
 from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of
 from toonset.palette.names import name_of
 from toonset.palette.palette import Palette
@@ -179,6 +179,7 @@ def _page(
     whole = {
         "schema": "toonset-view/2",
         **scene,
+        "coding": coding(),
         "figure": {
             "target": first.target.tolist(),
             "reach": FILL * first.size_wh[0] / 2 / first.scale,

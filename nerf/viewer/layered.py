@@ -3,7 +3,7 @@
     colour = ((1 - t) a + t b + rest) (1 - ink) + pen ink
 
 a and b are paints; most pixels have one, those along borders are mixtures of two. `rest` is what
-paints do not explain: tones, grain, features without a paint of their own. When a paint changes, a
+paints do not explain: shadow, grain, features without a paint of their own. When a paint changes, a
 colour moves by `moved` times the change of its mixture, as in `toonset.palette.pixels.recolor`.
 """
 
@@ -17,11 +17,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from toonset.nerf.look.blend import DrawnView
+from toonset.palette.palette import Shadow
 from toonset.palette.pixels.recolor import share_moved
 
 LEVELS = 15  # of alpha and ink, from nothing to all
 PARTS = 8  # of a mixture
-WHOLE = 4  # of `moved`: as far as the mixture itself
+MOVES = np.array([1, 0, 0.35, 0.6, 0.7, 0.8, 0.9, 1.15])  # kinds of `moved`; 0: as the mixture
 LIKE = 6.0  # levels of 255: a colour so near to its paint is that paint
 EXACT = 1.5 / 255  # so well do paint and ink make up a pixel, or it is a drawing's own
 INKED = 16 / 255  # so near to a mixture of paint and pen a drawing's pixel is one
@@ -29,6 +30,7 @@ MOST_INK = 0.9  # of a drawing's pixel, under which its paint is seen
 AROUND = 5  # pixels, a window's side: paints in it may be in a mixture, the commonest COMMON
 COMMON = 3
 BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is none
+ELSE = 3.0  # times LIKE: so much worse is a paint that is neither the label nor around
 
 Map = UInt8[np.ndarray, "height width"]
 Mask = Bool[np.ndarray, "height width"]
@@ -47,7 +49,7 @@ class Layered:
         ink: (height, width) share of the coverage that lines have, 0 to LEVELS.
         first, second: (height, width) paints.
         part: (height, width) of the second, 0 to PARTS / 2.
-        moved: (height, width) how far a colour moves with its paints; WHOLE is as far as they.
+        moved: (height, width) how far a colour moves with its paints: one of MOVES.
         rest: (height, width, 3) what paints do not explain, levels of 255.
     """
 
@@ -61,13 +63,16 @@ class Layered:
     rest: Int16[np.ndarray, "height width 3"]
 
 
-def layered(view: DrawnView, paints: Colors, pen: Rgb | None) -> Layered | None:
+def layered(
+    view: DrawnView, paints: Colors, pen: Rgb | None, shadow: Shadow | None = None
+) -> Layered | None:
     """Return a view's layers; None where it shows nothing.
 
     Args:
         view: in the colours of `paints`.
         paints: that its labels name.
         pen: colour of the lines; None: there are none.
+        shadow: that the drawings have.
     """
     there = view.alpha >= 0.5 / LEVELS
     if not there.any():
@@ -79,7 +84,7 @@ def layered(view: DrawnView, paints: Colors, pen: Rgb | None) -> Layered | None:
     color = np.rint(paint * 255).clip(0, 255).astype(np.uint8)
     share = np.divide(ink, alpha, out=np.zeros_like(alpha), where=there).clip(0, 1)
     levels = [np.rint(np.where(there, one, 0) * LEVELS).astype(np.uint8) for one in (alpha, share)]
-    return Layered(corner, *levels, *_unmixed(color, labels, there, paints))
+    return Layered(corner, *levels, *_unmixed(color, labels, there, paints, shadow))
 
 
 def layered_shares(
@@ -100,7 +105,7 @@ def layered_shares(
     none = np.zeros(alpha.shape, np.uint8)
     cover = np.rint(alpha.clip(0, 1) * LEVELS).astype(np.uint8)
     rest = np.zeros((*alpha.shape, 3), np.int16)
-    return Layered(corner, cover, none, first, second, part, none + np.uint8(WHOLE), rest)
+    return Layered(corner, cover, none, first, second, part, none, rest)
 
 
 def _box(there: Mask) -> tuple[Box, tuple[int, int]]:
@@ -136,63 +141,89 @@ def _under_lines(
 
 
 def _unmixed(
-    color: UInt8[np.ndarray, "h w 3"], labels: Map, there: Mask, paints: Colors
+    color: UInt8[np.ndarray, "h w 3"],
+    labels: Map,
+    there: Mask,
+    paints: Colors,
+    shadow: Shadow | None,
 ) -> tuple[Map, Map, Map, Map, Int16[np.ndarray, "h w 3"]]:
     """Return the two paints of every pixel, the second one's part, how it moves, and the rest."""
     known = paints.astype(np.float32)
     first, part = labels.copy(), np.zeros_like(labels)
-    moved = np.full_like(labels, WHOLE)
+    moved = np.zeros_like(labels)
     rest = np.where(there[..., None], color - paints[labels].astype(np.int16), 0).astype(np.int16)
     at = np.flatnonzero(_largest(rest) > LIKE)
     second = first.copy()
     own = color.reshape(-1, 3)[at]
-    a, b, t = _best(own.astype(np.float32), labels, there, at, known)
+    near = _Near.of(labels, there, at)
+    a, b, t, off = near.best(own.astype(np.float32), known)
+    if shadow is not None:  # the same in shadow
+        dark = near.best((own / np.array(shadow.factor)).clip(0, 255).astype(np.float32), known)
+        a, b, t = (np.where(dark[3] < off, *pair) for pair in zip(dark, (a, b, t), strict=False))
     steps = np.rint(t * PARTS)
     less = steps > PARTS / 2
     a, b, steps = np.where(less, b, a), np.where(less, a, b), np.where(less, PARTS - steps, steps)
     cover = known[a] + (steps / PARTS).astype(np.float32)[:, None] * (known[b] - known[a])
     left = own - cover
-    found = np.rint(share_moved(own, cover) * WHOLE)
+    found = np.abs(share_moved(own, cover)[:, None] - MOVES).argmin(axis=1)
     for whole, values in (
         *((first, a), (second, b), (part, steps)),
-        (moved, np.where(_largest(left) > LIKE, found, WHOLE)),
+        (moved, np.where(_largest(left) > LIKE, found, 0)),
     ):
         whole.reshape(-1)[at] = values
     rest.reshape(-1, 3)[at] = np.rint(left)
     return first, second, part, moved, rest
 
 
-def _best(
-    color: Float[np.ndarray, "n 3"],
-    labels: Map,
-    there: Mask,
-    at: Int[np.ndarray, " n"],
-    known: Float[np.ndarray, "paints 3"],
-) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return the two paints that explain each colour best, and the second one's share.
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """What lies around some pixels.
 
-    Of one paint: the label's, or the one that the colour is like. Of two: both are seen around.
+    Attributes:
+        own: (n,) their labels.
+        common: (COMMON, n) the commonest labels around, or fewer.
+        count: (COMMON, n) how common they are, 0 where there are fewer.
     """
-    apart = np.stack([_dot(color - paint, color - paint) for paint in known], axis=1)
-    own, like = labels.reshape(-1)[at].astype(np.int64), apart.argmin(axis=1)
-    rows = np.arange(len(at))
-    a = np.where(apart[rows, like] <= LIKE**2, like, own)
-    least, b, t = apart[rows, a], a.copy(), np.zeros(len(at), np.float32)
-    seen = np.unique(labels[there])
-    masks = ((there & (labels == one)).astype(np.float32) for one in seen)
-    window = (AROUND, AROUND)
-    around = np.stack([cv2.boxFilter(one, -1, window).reshape(-1)[at] for one in masks])
-    order = np.argsort(-around, axis=0, kind="stable")[:COMMON]
-    for i, j in itertools.combinations(order, 2):
-        one, other = known[seen[i]], known[seen[j]]
-        way = other - one
-        share = (_dot(color - one, way) / np.maximum(_dot(way, way), 1)).clip(0, 1)
-        off = color - one - share[:, None] * way
-        away = _dot(off, off)
-        better = (around[j, rows] > 0) & (BETTER * away < least)
-        a, b = np.where(better, seen[i], a), np.where(better, seen[j], b)
-        t, least = np.where(better, share, t), np.where(better, away, least)
-    return a, b, t
+
+    own: Int[np.ndarray, " n"]
+    common: Int[np.ndarray, "k n"]
+    count: Float[np.ndarray, "k n"]
+
+    @classmethod
+    def of(cls, labels: Map, there: Mask, at: Int[np.ndarray, " n"]) -> _Near:
+        """Return what lies around the pixels of these numbers."""
+        seen = np.unique(labels[there])
+        masks = ((there & (labels == one)).astype(np.float32) for one in seen)
+        window = (AROUND, AROUND)
+        around = np.stack([cv2.boxFilter(one, -1, window).reshape(-1)[at] for one in masks])
+        order = np.argsort(-around, axis=0, kind="stable")[:COMMON]
+        count = np.take_along_axis(around, order, axis=0)
+        return cls(labels.reshape(-1)[at].astype(np.int64), seen[order].astype(np.int64), count)
+
+    def best(
+        self, color: Float[np.ndarray, "n 3"], known: Float[np.ndarray, "paints 3"]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return the two paints that explain each colour best, the second's share, how far off.
+
+        Of one paint: the label's, or else one that the colour is like. Of two: both lie around.
+        """
+        apart = np.stack([_dot(color - paint, color - paint) for paint in known], axis=1)
+        rows, like = np.arange(len(color)), apart.argmin(axis=1)
+        least, other = apart[rows, self.own], apart[rows, like]
+        strange = (least > LIKE**2) & (other <= LIKE**2)
+        a = np.where(strange, like, self.own)
+        least = np.where(strange, other + (ELSE * LIKE) ** 2, least)
+        b, t = a.copy(), np.zeros(len(color), np.float32)
+        for i, j in itertools.combinations(range(len(self.common)), 2):
+            one, other = known[self.common[i]], known[self.common[j]]
+            way = other - one
+            share = (_dot(color - one, way) / np.maximum(_dot(way, way), 1)).clip(0, 1)
+            off = color - one - share[:, None] * way
+            away = _dot(off, off)
+            better = (self.count[j] > 0) & (BETTER * away < least)
+            a, b = (np.where(better, self.common[n], old) for n, old in ((i, a), (j, b)))
+            t, least = np.where(better, share, t), np.where(better, away, least)
+        return a, b, t, least
 
 
 def _largest(values: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:

@@ -13,7 +13,7 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from toonset.camera import Camera
-from toonset.nerf.viewer.layered import LEVELS, WHOLE, Layered
+from toonset.nerf.viewer.layered import LEVELS, MOVES, PARTS, Layered
 
 EFFORT = 7  # 9 takes five times as long for 2 %
 QUALITY = 80  # of WebP pictures
@@ -59,6 +59,17 @@ def camera_record(camera: Camera) -> dict[str, Any]:
     }
 
 
+def coding() -> dict[str, Any]:
+    """Return what the page needs to read `layered_record`."""
+    return {
+        "levels": LEVELS,
+        "parts": PARTS,
+        "moves": MOVES.tolist(),
+        "step": REST_STEP,
+        "middle": MIDDLE,
+    }
+
+
 def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | None:
     """Return a view's layers: see `page/compose.js`, which puts them together.
 
@@ -74,7 +85,7 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
     inked = there & (view.ink == LEVELS)
     lined = there & (view.ink > 0) & ~inked
     mixed = there & (view.part > 0)
-    other = there & (view.moved != WHOLE)
+    other = there & (view.moved > 0)
     flags = (there & ~soft) + 2 * soft + 4 * inked + 8 * lined + 16 * mixed + 32 * other
     planes = [view.first, flags.astype(np.uint8)]
     lists = [

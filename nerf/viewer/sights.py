@@ -82,7 +82,7 @@ def _layer(view: Rendering, layer: str, shrink: int) -> Record | None:
     drawings = view.field.drawings
     if layer == "drawn" and drawings is not None:
         pen = drawings.pen and drawings.pen.rgb
-        return layered_record(layered(view.drawn, drawings.paints, pen))
+        return layered_record(layered(view.drawn, drawings.paints, pen, drawings.drawn_shadow))
     if layer == "palette" and view.shares is not None:
         parts = np.dstack([view.shares, view.alpha])
         height, width = (side // shrink for side in view.alpha.shape)

@@ -51,11 +51,9 @@ export function createPainter(canvas, scene, blob, ask) {
     if (known) return known;
     const [start, length] = record.maps;
     const now = [...colors, ...scene.paints.slice(colors.length)];
-    const pixels = composed(record, blob.subarray(start, start + length), files.rest ?? null, {
-      old: [...scene.palette.map((paint) => paint.rgb), ...scene.paints.slice(scene.palette.length)],
-      now,
-      ink,
-    });
+    const old = [...scene.palette.map((paint) => paint.rgb), ...scene.paints.slice(scene.palette.length)];
+    const maps = blob.subarray(start, start + length);
+    const pixels = composed(record, maps, files.rest ?? null, { old, now, ink }, scene.coding);
     const picture = newCanvas(pixels.width, pixels.height, (context) => context.putImageData(pixels, 0, 0));
     made.set(record, picture);
     return picture;

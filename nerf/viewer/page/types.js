@@ -30,6 +30,15 @@
 /** @typedef {any} LayerRecord a `LayeredRecord` or a `PictureRecord` */
 
 /**
+ * @typedef {object} Coding how a `LayeredRecord` is to be read
+ * @property {number} levels of alpha and ink, from nothing to all
+ * @property {number} parts of a mixture
+ * @property {number[]} moves how far a colour may move with its paints
+ * @property {number} step of `rest`, levels of 255
+ * @property {number} middle of `rest`: nothing
+ */
+
+/**
  * @typedef {object} Sight one of the views that the page holds
  * @property {number[]} angles yaw, elevation and roll, radians
  * @property {number} level which of the figure's elevations it belongs to; -1: only a drawing is seen so
@@ -70,6 +79,7 @@
  * @property {Figure} figure
  * @property {Paint[]} palette
  * @property {number[][]} paints of the drawn look: the palette's, then others that stay
+ * @property {Coding} coding
  * @property {{rgb: number[]} | null} pen that draws the lines
  * @property {ViewRecord[]} views
  * @property {Sight[]} sights

@@ -16,7 +16,14 @@ from toonset.camera import Camera
 from toonset.nerf.look.blend import DrawnView
 from toonset.nerf.viewer.layered import layered
 from toonset.nerf.viewer.page import page_html
-from toonset.nerf.viewer.scene import Blob, camera_record, layered_record, picture_record, webp
+from toonset.nerf.viewer.scene import (
+    Blob,
+    camera_record,
+    coding,
+    layered_record,
+    picture_record,
+    webp,
+)
 
 SIZE_WH = (60, 90)
 COLORS = ([217, 84, 48], [38, 138, 140], [246, 186, 62])
@@ -113,6 +120,7 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
             for name, rgb, share in zip(names, COLORS, (0.6, 0.3, 0.1), strict=True)
         ],
         "paints": list(COLORS),
+        "coding": coding(),
         "pen": {"rgb": PEN},
         "views": views,
         "sights": [blob.keep(sight) for sight in sights],
