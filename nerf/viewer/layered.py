@@ -22,7 +22,7 @@ from toonset.palette.pixels.recolor import share_moved
 
 LEVELS = 15  # of alpha and ink, from nothing to all
 PARTS = 8  # of a mixture
-MOVES = np.array([1, 0, 0.35, 0.6, 0.7, 0.8, 0.9, 1.15])  # kinds of `moved`; 0: as the mixture
+MOVES = np.array([1, 0, 0.4, 0.7, 0.87, 1.15])  # kinds of `moved`; 0: as the mixture
 LIKE = 6.0  # levels of 255: a colour so near to its paint is that paint
 EXACT = 1.5 / 255  # so well do paint and ink make up a pixel, or it is a drawing's own
 INKED = 16 / 255  # so near to a mixture of paint and pen a drawing's pixel is one
@@ -30,6 +30,7 @@ MOST_INK = 0.9  # of a drawing's pixel, under which its paint is seen
 AROUND = 5  # pixels, a window's side: paints in it may be in a mixture, the commonest COMMON
 COMMON = 3
 BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is none
+FAR = 16.0  # levels of 255: a colour not so far from its mixture moves as that does
 ELSE = 3.0  # times LIKE: so much worse is a paint that is neither the label nor around
 
 Map = UInt8[np.ndarray, "height width"]
@@ -168,7 +169,7 @@ def _unmixed(
     found = np.abs(share_moved(own, cover)[:, None] - MOVES).argmin(axis=1)
     for whole, values in (
         *((first, a), (second, b), (part, steps)),
-        (moved, np.where(_largest(left) > LIKE, found, 0)),
+        (moved, np.where(_largest(left) > FAR, found, 0)),
     ):
         whole.reshape(-1)[at] = values
     rest.reshape(-1, 3)[at] = np.rint(left)
