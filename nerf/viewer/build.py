@@ -64,8 +64,8 @@ class SheetDrawings:
     def of(cls, drawings: Sequence[Original], folder: Path) -> SheetDrawings:
         """Return drawings with what the calibration of a folder says of them."""
         file = member(folder, CALIBRATION)
-        views = list(read_calibration(file).views) if file else []
-        said = views if len(views) == len(drawings) else [None] * len(drawings)
+        views: list[ViewRecord | None] = list(read_calibration(file).views) if file else []
+        said = views if len(views) == len(drawings) else [None for _ in drawings]
         return cls([d.camera for d in drawings], [d.rgba for d in drawings], said)
 
 
@@ -156,8 +156,14 @@ def _bundle_html(bundle: Bundle, size: int | None) -> str:
         Camera.looking_at(middle, yaw, elevation, scale, (side, side), roll, k=k)
         for yaw, elevation, roll in ring.angles.tolist()
     ]
-    about = {"title": bundle.folder.resolve().name, "verdict": None, "palette": [], "paints": []}
-    scene = {**about, "layers": ["mannequin"], "pen": None}
+    scene: Record = {
+        "title": bundle.folder.resolve().name,
+        "verdict": None,
+        "palette": [],
+        "paints": [],
+        "layers": ["mannequin"],
+        "pen": None,
+    }
     poster = body_picture(mesh, cameras[ring.start])
     return _page(scene, ring, cameras, body_sights(mesh, cameras), sheet, poster)
 
@@ -194,8 +200,8 @@ def _page(
             for angles, level, layers in zip(ring.angles.tolist(), ring.level, sights, strict=True)
         ],
         "views": [
-            {**_view(number, *each), "sight": own, "picture": blob.keep(webp(picture))}
-            for number, (*each, own, picture) in enumerate(
+            {**_view(i, camera, said), "sight": own, "picture": blob.keep(webp(picture))}
+            for i, (camera, said, own, picture) in enumerate(
                 zip(sheet.cameras, sheet.calibrated, ring.own, sheet.pictures, strict=True)
             )
         ],

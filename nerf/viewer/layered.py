@@ -84,8 +84,10 @@ def layered(
     labels = np.where(there, view.labels[box], 0).astype(np.uint8)
     color = np.rint(paint * 255).clip(0, 255).astype(np.uint8)
     share = np.divide(ink, alpha, out=np.zeros_like(alpha), where=there).clip(0, 1)
-    levels = [np.rint(np.where(there, one, 0) * LEVELS).astype(np.uint8) for one in (alpha, share)]
-    return Layered(corner, *levels, *_unmixed(color, labels, there, paints, shadow))
+    cover, line = (
+        np.rint(np.where(there, one, 0) * LEVELS).astype(np.uint8) for one in (alpha, share)
+    )
+    return Layered(corner, cover, line, *_unmixed(color, labels, there, paints, shadow))
 
 
 def layered_shares(

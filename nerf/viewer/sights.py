@@ -81,7 +81,7 @@ def _sight(baked: Baked, camera: Camera, layers: Sequence[str]) -> Record:
 def _layer(view: Rendering, layer: str, shrink: int) -> Record | None:
     drawings = view.field.drawings
     if layer == "drawn" and drawings is not None:
-        pen = drawings.pen and drawings.pen.rgb
+        pen = None if drawings.pen is None else drawings.pen.rgb
         return layered_record(layered(view.drawn, drawings.paints, pen, drawings.drawn_shadow))
     if layer == "palette" and view.shares is not None:
         parts = np.dstack([view.shares, view.alpha])
