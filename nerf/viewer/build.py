@@ -65,7 +65,8 @@ class SheetDrawings:
         """Return drawings with what the calibration of a folder says of them."""
         file = member(folder, CALIBRATION)
         views: list[ViewRecord | None] = list(read_calibration(file).views) if file else []
-        said = views if len(views) == len(drawings) else [None for _ in drawings]
+        said = views if len(views) == len(drawings) else []
+        said = said or [None for _ in drawings]
         return cls([d.camera for d in drawings], [d.rgba for d in drawings], said)
 
 
