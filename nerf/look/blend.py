@@ -306,7 +306,7 @@ def _outlined(
         facing = float(look.texture.camera.rotation[2] @ view.camera.rotation[2])
         angle = float(np.arccos(np.clip(facing, -1, 1)))
         rims.append((look.texture.rim.at(look.x, look.y), look.share, angle))
-    inside = between_outlines(smooth_outline(cover, figure_px), rims)
+    inside = between_outlines(smooth_outline(cover, figure_px), rims, figure_px)
     return inked_outline(inside * figure_px, line_px, figure_px)
 
 

@@ -27,6 +27,7 @@ SAME = 0.02  # within the surface's outline, where a rim of the view is the draw
 SLOW = 0.015  # sigma along which a difference is an error of the hand
 LARGE = 0.02  # from which on it is a missing part
 REACH = 0.025  # beyond the surface, to which anything is added
+FRAY = 0.004  # sigma of what is carried over: the surface beyond the figure is rough
 BESIDE = 0.3  # radians off a drawing, in which its errors are the view's, too
 AGREEING = 4  # power of the cosine between view and drawing by which a rim counts
 
@@ -86,13 +87,16 @@ def smooth_outline(cover: Float[np.ndarray, "h w"], height_px: float) -> Inside:
     return _soft(inside_of(cover, height_px), SMOOTH * height_px)
 
 
-def between_outlines(own: Inside, rims: Sequence[tuple[np.ndarray, float, float]]) -> Inside:
+def between_outlines(
+    own: Inside, rims: Sequence[tuple[np.ndarray, float, float]], height_px: float
+) -> Inside:
     """Return how far within the view's outline pixels lie, of the height.
 
     Args:
         own: within the field's outline.
         rims: of every flanking drawing `Rim.at` the view's places, its share of the view, and the
             angle between both, radians.
+        height_px: of the figure.
     """
     moved, total = np.zeros(own.shape, np.float32), np.zeros(own.shape, np.float32)
     reach = ((own + REACH) / (REACH / 2)).clip(0, 1)
@@ -100,7 +104,7 @@ def between_outlines(own: Inside, rims: Sequence[tuple[np.ndarray, float, float]
         near = share * max(0.0, float(np.cos(angle))) ** AGREEING * at[..., 2] * reach
         moved += near * (at[..., 0] + max(0.0, 1 - angle / BESIDE) ** 2 * at[..., 1])
         total += near
-    found = own + moved / np.maximum(total, 0.5)
+    found = own + _soft(moved / np.maximum(total, 0.5), FRAY * height_px)
     loose = parts(found > 0, connectivity=4)
     kept = np.zeros(int(loose.max()) + 1, dtype=bool)
     kept[np.unique(loose[own > 0])] = True
