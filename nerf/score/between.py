@@ -1,0 +1,149 @@
+"""Measure what eyes see on a view between drawings, beside the drawings themselves.
+
+Nothing here needs the truth: a view that is as whole as the drawings beside it has about as long
+outlines and borders of paint as they have, no patches that neither of them shows, and the features
+that both show.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.nerf.look.blend import GUESSED, MIRRORED, flanking
+from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.render.layers import Rendering
+from toonset.nerf.score.outline_turning import border_turning, outline_turning
+from toonset.nerf.score.patches import (
+    Patches,
+    features,
+    fragments,
+    matched,
+    patches_of,
+    plain_colors,
+)
+
+Picture = UInt8[np.ndarray, "height width 4"]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What eyes count on one picture.
+
+    Attributes:
+        outline: whole turns of the silhouette's outlines (`outline_turning`).
+        borders: whole turns of the borders of paints.
+        patches: small areas of one paint.
+    """
+
+    outline: float
+    borders: float
+    patches: Patches
+
+
+@dataclass(frozen=True)
+class BetweenView:
+    """A view between two drawings, and what is wrong with it.
+
+    Attributes:
+        yaw: of the view, radians.
+        beside: numbers of the two drawings that it lies between; twice one that it lies beside.
+        outline: turns of its outlines.
+        own_outline: of the two drawings', mean.
+        borders: turns of its borders of paint.
+        own_borders: of the two drawings', mean.
+        fragments: small patches that neither of the two drawings has.
+        features: small patches that both have.
+        whole: as many of them the view has.
+        mirrored: share of its pixels that only the mirror image of a drawing shows.
+        guessed: share that no drawing shows.
+    """
+
+    yaw: float
+    beside: tuple[int, int]
+    outline: float
+    own_outline: float
+    borders: float
+    own_borders: float
+    fragments: int
+    features: int
+    whole: int
+    mirrored: float
+    guessed: float
+
+
+class Between:
+    """Judge views between drawings, at one size of the figure."""
+
+    def __init__(self, drawings: Drawings, tall_px: float) -> None:
+        """Take the drawings, and how tall the figure is in the pictures to judge, pixels."""
+        self._drawings, self._tall_px = drawings, tall_px
+
+    @cached_property
+    def pictures(self) -> tuple[Picture, ...]:
+        """Return the drawings, mirrored ones included, as they are drawn, at that size."""
+        unit = self._tall_px / self._drawings.height
+        views = (view.as_drawn for view in self._drawings.views)
+        return tuple(_resized(own.rgba, unit / own.camera.scale) for own in views)
+
+    @cached_property
+    def paints(self) -> UInt8[np.ndarray, "paints 3"]:
+        """Return the colours that eyes tell apart on the drawings."""
+        return plain_colors(self.pictures)
+
+    @cached_property
+    def drawn(self) -> tuple[Seen, ...]:
+        """Return what eyes count on the drawings."""
+        return tuple(self.seen(picture) for picture in self.pictures)
+
+    def seen(self, rgba: Picture) -> Seen:
+        """Return what eyes count on a picture whose figure is as tall as was said."""
+        alpha = rgba[..., 3] / np.float32(255)
+        paints = self.paints
+        return Seen(
+            outline_turning(alpha, self._tall_px),
+            border_turning(rgba, paints, self._tall_px),
+            patches_of(rgba, paints, self._tall_px),
+        )
+
+    def judged(self, view: Rendering, rgba: Picture | None = None) -> BetweenView:
+        """Return what is wrong with a view.
+
+        Args:
+            view: of a field with these drawings, the figure as tall as was said.
+            rgba: another picture of the same camera; None: the view in the drawn look.
+        """
+        cameras = [own.camera for own in self._drawings.views]
+        first, second, _ = flanking(cameras, view.camera)
+        own = self.seen(view.picture("drawn") if rgba is None else rgba)
+        pair = self.drawn[first], self.drawn[second]
+        common = features(pair[0].patches, pair[1].patches)
+        drawn = view.drawn
+        return BetweenView(
+            view.camera.angles[0],
+            (first, second),
+            own.outline,
+            (pair[0].outline + pair[1].outline) / 2,
+            own.borders,
+            (pair[0].borders + pair[1].borders) / 2,
+            fragments(own.patches, [one.patches for one in pair]),
+            len(common),
+            matched(common, own.patches),
+            drawn.share(MIRRORED),
+            drawn.share(GUESSED),
+        )
+
+
+def _resized(rgba: Picture, factor: float) -> Picture:
+    """Return a picture of another size, averaged with its coverage."""
+    size = tuple(max(1, round(side * factor)) for side in rgba.shape[1::-1])
+    how = cv2.INTER_AREA if factor < 1 else cv2.INTER_CUBIC
+    alpha = rgba[..., 3:] / np.float32(255)
+    whole = cv2.resize(np.dstack([rgba[..., :3] * alpha, alpha]), size, interpolation=how)
+    cover = whole[..., 3:].clip(0, 1)
+    color = (whole[..., :3] / np.maximum(cover, 1e-6)).clip(0, 255)
+    return np.rint(np.dstack([color, cover * 255])).astype(np.uint8)
