@@ -39,6 +39,7 @@ class Judged:
         reasons: of it.
         off: the worst drawing, share of the figure's height (see `toonset.nerf.score.left_out`).
         look: per held-out view where pixels count, share of the figure's height.
+        terms: of `toonset.nerf.score.torn`, without weights.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Judged:
     reasons: tuple[str, ...]
     off: float
     look: tuple[float, ...]
+    terms: tuple[float, ...] = ()
 
     @property
     def worst_look(self) -> float:
@@ -82,7 +84,8 @@ def judge(
         if per_px:
             looks.append(float(flip(truth, seen)[counted].sum()) / per_px)
         tiles.append(np.concatenate([truth, seen]))
-    judged = Judged(name, found.verdict, found.reasons, found.off, tuple(looks))
+    terms = () if found.torn is None else found.torn.terms
+    judged = Judged(name, found.verdict, found.reasons, found.off, tuple(looks), terms)
     return judged, encode_png((np.concatenate(tiles, axis=1) * 255 + 0.5).astype(np.uint8))
 
 

@@ -1,8 +1,11 @@
 """Measure what eyes see on a view between drawings, beside the drawings themselves.
 
-Nothing here needs the truth: a view that is as whole as the drawings beside it has about as long
-outlines and borders of paint as they have, no patches that neither of them shows, and the features
-that both show.
+Nothing here needs the truth: a view that is as whole as the drawings beside it has outlines and
+borders of paint that turn about as much as theirs, no patches that neither of them shows, and the
+features that both show. Whether they can be put together at all is told by painting the view from
+either of them alone: A and B, where both see the surface, in CIELAB and a little blurred,
+
+    apart = sum |A - B| / sum |view moved by a pixel - view| / height in pixels
 """
 
 from __future__ import annotations
@@ -14,9 +17,10 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.nerf.look.blend import GUESSED, MIRRORED, flanking
+from toonset.nerf.look.blend import GUESSED, MIRRORED, SOLID, Geometry, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.layers import Rendering
+from toonset.nerf.score.left_out import TALL_PX, by_pixel, difference
 from toonset.nerf.score.outline_turning import border_turning, outline_turning
 from toonset.nerf.score.patches import (
     Patches,
@@ -51,7 +55,8 @@ class BetweenView:
 
     Attributes:
         yaw: of the view, radians.
-        beside: numbers of the two drawings that it lies between; twice one that it lies beside.
+        beside: yaws of the two drawings that it lies between, radians; twice that of one that it
+            lies beside.
         outline: turns of its outlines.
         own_outline: of the two drawings', mean.
         borders: turns of its borders of paint.
@@ -59,12 +64,13 @@ class BetweenView:
         fragments: small patches that neither of the two drawings has.
         features: small patches that both have.
         whole: as many of them the view has.
+        apart: how far apart both paint the view, share of the figure's height; 0 of one drawing.
         mirrored: share of its pixels that only the mirror image of a drawing shows.
         guessed: share that no drawing shows.
     """
 
     yaw: float
-    beside: tuple[int, int]
+    beside: tuple[float, float]
     outline: float
     own_outline: float
     borders: float
@@ -72,6 +78,7 @@ class BetweenView:
     fragments: int
     features: int
     whole: int
+    apart: float
     mirrored: float
     guessed: float
 
@@ -125,7 +132,7 @@ class Between:
         drawn = view.drawn
         return BetweenView(
             view.camera.angles[0],
-            (first, second),
+            (cameras[first].angles[0], cameras[second].angles[0]),
             own.outline,
             (pair[0].outline + pair[1].outline) / 2,
             own.borders,
@@ -133,9 +140,42 @@ class Between:
             fragments(own.patches, [one.patches for one in pair]),
             len(common),
             matched(common, own.patches),
+            _apart(self._drawings, view, (first, second), self._tall_px),
             drawn.share(MIRRORED),
             drawn.share(GUESSED),
         )
+
+
+def _apart(drawings: Drawings, view: Rendering, beside: tuple[int, int], tall_px: float) -> float:
+    """Return how far apart two drawings paint a view, where both see it, over the height."""
+    if beside[0] == beside[1]:
+        return 0.0
+    geometry = Geometry(view.camera, view.alpha, view.depth, view.rgb, view.shares)
+    fitting = drawings.fitting(view.camera.scale)
+    seen = view.alpha >= SOLID
+    pictures = []
+    for number in beside:
+        found = blend_view(_alone(fitting, number), geometry)
+        seen &= (found.source != GUESSED) & (found.alpha >= SOLID)
+        pictures.append(found.paint)
+    half = TALL_PX / tall_px
+    first, second, whole = (_shrunk(one, half) for one in (*pictures, view.drawn.rgb))
+    both = _shrunk(seen.astype(np.float32), half) >= SOLID
+    moved = by_pixel(whole + 1 - _shrunk(view.drawn.alpha, half)[..., None])
+    return float((difference(first, second) * both).sum()) / max(moved, 1e-9) / TALL_PX
+
+
+def _alone(drawings: Drawings, number: int) -> Drawings:
+    """Return one of the drawings."""
+    for other in range(len(drawings.views) - 1, -1, -1):
+        drawings = drawings if other == number else drawings.without(other)
+    return drawings
+
+
+def _shrunk(values: np.ndarray, factor: float) -> np.ndarray:
+    size = tuple(max(1, round(side * factor)) for side in values.shape[1::-1])
+    how = cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(np.ascontiguousarray(values, np.float32), size, interpolation=how))
 
 
 def _resized(rgba: Picture, factor: float) -> Picture:

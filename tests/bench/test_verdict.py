@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import bench.verdict.__main__ as command
 from bench.verdict.curve import BAD, FINE, draw_curve, rank_correlation, table
+from bench.verdict.fit import character_of, fit_text, fitted
 from bench.verdict.measure import Judged, by_pixel
 from toonset.nerf.score.verdict import OK, WEAK
 
@@ -39,6 +40,26 @@ def test_ranks_agree_or_do_not() -> None:
     assert rank_correlation(rising) == pytest.approx(1)
     falling = [judged(str(i), OK, 0.001 * i, 0.001 / i) for i in range(1, 6)]
     assert rank_correlation(falling) == pytest.approx(-1)
+
+
+def test_weights_are_found_again_and_each_character_is_left_out() -> None:
+    rng = np.random.default_rng(0)
+    wanted = np.array([0.3, 0.0, 0.02, 0.01])
+    sheets = []
+    for number in range(12):
+        terms = rng.random(4)
+        look = float(terms @ wanted)
+        name = f"{'abcd'[number % 4] * 3}{number}-four"
+        sheets.append(Judged(name, OK, (), terms[0], (look, look), tuple(terms.tolist())))
+    found = fitted(sheets)
+    assert found is not None
+    np.testing.assert_allclose(found.weights, wanted, atol=1e-6)
+    assert found.rank == pytest.approx(1)
+    assert found.error == pytest.approx(0, abs=1e-6)
+    assert "off      0.3000" in fit_text(sheets)
+    assert fitted(sheets[:3]) is None
+    assert fit_text(sheets[:3]) == ""
+    assert character_of("aaa12-four-own") == character_of("aaa7-three") == "aaa"
 
 
 def test_a_move_by_a_pixel_is_told_by_what_is_drawn() -> None:

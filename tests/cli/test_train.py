@@ -82,11 +82,15 @@ def test_held_out_views_are_looked_at_and_reported(bundle: Path, toonset, tmp_pa
     shutil.copy(bundle / "transforms.json", bundle / "test")
     done = toonset("train", bundle, *FAST, "--json")
     assert done.code == 0
-    assert done.json["verdict"] | {"off_height": None} == {
+    assert done.json["verdict"] | {"off_height": None, "between": None} == {
         "verdict": "ok",
         "reasons": [],
         "off_height": None,
+        "between": None,
     }
+    between = done.json["verdict"]["between"]
+    assert between["torn"] <= between["bound"]
+    assert len(between["views"]) > 0
     assert done.json["test"]["psnr"] == pytest.approx(done.json["train"]["psnr"])
     assert "left" in done.err  # how long it will take
     flags = ("--json", "--no-palette", "--verbose")
