@@ -18,6 +18,16 @@ def view(
         Path,
         typer.Option("-o", "--out", help="Page to write: .html.", rich_help_panel=OUTPUT_PANEL),
     ] = Path("character.html"),
+    size: Annotated[
+        int | None,
+        typer.Option(
+            "--size",
+            min=8,
+            max=4096,
+            help="Side in px of the views' pictures (default: the figure is 400 px high).",
+            show_default=False,
+        ),
+    ] = None,
     force: ForceFlag = False,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
@@ -25,8 +35,9 @@ def view(
     """Write a page that anyone can open: the character turns and takes other colours.
 
     It is one file without anything from elsewhere, and works from the disk and offline. It shows
-    the drawn look, the field's layers, the drawings beside their renderings, and how sure every
-    camera is. A bundle that is not trained yet shows its drawings, cameras and mannequin.
+    what `toonset render` draws in steps of 5 degrees, the field's layers, the drawings beside their
+    renderings, and how sure every camera is. A bundle that is not trained yet shows its drawings,
+    cameras and mannequin.
     """
     printer = Printer(as_json, quiet)
     if out.suffix.lower() not in (".html", ".htm"):
@@ -38,8 +49,8 @@ def view(
 
     check_there([folder], "run or bundle", BundleError)
     check_new_file(out, force=force)
-    printer.progress("reading the field, drawing a turn")
-    data = view_html(folder).encode("utf-8")
+    printer.progress("drawing all views of the page")
+    data = view_html(folder, size).encode("utf-8")
     with new_files(out, force=force) as new:
         write_bytes(new / out.name, data)
     printer.result(

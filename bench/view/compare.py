@@ -12,24 +12,19 @@ import numpy as np
 from jaxtyping import UInt8
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from toonset.camera import Camera
 from toonset.errors import SetupError
-from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.render.depth_levels import LEVELS, DepthLevels
-from toonset.nerf.render.views import render
 from toonset.nerf.score.metrics import psnr_of
-from toonset.nerf.viewer.scene import camera_record
-from toonset.palette.pixels.labels import UNLABELLED
 from toonset.view import over_white
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 NO_BROWSER = "no browser to test the page in: apt-get install chromium"
 READ = """async shot => {
-  const { data } = await toonset.read(shot);
+  const canvas = await toonset.read(shot);
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
   let text = "";
   for (let i = 0; i < data.length; i += 1024)
     text += String.fromCharCode(...data.subarray(i, i + 1024));
-  return btoa(text);
+  return [btoa(text), canvas.width, canvas.height];
 }"""
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -51,28 +46,10 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
-def shown(page: Page, camera: Camera, layer: str, **more: Any) -> Picture:
-    """Return what the page draws; `more` are further entries of its shot."""
-    width, height = camera.size_wh
-    shot = {"camera": camera_record(camera), "layer": layer, **more}
-    data = np.frombuffer(b64decode(page.evaluate(READ, shot)), np.uint8)
-    return data.reshape(height, width, 4)
-
-
-def rendered(trained: TrainedField, camera: Camera, layer: str) -> Picture:
-    """Return what `render` draws; labels in the palette's colours, depth as grey of the hull."""
-    view = render(trained, camera)
-    if layer == "depth":
-        scale = DepthLevels.of(trained.hull, [camera])
-        near = 1 - (np.nan_to_num(view.depth) - scale.nearest) / (scale.unit * (LEVELS - 1))
-        grey = np.rint(255 * near).clip(0, 255)
-        return np.dstack([grey, grey, grey, 255 * np.isfinite(view.depth)]).astype(np.uint8)
-    picture = view.picture(layer)
-    if layer != "labels":
-        return picture
-    assert trained.palette is not None
-    there = picture != UNLABELLED
-    return np.dstack([trained.palette[np.where(there, picture, 0)], 255 * there]).astype(np.uint8)
+def shown(page: Page, sight: int, layer: str = "drawn", **more: Any) -> Picture:
+    """Return a view as the page shows it, in its own pixels; `more` are entries of its shot."""
+    data, width, height = page.evaluate(READ, {"sight": sight, "layer": layer, **more})
+    return np.frombuffer(b64decode(data), np.uint8).reshape(height, width, 4)
 
 
 def psnr(one: Picture, other: Picture) -> float:

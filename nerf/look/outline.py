@@ -17,6 +17,7 @@ from toonset.raster import depth_inside, nearest, sized_parts
 FINER, COARSER, LARGE_PX = 3, 2, 520.0  # samples per pixel and axis; of figures from this height on
 SMOOTH = 0.7 / 260  # sigma over the figure's height: what is finer in a field's opacity is noise
 CRUMB_PX = 30  # area of parts and holes that are noise, in a figure of CRUMB_AT px
+HOLE_PX = 80  # of holes in a field's outline: hulls of capes are torn
 CRUMB_AT = 260.0
 BAND_PX = 2.0  # beyond the outline, in which its soft side lies
 
@@ -67,11 +68,7 @@ def _rim_px(alpha: UInt8[np.ndarray, "height width"]) -> float:
 
 
 def crisp_outline(
-    alpha: Float[np.ndarray, "height width"],
-    border: float,
-    width_px: float,
-    figure_px: float,
-    hole_px: float = CRUMB_PX,
+    alpha: Float[np.ndarray, "height width"], border: float, width_px: float, figure_px: float
 ) -> tuple[Float[np.ndarray, "height width"], Float[np.ndarray, "height width"]]:
     """Return a crisp coverage, and how far a line along its inner side covers every pixel.
 
@@ -80,21 +77,65 @@ def crisp_outline(
         border: the coverage at the border.
         width_px: of the line; 0: none.
         figure_px: height of the figure.
-        hole_px: smaller holes are noise: area in a figure of CRUMB_AT px.
     """
-    height, width = alpha.shape
-    finer = FINER if figure_px < LARGE_PX else COARSER
-    size = (finer * width, finer * height)
+    finer = _finer(figure_px)
+    size = (finer * alpha.shape[1], finer * alpha.shape[0])
     fine = cv2.resize(alpha.astype(np.float32), size, interpolation=cv2.INTER_CUBIC)
     inside = cv2.GaussianBlur(fine, (0, 0), SMOOTH * figure_px * finer) >= border
-    samples = (figure_px / CRUMB_AT) ** 2 * finer**2
-    inside = without_crumbs(inside, CRUMB_PX * samples, hole_px * samples)
-    ink = np.zeros_like(alpha, dtype=np.float32)
+    return _drawn(inside, inside.astype(np.float32), width_px, figure_px, CRUMB_PX)
+
+
+def inked_outline(
+    inside_px: Float[np.ndarray, "height width"], width_px: float, figure_px: float
+) -> tuple[Float[np.ndarray, "height width"], Float[np.ndarray, "height width"]]:
+    """Return coverage and line as `crisp_outline` does, of an outline that is known exactly.
+
+    Args:
+        inside_px: how far within the outline pixels lie, < 0 beyond it.
+        width_px: of the line; 0: none.
+        figure_px: height of the figure.
+    """
+    finer = _finer(figure_px)
+    size = (finer * inside_px.shape[1], finer * inside_px.shape[0])
+    fine = finer * cv2.resize(inside_px, size, interpolation=cv2.INTER_CUBIC)
+    return _drawn(fine > 0, (fine + 0.5).clip(0, 1), width_px, figure_px, HOLE_PX)
+
+
+def without_noise(
+    alpha: Float[np.ndarray, "height width"], border: float, figure_px: float
+) -> Float[np.ndarray, "height width"]:
+    """Return a soft coverage with its border at a half, without crumbs and pinholes."""
+    solid = alpha >= border
+    noise = (figure_px / CRUMB_AT) ** 2
+    kept = without_crumbs(solid, CRUMB_PX * noise, HOLE_PX * noise)
+    low, high = 0.5 * alpha / border, 0.5 + 0.5 * (alpha - border) / (1 - border)
+    cover = np.where(solid, high, np.minimum(low, 0.499))
+    return np.where(kept == solid, cover, kept).astype(np.float32)
+
+
+def _finer(figure_px: float) -> int:
+    return FINER if figure_px < LARGE_PX else COARSER
+
+
+def _drawn(
+    solid: Bool[np.ndarray, "rows columns"],
+    cover: Float[np.ndarray, "rows columns"],
+    width_px: float,
+    figure_px: float,
+    hole_px: float,
+) -> tuple[Float[np.ndarray, "height width"], Float[np.ndarray, "height width"]]:
+    """Return coverage and line at a view's own pixels."""
+    finer = _finer(figure_px)
+    size = (solid.shape[1] // finer, solid.shape[0] // finer)
+    noise = (finer * figure_px / CRUMB_AT) ** 2
+    inside = without_crumbs(solid, CRUMB_PX * noise, hole_px * noise)
+    cover = np.where(inside == solid, cover, inside).astype(np.float32)
+    cover = cv2.resize(cover, size, interpolation=cv2.INTER_AREA)
+    ink = np.zeros_like(cover)
     if width_px > 0:
         depth = depth_inside(inside).astype(np.float32)
         line = np.clip(finer * width_px + 0.5 - depth, 0, 1) * inside
-        ink = cv2.resize(line, (width, height), interpolation=cv2.INTER_AREA)
-    cover = cv2.resize(inside.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
+        ink = cv2.resize(line, size, interpolation=cv2.INTER_AREA)
     return cover, np.minimum(ink, cover)
 
 

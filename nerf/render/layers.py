@@ -61,7 +61,7 @@ class Rendering:
         """
         if self.field.drawings is None:
             raise BundleError(NO_DRAWINGS)
-        view = Geometry(self.camera, self.alpha, self.depth, self.rgb, self.shares)
+        view = Geometry(self.camera, self.alpha, self.depth)
         return blend_view(self.field.drawings, view)
 
     def picture(self, layer: str | None = None) -> Layer:

@@ -42,7 +42,7 @@ def turntable(
     angles = turn_angles(drawn_ring(trained), count)
     if elevation is not None:
         angles[:, 1:] = (elevation, 0.0)
-    return _framed(trained, angles, size)
+    return framed(trained, angles, size)
 
 
 def between_drawings(
@@ -63,12 +63,12 @@ def between_drawings(
     _check(count, size)
     views = () if trained.drawings is None else trained.drawings.views
     ring = ring_of([view.as_drawn.camera for view in views])
-    return _framed(trained, angles_between(ring, count), size)
+    return framed(trained, angles_between(ring, count), size)
 
 
 def drawn_ring(trained: TrainedField) -> Angles:
     """Return yaw, elevation and roll of the drawings that a turn passes through, yaw rising."""
-    return ring_of([own.camera for own in _drawn(trained)])
+    return ring_of([own.camera for own in drawn_on_sheet(trained)])
 
 
 def filled_box(hull: Hull) -> tuple[np.ndarray, np.ndarray]:
@@ -84,14 +84,17 @@ def _check(count: int, size: int | None) -> None:
         raise UsageError(f"turntable: {count} views of {size} px; 1 or more of each are needed")
 
 
-def _drawn(trained: TrainedField) -> list[Original]:
+def drawn_on_sheet(trained: TrainedField) -> list[Original]:
     """Return the drawings as they are on the sheet; mirror images do not count."""
     views = () if trained.drawings is None else trained.drawings.views
     return [view.as_drawn for view in views if not view.mirrored]
 
 
-def _framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Camera, ...]:
-    """Return cameras at directions, with one scale and size that figure and drawings fit in."""
+def framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Camera, ...]:
+    """Return cameras at directions, with one scale and size that figure and drawings fit in.
+
+    See `turntable`; `angles` are yaw, elevation and roll, radians.
+    """
     low, high = filled_box(trained.hull)
     target = (low + high) / 2
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -103,7 +106,7 @@ def _framed(trained: TrainedField, angles: Angles, size: int | None) -> tuple[Ca
             for yaw, elevation, roll in angles
         )
 
-    drawn = _drawn(trained)
+    drawn = drawn_on_sheet(trained)
     around = [float(np.abs(c.project(corners)[0] - c.center).max()) for c in placed(1.0, 1)]
     reach = max([*around, *(_reach(own, target) for own in drawn)])
     if size is None and drawn:

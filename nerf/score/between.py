@@ -150,7 +150,7 @@ def _apart(drawings: Drawings, view: Rendering, beside: tuple[int, int], tall_px
     """Return how far apart two drawings paint a view, where both see it, over the height."""
     if beside[0] == beside[1]:
         return 0.0
-    geometry = Geometry(view.camera, view.alpha, view.depth, view.rgb, view.shares)
+    geometry = Geometry(view.camera, view.alpha, view.depth)
     fitting = drawings.fitting(view.camera.scale)
     seen = view.alpha >= SOLID
     pictures = []

@@ -93,7 +93,7 @@ def left_out(baked: Baked, seen: Scene, drawn: Scene) -> list[LeftOut]:
     def one(number: int) -> LeftOut:
         camera = small_camera(drawings, number)
         view = render(baked, camera)
-        shown = Geometry(camera, view.alpha, view.depth, view.rgb, view.shares)
+        shown = Geometry(camera, view.alpha, view.depth)
         return predicted(drawings, number, shown, frames[number], names, field=field)
 
     return side_by_side([partial(one, i) for i in range(len(frames))])

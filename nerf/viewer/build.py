@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import UInt8
-from PIL import Image
 from skimage.measure import marching_cubes
 
 from toonset.camera import Camera
@@ -26,140 +25,189 @@ from toonset.json_file import read_json
 from toonset.mesh import Mesh
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import LEVEL, carve
-from toonset.nerf.render.layers import default_layer
-from toonset.nerf.render.turn_angles import ring_of, turn_angles
-from toonset.nerf.render.turntable import FILL, turntable
+from toonset.nerf.kernels.threads import working_threads
+from toonset.nerf.look.drawings import Original
+from toonset.nerf.render.turntable import FILL, drawn_on_sheet, filled_box, framed
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field
 from toonset.nerf.viewer.page import page_html
-from toonset.nerf.viewer.scene import (
-    Blob,
-    camera_record,
-    drawings_record,
-    field_record,
-    plain_drawings_record,
-)
+from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
+from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding, webp
+from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of
 from toonset.palette.names import name_of
 from toonset.palette.palette import Palette
 
-FRAMES, FRAME_PX, QUALITY = 16, 280, 80  # of a turn: its pictures stand where the page cannot draw
-LAYERS = ("drawn", "rgb", "palette", "normal", "depth", "labels")
+FIGURE_PX = 400  # height of the figure, unless told otherwise
 HULL_VOXELS = 72  # along the longest side of a bundle's hull
 METRICS = "metrics.json"
+TRIAL_PX = 1000  # of pictures that the figure is measured in
+
+Record = dict[str, Any]
+Picture = UInt8[np.ndarray, "height width 4"]
 
 
-def view_html(folder: Path) -> str:
+@dataclass(frozen=True, eq=False)
+class SheetDrawings:
+    """The drawings of a sheet.
+
+    Attributes:
+        cameras: of each.
+        pictures: of each, straight alpha.
+        calibrated: what calibration said of each, None where it does not tell.
+    """
+
+    cameras: list[Camera]
+    pictures: list[Picture]
+    calibrated: list[ViewRecord | None]
+
+    @classmethod
+    def of(cls, drawings: Sequence[Original], folder: Path) -> SheetDrawings:
+        """Return drawings with what the calibration of a folder says of them."""
+        file = member(folder, CALIBRATION)
+        views: list[ViewRecord | None] = list(read_calibration(file).views) if file else []
+        said = views if len(views) == len(drawings) else []
+        said = said or [None for _ in drawings]
+        return cls([d.camera for d in drawings], [d.rgba for d in drawings], said)
+
+
+def view_html(folder: Path, size: int | None = None) -> str:
     """Return the page of a run folder, or of a bundle.
 
     A bundle that holds a run shows that; one that is not trained yet shows its drawings, its
     cameras and its mannequin, or the hull of its drawings.
 
+    Args:
+        folder: of the run or bundle.
+        size: side of the views' pictures, px; None: the figure is FIGURE_PX high.
+
     Raises:
-        ToonsetError: a file is missing or damaged, or the run's field has no planes.
+        ToonsetError: a file is missing or damaged.
     """
-    own_run = folder / "run"
-    if (folder / CONFIG).is_file():
-        return _run_html(folder)
-    if (own_run / CONFIG).is_file():
-        return _run_html(own_run)
-    return _bundle_html(read_bundle(folder))
+    runs = [place for place in (folder, folder / "run") if (place / CONFIG).is_file()]
+    with working_threads():
+        return _run_html(runs[0], size) if runs else _bundle_html(read_bundle(folder), size)
 
 
-def _run_html(run: Path) -> str:
+def _run_html(run: Path, size: int | None) -> str:
     trained = read_field(run)
     beside = run.resolve().parent
     in_bundle = (beside / CALIBRATION).is_file()
     palette = read_palette_of(beside) if in_bundle else None
-    title = beside.name if in_bundle else run.resolve().name
-    drawings = trained.drawings
-    cameras = [] if drawings is None else [view.camera for view in drawings.views]
     metrics = run / METRICS
     verdict = read_json(metrics).get("verdict") if metrics.is_file() else None
     about = {
+        "title": beside.name if in_bundle else run.resolve().name,
         "verdict": verdict and {"state": verdict["verdict"], "reasons": verdict["reasons"]},
         "palette": _paints(trained.palette, palette),
-        "views": _views(cameras, _calibrated(beside, len(cameras))),
     }
-    scene, blob = run_scene(trained, title, about)
-    return page_html(scene, blob, turn_pictures(trained))
+    return run_page(trained, about, SheetDrawings.of(drawn_on_sheet(trained), beside), size)
 
 
-def run_scene(
-    trained: TrainedField, title: str, about: dict[str, Any]
-) -> tuple[dict[str, Any], bytes]:
-    """Return a run's numbers, and its arrays deflated.
+def run_page(
+    trained: TrainedField,
+    about: Record,
+    sheet: SheetDrawings,
+    size: int | None = None,
+    views: int = VIEWS,
+) -> str:
+    """Return the page of a trained field.
 
     Args:
-        trained: the run's field.
-        title: of the page.
-        about: further entries: verdict, palette, views.
-
-    Raises:
-        BundleError: its field has no planes.
+        trained: the field.
+        about: title, verdict and palette: see `page/types.js`.
+        sheet: its drawings as they are on the sheet.
+        size: see `view_html`.
+        views: of a ring.
     """
-    blob = Blob()
-    turn = turntable(trained, FRAMES, size=FRAME_PX)
-    drawings = trained.drawings
-    pen = None if drawings is None else drawings.pen
-    missing = set() if drawings is not None else {"drawn"}
-    missing |= set() if trained.palette is not None else {"palette", "labels"}
-    layers = [layer for layer in LAYERS if layer not in missing]
-    layers.sort(key=lambda layer: layer != default_layer(trained))
+    ring = ring_through(sheet.cameras, views)
+    cameras = cameras_of(trained, ring, size)
+    layers, drawings = layers_of(trained), trained.drawings
     scene = {
-        "schema": "toonset-view/1",
-        "title": title,
-        "layers": layers,
-        "figure": {
-            "target": turn[0].target.tolist(),
-            "reach": FILL * FRAME_PX / 2 / turn[0].scale,
-            "fill": FILL,
-            "k": turn[0].k,
-            "turn": [list(camera.angles) for camera in turn],
-        },
-        "pen": pen and {"rgb": list(pen.rgb), "width_px": pen.width_px},
         **about,
-        "field": field_record(trained, blob),
-        "drawings": None if drawings is None else drawings_record(drawings, blob),
+        "layers": layers,
+        "pen": drawings and drawings.pen and {"rgb": list(drawings.pen.rgb)},
+        "paints": [] if drawings is None else drawings.paints.tolist(),
     }
-    return scene, blob.deflated()
+    poster = render(trained, cameras[ring.start]).picture(layers[0])
+    return _page(scene, ring, cameras, figure_sights(trained, cameras, ring.layered), sheet, poster)
 
 
-def turn_pictures(trained: TrainedField) -> list[bytes]:
-    """Return WebP pictures of a whole turn in the run's own look."""
-    layer = default_layer(trained)
-    cameras = turntable(trained, FRAMES, size=FRAME_PX)
-    return [_webp(render(trained, camera).picture(layer)) for camera in cameras]
+def cameras_of(trained: TrainedField, ring: Ring, size: int | None = None) -> tuple[Camera, ...]:
+    """Return the cameras of a figure's ring, as `toonset render --size` has them."""
+    if size is None:
+        low, high = filled_box(trained.hull)
+        size = _side(float(high[1] - low[1]) * framed(trained, ring.angles, TRIAL_PX)[0].scale)
+    return framed(trained, ring.angles, size)
 
 
-def _bundle_html(bundle: Bundle) -> str:
+def _bundle_html(bundle: Bundle, size: int | None) -> str:
     frames = [frame for frame in bundle.scene.frames if has_figure(frame)]
     if not frames:
         raise BundleError(f"{bundle.folder}: no picture shows a figure; there is nothing to view")
-    cameras = [frame.camera for frame in frames]
-    pictures = [frame.rgba for frame in frames]
-    mesh = bundle.mannequin or _hull_mesh(cameras, [alpha_of(frame) for frame in frames])
-    blob = Blob()
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    sheet = SheetDrawings.of([Original(one.camera, one.rgba) for one in frames], bundle.folder)
+    mesh = bundle.mannequin or _hull_mesh(sheet.cameras, [alpha_of(frame) for frame in frames])
+    ring = ring_through(sheet.cameras)
+    low, high = mesh.bounds
     middle = (low + high) / 2
-    scene = {
-        "schema": "toonset-view/1",
+    reach = float(np.linalg.norm(mesh.vertices - middle, axis=1).max())
+    k = float(np.median([camera.k for camera in sheet.cameras]))
+    side = size or _side(FILL * TRIAL_PX / 2 / reach * float(high[1] - low[1]))
+    scale = FILL * side / 2 / reach
+    cameras = [
+        Camera.looking_at(middle, yaw, elevation, scale, (side, side), roll, k=k)
+        for yaw, elevation, roll in ring.angles.tolist()
+    ]
+    scene: Record = {
         "title": bundle.folder.resolve().name,
-        "layers": ["mannequin"],
-        "figure": {
-            "target": middle.tolist(),
-            "reach": float(np.linalg.norm(mesh.vertices - middle, axis=1).max()),
-            "fill": FILL,
-            "k": float(np.median([camera.k for camera in cameras])),
-            "turn": turn_angles(ring_of(cameras), 1).tolist(),
-        },
-        "pen": None,
         "verdict": None,
         "palette": [],
-        "views": _views(cameras, _calibrated(bundle.folder, len(cameras))),
-        "field": None,
-        "drawings": plain_drawings_record(cameras, pictures, mesh, blob),
+        "paints": [],
+        "layers": ["mannequin"],
+        "pen": None,
     }
-    return page_html(scene, blob.deflated(), [_webp(pictures[0])])
+    poster = body_picture(mesh, cameras[ring.start])
+    return _page(scene, ring, cameras, body_sights(mesh, cameras), sheet, poster)
+
+
+def _side(trial_px: float) -> int:
+    """Return the side of pictures in which a figure so high in trial ones is FIGURE_PX high."""
+    return max(1, round(TRIAL_PX * FIGURE_PX / max(trial_px, 1.0)))
+
+
+def _page(
+    scene: Record,
+    ring: Ring,
+    cameras: Sequence[Camera],
+    sights: Sequence[Record],
+    sheet: SheetDrawings,
+    poster: Picture,
+) -> str:
+    blob, first = Blob(), cameras[0]
+    whole = {
+        "schema": "toonset-view/2",
+        **scene,
+        "coding": coding(),
+        "figure": {
+            "target": first.target.tolist(),
+            "reach": FILL * first.size_wh[0] / 2 / first.scale,
+            "fill": FILL,
+            "k": first.k,
+            "size": first.size_wh[0],
+            "elevations": ring.elevations,
+            "start": ring.start,
+        },
+        "sights": [
+            {"angles": list(angles), "level": level, "layers": blob.keep(layers)}
+            for angles, level, layers in zip(ring.angles.tolist(), ring.level, sights, strict=True)
+        ],
+        "views": [
+            {**_view(i, camera, said), "sight": own, "picture": blob.keep(webp(picture))}
+            for i, (camera, said, own, picture) in enumerate(
+                zip(sheet.cameras, sheet.calibrated, ring.own, sheet.pictures, strict=True)
+            )
+        ],
+    }
+    return page_html(whole, blob.deflated(), webp(poster, **SMALL))
 
 
 def _hull_mesh(cameras: Sequence[Camera], alphas: Sequence[np.ndarray]) -> Mesh:
@@ -174,9 +222,7 @@ def _hull_mesh(cameras: Sequence[Camera], alphas: Sequence[np.ndarray]) -> Mesh:
     )
 
 
-def _paints(
-    colors: UInt8[np.ndarray, "colors 3"] | None, palette: Palette | None
-) -> list[dict[str, Any]]:
+def _paints(colors: UInt8[np.ndarray, "colors 3"] | None, palette: Palette | None) -> list[Record]:
     """Return the colours of a run with the names and shares that a bundle gives them."""
     if colors is None:
         return []
@@ -190,36 +236,15 @@ def _paints(
     return found
 
 
-def _calibrated(folder: Path, count: int) -> list[ViewRecord | None]:
-    """Return what calibration said of every drawing, None where it does not tell."""
-    file = member(folder, CALIBRATION)
-    views = read_calibration(file).views if file else []
-    return list(views) if len(views) == count else [None] * count
-
-
-def _views(
-    cameras: Sequence[Camera], calibrated: Sequence[ViewRecord | None]
-) -> list[dict[str, Any]]:
-    found = []
-    for number, (camera, said) in enumerate(zip(cameras, calibrated, strict=True)):
-        yaw, elevation, _ = (math.degrees(angle) for angle in camera.angles)
-        sigma = said and {"yaw": said.sigma.yaw_deg, "elevation": said.sigma.elevation_deg}
-        found.append(
-            {
-                "name": f"{number:03d}.png" if said is None else said.name,
-                "verdict": "" if said is None else said.verdict,
-                "reason": "" if said is None else said.reason,
-                "yaw": yaw,
-                "elevation": elevation,
-                "sigma": sigma,
-                "camera": camera_record(camera),
-                "drawing": number,
-            }
-        )
-    return found
-
-
-def _webp(picture: UInt8[np.ndarray, "height width 4"]) -> bytes:
-    file = io.BytesIO()
-    Image.fromarray(picture).save(file, "WEBP", quality=QUALITY, method=6)
-    return file.getvalue()
+def _view(number: int, camera: Camera, said: ViewRecord | None) -> Record:
+    yaw, elevation, _ = (math.degrees(angle) for angle in camera.angles)
+    sigma = said and {"yaw": said.sigma.yaw_deg, "elevation": said.sigma.elevation_deg}
+    return {
+        "name": f"{number:03d}.png" if said is None else said.name,
+        "verdict": "" if said is None else said.verdict,
+        "reason": "" if said is None else said.reason,
+        "yaw": yaw,
+        "elevation": elevation,
+        "sigma": sigma,
+        "camera": camera_record(camera),
+    }

@@ -1,69 +1,45 @@
-"""Pack a run for the page: numbers as JSON, and all arrays in one deflated blob.
-
-The field itself goes along, planes and decoder: it is the smallest form that it has, and a page
-reads it once, at the hull's voxels, as `toonset.nerf.render.baked` does.
-"""
+"""Pack pictures of a figure for the page: numbers as JSON, and all else in one deflated blob."""
 
 from __future__ import annotations
 
+import io
 import zlib
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
+import cv2
 import numpy as np
-import torch
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import UInt8
+from PIL import Image
 
 from toonset.camera import Camera
-from toonset.errors import BundleError
-from toonset.mesh import Mesh
-from toonset.nerf.fields.base import DENSITY_SHIFT
-from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.fields.triplane import PLANES, TriplaneField
-from toonset.nerf.look.blend import (
-    BORDER,
-    FEATHER,
-    FIELD_VOTE,
-    HOLE_PX,
-    LEAD,
-    OWN,
-    OWN_VOTE,
-    SHARP,
-    SIDE,
-    SIDE_VOTE,
-    SLIVER,
-)
-from toonset.nerf.look.drawings import STEP, Drawings, Texture, levels_of
-from toonset.nerf.look.outline import CRUMB_AT, CRUMB_PX
-from toonset.nerf.look.paint_flow import NEIGHBOURS
-from toonset.nerf.look.shade import SOFT
-from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.views import baked_of
-from toonset.nerf.run.tensors import rows_near
-from toonset.nerf.viewer.volume import BLOCK, packed_hull
-from toonset.view import premultiply
+from toonset.nerf.viewer.layered import LEVELS, MOVES, PARTS, Layered
 
-CHANNELS = 4  # of a texel
-EDGE_STEPS = 5.0  # per pixel: how finely distances to an edge are kept
-EFFORT = 9
-MOST_PAINTS = 32  # that the page can tell apart: its shaders' arrays, page/field_layers.js
+EFFORT = 7  # 9 takes five times as long for 2 %
+QUALITY = 80  # of WebP pictures
+SMALL = {"quality": 60, "alpha_quality": 50}  # of further layers: 60 % of the bytes for 2 dB
+REST_STEP = 2  # levels of 255: how it is kept, since it may be as far off either way
+MIDDLE = 128
+
+Picture = UInt8[np.ndarray, "height width 4"]
 
 
 @dataclass(eq=False)
 class Blob:
-    """Arrays one after the other, each from a multiple of four bytes on."""
+    """Bytes of many parts one after the other."""
 
     parts: list[bytes] = field(default_factory=list)
     size: int = 0
 
-    def add(self, values: np.ndarray) -> dict[str, Any]:
-        """Append an array; return where it lies."""
-        data = np.ascontiguousarray(values).tobytes()
-        record = {"at": self.size, "type": values.dtype.name, "shape": list(values.shape)}
-        self.parts += [data, b"\0" * (-len(data) % 4)]
-        self.size += len(data) + len(self.parts[-1])
-        return record
+    def keep(self, record: Any) -> Any:
+        """Return a record with the bytes in it put here: where they begin, how many they are."""
+        if isinstance(record, dict):
+            return {name: self.keep(value) for name, value in record.items()}
+        if not isinstance(record, bytes):
+            return record
+        self.parts.append(record)
+        self.size += len(record)
+        return [self.size - len(record), len(record)]
 
     def deflated(self) -> bytes:
         """Return everything, as `DecompressionStream("deflate")` reads it."""
@@ -83,195 +59,83 @@ def camera_record(camera: Camera) -> dict[str, Any]:
     }
 
 
-def field_record(trained: TrainedField, blob: Blob) -> dict[str, Any]:
-    """Return a trained field.
+def coding() -> dict[str, Any]:
+    """Return what the page needs to read `layered_record`."""
+    return {
+        "levels": LEVELS,
+        "parts": PARTS,
+        "moves": MOVES.tolist(),
+        "step": REST_STEP,
+        "middle": MIDDLE,
+    }
 
-    Raises:
-        BundleError: it has more colours than a page can show.
+
+def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | None:
+    """Return a view's layers: see `page/compose.js`, which puts them together.
+
+    `maps` holds, for every pixel row after row, first the paint and then what is to be read of it
+    (alpha 1 whole, 2 soft; 4 ink, 8 soft ink; 16 a mixture; 32 moves otherwise than its paint);
+    then the soft alphas, soft inks, second paints, their parts and the moves of the pixels that
+    have any.
     """
-    triplane = trained.field
-    assert isinstance(triplane, TriplaneField)
-    drawn = () if trained.drawings is None else trained.drawings.paints
-    count = max(len(drawn), 0 if trained.palette is None else len(trained.palette))
-    if count > MOST_PAINTS:
-        raise BundleError(
-            f"run: has {count} colours, a page shows {MOST_PAINTS} at most; take fewer with "
-            "`toonset palette --max-colors` or --colors, and train again"
-        )
-    baked: Baked = baked_of(trained)
-    hull = packed_hull(trained)
-    texels, low, step = _planes(triplane, rows_near(triplane, trained.hull).numpy())
+    if view is None:
+        return None
+    there = view.alpha > 0
+    soft = there & (view.alpha < LEVELS)
+    inked = there & (view.ink == LEVELS)
+    lined = there & (view.ink > 0) & ~inked
+    mixed = there & (view.part > 0)
+    other = there & (view.moved > 0)
+    flags = (there & ~soft) + 2 * soft + 4 * inked + 8 * lined + 16 * mixed + 32 * other
+    planes = [view.first, flags.astype(np.uint8)]
+    lists = [
+        *(view.alpha[soft], view.ink[lined], view.second[mixed], view.part[mixed]),
+        view.moved[other],
+    ]
+    height, width = view.alpha.shape
+    rest = np.rint(view.rest / REST_STEP + MIDDLE).clip(0, 255).astype(np.uint8)
     return {
-        "low": triplane.low.tolist(),
-        "cell": triplane.cell,
-        "shape": list(triplane.shape),
-        "planes": {"texels": blob.add(texels), "axes": PLANES, "low": low, "step": step},
-        "hidden": _weights(triplane.hidden),
-        "out": _weights(triplane.out),
-        "densityShift": DENSITY_SHIFT,
-        "stepsPerCell": trained.step / triplane.cell,
-        "hull": {
-            "low": hull.low.tolist(),
-            "voxel": trained.hull.voxel,
-            "box": hull.box.tolist(),
-            "support": blob.add(hull.support),
-            "safe_steps": blob.add(hull.safe_steps),
-            "block": BLOCK,
-        },
-        "step": trained.step,
-        "table": None if baked.labels is None else blob.add(baked.labels.numpy()),
-        "paints": baked.paints.nan_to_num(-1.0).tolist(),
+        "box": [shrink * side for side in (*view.corner, width, height)],
+        "size": [width, height],
+        "maps": b"".join(part.tobytes() for part in (*planes, *lists)),
+        "rest": webp(rest) if view.rest.any() else None,
     }
 
 
-def _planes(
-    triplane: TriplaneField, used: np.ndarray
-) -> tuple[UInt8[np.ndarray, "layers height width 4"], list[list[float]], list[list[float]]]:
-    """Return the planes as layers of a texture, four channels each, padded to one size."""
-    images = [image.detach().numpy() for image in triplane.plane_images()]
-    height, width = (max(image.shape[axis] for image in images) for axis in (0, 1))
-    masks = np.split(used, np.cumsum([image.shape[0] * image.shape[1] for image in images])[:-1])
-    layers, lows, steps = [], [], []
-    for image, mask in zip(images, masks, strict=True):
-        tiles, low, step = _packed(image, mask.reshape(image.shape[:2]))
-        room = [(0, 0), (0, height - image.shape[0]), (0, width - image.shape[1]), (0, 0)]
-        layers.append(np.pad(tiles, room, mode="edge"))
-        lows.append(low)
-        steps.append(step)
-    return np.concatenate(layers), lows, steps
+def picture_record(picture: Picture, shrink: int = 1) -> dict[str, Any] | None:
+    """Return a picture, cut to what it shows; None where that is nothing."""
+    rows, columns = (np.flatnonzero(picture[..., 3].any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return None
+    top, left = (int(side[0]) // shrink * shrink for side in (rows, columns))
+    height, width = (
+        -(-(int(side[-1]) + 1 - start) // shrink) for side, start in ((rows, top), (columns, left))
+    )
+    part = picture[top : top + height * shrink, left : left + width * shrink]
+    room = [(0, height * shrink - part.shape[0]), (0, width * shrink - part.shape[1]), (0, 0)]
+    part = np.pad(part, room)
+    if shrink > 1:
+        part = _smaller(part, (width, height))
+    box = [left, top, width * shrink, height * shrink]
+    return {"box": box, "picture": webp(part, **(SMALL if shrink > 1 else {}))}
 
 
-def _packed(
-    values: Float[np.ndarray, "height width channels"], used: Bool[np.ndarray, "height width"]
-) -> tuple[UInt8[np.ndarray, "layers height width 4"], list[float], list[float]]:
-    """Return a plane's features as bytes, and low and step of every channel.
-
-    feature = low + step * byte. Texels that are never read (not `used`) are low everywhere.
-    """
-    height, width, channels = values.shape
-    chosen = values[used] if used.any() else values.reshape(-1, channels)
-    low = chosen.min(axis=0)
-    step = np.maximum(chosen.max(axis=0) - low, 1e-12) / 255
-    codes = np.where(used[..., None], ((values - low) / step + 0.5).clip(0, 255), 0)
-    padded = np.pad(codes.astype(np.uint8), ((0, 0), (0, 0), (0, -channels % CHANNELS)))
-    tiles = padded.reshape(height, width, -1, CHANNELS).transpose(2, 0, 1, 3)
-    return tiles, low.tolist(), step.tolist()
+def webp(
+    picture: UInt8[np.ndarray, "height width _"], quality: int = QUALITY, alpha_quality: int = 100
+) -> bytes:
+    """Return a WebP file."""
+    file = io.BytesIO()
+    Image.fromarray(picture).save(
+        file, "WEBP", quality=quality, alpha_quality=alpha_quality, method=4
+    )
+    return file.getvalue()
 
 
-def _weights(layer: torch.nn.Linear) -> dict[str, Any]:
-    """Return a layer's weights and biases, six digits each."""
-    digits = np.vectorize(lambda value: float(f"{value:.6g}"))
-    weight, bias = layer.weight.detach().double().numpy(), layer.bias.detach().double().numpy()
-    return {"weight": digits(weight).tolist(), "bias": digits(bias).tolist()}
-
-
-def drawings_record(drawings: Drawings, blob: Blob) -> dict[str, Any]:
-    """Return the page's record of the drawn look."""
-    textures = drawings.textures
-    paint, whole, about = _atlases(drawings, textures)
-    shape = drawings.shape
-    pen, outline = (line and asdict(line) for line in (drawings.pen, drawings.outline))
-    return {
-        "cameras": [camera_record(texture.camera) for texture in textures],
-        "paint": blob.add(paint),
-        "whole": blob.add(whole),
-        "about": blob.add(about),
-        "edgeSteps": EDGE_STEPS,
-        "depths": list(drawings.depths),
-        "height": drawings.height,
-        "paints": drawings.paints.tolist(),
-        "pen": pen,
-        "outline": outline,
-        "bent": drawings.bent,
-        "flows": [
-            {
-                "pair": list(flow.pair),
-                "camera": camera_record(flow.camera),
-                "flow": blob.add(flow.flow.astype(np.float16)),
-            }
-            for flow in drawings.flows
-        ],
-        "shape": shape and _surface(shape.vertices, shape.faces, shape.beyond, blob),
-        "steps": drawings.steps and asdict(drawings.steps),
-        "shade": drawings.shade and asdict(drawings.shade),
-        "shadow": drawings.painted_shadow and list(drawings.painted_shadow.factor),
-        "slack": STEP,
-        "crumb": {"area": CRUMB_PX, "hole": HOLE_PX, "height": CRUMB_AT},
-        "border": BORDER,
-        "sliver": SLIVER,
-        "fieldVote": FIELD_VOTE,
-        "sideVote": SIDE_VOTE,
-        "ownVote": OWN_VOTE,
-        "lead": LEAD if drawings.apart else 0.0,
-        "sharp": SHARP if drawings.apart else 1,
-        "featherPx": FEATHER * drawings.height * max(view.camera.scale for view in drawings.views),
-        "softNormals": SOFT,
-        "own": OWN,
-        "side": SIDE,
-        "neighbours": NEIGHBOURS,
-    }
-
-
-def plain_drawings_record(
-    cameras: Sequence[Camera],
-    pictures: Sequence[UInt8[np.ndarray, "_ _ 4"]],
-    mesh: Mesh,
-    blob: Blob,
-) -> dict[str, Any]:
-    """Return drawings and a body beside them, before anything is trained."""
-    sizes = [picture.shape[:2] for picture in pictures]
-    whole = [_bytes(premultiply(picture) / 255) for picture in pictures]
-    return {
-        "cameras": [camera_record(camera) for camera in cameras],
-        "whole": blob.add(np.stack([_padded(one, _largest(sizes), "constant") for one in whole])),
-        "shape": _surface(mesh.vertices, mesh.faces, 0.0, blob),
-        "steps": None,
-        "shade": None,
-    }
-
-
-def _surface(
-    vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"], beyond: float, blob: Blob
-) -> dict[str, Any]:
-    return {
-        "vertices": blob.add(vertices.astype(np.float32)),
-        "faces": blob.add(faces.astype(np.uint32)),
-        "beyond": beyond,
-    }
-
-
-def _largest(sizes: Sequence[tuple[int, ...]]) -> tuple[int, int]:
-    return max(size[0] for size in sizes), max(size[1] for size in sizes)
-
-
-def _padded(
-    layer: UInt8[np.ndarray, "h w 4"], size: tuple[int, int], mode: Any
-) -> UInt8[np.ndarray, "height width 4"]:
-    room = [(0, size[0] - layer.shape[0]), (0, size[1] - layer.shape[1]), (0, 0)]
-    return np.pad(layer, room, mode=mode)
-
-
-def _atlases(
-    drawings: Drawings, textures: tuple[Texture, ...]
-) -> tuple[
-    UInt8[np.ndarray, "n h w 4"], UInt8[np.ndarray, "n h w 4"], UInt8[np.ndarray, "n h w 4"]
-]:
-    """Return, a layer per drawing: paint and label; the drawing itself; depth and edges.
-
-    Depth is that of `Texture.far`, in levels of `Drawing`; then pixels to the nearest edge, times
-    EDGE_STEPS; then coverage.
-    """
-    size = _largest([texture.labels.shape for texture in textures])
-    paint, whole, about = [], [], []
-    for texture in textures:
-        paint.append(_padded(np.dstack([_bytes(texture.paint), texture.labels]), size, "edge"))
-        whole.append(_padded(_bytes(texture.whole), size, "constant"))
-        far = np.where(np.isfinite(texture.far), texture.far, np.nan)
-        edge = np.rint(texture.to_edge * EDGE_STEPS).clip(0, 255).astype(np.uint8)
-        layers = [levels_of(far, drawings.depths), edge, _bytes(texture.whole[..., 3])]
-        about.append(_padded(np.dstack([*layers, np.zeros_like(edge)]), size, "constant"))
-    return np.stack(paint), np.stack(whole), np.stack(about)
-
-
-def _bytes(values: Float[np.ndarray, "*shape"]) -> UInt8[np.ndarray, "*shape"]:
-    return (values * 255 + 0.5).clip(0, 255).astype(np.uint8)
+def _smaller(picture: Picture, size_wh: tuple[int, int]) -> Picture:
+    """Return a picture in fewer pixels; transparent ones lend no colour."""
+    alpha = picture[..., 3:].astype(np.float32)
+    both = cv2.resize(
+        np.dstack([picture[..., :3] * alpha, alpha]), size_wh, interpolation=cv2.INTER_AREA
+    )
+    both[..., :3] /= np.maximum(both[..., 3:], 1e-3)
+    return np.rint(both).clip(0, 255).astype(np.uint8)

@@ -88,11 +88,16 @@ def _shifted(
     color: Colors, cover: Float[np.ndarray, "n 3"], change: Float[np.ndarray, "n 3"]
 ) -> Colors:
     """Return colours after what covers them has changed: see the module's equation."""
+    moved = color + share_moved(color, cover)[:, None] * change
+    return np.rint(moved).clip(0, 255).astype(np.uint8)
+
+
+def share_moved(color: Colors, cover: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+    """Return how far colours move with what covers them: k s of the module's equation."""
     floor = 255 * FLOOR  # black has no shades
     own, whole = color + floor, cover + floor
     shade = (own * whole).sum(axis=1) / np.square(whole).sum(axis=1)
-    shade = shade.clip(0, BRIGHTEST)[:, None]
-    like = np.rint((shade * whole - floor).clip(0, 255)).astype(np.uint8)
+    shade = shade.clip(0, BRIGHTEST)
+    like = np.rint((shade[:, None] * whole - floor).clip(0, 255)).astype(np.uint8)
     off = np.linalg.norm(oklab_from_rgb(color) - oklab_from_rgb(like), axis=1)
-    kept = (2 - off / SHADE).clip(0, 1)[:, None]
-    return np.rint(color + kept * shade * change).clip(0, 255).astype(np.uint8)
+    return np.asarray((2 - off / SHADE).clip(0, 1) * shade)

@@ -1,4 +1,4 @@
-// Still PNG pictures to one animation, where a browser writes no WebP.
+// Still PNG pictures to one animation.
 // Source: W3C, "Portable Network Graphics (PNG) Specification (Third Edition)", 11.3.6.
 
 const PNG_SIGNATURE = 8; // bytes

@@ -22,17 +22,16 @@ export function rotationFromAngles(yaw, elevation, roll = 0) {
 /**
  * The camera of a square turntable picture that shows all of the figure at zoom 1.
  * @param {{target: number[], reach: number, fill: number, k: number}} figure
- * @param {number} yaw radians
- * @param {number} elevation radians
+ * @param {number[]} angles yaw, elevation and roll, radians
  * @param {number[]} size width and height, pixels
  * @param {number} [zoom]
  * @param {number[]} [pan] how far the figure is moved, of the picture's shorter side
  * @returns {Camera}
  */
-export function turntableCamera(figure, yaw, elevation, size, zoom = 1, pan = [0, 0]) {
+export function turntableCamera(figure, [yaw, elevation, roll], size, zoom = 1, pan = [0, 0]) {
   const side = Math.min(size[0], size[1]);
   return {
-    rotation: rotationFromAngles(yaw, elevation),
+    rotation: rotationFromAngles(yaw, elevation, roll),
     target: figure.target,
     scale: (zoom * figure.fill * side) / 2 / figure.reach,
     center: [size[0] / 2 + pan[0] * side, size[1] / 2 + pan[1] * side],
@@ -71,14 +70,4 @@ export function resized(camera, factor) {
     center: camera.center.map((v) => v * factor),
     size: camera.size.map((v) => Math.max(1, Math.round(v * factor))),
   };
-}
-
-/**
- * @param {Camera} a
- * @param {Camera} b
- * @returns {number} radians between what they look along
- */
-export function angleBetween(a, b) {
-  const dot = [6, 7, 8].reduce((sum, i) => sum + a.rotation[i] * b.rotation[i], 0);
-  return Math.acos(Math.min(1, Math.max(-1, dot)));
 }

@@ -35,7 +35,7 @@ export function createCompare(scene, store, pictures) {
   const [stage, tools] = [part("stage", HTMLElement), part("compare", HTMLElement)];
   const overlay = part("overlay", HTMLCanvasElement);
   const [split, onion] = [part("split", HTMLElement), part("onion", HTMLInputElement)];
-  const under = [part("view", HTMLElement), part("pictures", HTMLElement)];
+  const under = [part("view", HTMLElement), part("poster", HTMLElement)];
   const group = radioGroup("comparison", COMPARISON_NAMES, (value) =>
     store.set({ comparison: /** @type {Comparison} */ (value) }),
   );

@@ -1,7 +1,7 @@
-// The camera that the stage shows: on the turntable, or a drawing's own.
+// The camera that the stage shows: of the nearest view on the turntable, or a drawing's own.
 
-import { turntableCamera } from "./camera.js";
-import { FARTHEST, STEEPEST, ZOOMS, clamp } from "./state.js";
+import { project, turntableCamera } from "./camera.js";
+import { FARTHEST, ZOOMS, clamp } from "./state.js";
 
 /** @typedef {import("./types.js").Camera} Camera */
 /** @typedef {import("./types.js").Scene} Scene */
@@ -15,11 +15,26 @@ export const RADIAN = Math.PI / 180;
 /**
  * @param {Scene} scene
  * @param {State} state
+ * @returns {number} the view to show: a drawing's own, or the nearest that has the layer
+ */
+export function shownSight({ figure, sights, views }, { snapped, yaw, elevation, layer }) {
+  if (views[snapped]) return views[snapped].sight;
+  const off = figure.elevations.map((one) => Math.abs(one - elevation));
+  const level = off.indexOf(Math.min(...off));
+  const near = sights.map((sight) =>
+    sight.level === level && layer in sight.layers ? Math.cos(sight.angles[0] - yaw * RADIAN) : -2,
+  );
+  return near.indexOf(Math.max(...near));
+}
+
+/**
+ * @param {Scene} scene
+ * @param {State} state
  * @returns {Camera} of the rendering
  */
 export function shownCamera(scene, state) {
   const view = scene.views[state.snapped];
-  if (!view) return orbitCamera(scene, state);
+  if (!view) return sightCamera(scene, state, shownSight(scene, state));
   const { x, y, factor } = drawingBox(view.camera.size, state);
   const moved = state.comparison === "beside" ? state.size[0] / 2 : 0;
   const [u, v] = view.camera.center;
@@ -33,13 +48,12 @@ export function shownCamera(scene, state) {
 
 /**
  * @param {Scene} scene
- * @param {State} state
+ * @param {Pick<State, "zoom" | "pan" | "cameras" | "size">} state
+ * @param {number} sight
  * @returns {Camera}
  */
-function orbitCamera(scene, state) {
-  const zoom = state.zoom * (state.cameras ? CAMERAS_ZOOM : 1);
-  const [yaw, elevation] = [state.yaw * RADIAN, state.elevation * RADIAN];
-  return turntableCamera(scene.figure, yaw, elevation, state.size, zoom, state.pan);
+function sightCamera({ figure, sights }, { zoom, pan, cameras, size }, sight) {
+  return turntableCamera(figure, sights[sight].angles, size, zoom * (cameras ? CAMERAS_ZOOM : 1), pan);
 }
 
 /**
@@ -59,40 +73,30 @@ export function drawingBox([width, height], { size, comparison }) {
  * @returns {Pose} on the turntable: the same, or as near as can be to the drawing's camera
  */
 export function poseOf(scene, state) {
-  if (!scene.views[state.snapped]) return state;
+  const view = scene.views[state.snapped];
+  if (!view) return state;
   const camera = shownCamera(scene, state);
-  const [x, y, z] = camera.rotation.slice(6);
-  const whole = orbitCamera(scene, { ...state, zoom: 1, pan: [0, 0], cameras: false });
-  const seen = offsetOf(camera, whole.target);
+  const whole = sightCamera(scene, { ...state, zoom: 1, pan: [0, 0], cameras: false }, view.sight);
+  const seen = project(camera, whole.target);
   const side = Math.min(...state.size);
-  return limited({
-    yaw: Math.atan2(-x, -z) / RADIAN,
-    elevation: Math.asin(clamp(-y, -1, 1)) / RADIAN,
-    zoom: camera.scale / whole.scale,
+  return limited(scene, {
+    yaw: view.yaw,
+    elevation: view.elevation,
+    zoom: camera.scale / (1 + camera.k * seen[2]) / whole.scale,
     pan: [0, 1].map((i) => (seen[i] - whole.center[i]) / side),
   });
 }
 
 /**
+ * @param {Scene} scene
  * @param {Pose} pose
  * @returns {Pose} within what the page allows
  */
-export function limited(pose) {
+export function limited({ figure: { elevations } }, pose) {
   return {
     yaw: pose.yaw,
-    elevation: clamp(pose.elevation, -STEEPEST, STEEPEST),
+    elevation: clamp(pose.elevation, elevations[0], elevations[elevations.length - 1]),
     zoom: clamp(pose.zoom, ZOOMS[0], ZOOMS[1]),
     pan: pose.pan.map((v) => clamp(v, -FARTHEST, FARTHEST)),
   };
-}
-
-/**
- * @param {Camera} camera
- * @param {number[]} point world
- * @returns {number[]} its pixel, depth left out
- */
-export function offsetOf(camera, point) {
-  const d = point.map((v, i) => v - camera.target[i]);
-  const [x, y] = [0, 3].map((row) => d.reduce((sum, v, i) => sum + v * camera.rotation[row + i], 0));
-  return [camera.center[0] + camera.scale * x, camera.center[1] + camera.scale * camera.aspect * y];
 }

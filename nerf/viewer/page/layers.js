@@ -11,7 +11,7 @@ export const LAYER_NAMES = {
   palette: "Palette",
   normal: "Normals",
   depth: "Depth",
-  labels: "Labels",
+  source: "Source",
   mannequin: "Body",
 };
 
@@ -21,8 +21,18 @@ export const LAYER_NAMES = {
  */
 export function createLayers(scene, store) {
   const names = Object.fromEntries(scene.layers.map((layer) => [layer, LAYER_NAMES[layer]]));
+  const lines = part("lines", HTMLButtonElement);
   const group = radioGroup("layer", names, (value) => store.set({ layer: /** @type {Layer} */ (value) }));
   part("layers", HTMLElement).append(...group.parts);
-  store.listen((state) => group.show(state.layer));
-  group.show(store.state.layer);
+  lines.hidden = !scene.pen;
+  lines.addEventListener("click", () => store.set({ lines: !store.state.lines }));
+
+  /** @param {import("./state.js").State} state */
+  function show(state) {
+    group.show(state.layer);
+    lines.setAttribute("aria-pressed", String(state.lines));
+    part("sources", HTMLElement).hidden = state.layer !== "source";
+  }
+  store.listen(show);
+  show(store.state);
 }

@@ -29,6 +29,7 @@ export function hashOf(scene, state) {
     ["layer", state.layer, state.layer !== start.layer],
     ["colors", colors, state.colors.some((rgb, i) => !sameColor(rgb, start.colors[i]))],
     ["ink", state.ink ? hexOf(state.ink).slice(1) : "", !sameColor(state.ink, start.ink)],
+    ["lines", "0", !state.lines],
     ["view", String(state.snapped + 1), state.snapped >= 0],
     ["compare", state.comparison, state.snapped >= 0 && state.comparison !== start.comparison],
     ["cameras", "1", state.cameras],
@@ -50,7 +51,7 @@ export function stateOfHash(scene, hash) {
   const colors = (words.get("colors") ?? "").split(",").map(rgbOf);
   return {
     ...start,
-    ...limited({
+    ...limited(scene, {
       yaw: wrapped(numberOf(words.get("yaw"), start.yaw)),
       elevation: numberOf(words.get("elevation"), start.elevation),
       zoom: numberOf(words.get("zoom"), 1),
@@ -59,7 +60,8 @@ export function stateOfHash(scene, hash) {
     layer: scene.layers.find((layer) => layer === words.get("layer")) ?? start.layer,
     colors: colors.length === start.colors.length && colors.every(isColor) ? colors : start.colors,
     ink: start.ink && (rgbOf(words.get("ink") ?? "") ?? start.ink),
-    snapped: (scene.views[view - 1]?.drawing ?? -1) >= 0 ? view - 1 : -1,
+    lines: words.get("lines") !== "0",
+    snapped: scene.views[view - 1] ? view - 1 : -1,
     comparison: comparisonOf(words.get("compare")) ?? start.comparison,
     cameras: words.get("cameras") === "1",
   };

@@ -1,7 +1,8 @@
 // Turning, zooming and moving the figure: mouse, touch and keys.
 
+import { part } from "./elements.js";
 import { limited, poseOf } from "./framing.js";
-import { startState } from "./state.js";
+import { clamp, startState } from "./state.js";
 
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./state.js").Store} Store */
@@ -15,6 +16,7 @@ const WHEEL = 0.0015; // per pixel of a wheel's turn
 const WHEEL_LINE = 16; // pixels, where a wheel counts lines
 const SLOWER = 0.006; // per millisecond: how inertia ends
 const STOPPED = 0.01; // degrees per millisecond
+const SPIN = 0.05; // degrees per millisecond: a turn takes 7.2 s
 const STALE = 80; // milliseconds without movement: then there is no swing left
 
 /**
@@ -28,11 +30,12 @@ export function createOrbit(stage, scene, store) {
   let speed = [0, 0];
   let movedAt = 0;
   let swing = 0;
+  const spinning = part("spin", HTMLButtonElement);
 
   /** @param {(pose: Pose) => Partial<Pose>} change */
   function move(change) {
     const pose = poseOf(scene, store.state);
-    store.set({ ...limited({ ...pose, ...change(pose) }), snapped: -1 });
+    store.set({ ...limited(scene, { ...pose, ...change(pose) }), snapped: -1 });
   }
 
   /** @param {number} yaw @param {number} elevation degrees */
@@ -45,7 +48,7 @@ export function createOrbit(stage, scene, store) {
   /** @param {number} factor @param {number[]} [about] a place that stays, from the middle */
   const zoom = (factor, about = [0, 0]) =>
     move((pose) => {
-      const { zoom } = limited({ ...pose, zoom: pose.zoom * factor });
+      const { zoom } = limited(scene, { ...pose, zoom: pose.zoom * factor });
       const grown = zoom / pose.zoom;
       return { zoom, pan: pose.pan.map((v, i) => about[i] + (v - about[i]) * grown) };
     });
@@ -67,20 +70,40 @@ export function createOrbit(stage, scene, store) {
   function stop() {
     cancelAnimationFrame(swing);
     speed = [0, 0];
+    spinning.setAttribute("aria-pressed", "false");
   }
 
-  function swingOn() {
-    if (matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+  /** Turn on at `speed`. @param {number} slower per millisecond */
+  function swingOn(slower) {
     let last = performance.now();
     /** @param {number} now */
     function step(now) {
       const time = Math.max(0, now - last);
       last = now;
       turn(speed[0] * time, speed[1] * time);
-      speed = speed.map((v) => v * Math.exp(-SLOWER * time));
+      speed = speed.map((v) => v * Math.exp(-slower * time));
       if (Math.hypot(...speed) > STOPPED) swing = requestAnimationFrame(step);
     }
     if (Math.hypot(...speed) > STOPPED) swing = requestAnimationFrame(step);
+  }
+
+  function spin() {
+    const on = spinning.getAttribute("aria-pressed") === "true";
+    stop();
+    if (on) return;
+    spinning.setAttribute("aria-pressed", "true");
+    speed = [SPIN, 0];
+    swingOn(0);
+  }
+
+  /** @param {number} rings up */
+  function climb(rings) {
+    const { elevations } = scene.figure;
+    move(({ elevation }) => {
+      const off = elevations.map((one) => Math.abs(one - elevation));
+      const next = off.indexOf(Math.min(...off)) + rings;
+      return { elevation: elevations[clamp(next, 0, elevations.length - 1)] };
+    });
   }
 
   /** @param {PointerEvent} event */
@@ -123,7 +146,8 @@ export function createOrbit(stage, scene, store) {
   /** @param {PointerEvent} event */
   function up(event) {
     if (!pointers.delete(event.pointerId) || pointers.size) return;
-    if (event.timeStamp - movedAt < STALE && !event.shiftKey) swingOn();
+    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (event.timeStamp - movedAt < STALE && !event.shiftKey && !calm) swingOn(SLOWER);
   }
 
   /** @type {Record<string, number[]>} right and down */
@@ -134,7 +158,8 @@ export function createOrbit(stage, scene, store) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const arrow = arrows[event.key];
     if (arrow && event.shiftKey) pan(arrow[0] * KEY_PAN, arrow[1] * KEY_PAN);
-    else if (arrow) turn(-arrow[0] * KEY_TURN, arrow[1] * KEY_TURN);
+    else if (arrow?.[0]) turn(-arrow[0] * KEY_TURN, 0);
+    else if (arrow) climb(arrow[1]);
     else if ("+=".includes(event.key)) zoom(KEY_ZOOM);
     else if ("-_".includes(event.key)) zoom(1 / KEY_ZOOM);
     else if (event.key === "Home") home();
@@ -151,6 +176,7 @@ export function createOrbit(stage, scene, store) {
     zoom(Math.exp(-event.deltaY * lines * WHEEL), place(event));
   }
 
+  spinning.addEventListener("click", spin);
   stage.addEventListener("pointerdown", down);
   stage.addEventListener("pointermove", drag);
   for (const end of ["pointerup", "pointercancel"])
@@ -158,5 +184,5 @@ export function createOrbit(stage, scene, store) {
   stage.addEventListener("keydown", key);
   stage.addEventListener("wheel", wheel, { passive: false });
   stage.addEventListener("dblclick", home);
-  return { home, zoom: (/** @type {number} */ factor) => zoom(factor), stop };
+  return { home, zoom: (/** @type {number} */ factor) => zoom(factor) };
 }

@@ -1,10 +1,9 @@
-// Pictures to keep: the stage as PNG, and a turning figure.
+// Pictures to keep: the stage as PNG, and a turning figure as an animated one.
 
 import { animatedPng } from "./apng.js";
 import { resized } from "./camera.js";
 import { part, say } from "./elements.js";
 import { shotOf } from "./stage.js";
-import { animatedWebp } from "./webp.js";
 
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./types.js").Shot} Shot */
@@ -12,15 +11,13 @@ import { animatedWebp } from "./webp.js";
 const TURN_FRAMES = 24;
 const FRAME_TIME = 100; // milliseconds
 const FRAME_SIZE = 480; // pixels
-const FILE_QUALITY = 0.9;
 
 /**
  * @param {Scene} scene
  * @param {import("./state.js").Store} store
- * @param {() => {read: (shot: Shot) => Promise<ImageData>}} renderer that draws now
- * @param {() => void} redraw the stage, after its canvas was used
+ * @param {{read: (shot: Shot) => Promise<HTMLCanvasElement>}} painter
  */
-export function createSave(scene, store, renderer, redraw) {
+export function createSave(scene, store, painter) {
   const [button, progress] = [part("save_turn", HTMLButtonElement), part("progress", HTMLProgressElement)];
   let running = false;
 
@@ -29,7 +26,7 @@ export function createSave(scene, store, renderer, redraw) {
     const css = part("stage", HTMLElement).clientWidth / shot.camera.size[0];
     const factor = Number(part("factor", HTMLSelectElement).value) * css;
     const camera = resized(shot.camera, factor);
-    const file = await encoded(await renderer().read({ ...shot, camera }), "image/png");
+    const file = await encoded(await painter.read({ ...shot, camera }));
     download(file, `${fileName(scene.title)}.png`);
     say(`Saved ${camera.size.join(" × ")} pixels.`);
   }
@@ -45,17 +42,12 @@ export function createSave(scene, store, renderer, redraw) {
     for (let i = 0; i < TURN_FRAMES && running; i++) {
       progress.value = i;
       const shot = shotOf(scene, { ...state, yaw: state.yaw + (360 * i) / TURN_FRAMES });
-      files.push(await encoded(await renderer().read(shot), "image/webp"));
-      redraw();
+      files.push(await encoded(await painter.read(shot)));
       await new Promise((resolve) => setTimeout(resolve)); // input comes in between
     }
     if (files.length < TURN_FRAMES) return say("The turntable was stopped.");
     const pictures = await Promise.all(files.map((file) => file.arrayBuffer()));
-    const webp = files[0].type === "image/webp"; // else PNG, as browsers do that write no WebP
-    const file = webp
-      ? animatedWebp(pictures, FRAME_SIZE, FRAME_SIZE, FRAME_TIME)
-      : animatedPng(pictures, FRAME_TIME);
-    download(file, `${fileName(scene.title)}-turn.${webp ? "webp" : "png"}`);
+    download(animatedPng(pictures, FRAME_TIME), `${fileName(scene.title)}-turn.png`);
     say(`Saved a turn of ${TURN_FRAMES} pictures.`);
   }
 
@@ -66,7 +58,6 @@ export function createSave(scene, store, renderer, redraw) {
     } catch (error) {
       say(`Could not save: ${error instanceof Error ? error.message : error}`);
     }
-    redraw();
   }
 
   part("save_png", HTMLElement).addEventListener("click", () => guarded(savePng));
@@ -80,17 +71,11 @@ export function createSave(scene, store, renderer, redraw) {
 }
 
 /**
- * @param {ImageData} pixels
- * @param {string} type
- * @returns {Promise<Blob>} of that type, or PNG
+ * @param {HTMLCanvasElement} canvas
+ * @returns {Promise<Blob>} PNG
  */
-async function encoded(pixels, type) {
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [pixels.width, pixels.height];
-  canvas.getContext("2d")?.putImageData(pixels, 0, 0);
-  const file = await new Promise((/** @type {(file: Blob | null) => void} */ done) =>
-    canvas.toBlob(done, type, FILE_QUALITY),
-  );
+async function encoded(canvas) {
+  const file = await new Promise((/** @type {(file: Blob | null) => void} */ done) => canvas.toBlob(done));
   if (!file) throw new Error("the picture is too large; choose a smaller size");
   return file;
 }

@@ -1,36 +1,44 @@
-// The page's data: numbers as JSON, arrays in one deflated blob.
+// The page's data: numbers as JSON, all else in one deflated blob.
 
-/** @typedef {import("./types.js").ArrayRecord} ArrayRecord */
-
-const TYPES = { uint8: Uint8Array, uint32: Uint32Array, float16: Uint16Array, float32: Float32Array };
+/** @typedef {import("./types.js").Range} Range */
 
 /** @returns {import("./types.js").Scene} */
 export function readScene() {
   return JSON.parse(textOf("scene"));
 }
 
-/** @returns {string[]} pictures of a whole turn, the front first, as data URLs */
-export function readTurn() {
-  return JSON.parse(textOf("turn"));
-}
-
-/** @returns {Promise<ArrayBuffer>} the arrays, inflated */
+/** @returns {Promise<Uint8Array>} the blob, inflated */
 export async function readBlob() {
   const text = atob(textOf("blob"));
   const bytes = new Uint8Array(text.length);
-  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Response(stream).arrayBuffer();
+  return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 /**
- * @param {ArrayBuffer} blob
- * @param {ArrayRecord} record
- * @returns {Uint8Array | Uint16Array | Uint32Array | Float32Array} half floats as their 16 bits
+ * @param {Uint8Array} blob
+ * @param {Range} range
+ * @returns {Promise<ImageBitmap>} the WebP picture that lies there
  */
-export function arrayOf(blob, record) {
-  const Type = TYPES[/** @type {keyof TYPES} */ (record.type)];
-  return new Type(blob, record.at, record.shape.reduce((a, b) => a * b, 1));
+export function pictureAt(blob, [start, length]) {
+  const file = new Blob([blob.slice(start, start + length)], { type: "image/webp" });
+  return createImageBitmap(file);
+}
+
+/**
+ * @param {number} width
+ * @param {number} height
+ * @param {(context: CanvasRenderingContext2D) => void} [paint]
+ * @returns {HTMLCanvasElement} that has been painted
+ */
+export function newCanvas(width, height, paint = () => {}) {
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [width, height];
+  const context = canvas.getContext("2d");
+  if (!context) throw new Error("the browser has no room for another picture");
+  paint(context);
+  return canvas;
 }
 
 /**

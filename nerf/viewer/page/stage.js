@@ -1,8 +1,7 @@
-// The stage: draws when something has changed, roughly while it moves and well once it rests.
+// The stage: draws when something has changed.
 
-import { resized } from "./camera.js";
 import { part } from "./elements.js";
-import { poseOf, shownCamera } from "./framing.js";
+import { RADIAN, shownCamera, shownSight } from "./framing.js";
 import { LAYER_NAMES } from "./layers.js";
 import { wrapped } from "./state.js";
 
@@ -10,13 +9,9 @@ import { wrapped } from "./state.js";
 /** @typedef {import("./types.js").Shot} Shot */
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./state.js").Store} Store */
-/** @typedef {{draw: (shot: Shot) => void}} Painter */
+/** @typedef {{draw: (shot: Shot) => boolean}} Painter */
 
 const REST = 150; // milliseconds without a change
-const SLOW = 36; // milliseconds from one moving picture to the next: more is not smooth
-const QUICK = 20; // less leaves room for larger ones
-const SIZES = [1, 0.84, 0.7, 0.6, 0.5, 0.4]; // of moving pictures, to those at rest
-const ROUNDS = 20; // quick pictures in a row before larger ones are tried
 const DENSEST = 2; // canvas pixels per CSS pixel
 const SIDES = [
   "front",
@@ -32,11 +27,12 @@ const SIDES = [
 /**
  * @param {Scene} scene
  * @param {State} state
- * @returns {Shot} in full quality
+ * @returns {Shot}
  */
 export function shotOf(scene, state) {
-  const { layer, colors, ink } = state;
-  return { camera: shownCamera(scene, state), layer, colors, ink, still: true };
+  const { layer, colors, lines } = state;
+  const ink = lines ? state.ink : null;
+  return { camera: shownCamera(scene, state), sight: shownSight(scene, state), layer, colors, ink };
 }
 
 /**
@@ -50,45 +46,18 @@ export function createStage(canvas, scene, store) {
   let painter = null;
   /** @type {() => void} */
   let drawn = () => {};
-  /** @type {(error: unknown) => void} */
-  let failed = () => {};
-  let [frame, timer, still] = [0, 0, true];
-  let [coarse, quick, last] = [0, 0, 0]; // of SIZES; quick pictures in a row; when the last one began
+  let [frame, timer] = [0, 0];
 
-  /** @param {number} now milliseconds */
-  function paint(now) {
+  function paint() {
     frame = 0;
-    if (!painter) return;
-    if (!still) suit(now - last);
-    last = now;
-    const shot = shotOf(scene, store.state);
-    try {
-      painter.draw(still ? shot : { ...shot, camera: resized(shot.camera, SIZES[coarse]), still });
-    } catch (error) {
-      painter = null;
-      failed(error);
-      return;
-    }
-    drawn();
-  }
-
-  /** @param {number} took milliseconds since the last picture: moving ones become as large as may be */
-  function suit(took) {
-    if (took > 4 * REST) return; // it has rested
-    quick = took < QUICK ? quick + 1 : 0;
-    if (took > SLOW) coarse = Math.min(SIZES.length - 1, coarse + 1);
-    if (quick === ROUNDS) [coarse, quick] = [Math.max(0, coarse - 1), 0];
+    if (painter?.draw(shotOf(scene, store.state))) drawn();
   }
 
   function ask() {
     frame ||= requestAnimationFrame(paint);
   }
 
-  function rest() {
-    still = true;
-    canvas.setAttribute("aria-label", labelOf(scene, store.state));
-    ask();
-  }
+  const tell = () => canvas.setAttribute("aria-label", labelOf(scene, store.state));
 
   function fit() {
     const density = Math.min(DENSEST, devicePixelRatio || 1);
@@ -98,23 +67,21 @@ export function createStage(canvas, scene, store) {
 
   store.listen((state, old) => {
     if (!looksOther(state, old)) return;
-    still = false;
     clearTimeout(timer);
-    timer = setTimeout(rest, REST);
+    timer = setTimeout(tell, REST);
     ask();
   });
   new ResizeObserver(fit).observe(stage);
   addEventListener("resize", fit); // the page's zoom, too
   fit();
-  canvas.setAttribute("aria-label", labelOf(scene, store.state));
+  tell();
   return {
     /**
-     * @param {Painter | null} next that draws from now on
+     * @param {Painter} next that draws from now on
      * @param {() => void} whenDrawn after each picture
-     * @param {(error: unknown) => void} whenFailed it is no longer asked then
      */
-    use(next, whenDrawn, whenFailed) {
-      [painter, drawn, failed] = [next, whenDrawn, whenFailed];
+    use(next, whenDrawn) {
+      [painter, drawn] = [next, whenDrawn];
       ask();
     },
     ask,
@@ -136,6 +103,7 @@ function looksOther(state, old) {
     "layer",
     "colors",
     "ink",
+    "lines",
     "snapped",
     "comparison",
     "cameras",
@@ -150,11 +118,10 @@ function looksOther(state, old) {
  * @returns {string} what is to be seen, in words
  */
 function labelOf(scene, state) {
-  const pose = poseOf(scene, state);
+  const [yaw, elevation] = scene.sights[shownSight(scene, state)].angles.map((angle) => angle / RADIAN);
   const drawing = state.snapped < 0 ? "" : `, camera of drawing ${state.snapped + 1}`;
-  const [yaw, elevation] = [Math.round(wrapped(pose.yaw)), Math.round(pose.elevation)];
-  const angles = `yaw ${yaw}°, elevation ${elevation}°`;
-  return `The figure, ${sideOf(pose.yaw)}, ${angles}${drawing}, layer ${LAYER_NAMES[state.layer]}`;
+  const angles = `yaw ${Math.round(wrapped(yaw))}°, elevation ${Math.round(elevation)}°`;
+  return `The figure, ${sideOf(yaw)}, ${angles}${drawing}, layer ${LAYER_NAMES[state.layer]}`;
 }
 
 /**

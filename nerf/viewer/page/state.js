@@ -7,12 +7,13 @@
 /**
  * @typedef {object} State
  * @property {number} yaw degrees, 0 = front
- * @property {number} elevation degrees, > 0 looks down
+ * @property {number} elevation degrees, > 0 looks down: the nearest ring of views is shown
  * @property {number} zoom 1 = all of the figure
  * @property {number[]} pan of the figure, in shares of the stage's shorter side
  * @property {Layer} layer
  * @property {number[][]} colors of the palette
  * @property {number[] | null} ink colour of the lines
+ * @property {boolean} lines whether there are any
  * @property {number} snapped the drawing whose camera is used, -1 = none
  * @property {Comparison} comparison of that drawing with the rendering
  * @property {number} split share of the stage that shows the drawing
@@ -28,7 +29,6 @@
  * @property {(listener: (state: State, old: State) => void) => void} listen from now on
  */
 
-export const STEEPEST = 85;
 export const ZOOMS = [0.25, 12];
 export const FARTHEST = 3;
 
@@ -40,15 +40,17 @@ export const COMPARISONS = ["slider", "beside", "onion", "difference"];
  * @returns {State} at the start
  */
 export function startState(scene) {
-  const [yaw, elevation] = scene.figure.turn[0].map((angle) => (angle * 180) / Math.PI);
+  const { start, elevations } = scene.figure;
+  const { angles, level } = scene.sights[start];
   return {
-    yaw,
-    elevation: clamp(elevation, -STEEPEST, STEEPEST),
+    yaw: (angles[0] * 180) / Math.PI,
+    elevation: elevations[level],
     zoom: 1,
     pan: [0, 0],
     layer: scene.layers[0],
     colors: scene.palette.map((paint) => paint.rgb),
     ink: scene.pen && scene.pen.rgb,
+    lines: true,
     snapped: -1,
     comparison: "slider",
     split: 0.5,

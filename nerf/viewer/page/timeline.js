@@ -44,10 +44,10 @@ export function createTimeline(scene, store, pictures) {
 /**
  * @param {Scene} scene
  * @param {import("./state.js").Store} store
- * @param {number} i the drawing whose camera the stage takes; nothing happens if it has none
+ * @param {number} i the drawing whose camera the stage takes
  */
 export function snap(scene, store, i) {
-  if (scene.views[i]?.drawing >= 0) store.set({ snapped: i, cameras: false });
+  if (scene.views[i]) store.set({ snapped: i, cameras: false });
 }
 
 /**

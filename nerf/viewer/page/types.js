@@ -12,9 +12,38 @@
  * @property {number} aspect fy / fx
  */
 
-/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "labels" | "mannequin"} Layer */
+/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "source" | "mannequin"} Layer */
 
-/** @typedef {{at: number, type: string, shape: number[]}} ArrayRecord where an array lies in the blob */
+/** @typedef {[number, number]} Range where something begins in the blob, and how many bytes it is */
+
+/**
+ * @typedef {object} LayeredRecord a picture in layers, in any colours
+ * @property {number[]} box left, top, width and height in the view, its pixels
+ * @property {number[]} size width and height of the layers
+ * @property {Range} maps
+ * @property {Range | null} rest a WebP picture of what the paints do not explain
+ * @property {undefined} [picture]
+ */
+
+/** @typedef {{box: number[], picture: Range, maps?: any, rest?: any, size?: any}} PictureRecord a WebP picture */
+
+/** @typedef {any} LayerRecord a `LayeredRecord` or a `PictureRecord` */
+
+/**
+ * @typedef {object} Coding how a `LayeredRecord` is to be read
+ * @property {number} levels of alpha and ink, from nothing to all
+ * @property {number} parts of a mixture
+ * @property {number[]} moves how far a colour may move with its paints
+ * @property {number} step of `rest`, levels of 255
+ * @property {number} middle of `rest`: nothing
+ */
+
+/**
+ * @typedef {object} Sight one of the views that the page holds
+ * @property {number[]} angles yaw, elevation and roll, radians
+ * @property {number} level which of the figure's elevations it belongs to; -1: only a drawing is seen so
+ * @property {Partial<Record<Layer, LayerRecord | null>>} layers null: nothing is seen
+ */
 
 /** @typedef {{name: string, rgb: number[], share: number}} Paint a share of 0 is not known */
 
@@ -27,16 +56,19 @@
  * @property {number} elevation degrees
  * @property {{yaw: number, elevation: number} | null} sigma degrees
  * @property {Camera} camera
- * @property {number} drawing its layer in `drawings`; -1: it shows no figure
+ * @property {number} sight the view from its camera
+ * @property {Range} picture the drawing, a WebP picture
  */
 
 /**
- * @typedef {object} Figure how turntable cameras see it
+ * @typedef {object} Figure how the views see it: square pictures with the target in the middle
  * @property {number[]} target
  * @property {number} reach
  * @property {number} fill
  * @property {number} k
- * @property {number[][]} turn yaw, elevation and roll of the pictures of a turn, radians, the first at the start
+ * @property {number} size side of a view, pixels
+ * @property {number[]} elevations of its rings of views, degrees, rising
+ * @property {number} start the view that is shown first
  */
 
 /**
@@ -46,19 +78,20 @@
  * @property {Layer[]} layers that can be shown, the first at the start
  * @property {Figure} figure
  * @property {Paint[]} palette
- * @property {{rgb: number[], width_px: number} | null} pen that draws the outline
+ * @property {number[][]} paints of the drawn look: the palette's, then others that stay
+ * @property {Coding} coding
+ * @property {{rgb: number[]} | null} pen that draws the lines
  * @property {ViewRecord[]} views
- * @property {any} field the trained field, see `scene.py`; null: nothing is trained yet
- * @property {any} drawings what the drawn look is made of, or null
+ * @property {Sight[]} sights
  */
 
 /**
- * @typedef {object} Shot what the renderer draws
+ * @typedef {object} Shot what the painter shows
  * @property {Camera} camera its size is the picture's
+ * @property {number} sight the view that stands for it
  * @property {Layer} layer
  * @property {number[][]} colors of the palette, as shown: sRGB, 0 to 255
- * @property {number[] | null} ink colour of the lines, as shown
- * @property {boolean} still full quality; else as fast as turning needs
+ * @property {number[] | null} ink colour of the lines, as shown; null: without lines
  */
 
 export {};

@@ -89,12 +89,12 @@ def drawings(cameras: list[Camera] | None = None, line_px: float = LINE_PX) -> D
 
 
 def geometry(camera: Camera) -> Geometry:
-    """Return what a perfect field would show, but for its colour: grey."""
+    """Return what a perfect field would show."""
     _, seen = surface(camera.resized(FINE))
     rows, columns = camera.size_wh[::-1]
     alpha = seen.reshape(rows, FINE, columns, FINE).mean(axis=(1, 3))
     depth = np.where(alpha >= 0.5, depth_of(camera), np.nan)
-    return Geometry(camera, alpha, depth, 0.5 * np.repeat(alpha[..., None], 3, axis=-1), None)
+    return Geometry(camera, alpha, depth)
 
 
 def unseen(view: Geometry) -> Geometry:

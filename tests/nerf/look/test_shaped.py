@@ -29,11 +29,9 @@ def drawn(hand: Hand, views: int = 8) -> Drawings:
 
 
 def misty(camera: Camera) -> Geometry:
-    """Return a field that knows neither outline nor depth, grey."""
+    """Return a field that knows neither outline nor depth."""
     size = camera.size_wh[::-1]
-    return Geometry(
-        camera, np.full(size, 0.4), np.full(size, np.nan), np.full((*size, 3), 0.2), None
-    )
+    return Geometry(camera, np.full(size, 0.4), np.full(size, np.nan))
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +113,7 @@ def test_a_view_beside_the_shape_is_empty(lined: Drawings) -> None:
     assert not view.alpha.any()
 
 
-def test_two_drawings_leave_the_rest_to_the_field() -> None:
+def test_two_drawings_leave_the_rest_to_a_guess() -> None:
     few = drawn(Hand(), views=2)
     view = blend_view(few, misty(camera_at(np.pi / 2)))
     assert np.isfinite(view.rgb).all()

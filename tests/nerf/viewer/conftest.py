@@ -15,12 +15,12 @@ Open = Callable[..., Viewer]
 
 
 @pytest.fixture
-def open_page(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
+def open_page(browser: Browser, tmp_path: Path) -> Iterator[Open]:
     """Return a function that opens a page; nothing on the console, no request is let pass."""
     opened: list[Viewer] = []
 
     def open_one(hash: str = "", scene: dict[str, Any] | None = None, **options: Any) -> Viewer:
-        path = write_page(tmp_path, monkeypatch, **(scene or {}))
+        path = write_page(tmp_path, **(scene or {}))
         context = browser.new_context(
             **{"viewport": {"width": 1000, "height": 800}, "reduced_motion": "reduce", **options}
         )

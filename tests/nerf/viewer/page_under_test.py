@@ -3,67 +3,88 @@
 from __future__ import annotations
 
 import math
-import shutil
 from base64 import b64encode
 from dataclasses import dataclass, field
-from io import BytesIO
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
-from PIL import Image
 from playwright.sync_api import Page
 
 from toonset.camera import Camera
-from toonset.nerf.viewer import page as page_module
-from toonset.nerf.viewer.scene import Blob, camera_record
+from toonset.nerf.look.blend import DrawnView
+from toonset.nerf.viewer.layered import layered
+from toonset.nerf.viewer.page import page_html
+from toonset.nerf.viewer.scene import (
+    Blob,
+    camera_record,
+    coding,
+    layered_record,
+    picture_record,
+    webp,
+)
 
 SIZE_WH = (60, 90)
 COLORS = ([217, 84, 48], [38, 138, 140], [246, 186, 62])
 PEN = [20, 10, 30]
-# An ellipse of the first paint, a spot of the second in front, the outline in the pen's colour.
-RENDERER = """
-import { project } from "./camera.js";
+SIDE = 120  # of the views
+TARGET = np.array([0.0, 1.0, 0.0])
+HEIGHTS = (0.0, 30.0)  # of the rings, degrees
+VERDICTS = {"ok": 0, "weak": 50, "ambiguous": 180, "failed": -90}  # and yaws, degrees
 
-export async function createRenderer(canvas, scene) {
-  if (!scene.field) throw new Error("no WebGL 2");
-  globalThis.shots = [];
-  const context = canvas.getContext("2d", { willReadFrequently: true });
-  const css = (rgb) => `rgb(${rgb.join(" ")})`;
-  return {
-    draw(shot) {
-      globalThis.shots.push(shot);
-      if (globalThis.breaks) throw new Error("context lost");
-      [canvas.width, canvas.height] = shot.camera.size;
-      const [u, v] = project(shot.camera, scene.figure.target);
-      context.fillStyle = css(shot.colors[0]);
-      context.strokeStyle = css(shot.ink ?? [0, 0, 0]);
-      context.beginPath();
-      context.ellipse(u, v, shot.camera.scale * 0.3, shot.camera.scale * 0.8, 0, 0, 7);
-      context.fill();
-      context.stroke();
-      const front = scene.figure.target.map((t, i) => t + [0, 0, 0.3][i]);
-      const [x, y, z] = project(shot.camera, front);
-      context.fillStyle = css(shot.colors[1]);
-      if (z < 0) context.fillRect(x - 4, y - 4, 8, 8);
-    },
-    read(shot) {
-      this.draw(shot);
-      return context.getImageData(0, 0, canvas.width, canvas.height);
-    },
-  };
-}
-"""
+
+def sight_camera(yaw: float, elevation: float) -> Camera:
+    """Return the camera of a view, from degrees."""
+    return Camera.looking_at(
+        TARGET, math.radians(yaw), math.radians(elevation), 0.47 * SIDE, (SIDE, SIDE)
+    )
+
+
+def drawn_ellipse(camera: Camera) -> DrawnView:
+    """Return an ellipse of the first paint in an outline, a spot of the second in front."""
+    (x, y) = (camera.pixel_grid()[..., axis] - camera.center[axis] for axis in (0, 1))
+    away = np.hypot(x / (0.3 * camera.scale), y / (0.8 * camera.scale))
+    alpha = np.clip((1 - away) * 10, 0, 1).astype(np.float32)
+    ink = np.where(away > 0.85, alpha, 0).astype(np.float32)
+    pixels, depth, _ = camera.project(TARGET[None] + [0, 0, 0.3])
+    near = np.abs(camera.pixel_grid() - pixels[0]).max(axis=-1) < 6
+    labels = (near & (depth[0] < 0)).astype(np.uint8)
+    paint = (np.array(COLORS, np.float32) / 255)[labels]
+    line = np.array(PEN, np.float32) / 255
+    rgb = paint * (alpha - ink)[..., None] + ink[..., None] * line
+    return DrawnView(rgb, alpha, ink, labels, paint, np.zeros_like(labels))
+
+
+def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, Any]:
+    view = drawn_ellipse(sight_camera(yaw, elevation))
+    layers = {"drawn": layered_record(layered(view, np.array(COLORS, np.uint8), tuple(PEN)))}
+    for i, layer in enumerate(("rgb", "normal", "depth", "source") if whole else ()):
+        grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
+        opaque = 255 * (view.alpha > 0.5).astype(np.uint8)
+        layers[layer] = picture_record(np.dstack([grey, grey, grey, opaque]), 2)
+    angles = [math.radians(yaw), math.radians(elevation), 0.0]
+    return {"angles": angles, "level": level, "layers": layers}
+
+
+@cache
+def _sights() -> list[dict[str, Any]]:
+    """Return a ring of steps of 5 degrees, a higher one of 30, and the drawings' own views."""
+    rings = [
+        _sight(step * i, elevation, level, i % 3 == 0)
+        for level, (elevation, step) in enumerate(zip(HEIGHTS, (5, 30), strict=True))
+        for i in range(360 // step)
+    ]
+    return [*rings, *(_sight(yaw, 5, -1, True) for yaw in VERDICTS.values())]
 
 
 def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
-    """Return numbers and arrays of a page with four drawings: one of each verdict."""
+    """Return numbers and pictures of a page with four drawings: one of each verdict."""
     blob = Blob()
     width, height = SIZE_WH
-    whole = np.zeros((3, height, width, 4), np.uint8)
-    whole[:, 10:80, 20:40] = [100, 50, 25, 128]  # half covered: its colour is twice as bright
-    verdicts = {"ok": 0, "weak": 50, "ambiguous": 180, "failed": -90}
+    whole = np.zeros((height, width, 4), np.uint8)
+    whole[10:80, 20:40] = [200, 100, 50, 128]
+    sights = _sights()
     views = [
         {
             "name": f"{i:03}.png",
@@ -73,34 +94,36 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
             "elevation": 5,
             "sigma": None if verdict == "failed" else {"yaw": 4 + 20 * i, "elevation": 2},
             "camera": camera_record(
-                Camera.looking_at(
-                    np.array([0.0, 1.0, 0.0]), np.deg2rad(yaw), np.deg2rad(5), 40.0, SIZE_WH
-                )
+                Camera.looking_at(TARGET, np.deg2rad(yaw), np.deg2rad(5), 40.0, SIZE_WH)
             ),
-            "drawing": -1 if verdict == "failed" else i,
+            "sight": len(sights) - len(VERDICTS) + i,
+            "picture": blob.keep(webp(whole, 100)),
         }
-        for i, (verdict, yaw) in enumerate(verdicts.items())
+        for i, (verdict, yaw) in enumerate(VERDICTS.items())
     ]
     names = ("red", "teal", "gold")
     scene = {
         "title": "A figure",
         "verdict": {"state": "weak", "reasons": ["no drawing shows the left side"]},
-        "layers": ["drawn", "rgb", "palette", "normal", "depth", "labels"],
+        "layers": ["drawn", "rgb", "normal", "depth", "source"],
         "figure": {
-            "target": [0.0, 1.0, 0.0],
+            "target": TARGET.tolist(),
             "reach": 1.0,
             "fill": 0.94,
             "k": 0.0,
-            "turn": [[math.radians(45 * i), 0.0, 0.0] for i in range(8)],
+            "size": SIDE,
+            "elevations": list(HEIGHTS),
+            "start": 0,
         },
         "palette": [
             {"name": name, "rgb": rgb, "share": share}
             for name, rgb, share in zip(names, COLORS, (0.6, 0.3, 0.1), strict=True)
         ],
-        "pen": {"rgb": PEN, "width_px": 2.0},
+        "paints": list(COLORS),
+        "coding": coding(),
+        "pen": {"rgb": PEN},
         "views": views,
-        "field": {"any": 1},
-        "drawings": {"whole": blob.add(whole)},
+        "sights": [blob.keep(sight) for sight in sights],
         **changes,
     }
     return scene, blob.deflated()
@@ -118,8 +141,12 @@ class Viewer:
         return self.page.evaluate("toonset.store.state")
 
     @property
-    def shots(self) -> list[dict[str, Any]]:
-        return self.page.evaluate("shots")
+    def shot(self) -> dict[str, Any]:
+        return self.page.evaluate("toonset.shot()")
+
+    @property
+    def sight(self) -> dict[str, Any]:
+        return self.page.evaluate("toonset.scene.sights[toonset.shot().sight]")
 
     def set(self, **change: Any) -> None:
         self.page.evaluate("change => toonset.store.set(change)", change)
@@ -147,8 +174,9 @@ class Viewer:
         return self.page.evaluate(
             """([u, v]) => {
               const canvas = document.getElementById("view");
-              const context = canvas.getContext("2d");
-              return [...context.getImageData(u * canvas.width, v * canvas.height, 1, 1).data];
+              const copy = new OffscreenCanvas(1, 1).getContext("2d");
+              copy.drawImage(canvas, -Math.floor(u * canvas.width), -Math.floor(v * canvas.height));
+              return [...copy.getImageData(0, 0, 1, 1).data];
             }""",
             [u, v],
         )
@@ -169,23 +197,10 @@ class Viewer:
         return self.page.locator("#message").inner_text()
 
 
-def write_page(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> Path:
-    """Write the page of `figure_scene`, with a renderer that draws an ellipse."""
-    modules = folder / "page"
-    if not modules.exists():
-        shutil.copytree(page_module.FOLDER, modules)
-        (modules / "renderer.js").write_text(RENDERER)
-    monkeypatch.setattr(page_module, "FOLDER", modules)
-    scene, blob = figure_scene(**changes)
+def write_page(folder: Path, *, blob: bytes | None = None, **changes: Any) -> Path:
+    """Write the page of `figure_scene`; with other bytes than its pictures if there are any."""
+    scene, own = figure_scene(**changes)
     path = folder / "page.html"
-    path.write_text(page_module.page_html(scene, blob, _turn()), encoding="utf-8")
+    poster = webp(np.full((20, 20, 4), 90, np.uint8))
+    path.write_text(page_html(scene, own if blob is None else blob, poster), encoding="utf-8")
     return path
-
-
-def _turn() -> list[bytes]:
-    pictures = []
-    for i in range(8):
-        file = BytesIO()
-        Image.new("RGBA", (20, 20), (30 * i, 90, 90, 255)).save(file, "WEBP", lossless=True)
-        pictures.append(file.getvalue())
-    return pictures

@@ -1,145 +1,172 @@
-"""What the page draws, beside what `toonset render` does: layers, the drawn look, other colours."""
+"""What the page shows, beside what `toonset render` draws: layers, other colours, lines."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from jaxtyping import Bool, UInt8
 from playwright.sync_api import Browser, Page
 
-from bench.view.compare import psnr, rendered, shown
+from bench.view.compare import psnr, shown
 from tests.nerf.bodies import Hand, body, sheet
 from tests.nerf.ellipsoids import QUICK
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.look.blend import SOLID
 from toonset.nerf.render.recolor import recolor_run
-from toonset.nerf.render.turntable import turntable
+from toonset.nerf.render.turntable import drawn_on_sheet
 from toonset.nerf.render.views import render
 from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.training import train
-from toonset.nerf.viewer.build import run_scene
-from toonset.nerf.viewer.page import page_html
-from toonset.nerf.viewer.scene import camera_record
+from toonset.nerf.viewer.build import SheetDrawings, cameras_of, run_page
+from toonset.nerf.viewer.ring import Ring, ring_through
+from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
+from toonset.raster import dilate
 from toonset.view import over_white
 
-SIDE = 160
-LEAST_DB = {"drawn": 30.0}  # else 33
-SIGHTS = ((0.0, 0.0), (70.0, 20.0), (200.0, -15.0))  # yaw, elevation, degrees
+SIDE, VIEWS = 160, 12
+NEW = (40, 220, 60)
+NEAR = 0.05  # OKLab: a colour so near to another is its like
+LEAST_DB = {"drawn": 36.0, "rgb": 27.0, "normal": 23.0, "depth": 27.0, "source": 30.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A field's page in a browser, and its views."""
+
+    trained: TrainedField
+    page: Page
+    ring: Ring
+    cameras: tuple[Camera, ...]
+
+    @property
+    def colors(self) -> list[list[int]]:
+        assert self.trained.palette is not None
+        return self.trained.palette.tolist()
+
+    def recolored(self, number: int) -> tuple[TrainedField, list[list[int]]]:
+        """Return the field with one colour changed, and the page's colours then."""
+        old = self.colors
+        changed = recolor_run(self.trained, [f"{hex_of(tuple(old[number]))}={hex_of(NEW)}"])
+        return changed, [list(NEW) if i == number else rgb for i, rgb in enumerate(old)]
 
 
 @pytest.fixture(scope="module")
-def fields() -> dict[str, TrainedField]:
-    """Return a field, and one whose surface is that of the character's own body."""
+def pages(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Shown]]:
+    """Yield the page of a field, and of one whose surface is the character's own body."""
     scene = label_scene(sheet(body(), Hand()))[0]
     shaded = replace(label_scene(sheet(body(), Hand(shadow=0.7)))[0], mannequin=body())
-    return {"field": train(scene, QUICK).field, "body": train(shaded, QUICK).field}
-
-
-@pytest.fixture(scope="module")
-def pages(
-    browser: Browser, fields: dict[str, TrainedField], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, tuple[TrainedField, Page]]]:
     found = {}
-    for name, trained in fields.items():
-        scene, blob = run_scene(trained, name, {"verdict": None, "palette": [], "views": []})
+    for name, one in {"field": scene, "body": shaded}.items():
+        trained = train(one, QUICK).field
+        drawn = SheetDrawings.of(drawn_on_sheet(trained), tmp_path_factory.mktemp("none"))
+        assert trained.palette is not None
+        colors = trained.palette.tolist()
+        palette = [{"name": str(rgb), "rgb": rgb, "share": 0.0} for rgb in colors]
+        about = {"title": name, "verdict": None, "palette": palette}
         file = tmp_path_factory.mktemp("page") / "page.html"
-        file.write_text(page_html(scene, blob, []), encoding="utf-8")
+        file.write_text(run_page(trained, about, drawn, SIDE, VIEWS), encoding="utf-8")
         page = browser.new_page(viewport={"width": 500, "height": 600})
         page.goto(file.as_uri())
         page.wait_for_selector("#poster[hidden]", state="attached", timeout=60_000)
-        found[name] = (trained, page)
+        ring = ring_through(drawn.cameras, VIEWS)
+        found[name] = Shown(trained, page, ring, cameras_of(trained, ring, SIDE))
     yield found
-    for _, page in found.values():
-        page.close()
+    for one in found.values():
+        one.page.close()
 
 
-def camera_at(trained: TrainedField, yaw: float, elevation: float) -> Camera:
-    start = turntable(trained, 36, size=SIDE)[0]
-    return Camera.looking_at(
-        start.target,
-        math.radians(yaw),
-        math.radians(elevation),
-        0.9 * start.scale,
-        (SIDE, SIDE),
-        k=start.k,
-    )
-
-
-def drawn_by_page(
-    page: Page, trained: TrainedField, camera: Camera, layer: str, **more: Any
-) -> np.ndarray:
-    assert trained.palette is not None
-    return shown(page, camera, layer, **{"colors": trained.palette.tolist(), **more})
-
-
-@pytest.mark.parametrize("layer", ["drawn", "rgb", "palette", "normal", "depth", "labels"])
+@pytest.mark.parametrize("layer", LEAST_DB)
 @pytest.mark.parametrize("name", ["field", "body"])
-def test_a_layer_is_what_render_draws(
-    pages: dict[str, tuple[TrainedField, Page]], name: str, layer: str
+def test_a_layer_is_what_render_draws(pages: dict[str, Shown], name: str, layer: str) -> None:
+    one = pages[name]
+    for i, camera in enumerate(one.cameras):
+        if layer == "drawn" or one.ring.layered[i]:
+            found = psnr(shown(one.page, i, layer), render(one.trained, camera).picture(layer))
+            assert found >= LEAST_DB[layer], (i, found)
+
+
+@pytest.mark.parametrize("name", ["field", "body"])
+def test_every_drawing_is_one_of_the_views(pages: dict[str, Shown], name: str) -> None:
+    one = pages[name]
+    views = one.page.evaluate("toonset.scene.views")
+    for view, own in zip(views, drawn_on_sheet(one.trained), strict=True):
+        camera = one.cameras[view["sight"]]
+        np.testing.assert_allclose(camera.rotation, own.camera.rotation, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["field", "body"])
+def test_another_colour_is_as_render_has_it_and_leaves_nothing_of_the_old(
+    pages: dict[str, Shown], name: str
 ) -> None:
-    trained, page = pages[name]
-    for yaw, elevation in SIGHTS:
-        camera = camera_at(trained, yaw, elevation)
-        found = psnr(drawn_by_page(page, trained, camera, layer), rendered(trained, camera, layer))
-        assert found >= LEAST_DB.get(layer, 33.0), (yaw, elevation, found)
+    one = pages[name]
+    front = render(one.trained, one.cameras[0]).drawn.palette_labels(len(one.colors))
+    for number in np.flatnonzero(np.bincount(front[front < 255]) > 0.1 * (front < 255).sum()):
+        changed, colors = one.recolored(number)
+        old = one.colors[number]
+        for i, camera in list(enumerate(one.cameras))[::3]:
+            after = shown(one.page, i, colors=colors)
+            assert psnr(after, render(changed, camera).picture()) >= 30.0, (number, i)
+            left = like(after, old) & (after[..., 3] == 255)
+            others = [like(np.array([[rgb]], np.uint8), old)[0, 0] for rgb in colors]
+            assert any(others) or not left.any(), (number, i, int(left.sum()))
 
 
 @pytest.mark.parametrize("layer", ["drawn", "palette"])
-def test_another_colour_changes_only_that_paint(
-    pages: dict[str, tuple[TrainedField, Page]], layer: str
-) -> None:
-    trained, page = pages["field"]
-    assert trained.palette is not None
-    colors = trained.palette.tolist()
-    new = [40, 220, 60]
-    changed = recolor_run(trained, [f"{hex_of(tuple(colors[0]))}={hex_of((40, 220, 60))}"])
-    camera = camera_at(trained, 40.0, 5.0)
-    before = drawn_by_page(page, trained, camera, layer)
-    after = drawn_by_page(page, trained, camera, layer, colors=[new, *colors[1:]])
-    apart = np.abs(over_white(after) - over_white(before)).max(axis=-1)
-    moved = apart > 2 / 255
-    view = render(trained, camera)
-    assert view.labels is not None
-    by_field, by_drawings = view.labels == 0, view.drawn.palette_labels(len(colors)) == 0
-    own = by_field | by_drawings if layer == "drawn" else by_field  # the look takes from both
-    assert moved[own].mean() > 0.9
-    far = ~np.asarray(
-        np.lib.stride_tricks.sliding_window_view(np.pad(own, 3), (7, 7)).any(axis=(2, 3))
+def test_another_colour_changes_only_that_paint(pages: dict[str, Shown], layer: str) -> None:
+    one = pages["field"]
+    _, colors = one.recolored(0)
+    i = int(np.flatnonzero(one.ring.layered)[1])
+    apart = np.abs(
+        over_white(shown(one.page, i, layer, colors=colors)) - over_white(shown(one.page, i, layer))
     )
-    assert not moved[far].any()
-    assert psnr(after, rendered(changed, camera, layer)) >= LEAST_DB.get(layer, 33.0)
+    moved = apart.max(axis=-1) > 3 / 255
+    view = render(one.trained, one.cameras[i])
+    assert view.labels is not None
+    own = (view.labels == 0) | (view.drawn.palette_labels(len(colors)) == 0)
+    assert moved[own].mean() > 0.7
+    assert not moved[~dilate(own, 4)].any()
 
 
-def test_moving_pictures_are_alike(pages: dict[str, tuple[TrainedField, Page]]) -> None:
-    for trained, page in pages.values():
-        camera = camera_at(trained, 110.0, 10.0)
-        still, moving = (
-            drawn_by_page(page, trained, camera, "drawn", still=still) for still in (True, False)
-        )
-        assert psnr(still, moving) > 22
+def test_lines_are_switched_off(pages: dict[str, Shown]) -> None:
+    one = pages["field"]
+    assert one.trained.drawings is not None
+    pen = one.trained.drawings.pen
+    assert pen is not None
+    for i, camera in list(enumerate(one.cameras))[1::3]:
+        view = render(one.trained, camera).drawn
+        line = (view.ink > 0.9 * view.alpha) & (view.alpha >= SOLID)
+        if i in one.ring.own:  # a drawing's own lines lie a little beside
+            continue
+        with_lines, without = shown(one.page, i), shown(one.page, i, ink=None)
+        assert like(with_lines, pen.rgb)[line].mean() > 0.9
+        assert like(without, pen.rgb)[line].mean() < 0.1
+        np.testing.assert_array_equal(with_lines[..., 3], without[..., 3])
+        blue = shown(one.page, i, ink=[0, 0, 255])
+        assert like(blue, (0, 0, 255))[line].mean() > 0.9
 
 
-def test_memory_stays_as_it_is_while_it_turns(pages: dict[str, tuple[TrainedField, Page]]) -> None:
-    trained, page = pages["field"]
+def test_memory_stays_as_it_is_while_it_turns(pages: dict[str, Shown]) -> None:
+    page = pages["field"].page
     session = page.context.new_cdp_session(page)
-    camera = camera_record(camera_at(trained, 0.0, 0.0))
 
     def used() -> int:
         session.send("HeapProfiler.collectGarbage")
         return int(page.evaluate("performance.memory.usedJSHeapSize"))
 
-    draw = (
-        "([n, camera]) => { for (let i = 0; i < n; i++) toonset.draw({ camera, still: false }); }"
-    )
-    page.evaluate(draw, [20, camera])
+    turn = """async n => { for (let i = 0; i < n; i++) {
+        toonset.store.set({ yaw: 30 * i });
+        await new Promise(requestAnimationFrame);
+    } }"""
+    page.evaluate(turn, 24)
     before = used()
-    page.evaluate(draw, [200, camera])
+    page.evaluate(turn, 120)
     assert used() < before + 1_000_000
 
 
@@ -154,3 +181,10 @@ def test_top_level_names_are_unique() -> None:
         .startswith(("const ", "let ", "function ", "class "))
     ]
     assert sorted(names) == sorted(set(names))
+
+
+def like(picture: UInt8[np.ndarray, "h w _"], rgb: Any) -> Bool[np.ndarray, "h w"]:
+    """Return which pixels have a colour like another."""
+    flat = picture[..., :3].reshape(-1, 3)
+    off = np.linalg.norm(oklab_from_rgb(flat) - oklab_from_rgb(np.array([rgb], np.uint8)), axis=1)
+    return (off < NEAR).reshape(picture.shape[:2])

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.nerf.bodies import Hand, body, sheet
@@ -14,10 +12,6 @@ from toonset.cli.main import main
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import save_obj
-from toonset.errors import BundleError
-from toonset.nerf.train.result import Training
-from toonset.nerf.viewer.page import FOLDER
-from toonset.nerf.viewer.scene import MOST_PAINTS, Blob, field_record
 from toonset.write import write_bytes, write_json
 
 HOSTILE = "a</script><script>x='1'"
@@ -54,7 +48,7 @@ def test_a_bundle_becomes_one_quiet_file(
     page = tmp_path / "page.html"
     assert view(monkeypatch, bundle, "-o", page) == 0
     text = page.read_text(encoding="utf-8")
-    assert len(re.findall("<script", text)) == 4  # numbers, pictures, arrays, the modules
+    assert len(re.findall("<script", text)) == 3  # numbers, pictures, the modules
     assert "<title>a&lt;" in text
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", text)
     (policy,) = re.findall("""<meta http-equiv=.*content="([^"]*)""", text)
@@ -74,6 +68,7 @@ def test_what_cannot_be_written_is_refused_first(
         ([bundle, "-o", tmp_path / "page.png"], "ends in .html"),
         ([bundle, "-o", there], "exists already; pass --force"),
         ([bundle, "-o", there / "page.html"], "is a file"),
+        ([bundle, "-o", tmp_path / "x.html", "--size", "4"], "--size"),
         ([tmp_path / "nothing", "-o", tmp_path / "x.html"], "no such file"),
         ([tmp_path / "nothing", "-o", there], "no such file; check the name of the run or bundle"),
     ]
@@ -82,11 +77,3 @@ def test_what_cannot_be_written_is_refused_first(
         assert said in capsys.readouterr().err
     assert there.read_text() == "mine"
     assert not (tmp_path / "x.html").exists()
-
-
-def test_more_colours_than_a_page_shows_are_refused(training: Training) -> None:
-    many = np.zeros((MOST_PAINTS + 1, 3), np.uint8)
-    with pytest.raises(BundleError, match=f"{MOST_PAINTS + 1} colours"):
-        field_record(replace(training.result, palette=many), Blob())
-    shader = (FOLDER / "field_layers.js").read_text(encoding="utf-8")
-    assert f"MOST_PAINTS = {MOST_PAINTS};" in shader

@@ -1,0 +1,126 @@
+// Shows views of the figure: each is a picture, or layers that are put together in today's colours.
+
+import { project } from "./camera.js";
+import { composed } from "./compose.js";
+import { newCanvas, pictureAt } from "./scene.js";
+
+/** @typedef {import("./types.js").LayerRecord} LayerRecord */
+/** @typedef {import("./types.js").Scene} Scene */
+/** @typedef {import("./types.js").Shot} Shot */
+/** @typedef {{picture?: ImageBitmap, rest?: Uint8ClampedArray | null}} Loaded what a record's files hold */
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {Scene} scene
+ * @param {Uint8Array} blob
+ * @param {() => void} ask for the picture again: what it lacked is there
+ */
+export function createPainter(canvas, scene, blob, ask) {
+  /** @type {Map<LayerRecord, Promise<Loaded>>} */
+  const loading = new Map();
+  /** @type {Map<LayerRecord, Loaded>} */
+  const loaded = new Map();
+  /** @type {Map<LayerRecord, HTMLCanvasElement>} in the colours of `shown` */
+  const made = new Map();
+  let shown = "";
+
+  /** @param {LayerRecord} record @returns {Promise<Loaded>} */
+  function load(record) {
+    const known = loading.get(record) ?? read(record);
+    loading.set(record, known);
+    return known;
+  }
+
+  /** @param {LayerRecord} record @returns {Promise<Loaded>} */
+  async function read(record) {
+    /** @type {Loaded} */
+    const found = record.picture
+      ? { picture: await pictureAt(blob, record.picture) }
+      : { rest: record.rest ? pixelsOf(await pictureAt(blob, record.rest)) : null };
+    loaded.set(record, found);
+    return found;
+  }
+
+  /** @param {LayerRecord} record @param {Loaded} files @param {Shot} shot @returns {CanvasImageSource} */
+  function pictureOf(record, files, { colors, ink }) {
+    if (files.picture) return files.picture;
+    const key = JSON.stringify([colors, ink]);
+    if (key !== shown) made.clear();
+    shown = key;
+    const known = made.get(record);
+    if (known) return known;
+    const [start, length] = record.maps;
+    const now = [...colors, ...scene.paints.slice(colors.length)];
+    const old = [...scene.palette.map((paint) => paint.rgb), ...scene.paints.slice(scene.palette.length)];
+    const maps = blob.subarray(start, start + length);
+    const pixels = composed(record, maps, files.rest ?? null, { old, now, ink }, scene.coding);
+    const picture = newCanvas(pixels.width, pixels.height, (context) => context.putImageData(pixels, 0, 0));
+    made.set(record, picture);
+    return picture;
+  }
+
+  /** @param {HTMLCanvasElement} into @param {Shot} shot @param {LayerRecord | null} record @param {Loaded} files */
+  function put(into, shot, record, files) {
+    const { camera } = shot;
+    if (into.width !== camera.size[0]) into.width = camera.size[0];
+    if (into.height !== camera.size[1]) into.height = camera.size[1];
+    const context = into.getContext("2d");
+    context?.clearRect(0, 0, into.width, into.height);
+    if (!context || !record) return;
+    const { target, size, fill, reach } = scene.figure;
+    const [u, v, depth] = project(camera, target);
+    const factor = (2 * reach * camera.scale) / (fill * size * (1 + camera.k * depth));
+    const [left, top, width, height] = record.box;
+    context.imageSmoothingQuality = "high";
+    context.drawImage(
+      pictureOf(record, files, shot),
+      u + (left - size / 2) * factor,
+      v + (top - size / 2) * factor * camera.aspect,
+      width * factor,
+      height * factor * camera.aspect,
+    );
+  }
+
+  /** @param {Shot} shot */
+  const recordOf = (shot) => scene.sights[shot.sight].layers[shot.layer] ?? null;
+
+  return {
+    /**
+     * Show a view on the canvas, which takes its size; what is not read yet is shown a moment later.
+     * @param {Shot} shot
+     * @returns {boolean} whether it is shown
+     */
+    draw(shot) {
+      const record = recordOf(shot);
+      const files = record ? loaded.get(record) : {};
+      if (files) put(canvas, shot, record, files);
+      else if (record) load(record).then(ask, ask);
+      return Boolean(files);
+    },
+
+    /**
+     * @param {Shot} shot
+     * @returns {Promise<HTMLCanvasElement>} a picture of its own
+     */
+    async read(shot) {
+      const record = recordOf(shot);
+      const files = record ? await load(record) : {};
+      return newCanvas(1, 1, ({ canvas: own }) => put(own, shot, record, files));
+    },
+
+    /** Read what turning needs, one view after the other. */
+    async readAll() {
+      for (const { layers } of scene.sights) {
+        const record = layers[scene.layers[0]];
+        if (record) await load(record).catch(() => {});
+      }
+    },
+  };
+}
+
+/** @param {ImageBitmap} picture @returns {Uint8ClampedArray} four bytes a pixel */
+function pixelsOf(picture) {
+  const { width, height } = picture;
+  const canvas = newCanvas(width, height, (context) => context.drawImage(picture, 0, 0));
+  return /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d")).getImageData(0, 0, width, height).data;
+}

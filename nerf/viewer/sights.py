@@ -1,0 +1,96 @@
+"""Draw what a page shows from each of its views: a trained figure, or a plain body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from toonset.camera import Camera
+from toonset.dataset.mesh.rasterize import depth_and_normals
+from toonset.mesh import Mesh
+from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.kernels.threads import side_by_side
+from toonset.nerf.render.baked import Baked
+from toonset.nerf.render.layers import Rendering, default_layer
+from toonset.nerf.render.views import baked_of, render
+from toonset.nerf.viewer.layered import layered, layered_shares
+from toonset.nerf.viewer.scene import layered_record, picture_record
+
+LAYERS = ("drawn", "rgb", "palette", "normal", "depth", "source")
+SHRINK = 2  # pixels of the layer that is seen at first for one of the others
+BODY, AMBIENT = (158, 178, 204), 0.55  # sRGB of a plain body, and its light from everywhere
+LIGHT = np.array([-0.4, -0.6, -0.7]) / np.linalg.norm([-0.4, -0.6, -0.7])  # camera axes
+FINER = 2  # samples of a body per pixel and axis
+
+Record = dict[str, Any]
+
+
+def layers_of(trained: TrainedField) -> list[str]:
+    """Return the layers that a figure's page has, the first at the start."""
+    missing = set() if trained.drawings is not None else {"drawn", "source"}
+    missing |= set() if trained.palette is not None else {"palette"}
+    layers = [layer for layer in LAYERS if layer not in missing]
+    return sorted(layers, key=lambda layer: layer != default_layer(trained))
+
+
+def figure_sights(
+    trained: TrainedField, cameras: Sequence[Camera], layered: Sequence[bool]
+) -> list[Record]:
+    """Return a record of each layer that each camera has: see `page/types.js`.
+
+    Args:
+        trained: the figure.
+        cameras: of the views.
+        layered: which of them have all layers; the others have the first.
+    """
+    layers = layers_of(trained)
+    own = [layers if all_of_them else layers[:1] for all_of_them in layered]
+    baked = baked_of(trained)
+    return side_by_side([partial(_sight, baked, *each) for each in zip(cameras, own, strict=True)])
+
+
+def body_sights(mesh: Mesh, cameras: Sequence[Camera]) -> list[Record]:
+    """Return the record of a plain body that each camera has."""
+    return side_by_side([partial(_body_sight, mesh, camera) for camera in cameras])
+
+
+def body_picture(mesh: Mesh, camera: Camera) -> UInt8[np.ndarray, "height width 4"]:
+    """Return a body in plain light."""
+    _, normal = depth_and_normals(mesh.vertices, mesh.faces, camera.resized(FINER))
+    hit = (normal != 0).any(axis=-1)
+    light = np.where(hit, AMBIENT + (1 - AMBIENT) * (normal @ LIGHT).clip(0, 1), 0)
+    fine = np.dstack([light, hit]).astype(np.float32)
+    mean = cv2.resize(fine, camera.size_wh, interpolation=cv2.INTER_AREA)
+    straight = mean[..., :1] / np.maximum(mean[..., 1:], 1e-6) * np.array(BODY)
+    return np.rint(np.dstack([straight, 255 * mean[..., 1]])).clip(0, 255).astype(np.uint8)
+
+
+def _sight(baked: Baked, camera: Camera, layers: Sequence[str]) -> Record:
+    view = render(baked, camera)
+    return {
+        layer: _layer(view, layer, 1 if number == 0 else SHRINK)
+        for number, layer in enumerate(layers)
+    }
+
+
+def _layer(view: Rendering, layer: str, shrink: int) -> Record | None:
+    drawings = view.field.drawings
+    if layer == "drawn" and drawings is not None:
+        pen = None if drawings.pen is None else drawings.pen.rgb
+        return layered_record(layered(view.drawn, drawings.paints, pen, drawings.drawn_shadow))
+    if layer == "palette" and view.shares is not None:
+        parts = np.dstack([view.shares, view.alpha])
+        height, width = (side // shrink for side in view.alpha.shape)
+        blocks = parts[: height * shrink, : width * shrink]
+        mean = blocks.reshape(height, shrink, width, shrink, -1).mean(axis=(1, 3))
+        return layered_record(layered_shares(mean[..., :-1], mean[..., -1]), shrink)
+    return picture_record(view.picture(layer), shrink)
+
+
+def _body_sight(mesh: Mesh, camera: Camera) -> Record:
+    return {"mannequin": picture_record(body_picture(mesh, camera))}
