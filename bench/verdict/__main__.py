@@ -1,8 +1,9 @@
 """`python -m bench.verdict`: does the verdict of a run say how its new views look?
 
 Trains on the steps of `bench stability`'s pages about training, or on case folders, and compares
-what the verdict rests on with FLIP of held-out views. The weights of `toonset.nerf.score.torn` are
-fitted to them. The same command goes on where it was stopped; a sheet takes about 8 CPU s.
+what the verdict rests on with FLIP of held-out views. Of cases it also says how well this and
+measures of views between drawings rank characters that they were not fitted on. The same command
+goes on where it was stopped; a sheet takes 8 to 20 CPU s.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from bench.stability.pages import PAGES
 from bench.stability.sheets import Step
 from bench.stability.trials import Page
 from bench.verdict.curve import draw_curve, table
-from bench.verdict.fit import fit_text
+from bench.verdict.fit import OWN, told_text
 from bench.verdict.measure import QUICK, Judged, judge
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Scene
@@ -31,7 +32,6 @@ from toonset.json_file import read_json
 from toonset.write import write_bytes, write_json
 
 SHEETS, CURVE = "sheets.json", "curve.png"
-OWN = "-own"  # ends the names of sheets with their own mannequin
 EVERY = 2  # of a case's held-out views
 
 Drawer = Callable[[], tuple[Scene, Scene, Any]]
@@ -69,7 +69,7 @@ def main(
         name: [s for s in done if _group(s) == name] for name in sorted(set(map(_group, done)))
     }
     for name, sheets in groups.items():
-        print(f"\n{name}\n{table(sheets)}\n{fit_text(sheets)}")
+        print(f"\n{name}\n{table(sheets)}\n{told_text(sheets)}")
     write_bytes(out / CURVE, draw_curve(groups))
 
 
@@ -104,7 +104,7 @@ def _case(folder: Path, mannequin: Path | None) -> tuple[Scene, Scene, None]:
 
 def _judged(row: dict[str, Any]) -> Judged:
     lists: dict[str, Any] = {
-        name: tuple(row.get(name, ())) for name in ("reasons", "look", "terms")
+        name: tuple(row.get(name, ())) for name in ("reasons", "look", "terms", "flip")
     }
     return Judged(**row | lists)
 

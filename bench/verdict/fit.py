@@ -1,53 +1,68 @@
-"""Fit the weights of what eyes mind between drawings to how held-out views look."""
+"""Ask whether what a run knows of itself tells how its new views look, for unknown characters.
+
+Every set of terms is fitted to FLIP over the figure, without a constant, and predicts sheets of
+characters that it was not fitted on; so is a bound chosen.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from bench.verdict.measure import Judged
-from toonset.nerf.score.torn import APART, BORDERS, OFF, OUTLINE
+from bench.records.record import aligned
+from bench.verdict.curve import BAD
+from bench.verdict.measure import TERMS, Judged
+from toonset.nerf.score.verdict import MOST_OFF
 
-TERMS = ("off", "apart", "borders", "outline")
-IN_USE = (OFF, APART, BORDERS, OUTLINE)
+OWN = "-own"  # ends the names of sheets with their own mannequin
 FEWEST = 6  # sheets of which weights are fitted
+MOST_ALARMS = 0.1  # of sheets with their own mannequin, that a bound may call weak
+HEAD = ("terms", "all", "own body", "others", "own called weak", "bad ones found")
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Weights, and how well those of the other characters predict each sheet.
+class Told:
+    """What a set of terms tells of characters that it was not fitted on.
 
     Attributes:
-        weights: of TERMS, none negative (Lawson, Hanson 1974).
-        rank: Spearman's of predicted and true looks, each character left out.
-        error: root mean square of these predictions, share of the height.
-        rank_in_use: Spearman's of the weights in use.
+        terms: of TERMS.
+        rank: Spearman's of predicted FLIP over the figure and the true one.
+        rank_own, rank_others: the same of sheets with and without their own mannequin.
+        alarms: sheets with their own mannequin above a bound under which 9 of 10 of those of the
+            other characters are.
+        found: sheets above it that look bad and are not off by more than MOST_OFF.
     """
 
-    weights: tuple[float, ...]
+    terms: tuple[str, ...]
     rank: float
-    error: float
-    rank_in_use: float
+    rank_own: float
+    rank_others: float
+    alarms: int
+    found: int
 
 
-def fitted(sheets: Sequence[Judged]) -> Fit | None:
-    """Return the weights that fit the mean look of sheets; None of too few."""
-    known = [sheet for sheet in sheets if sheet.terms and sheet.look]
-    if len(known) < FEWEST:
-        return None
-    terms = np.array([sheet.terms for sheet in known])
-    look = np.array([np.mean(sheet.look) for sheet in known])
+def told(sheets: Sequence[Judged]) -> list[Told]:
+    """Return what every set of terms tells; empty of too few sheets or characters."""
+    known = [sheet for sheet in sheets if sheet.terms and sheet.flip]
     characters = np.array([character_of(sheet.name) for sheet in known])
-    predicted = np.zeros(len(known))
-    for character in np.unique(characters):
-        own = characters == character
-        predicted[own] = terms[own] @ _weights(terms[~own], look[~own])
-    error = float(np.sqrt(np.mean((predicted - look) ** 2)))
-    in_use = _rank(terms @ np.array(IN_USE), look)
-    return Fit(tuple(_weights(terms, look).tolist()), _rank(predicted, look), error, in_use)
+    if len(known) < FEWEST or len(np.unique(characters)) == 1:
+        return []
+    terms = np.array([sheet.terms for sheet in known])
+    flip = np.array([np.mean(sheet.flip) for sheet in known])
+    own = np.array([sheet.name.endswith(OWN) for sheet in known])
+    missed = np.array([_is_missed(sheet) for sheet in known])
+    result = []
+    for count in range(1, len(TERMS) + 1):
+        for chosen in combinations(range(len(TERMS)), count):
+            guess, above = _left_out(terms[:, chosen], flip, characters, own)
+            ranks = (_rank(guess[part], flip[part]) for part in (own | True, own, ~own))
+            counts = int((above & own).sum()), int((above & missed).sum())
+            result.append(Told(tuple(TERMS[i] for i in chosen), *ranks, *counts))
+    return result
 
 
 def character_of(name: str) -> str:
@@ -55,29 +70,56 @@ def character_of(name: str) -> str:
     return name.partition("-")[0].rstrip("0123456789") or name
 
 
-def fit_text(sheets: Sequence[Judged]) -> str:
-    """Return the weights beside those in use, a line each; "" of too few sheets."""
-    found = fitted(sheets)
-    if found is None:
+def told_text(sheets: Sequence[Judged]) -> str:
+    """Return a row for every set of terms; "" of too few sheets."""
+    found = told(sheets)
+    if not found:
         return ""
-    rows = zip(TERMS, found.weights, IN_USE, strict=True)
-    return "\n".join(
-        [
-            f"torn, weights that fit {len(sheets)} sheets (none negative), and those in use:",
-            *(f"  {name:8s} {weight:.4f}  {used:.4f}" for name, weight, used in rows),
-            f"each character left out: rank correlation {found.rank:.2f}, error "
-            f"{100 * found.error:.2f} % of the height; of those in use {found.rank_in_use:.2f}",
-        ]
-    )
+    own = sum(sheet.name.endswith(OWN) for sheet in sheets)
+    missed = sum(_is_missed(sheet) for sheet in sheets)
+    rows = [
+        (
+            " ".join(one.terms),
+            *(f"{rank:.2f}" for rank in (one.rank, one.rank_own, one.rank_others)),
+            f"{one.alarms} of {own}",
+            f"{one.found} of {missed}",
+        )
+        for one in found
+    ]
+    title = "rank correlation with FLIP over the figure, each character left out"
+    return "\n".join([title, *aligned([HEAD, *rows], words=1)])
 
 
-def _weights(terms: Float[np.ndarray, "n terms"], look: Float[np.ndarray, " n"]) -> np.ndarray:
+def _is_missed(sheet: Judged) -> bool:
+    return sheet.worst_look > BAD and sheet.off <= MOST_OFF
+
+
+def _left_out(
+    terms: Float[np.ndarray, "n terms"],
+    flip: Float[np.ndarray, " n"],
+    characters: np.ndarray,
+    own: Bool[np.ndarray, " n"],
+) -> tuple[Float[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
+    """Return predicted FLIP, by weights and bounds of the other characters, and what is above.
+
+    Weights are least squares, none negative (Lawson, Hanson 1974).
+    """
     from scipy.optimize import nnls
 
-    return np.asarray(nnls(terms, look)[0])
+    guess, above = np.zeros(len(flip)), np.zeros(len(flip), bool)
+    for character in np.unique(characters):
+        here = characters == character
+        summed = terms @ nnls(terms[~here], flip[~here])[0]
+        guess[here] = summed[here]
+        if (own & ~here).any():
+            bound = np.quantile(summed[own & ~here], 1 - MOST_ALARMS, method="inverted_cdf")
+            above[here] = summed[here] > bound
+    return guess, above
 
 
 def _rank(first: np.ndarray, second: np.ndarray) -> float:
     from scipy.stats import rankdata
 
+    if len(first) < FEWEST or not (np.ptp(first) and np.ptp(second)):
+        return float("nan")
     return float(np.corrcoef(rankdata(first), rankdata(second))[0, 1])

@@ -11,15 +11,20 @@ either of them alone: A and B, where both see the surface, in CIELAB and a littl
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from toonset.camera import Camera
+from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.look.blend import GUESSED, MIRRORED, SOLID, Geometry, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering
+from toonset.nerf.render.turntable import between_drawings
+from toonset.nerf.render.views import render
 from toonset.nerf.score.left_out import TALL_PX, by_pixel, difference
 from toonset.nerf.score.outline_turning import border_turning, outline_turning
 from toonset.nerf.score.patches import (
@@ -31,6 +36,7 @@ from toonset.nerf.score.patches import (
     plain_colors,
 )
 
+VIEWS, REPORTED_PX = 4, 120.0  # of a report, as many as a preview shows; px of the figure
 Picture = UInt8[np.ndarray, "height width 4"]
 
 
@@ -144,6 +150,27 @@ class Between:
             drawn.share(MIRRORED),
             drawn.share(GUESSED),
         )
+
+
+def views_between(baked: Baked, count: int = VIEWS) -> tuple[BetweenView, ...]:
+    """Return what is wrong with views half way between drawings, the figure REPORTED_PX tall.
+
+    Args:
+        baked: a field; empty where it has no drawings.
+        count: number of views, yaw rising.
+    """
+    drawings = baked.trained.drawings
+    if drawings is None:
+        return ()
+    judge = Between(drawings, REPORTED_PX)
+    assert judge.drawn  # made here: two threads must not make them twice
+
+    def one(camera: Camera) -> BetweenView:
+        small = camera.resized(REPORTED_PX / (drawings.height * camera.scale))
+        return judge.judged(render(baked, small))
+
+    cameras = between_drawings(baked.trained, count)
+    return tuple(side_by_side([partial(one, camera) for camera in cameras]))
 
 
 def _apart(drawings: Drawings, view: Rendering, beside: tuple[int, int], tall_px: float) -> float:

@@ -1,9 +1,9 @@
 """Judge a run: ok, or weak and why.
 
 A run is weak where a drawing and what the others make of its side are plainly apart (`left_out`),
-where views between drawings are torn (`torn`), or where no drawing shows a side (`view_coverage`).
-The bounds are where people would be unhappy with new views (docs/decisions.md, `python -m
-bench.verdict`).
+or where no drawing shows a side (`view_coverage`). The bound is where people would be unhappy with
+new views (docs/decisions.md, `python -m bench.verdict`). What eyes see on views between drawings is
+reported, but decides nothing: it does not tell how new views of an unknown character look.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.options import STEPS_ON_SECTIONS, STEPS_ON_SHAPE, USUAL_STEPS
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.baked import Baked
+from toonset.nerf.score.between import BetweenView, views_between
 from toonset.nerf.score.left_out import LeftOut, left_out
-from toonset.nerf.score.torn import MOST_TORN, Torn, torn_views, why_torn
 from toonset.nerf.train.result import Training
 from toonset.palette.pixels.labels import UNLABELLED
 
@@ -43,13 +43,13 @@ class Verdict:
         verdict: OK or WEAK.
         reasons: why it is weak and what helps, a line each, for people.
         views: what it rests on: every drawing as the others predict it.
-        torn: and what eyes mind on views between them; None where there are none.
+        between: what eyes see on views between them, which decides nothing.
     """
 
     verdict: str
     reasons: tuple[str, ...]
     views: tuple[LeftOut, ...]
-    torn: Torn | None = None
+    between: tuple[BetweenView, ...] = ()
 
     @property
     def off(self) -> float:
@@ -63,7 +63,7 @@ class Verdict:
             "verdict": self.verdict,
             "reasons": list(self.reasons),
             "off_height": {"worst": round(self.off, 6), "bound": MOST_OFF, "views": views},
-            "between": None if self.torn is None else _between(self.torn),
+            "between": [_between(view) for view in self.between],
         }
 
 
@@ -80,14 +80,10 @@ def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> 
         return Verdict(WEAK, (*reasons, NOTHING), ())
     baked = baked or Baked.of(training.result)
     views = left_out(baked, training.seen, drawn)
-    torn = torn_views(baked, max((view.off for view in views), default=0.0))
-    reasons += [text for text in (judged(views, training), judged_between(torn)) if text]
-    return Verdict(WEAK if reasons else OK, tuple(reasons), tuple(views), torn)
-
-
-def judged_between(torn: Torn) -> str:
-    """Return why a run is weak, by its views between drawings; "" of an ok one."""
-    return why_torn(torn) if torn.sum > MOST_TORN else ""
+    said = judged(views, training)
+    reasons = [*reasons, said] if said else reasons
+    found = WEAK if reasons else OK
+    return Verdict(found, tuple(reasons), tuple(views), views_between(baked))
 
 
 def judged(views: Sequence[LeftOut], training: Training) -> str:
@@ -99,18 +95,10 @@ def judged(views: Sequence[LeftOut], training: Training) -> str:
     return f"{_measured(worst)}; {_remedy(training, worst, stands_out=stands_out)}"
 
 
-def _between(torn: Torn) -> dict[str, Any]:
-    """Return what eyes mind between drawings for a report."""
-    names = ("off", "apart", "borders", "outline")
-    terms = {name: round(value, 6) for name, value in zip(names, torn.terms, strict=True)}
-    views = [
-        {
-            "yaw_deg": round(math.degrees(view.yaw) % 360, 2),
-            **{key: round(value, 6) for key, value in vars(view).items() if key in SHOWN},
-        }
-        for view in torn.views
-    ]
-    return {"torn": round(torn.sum, 6), "bound": MOST_TORN, "terms": terms, "views": views}
+def _between(view: BetweenView) -> dict[str, Any]:
+    """Return what eyes see on a view between drawings for a report."""
+    shown = {name: round(getattr(view, name), 6) for name in SHOWN}
+    return {"yaw_deg": round(math.degrees(view.yaw) % 360, 2), **shown}
 
 
 def _measured(worst: LeftOut) -> str:

@@ -22,7 +22,6 @@ from toonset.nerf.prepare.unwarp import Unwarping
 from toonset.nerf.score import verdict
 from toonset.nerf.score.between import BetweenView
 from toonset.nerf.score.left_out import LeftOut
-from toonset.nerf.score.torn import MOST_TORN, Torn
 from toonset.nerf.score.verdict import MOST_OFF, OK, WEAK, Verdict, blended, judged, verdict_of
 from toonset.nerf.train.result import Step, Training
 
@@ -66,18 +65,12 @@ def view(name: str, off: float) -> LeftOut:
     return LeftOut(name, ("a.png", "b.png"), off, 0.12, "upper left", "dark red")
 
 
-def between(**changed: Any) -> BetweenView:
-    """Return a view between two drawings, as whole as they are."""
-    sides = math.radians(45), math.radians(90)
-    plain = BetweenView(math.radians(68), sides, 8.0, 8.0, 50.0, 50.0, 0, 2, 2, 0.0, 0.0, 0.0)
-    return replace(plain, **changed)
-
-
 @pytest.fixture
 def whole(monkeypatch) -> Callable[[Training], Verdict]:
     """Return the verdict of a training whose drawings predict each other."""
+    torn = BetweenView(math.radians(-68), (0, 1), 20.0, 8.0, 99.0, 50.0, 90, 2, 0, 0.25, 0.0, 0.5)
     monkeypatch.setattr(verdict, "left_out", lambda *_: [view("0", 0.0)])
-    monkeypatch.setattr(verdict, "torn_views", lambda _, off: Torn(off, (between(),)))
+    monkeypatch.setattr(verdict, "views_between", lambda _: (torn,))
     return lambda found: verdict_of(found, found.prepared.scene, cast(Any, "baked"))
 
 
@@ -88,6 +81,8 @@ def test_what_agrees_is_ok_and_what_shows_nothing_is_weak(whole) -> None:
     found = whole(training(scene(*TURN)))
     assert (found.verdict, found.reasons) == (OK, ())
     assert found.to_json()["off_height"] == {"worst": 0, "bound": MOST_OFF, "views": {"0": 0}}
+    (told,) = found.to_json()["between"]
+    assert (told["yaw_deg"], told["apart"], told["fragments"]) == (292.0, 0.25, 90)  # torn, but ok
     blank = training(scene(*TURN), result=cast(Any, SimpleNamespace(drawings=None)))
     empty = verdict_of(blank, blank.prepared.scene)
     assert empty.verdict == WEAK
@@ -111,45 +106,6 @@ def test_a_run_is_as_weak_as_its_worst_drawing() -> None:
     short = replace(done, history=DONE[:20])
     assert "these were 20 steps: train longer" in judged(odd, short)
     assert "train longer" not in judged(odd, replace(short, stopped="the loss grew"))
-
-
-def test_torn_views_between_drawings_make_a_run_weak(whole, monkeypatch) -> None:
-    torn = between(borders=80.0, apart=0.011, whole=1, guessed=0.2)
-    found = Torn(0.016, (between(), torn))
-    monkeypatch.setattr(verdict, "torn_views", lambda *_: found)
-    said = whole(training(scene(*TURN)))
-    assert said.verdict == WEAK
-    (reason,) = said.reasons
-    assert reason.startswith("between the drawings at 45 and 90 deg new views are torn: ")
-    for part in (
-        "borders of colours are ragged, 1.6 times as winding",
-        "these paint it 1.1 % of the height apart",
-        "1 of 2 small features are torn or missing",
-        "no drawing shows 20 % of it",
-        "add a drawing at about 68 deg",
-    ):
-        assert part in reason
-    told = said.to_json()["between"]
-    assert told["bound"] == MOST_TORN < told["torn"]
-    assert [view["yaw_deg"] for view in told["views"]] == [68.0, 68.0]
-
-
-def test_every_term_of_the_sum_adds_to_it() -> None:
-    whole_run = Torn(0.0, (between(),))
-    assert whole_run.sum == 0
-    changes: tuple[dict[str, float], ...] = (
-        {"apart": 0.01},
-        {"borders": 75.0},
-        {"outline": 12.0},
-        {"outline": 5.0},
-    )
-    for change in changes:
-        one, two = (Torn(0.0, (between(**change), view)) for view in (between(), between(**change)))
-        assert 0 < one.sum < two.sum
-        assert one.worst == between(**change)
-    assert Torn(0.01, (between(),)).sum > 0
-    assert Torn(0.0, (between(borders=30.0),)).sum == 0  # fewer borders are no raggedness
-    assert Torn(0.01, ()).terms == (0.01, 0.0, 0.0, 0.0)
 
 
 def test_blends_are_named_where_there_are_many() -> None:
