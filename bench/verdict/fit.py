@@ -59,9 +59,12 @@ def told(sheets: Sequence[Judged]) -> list[Told]:
     for count in range(1, len(TERMS) + 1):
         for chosen in combinations(range(len(TERMS)), count):
             guess, above = _left_out(terms[:, chosen], flip, characters, own)
-            ranks = (_rank(guess[part], flip[part]) for part in (own | True, own, ~own))
-            counts = int((above & own).sum()), int((above & missed).sum())
-            result.append(Told(tuple(TERMS[i] for i in chosen), *ranks, *counts))
+            names = tuple(TERMS[i] for i in chosen)
+            whole, mine, others = (
+                _rank(guess[part], flip[part]) for part in (own | ~own, own, ~own)
+            )
+            alarms, found = int((above & own).sum()), int((above & missed).sum())
+            result.append(Told(names, whole, mine, others, alarms, found))
     return result
 
 

@@ -80,10 +80,10 @@ def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> 
         return Verdict(WEAK, (*reasons, NOTHING), ())
     baked = baked or Baked.of(training.result)
     views = left_out(baked, training.seen, drawn)
-    said = judged(views, training)
-    reasons = [*reasons, said] if said else reasons
-    found = WEAK if reasons else OK
-    return Verdict(found, tuple(reasons), tuple(views), views_between(baked))
+    found = judged(views, training)
+    reasons += [found] if found else []
+    between = views_between(baked)
+    return Verdict(WEAK if reasons else OK, tuple(reasons), tuple(views), between)
 
 
 def judged(views: Sequence[LeftOut], training: Training) -> str:
