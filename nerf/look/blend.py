@@ -59,6 +59,12 @@ class Geometry:
     alpha: Float[np.ndarray, "height width"]
     depth: Float[np.ndarray, "height width"]
 
+    @classmethod
+    def of(cls, camera: Camera) -> Geometry:
+        """Return what is seen where only the mannequin's shape is known: nothing."""
+        size = camera.size_wh[::-1]
+        return cls(camera, np.zeros(size, np.float32), np.full(size, np.nan, np.float32))
+
     def crop(self, rows: slice, columns: slice) -> Geometry:
         """Return a part of the view."""
         at = (rows, columns)

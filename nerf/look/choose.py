@@ -29,6 +29,7 @@ GOOD = 0.4  # trust from which a drawing may take a feature
 BAND = 0.03  # on either side of a border between patches, in which the seam may move
 FINE = 0.02  # detail is what a blur of this sigma takes away
 STEP, MOST = 40, 200  # levels of three channels: detail is flooded in steps, up to the most
+ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
 STRAY = 4e-4  # of the squared height: smaller fragments of what a drawing has larger go
 FRAGMENT = 0.5  # of its area in the drawing
@@ -90,12 +91,28 @@ def choose(
     )
     counts += 1e-6 * np.stack([look.seen for look in looks])
     best = np.where(counts.max(axis=0) > 0, counts.argmax(axis=0), -1)
+    best = _without_islands(best, within, ISLAND * figure_px**2)
     if len(looks) == 1:
         return best, counts
     good = np.stack([trust > GOOD for trust in trusts])
     flooded = _flooded(best, looks, good, within, figure_px)
     may = np.take_along_axis(good, flooded.clip(0)[None], 0)[0] & (flooded >= 0)
-    return np.where(may, flooded, best), counts
+    found = np.where(may, flooded, best)
+    return _without_islands(found, within, ISLAND * figure_px**2), counts
+
+
+def _without_islands(
+    chosen: Int[np.ndarray, "h w"], within: Mask, least_px: float
+) -> Int[np.ndarray, "h w"]:
+    """Return a choice whose small patches show the drawing that shows what is round them."""
+    small = np.zeros(chosen.shape, dtype=bool)
+    for value in np.unique(chosen[within]):
+        part, areas = sized_parts(within & (chosen == value))
+        few = areas < least_px
+        few[0] = False
+        small |= np.take(few, part)
+    (found,) = filled_from(within & ~small, chosen)
+    return np.where(small, found, chosen)
 
 
 def _flooded(

@@ -69,7 +69,8 @@ def render_files(
                 unseen[stem] = view.drawn.by_field
     worst = max(unseen, key=unseen.__getitem__, default="")
     if worst and unseen[worst] > UNSEEN:
-        say(f"{worst}: {unseen[worst]:.0%} of it is in no drawing and has the field's own colour")
+        guessed = "is in no drawing and goes on with the paint beside it"
+        say(f"{worst}: {unseen[worst]:.0%} of it {guessed}")
     if depths:
         yield DEPTH_FILE, _json(levels.to_json(depths))
     of_pictures = [name for name in formats if name != LAYERED]

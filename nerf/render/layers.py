@@ -28,8 +28,8 @@ Layer = UInt8[np.ndarray, "height width *channels"]
 
 
 @dataclass(frozen=True, eq=False)
-class Rendering:
-    """One rendered view.
+class FieldView:
+    """What a camera sees of a field.
 
     Attributes:
         rgb: (height, width, 3) premultiplied colour in [0, 1].
@@ -40,8 +40,6 @@ class Rendering:
             without palette.
         shares: (height, width, colors) share of a pixel that each palette colour covers
             (premultiplied by alpha); None without palette.
-        camera: it is seen from.
-        field: that was rendered.
     """
 
     rgb: Float[np.ndarray, "height width 3"]
@@ -49,8 +47,54 @@ class Rendering:
     depth: Float[np.ndarray, "height width"]
     labels: UInt8[np.ndarray, "height width"] | None
     shares: Float[np.ndarray, "height width colors"] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Rendering:
+    """One rendered view: the field's own, and the drawn look.
+
+    Each is made when it is first asked for: where the mannequin is the surface, the drawn look
+    needs nothing of the field. rgb, alpha, depth, labels and shares are those of `FieldView`.
+
+    Attributes:
+        camera: it is seen from.
+        field: that was rendered.
+        cast: returns what the camera sees of it.
+    """
+
     camera: Camera
     field: TrainedField
+    cast: Callable[[], FieldView]
+
+    @cached_property
+    def seen(self) -> FieldView:
+        """Return what the camera sees of the field."""
+        return self.cast()
+
+    @property
+    def rgb(self) -> Float[np.ndarray, "height width 3"]:
+        """Return premultiplied colour in [0, 1]: see `FieldView`."""
+        return self.seen.rgb
+
+    @property
+    def alpha(self) -> Float[np.ndarray, "height width"]:
+        """Return opacity in [0, 1]: see `FieldView`."""
+        return self.seen.alpha
+
+    @property
+    def depth(self) -> Float[np.ndarray, "height width"]:
+        """Return depth, nan where nothing is seen: see `FieldView`."""
+        return self.seen.depth
+
+    @property
+    def labels(self) -> UInt8[np.ndarray, "height width"] | None:
+        """Return the most frequent palette labels: see `FieldView`."""
+        return self.seen.labels
+
+    @property
+    def shares(self) -> Float[np.ndarray, "height width colors"] | None:
+        """Return the share of a pixel that each palette colour covers: see `FieldView`."""
+        return self.seen.shares
 
     @cached_property
     def drawn(self) -> DrawnView:
@@ -61,7 +105,8 @@ class Rendering:
         """
         if self.field.drawings is None:
             raise BundleError(NO_DRAWINGS)
-        view = Geometry(self.camera, self.alpha, self.depth)
+        known = self.field.drawings.shape is not None
+        view = Geometry.of(self.camera) if known else Geometry(self.camera, self.alpha, self.depth)
         return blend_view(self.field.drawings, view)
 
     def picture(self, layer: str | None = None) -> Layer:
@@ -176,7 +221,7 @@ def alpha_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
 
 
 def source_picture(rendering: Rendering) -> UInt8[np.ndarray, "height width 4"]:
-    """Return where paint comes from: grey of a drawing, blue of a mirror image, red of the field.
+    """Return where paint comes from: grey of a drawing, blue of a mirror image, red: guessed.
 
     Raises:
         BundleError: the run holds no drawings.

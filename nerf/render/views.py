@@ -8,6 +8,7 @@ voxel covers several pixels the view is rendered smaller and enlarged: it has no
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -22,7 +23,7 @@ from toonset.nerf.kernels.threads import one_thread
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import cast
 from toonset.nerf.render.labels import NONE, labels_of, palette_shares
-from toonset.nerf.render.layers import Rendering
+from toonset.nerf.render.layers import FieldView, Rendering
 from toonset.nerf.render.rays import ViewRays
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.raster import nearest
@@ -43,12 +44,13 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
         source: a trained field; what is prepared for its first view is kept for the next ones.
         camera: where it is seen from.
     """
-    return _render(source if isinstance(source, Baked) else baked_of(source), camera)
+    baked = source if isinstance(source, Baked) else baked_of(source)
+    return Rendering(camera, baked.trained, partial(_seen, baked, camera))
 
 
 @torch.no_grad()
 @one_thread()
-def _render(baked: Baked, camera: Camera) -> Rendering:
+def _seen(baked: Baked, camera: Camera) -> FieldView:
     detail_px = _detail(baked.trained) * camera.scale
     small = camera.resized(min(1.0, FINEST / detail_px)) if detail_px > FINEST else camera
     width, height = small.size_wh
@@ -66,8 +68,10 @@ def _render(baked: Baked, camera: Camera) -> Rendering:
         shares = palette_shares(baked.labels, baked.paints, seen[3], labels, chosen, more)
     seen[:, chosen] = more.mean(dim=2)
     means = seen.numpy(), None if shares is None else shares.numpy()
-    found = _rendering(*means, small, baked)
-    return found if small.size_wh == camera.size_wh else enlarged(found, camera)
+    found = _field_view(*means)
+    if small.size_wh == camera.size_wh:
+        return found
+    return enlarged(found, small, camera, 2 * baked.trained.hull.voxel)
 
 
 def _detail(trained: TrainedField) -> float:
@@ -78,17 +82,19 @@ def _detail(trained: TrainedField) -> float:
     return min(hull.voxel, float(hull.box.size.max()) / field.resolution)
 
 
-def enlarged(view: Rendering, camera: Camera) -> Rendering:
-    """Return a rendering as a larger camera of the same sight has it.
+def enlarged(view: FieldView, small: Camera, camera: Camera, apart: float) -> FieldView:
+    """Return a view as a larger camera of the same sight has it.
 
     Args:
         view: what is enlarged.
+        small: its camera.
         camera: of the same rotation and middle.
+        apart: world units: nearer depths belong to one surface.
     """
-    finer = camera.scale / view.camera.scale
-    small, large = _figure_boxes(view.alpha > 0, finer, camera.size_wh)
+    finer = camera.scale / small.scale
+    part_of, large = _figure_boxes(view.alpha > 0, finer, camera.size_wh)
     corner = np.array([one.start for one in large[::-1]])
-    start = np.array([one.start for one in small[::-1]])
+    start = np.array([one.start for one in part_of[::-1]])
     size = tuple(one.stop - one.start for one in large[::-1])
     shift = (corner + 0.5) / finer - 0.5 - start
     inverse = np.array([[1 / finer, 0, shift[0]], [0, 1 / finer, shift[1]]])
@@ -97,7 +103,7 @@ def enlarged(view: Rendering, camera: Camera) -> Rendering:
         flags = how | cv2.WARP_INVERSE_MAP
         border = cv2.BORDER_REPLICATE
         found = cv2.warpAffine(
-            np.ascontiguousarray(picture[small]), inverse, size, flags=flags, borderMode=border
+            np.ascontiguousarray(picture[part_of]), inverse, size, flags=flags, borderMode=border
         )
         return found
 
@@ -116,20 +122,20 @@ def enlarged(view: Rendering, camera: Camera) -> Rendering:
             shares[..., part] = warped(view.shares[..., part], cv2.INTER_LINEAR).reshape(
                 *alpha.shape, -1
             )
-    seen = np.isfinite(view.depth[small])
+    seen = np.isfinite(view.depth[part_of])
     depth = np.full(alpha.shape, np.nan, np.float32)
     if seen.any():
         whole = view.depth.copy().astype(np.float32)
-        whole[small] = whole[small][nearest(seen)]
+        whole[part_of] = whole[part_of][nearest(seen)]
         slope, step = (warped(whole, how) for how in (cv2.INTER_LINEAR, cv2.INTER_NEAREST))
         # across a step in depth no place lies half way
-        near = np.abs(slope - step) < 2 * view.field.hull.voxel
+        near = np.abs(slope - step) < apart
         depth = np.where(alpha >= SEEN_FROM, np.where(near, slope, step), np.nan)
     if shares is not None:
         found = np.where(alpha >= SEEN_FROM, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
         shares, labels = placed(shares), placed(found, UNLABELLED)
     parts = (placed(rgb), placed(alpha), placed(depth, np.nan), labels, shares)
-    return Rendering(*parts, camera, view.field)
+    return FieldView(*parts)
 
 
 def _figure_boxes(
@@ -171,12 +177,10 @@ def _grid(height: int, width: int) -> Float[Tensor, "2 pixels"]:
     return torch.stack([u, v]).view(2, -1)
 
 
-def _rendering(
+def _field_view(
     mean: Float[np.ndarray, "5 height width"],
     shares: Float[np.ndarray, "height width colors"] | None,
-    camera: Camera,
-    baked: Baked,
-) -> Rendering:
+) -> FieldView:
     alpha = mean[3].clip(0, 1)
     seen = alpha >= SEEN_FROM
     depth = np.where(seen, mean[4] / np.where(seen, alpha, 1), np.nan)
@@ -184,7 +188,7 @@ def _rendering(
     if shares is not None:
         labels = np.where(seen, shares.argmax(axis=-1), UNLABELLED).astype(np.uint8)
     rgb = np.ascontiguousarray(np.moveaxis(mean[:3], 0, -1))
-    return Rendering(rgb, alpha, depth, labels, shares, camera, baked.trained)
+    return FieldView(rgb, alpha, depth, labels, shares)
 
 
 def borders(

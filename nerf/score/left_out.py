@@ -88,14 +88,14 @@ def left_out(baked: Baked, seen: Scene, drawn: Scene) -> list[LeftOut]:
         return []
     drawings = drawings.fitting(TALL_PX / drawings.height)
     assert drawings.textures  # made here: two threads must not make them twice
-    plain = drawings.outline is None
+    field = drawings.outline is None
 
     def one(number: int) -> LeftOut:
         camera = small_camera(drawings, number)
         view = render(baked, camera)
         shown = Geometry(camera, view.alpha, view.depth)
-        field = _over_white(view.rgb, view.alpha) if plain else None
-        return predicted(drawings, number, shown, frames[number], names, field)
+        colors = _over_white(view.rgb, view.alpha) if field else None
+        return predicted(drawings, number, shown, frames[number], names, colors)
 
     return side_by_side([partial(one, i) for i in range(len(frames))])
 
@@ -112,7 +112,7 @@ def predicted(
     view: Geometry,
     frame: Frame,
     names: Sequence[str],
-    field: Picture | None = None,
+    colors: Picture | None = None,
 ) -> LeftOut:
     """Return a drawing as the others predict it.
 
@@ -122,7 +122,7 @@ def predicted(
         view: of the field, by `small_camera`.
         frame: what it is compared with.
         names: of all drawings, in their order.
-        field: the view in the field's own colours, over white, where they count, too.
+        colors: the field's own, over white, which count, too; None: they do not.
     """
     others = drawings.without(number)
     beside = [name for i, name in enumerate(names) if i != number]
@@ -131,8 +131,8 @@ def predicted(
     size = view.camera.size_wh
     drawn = cv2.resize(over_white(frame.rgba), size, interpolation=cv2.INTER_AREA)
     apart = difference(_over_white(found.rgb, found.alpha), drawn)
-    if field is not None:
-        own = difference(field, drawn)
+    if colors is not None:
+        own = difference(colors, drawn)
         apart = max(apart, own, key=lambda error: float(error.sum()))
     figure = cv2.resize(frame.rgba[..., 3], size, interpolation=cv2.INTER_AREA) > HALF
     figure |= found.alpha > SOLID

@@ -151,6 +151,6 @@ def test_a_film_without_its_codec_is_refused_before_any_work(toonset, tmp_path, 
 
 def test_what_no_drawing_shows_is_said(lined: Path, toonset, tmp_path: Path) -> None:
     above = ("render", lined, "--turntable", 1, "--elevation", 80, "-o", tmp_path / "above")
-    assert "is in no drawing and has the field's own colour" in toonset(*above).err
+    assert "is in no drawing and goes on with the paint beside it" in toonset(*above).err
     level = ("render", lined, "--turntable", 1, "-o", tmp_path / "level")
     assert "in no drawing" not in toonset(*level).err

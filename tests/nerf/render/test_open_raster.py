@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import xml.etree.ElementTree as ET
 import zipfile
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -16,7 +17,7 @@ from tests.nerf.look.painted import EYE, INK, PALETTE, camera_at, geometry
 from toonset.errors import OutputError, PaletteError, UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.look.drawings import Drawings
-from toonset.nerf.render.layers import Rendering
+from toonset.nerf.render.layers import FieldView, Rendering
 from toonset.nerf.render.open_raster import PaintLayer, check_layered, encode_ora, layered
 from toonset.palette.names import name_of
 
@@ -30,7 +31,9 @@ def rendering(drawn: Drawings | None, yaw: float) -> Rendering:
     shares[..., 0] = seen.alpha
     field = cast(TrainedField, SimpleNamespace(palette=PALETTE, drawings=drawn))
 
-    return Rendering(seen.rgb, seen.alpha, seen.depth, None, shares, seen.camera, field)
+    rgb = 0.5 * np.repeat(seen.alpha[..., None], 3, axis=-1)
+    shown = FieldView(rgb, seen.alpha, seen.depth, None, shares)
+    return Rendering(seen.camera, field, lambda: shown)
 
 
 def of(view: Rendering, layer: str = "drawn") -> tuple[list[PaintLayer], np.ndarray]:
@@ -116,7 +119,8 @@ def test_what_is_seen_of_the_field_has_layers_too(egg: Drawings) -> None:
 
 def test_a_run_without_palette_has_none(egg: Drawings) -> None:
     view = rendering(egg, 0.0)
-    object.__setattr__(view, "shares", None)
+    bare = replace(view.seen, shares=None)
+    view = replace(view, cast=lambda: bare)
     with pytest.raises(PaletteError, match="train again"):
         layered(view, "drawn", view.picture("drawn"))
 
