@@ -1,8 +1,9 @@
 """`python -m bench.verdict`: does the verdict of a run say how its new views look?
 
 Trains on the steps of `bench stability`'s pages about training, or on case folders, and compares
-what the verdict rests on with FLIP of held-out views. The same command goes on where it was
-stopped; a sheet takes about 8 CPU s.
+what the verdict rests on with FLIP of held-out views. Of cases it also says how well this and
+measures of views between drawings rank characters that they were not fitted on. The same command
+goes on where it was stopped; a sheet takes 8 to 20 CPU s.
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ from typing import Annotated, Any
 
 import typer
 
-from bench.cases.cases import case_folders, halved
+from bench.cases.cases import MANNEQUIN_FILE, case_folders, halved
 from bench.stability.fields import TRAINING
 from bench.stability.pages import PAGES
 from bench.stability.sheets import Step
 from bench.stability.trials import Page
 from bench.verdict.curve import draw_curve, table
+from bench.verdict.fit import OWN, told_text
 from bench.verdict.measure import QUICK, Judged, judge
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Scene
+from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import ToonsetError
 from toonset.json_file import read_json
 from toonset.write import write_bytes, write_json
@@ -41,12 +44,15 @@ def main(
     cases: Annotated[
         Path | None, typer.Option(help="Folders with views/ and test/, at half size.")
     ] = None,
+    own: Annotated[
+        bool, typer.Option("--own", help="Of cases, train on their own mannequin.obj, too.")
+    ] = False,
 ) -> None:
     """Judge every sheet that is not judged yet, then say and draw what was found."""
     out.mkdir(parents=True, exist_ok=True)
     kept = out / SHEETS
     done = [_judged(row) for row in read_json(kept)] if kept.is_file() else []
-    for name, draw in _cases(cases) if cases else _synthetic(seeds):
+    for name, draw in _cases(cases, own=own) if cases else _synthetic(seeds):
         if only not in name or name in {sheet.name for sheet in done}:
             continue
         try:
@@ -63,7 +69,7 @@ def main(
         name: [s for s in done if _group(s) == name] for name in sorted(set(map(_group, done)))
     }
     for name, sheets in groups.items():
-        print(f"\n{name}\n{table(sheets)}")
+        print(f"\n{name}\n{table(sheets)}\n{told_text(sheets)}")
     write_bytes(out / CURVE, draw_curve(groups))
 
 
@@ -82,18 +88,24 @@ def _drawn(page: Page, step: Step, seed: int) -> tuple[Scene, Scene, Any]:
     return scene.train, scene.test, scene.where
 
 
-def _cases(folder: Path) -> Iterator[tuple[str, Drawer]]:
+def _cases(folder: Path, *, own: bool) -> Iterator[tuple[str, Drawer]]:
     for case in case_folders(folder, "test/transforms.json"):
-        yield case.name, partial(_case, case)
+        yield case.name, partial(_case, case, None)
+        if own and (case / MANNEQUIN_FILE).is_file():
+            yield f"{case.name}{OWN}", partial(_case, case, case / MANNEQUIN_FILE)
 
 
-def _case(folder: Path) -> tuple[Scene, Scene, None]:
+def _case(folder: Path, mannequin: Path | None) -> tuple[Scene, Scene, None]:
     train, test = (halved(read_scene(folder / name)) for name in ("views", "test"))
+    if mannequin is not None:
+        train = replace(train, mannequin=load_mesh(mannequin))
     return train, replace(test, frames=test.frames[::EVERY]), None
 
 
 def _judged(row: dict[str, Any]) -> Judged:
-    lists: dict[str, Any] = {name: tuple(row[name]) for name in ("reasons", "look")}
+    lists: dict[str, Any] = {
+        name: tuple(row.get(name, ())) for name in ("reasons", "look", "terms", "flip")
+    }
     return Judged(**row | lists)
 
 

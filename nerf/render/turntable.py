@@ -50,6 +50,8 @@ def between_drawings(
 ) -> tuple[Camera, ...]:
     """Return `count` cameras half way between drawings, the first nearest to front.
 
+    Mirrored drawings count, too: the view from there is one of them, turned round.
+
     Args:
         trained: see `turntable`.
         count: number of views, yaw rising.
@@ -59,7 +61,9 @@ def between_drawings(
         UsageError: no view, or pictures without a pixel.
     """
     _check(count, size)
-    return framed(trained, angles_between(drawn_ring(trained), count), size)
+    views = () if trained.drawings is None else trained.drawings.views
+    ring = ring_of([view.as_drawn.camera for view in views])
+    return framed(trained, angles_between(ring, count), size)
 
 
 def drawn_ring(trained: TrainedField) -> Angles:

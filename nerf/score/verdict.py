@@ -2,11 +2,13 @@
 
 A run is weak where a drawing and what the others make of its side are plainly apart (`left_out`),
 or where no drawing shows a side (`view_coverage`). The bound is where people would be unhappy with
-new views (docs/decisions.md, `python -m bench.verdict`).
+new views (docs/decisions.md, `python -m bench.verdict`). What eyes see on views between drawings is
+reported, but decides nothing: it does not tell how new views of an unknown character look.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +19,7 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.options import STEPS_ON_SECTIONS, STEPS_ON_SHAPE, USUAL_STEPS
 from toonset.nerf.prepare.view_coverage import guesses
 from toonset.nerf.render.baked import Baked
+from toonset.nerf.score.between import BetweenView, views_between
 from toonset.nerf.score.left_out import LeftOut, left_out
 from toonset.nerf.train.result import Training
 from toonset.palette.pixels.labels import UNLABELLED
@@ -25,6 +28,10 @@ OK, WEAK = "ok", "weak"
 MOST_OFF = 0.021  # of the figure's height, of the worst drawing (docs/decisions.md)
 BLENDS = 0.3  # of the figures' pixels; clean drawings of 80 px have 0.2, larger ones fewer
 STANDS_OUT = 1.4  # times the median drawing's: one that is wrong by itself
+SHOWN = (  # of a view between drawings, in a report
+    *("outline", "own_outline", "borders", "own_borders", "apart"),
+    *("fragments", "features", "whole", "mirrored", "guessed"),
+)
 NOTHING = "the field shows no figure: look at preview.png, and train longer or check the cameras"
 
 
@@ -36,11 +43,13 @@ class Verdict:
         verdict: OK or WEAK.
         reasons: why it is weak and what helps, a line each, for people.
         views: what it rests on: every drawing as the others predict it.
+        between: what eyes see on views between them, which decides nothing.
     """
 
     verdict: str
     reasons: tuple[str, ...]
     views: tuple[LeftOut, ...]
+    between: tuple[BetweenView, ...] = ()
 
     @property
     def off(self) -> float:
@@ -54,6 +63,7 @@ class Verdict:
             "verdict": self.verdict,
             "reasons": list(self.reasons),
             "off_height": {"worst": round(self.off, 6), "bound": MOST_OFF, "views": views},
+            "between": [_between(view) for view in self.between],
         }
 
 
@@ -68,10 +78,12 @@ def verdict_of(training: Training, drawn: Scene, baked: Baked | None = None) -> 
     reasons = guesses(training.seen)
     if training.result.drawings is None:
         return Verdict(WEAK, (*reasons, NOTHING), ())
-    views = left_out(baked or Baked.of(training.result), training.seen, drawn)
+    baked = baked or Baked.of(training.result)
+    views = left_out(baked, training.seen, drawn)
     found = judged(views, training)
     reasons += [found] if found else []
-    return Verdict(WEAK if reasons else OK, tuple(reasons), tuple(views))
+    between = views_between(baked)
+    return Verdict(WEAK if reasons else OK, tuple(reasons), tuple(views), between)
 
 
 def judged(views: Sequence[LeftOut], training: Training) -> str:
@@ -81,6 +93,12 @@ def judged(views: Sequence[LeftOut], training: Training) -> str:
         return ""
     stands_out = worst.off > STANDS_OUT * float(np.median([view.off for view in views]))
     return f"{_measured(worst)}; {_remedy(training, worst, stands_out=stands_out)}"
+
+
+def _between(view: BetweenView) -> dict[str, Any]:
+    """Return what eyes see on a view between drawings for a report."""
+    shown = {name: round(getattr(view, name), 6) for name in SHOWN}
+    return {"yaw_deg": round(math.degrees(view.yaw) % 360, 2), **shown}
 
 
 def _measured(worst: LeftOut) -> str:

@@ -10,6 +10,7 @@ import torch
 
 from toonset.cli.common.refusals import RENAMED
 from toonset.cli.common.train_watch import LOG_S, RateLimit, Stopper
+from toonset.nerf.score.between import VIEWS
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
 RUN_FILES = {
@@ -82,11 +83,15 @@ def test_held_out_views_are_looked_at_and_reported(bundle: Path, toonset, tmp_pa
     shutil.copy(bundle / "transforms.json", bundle / "test")
     done = toonset("train", bundle, *FAST, "--json")
     assert done.code == 0
-    assert done.json["verdict"] | {"off_height": None} == {
+    assert done.json["verdict"] | {"off_height": None, "between": None} == {
         "verdict": "ok",
         "reasons": [],
         "off_height": None,
+        "between": None,
     }
+    between = done.json["verdict"]["between"]
+    assert len(between) == VIEWS
+    assert all(view["whole"] <= view["features"] for view in between)
     assert done.json["test"]["psnr"] == pytest.approx(done.json["train"]["psnr"])
     assert "left" in done.err  # how long it will take
     flags = ("--json", "--no-palette", "--verbose")

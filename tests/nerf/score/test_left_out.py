@@ -94,6 +94,20 @@ def test_a_feature_that_one_drawing_lacks_is_found_and_named(
     assert 0 < found.differs < 0.3
 
 
+def test_the_colours_of_a_field_count_if_they_are_farther_off(exact: Scene) -> None:
+    drawings = drawings_of(exact, exact, depth_of, bent=False)
+    assert drawings is not None
+    drawings = drawings.fitting(TALL_PX / drawings.height)
+    view, names = geometry(small_camera(drawings, 0)), [frame.name for frame in exact.frames]
+    black = np.zeros((*view.alpha.shape, 3), np.float32)
+    plain = predicted(drawings, 0, view, exact.frames[0], names)
+    assert predicted(drawings, 0, view, exact.frames[0], names, black).off > 2 * plain.off
+    shown = cv2.resize(
+        over_white(exact.frames[0].rgba), view.camera.size_wh, interpolation=cv2.INTER_AREA
+    )
+    assert predicted(drawings, 0, view, exact.frames[0], names, shown) == plain
+
+
 def test_it_does_not_depend_on_how_large_drawings_are(exact: Scene) -> None:
     def off(side: int) -> float:
         cameras = [camera.resized(side / 120) for camera in ring()]

@@ -20,6 +20,7 @@ from toonset.nerf.prepare.registration import Registration
 from toonset.nerf.prepare.symmetry import Symmetry
 from toonset.nerf.prepare.unwarp import Unwarping
 from toonset.nerf.score import verdict
+from toonset.nerf.score.between import BetweenView
 from toonset.nerf.score.left_out import LeftOut
 from toonset.nerf.score.verdict import MOST_OFF, OK, WEAK, Verdict, blended, judged, verdict_of
 from toonset.nerf.train.result import Step, Training
@@ -67,7 +68,9 @@ def view(name: str, off: float) -> LeftOut:
 @pytest.fixture
 def whole(monkeypatch) -> Callable[[Training], Verdict]:
     """Return the verdict of a training whose drawings predict each other."""
+    torn = BetweenView(math.radians(-68), (0, 1), 20.0, 8.0, 99.0, 50.0, 90, 2, 0, 0.25, 0.0, 0.5)
     monkeypatch.setattr(verdict, "left_out", lambda *_: [view("0", 0.0)])
+    monkeypatch.setattr(verdict, "views_between", lambda _: (torn,))
     return lambda found: verdict_of(found, found.prepared.scene, cast(Any, "baked"))
 
 
@@ -78,6 +81,8 @@ def test_what_agrees_is_ok_and_what_shows_nothing_is_weak(whole) -> None:
     found = whole(training(scene(*TURN)))
     assert (found.verdict, found.reasons) == (OK, ())
     assert found.to_json()["off_height"] == {"worst": 0, "bound": MOST_OFF, "views": {"0": 0}}
+    (told,) = found.to_json()["between"]
+    assert (told["yaw_deg"], told["apart"], told["fragments"]) == (292.0, 0.25, 90)  # torn, but ok
     blank = training(scene(*TURN), result=cast(Any, SimpleNamespace(drawings=None)))
     empty = verdict_of(blank, blank.prepared.scene)
     assert empty.verdict == WEAK

@@ -1,0 +1,1 @@
+"""What eyes see on views between drawings: outlines, fragments, features, steadiness, size."""
