@@ -178,7 +178,6 @@ def add_drawings(training: Training, scene: Scene) -> TrainedField:
         ready.shape,
         differences(seen),
         bent=ready.bent,
-        apart=not ready.compared,
     )
     result = replace(training.result, drawings=found)
     keep(result, baked)

@@ -30,7 +30,6 @@ def drawings_of(
     differences: Sequence[Bool[np.ndarray, "height width"] | None] = (),
     *,
     bent: bool,
-    apart: bool = False,
 ) -> Drawings | None:
     """Build the drawn look's drawings; None if no drawing, or no field, shows a figure.
 
@@ -42,7 +41,6 @@ def drawings_of(
         differences: per drawing along the mirror plane where it shows that left and right differ,
             None of others; empty where nothing is mirrored.
         bent: whether they were bent.
-        apart: whether nobody made them agree.
     """
     known = [*differences, *[None] * (len(ready.frames) - len(differences))]
     rows = [
@@ -78,7 +76,7 @@ def drawings_of(
         for (frame, own, _), paint, depth in zip(rows, flat.paints, shown, strict=True)
     )
     palette = ready.palette if ready.palette is not None else _common_colors(views)
-    found = Drawings(views, (), line, line, palette, height, extent, bent, apart, shape)
+    found = Drawings(views, (), line, line, palette, height, extent, bent, shape)
     found = replace(found, steps=flat.steps, shade=flat.shade, shadow=ready.shadow)
     return found.with_flows(pair_flows(found, depth_of))
 

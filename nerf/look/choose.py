@@ -23,7 +23,7 @@ from toonset.raster import distance_to, nearest, sized_parts
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
 SQUARE_ON = 0.8  # of a pixel of the drawing per pixel of the view: from here on it saw enough
-SPREAD = 0.012  # sigma over which drawings are compared
+SPREAD = 0.04  # sigma over which drawings are compared
 OTHER = 0.1  # share of a drawing that does not flank the view
 GOOD = 0.4  # trust from which a drawing may take a feature
 BAND = 0.03  # on either side of a border between patches, in which the seam may move

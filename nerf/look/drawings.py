@@ -109,8 +109,6 @@ class Drawings:
         height: of the figure, world units.
         depths: the nearest and the farthest, past the cameras' targets, world units.
         bent: whether the drawings had to be bent to agree: their hull is a little too large then.
-        apart: whether nobody made the drawings agree: each shows another body, and where two
-            contradict each other one wins as a whole.
         shape: the mannequin's, where it is the character's; None: the surface is the field's.
         steps: lines at steps in depth; None: there are none, or the paint has them.
         shade: a shadow that the paint lacks; None: there is none, or the paint has it.
@@ -126,7 +124,6 @@ class Drawings:
     height: float
     depths: tuple[float, float]
     bent: bool
-    apart: bool = False
     shape: Shape | None = None
     steps: StepLines | None = None
     shade: Shade | None = None

@@ -123,7 +123,6 @@ class DrawingsRecord(BaseModel):
     height: Size
     depths: tuple[Number, Number]
     bent: bool
-    apart: bool = False
     shape: ShapeRecord | None
     steps: StepsRecord | None
     shade: ShadeRecord | None
@@ -145,7 +144,6 @@ class DrawingsRecord(BaseModel):
                 "height": drawings.height,
                 "depths": drawings.depths,
                 "bent": drawings.bent,
-                "apart": drawings.apart,
                 "shape": shape and _where(shape),
                 "steps": drawings.steps and asdict(drawings.steps),
                 "shade": drawings.shade and asdict(drawings.shade),
@@ -230,7 +228,6 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         record.height,
         record.depths,
         record.bent,
-        record.apart,
         shape,
         None if record.steps is None else StepLines(**record.steps.model_dump()),
         None if record.shade is None else Shade(**record.shade.model_dump()),
