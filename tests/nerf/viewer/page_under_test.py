@@ -58,7 +58,9 @@ def drawn_ellipse(camera: Camera) -> DrawnView:
 
 def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, Any]:
     view = drawn_ellipse(sight_camera(yaw, elevation))
-    layers = {"drawn": layered_record(layered(view, np.array(COLORS, np.uint8), tuple(PEN)))}
+    red, green, blue = PEN
+    found = layered(view, np.array(COLORS, np.uint8), (red, green, blue))
+    layers = {"drawn": layered_record(found)}
     for i, layer in enumerate(("rgb", "normal", "depth", "source") if whole else ()):
         grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
         opaque = 255 * (view.alpha > 0.5).astype(np.uint8)

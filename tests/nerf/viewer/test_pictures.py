@@ -53,7 +53,8 @@ class Shown:
     def recolored(self, number: int) -> tuple[TrainedField, list[list[int]]]:
         """Return the field with one colour changed, and the page's colours then."""
         old = self.colors
-        changed = recolor_run(self.trained, [f"{hex_of(tuple(old[number]))}={hex_of(NEW)}"])
+        red, green, blue = old[number]
+        changed = recolor_run(self.trained, [f"{hex_of((red, green, blue))}={hex_of(NEW)}"])
         return changed, [list(NEW) if i == number else rgb for i, rgb in enumerate(old)]
 
 
@@ -108,7 +109,7 @@ def test_another_colour_is_as_render_has_it_and_leaves_nothing_of_the_old(
     one = pages[name]
     front = render(one.trained, one.cameras[0]).drawn.palette_labels(len(one.colors))
     for number in np.flatnonzero(np.bincount(front[front < 255]) > 0.1 * (front < 255).sum()):
-        changed, colors = one.recolored(number)
+        changed, colors = one.recolored(int(number))
         old = one.colors[number]
         for i, camera in list(enumerate(one.cameras))[::3]:
             after = shown(one.page, i, colors=colors)

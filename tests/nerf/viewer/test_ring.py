@@ -15,9 +15,15 @@ from toonset.nerf.viewer.ring import ring_through
 def cameras(*angles: Sequence[float]) -> list[Camera]:
     """Return cameras at yaws, elevations and rolls in degrees."""
     return [
-        Camera.looking_at(np.zeros(3), *map(math.radians, one[:2]), 1.0, (9, 9), math.radians(roll))
+        Camera.looking_at(
+            np.zeros(3),
+            math.radians(one[0]),
+            math.radians(one[1]),
+            1.0,
+            (9, 9),
+            math.radians(one[2] if len(one) > 2 else 0.0),
+        )
         for one in angles
-        for roll in [one[2] if len(one) > 2 else 0.0]
     ]
 
 
