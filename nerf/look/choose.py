@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -56,9 +57,11 @@ class Look:
     share: float
     scale: float
 
-    def paint(self, how: int = cv2.INTER_CUBIC) -> Float[np.ndarray, "h w 3"]:
+    @cached_property
+    def paint(self) -> Float[np.ndarray, "h w 3"]:
         """Return the drawing's colours at the places."""
-        return sample_picture(self.texture.paint, (self.x, self.y), how).clip(0, 1)
+        found = sample_picture(self.texture.paint, (self.x, self.y), cv2.INTER_CUBIC)
+        return np.clip(found, 0, 1, out=found)
 
     def trust(self, figure_px: float) -> Float[np.ndarray, "h w"]:
         """Return how well the drawing shows every place, 0 to 1."""
@@ -136,9 +139,10 @@ def _flooded(
         return best
     detail = np.zeros(best.shape, np.float32)
     for look, own in zip(looks, good, strict=True):
-        paint = look.paint(cv2.INTER_LINEAR)
-        soft = cv2.GaussianBlur(paint, (0, 0), FINE * figure_px)
-        fine = 255 * np.abs(paint - soft).sum(axis=-1)
+        if not (own & free).any():
+            continue
+        soft = cv2.GaussianBlur(look.paint, (0, 0), FINE * figure_px)
+        fine = cv2.transform(cv2.absdiff(look.paint, soft), np.full((1, 3), 255, np.float32))
         detail = np.maximum(detail, cv2.dilate(fine, np.ones((3, 3))) * own)
     order = -(np.minimum(detail, MOST) // STEP).astype(np.int32)
     seeds = np.where(free | (best < 0), 0, best + 1)
@@ -154,15 +158,16 @@ def mixed(
     """
     color = np.zeros((*chosen.shape, 3), np.float32)
     label = np.zeros(chosen.shape, np.uint8)
-    pictures = [look.paint() for look in looks]
-    for number, look in enumerate(looks):
-        own = chosen == number
-        color[own] = pictures[number][own]
+    used = [number for number in range(len(looks)) if (chosen == number).any()]
+    for number in used:
+        own, look = chosen == number, looks[number]
+        color[own] = look.paint[own]
         label[own] = sample_picture(look.texture.labels, (look.x, look.y), cv2.INTER_NEAREST)[own]
     most = np.take_along_axis(counts, chosen.clip(0)[None], 0)[0]
     total, weights = color.copy(), np.ones(chosen.shape, np.float32)
-    for number, picture in enumerate(pictures):
-        like = 1 - np.abs(picture - color).max(axis=-1) / LIKE
+    for number in used:
+        picture = looks[number].paint
+        like = 1 - cv2.absdiff(picture, color).max(axis=-1) / LIKE
         weight = (counts[number] / np.maximum(most, 1e-6)).clip(0, 1) * like.clip(0, 1)
         weight *= (chosen != number) & (chosen >= 0)
         total += weight[..., None] * picture

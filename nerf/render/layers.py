@@ -60,11 +60,13 @@ class Rendering:
         camera: it is seen from.
         field: that was rendered.
         cast: returns what the camera sees of it.
+        surface: returns what the drawn look needs of it.
     """
 
     camera: Camera
     field: TrainedField
     cast: Callable[[], FieldView]
+    surface: Callable[[], Geometry]
 
     @cached_property
     def seen(self) -> FieldView:
@@ -106,8 +108,9 @@ class Rendering:
         if self.field.drawings is None:
             raise BundleError(NO_DRAWINGS)
         known = self.field.drawings.shape is not None
-        view = Geometry.of(self.camera) if known else Geometry(self.camera, self.alpha, self.depth)
-        return blend_view(self.field.drawings, view)
+        return blend_view(
+            self.field.drawings, Geometry.of(self.camera) if known else self.surface()
+        )
 
     def picture(self, layer: str | None = None) -> Layer:
         """Return one layer as RGBA with straight alpha, or as a label map.

@@ -20,6 +20,7 @@ from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.kernels.threads import one_thread
+from toonset.nerf.look.blend import Geometry
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import cast
 from toonset.nerf.render.labels import NONE, labels_of, palette_shares
@@ -45,7 +46,21 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
         camera: where it is seen from.
     """
     baked = source if isinstance(source, Baked) else baked_of(source)
-    return Rendering(camera, baked.trained, partial(_seen, baked, camera))
+    casts = (partial(cast_view, baked, camera) for cast_view in (_seen, surface_of))
+    return Rendering(camera, baked.trained, *casts)
+
+
+@torch.no_grad()
+@one_thread()
+def surface_of(baked: Baked, camera: Camera) -> Geometry:
+    """Return opacity and depth alone, a ray per voxel: the drawn look smooths more away."""
+    small = camera.resized(min(1.0, 1 / max(_detail(baked.trained) * camera.scale, 1e-9)))
+    width, height = small.size_wh
+    seen = cast(ViewRays.of(baked, small), _grid(height, width)).view(5, height, width)
+    found = _field_view(seen.numpy(), None)
+    if small.size_wh != camera.size_wh:
+        found = enlarged(found, small, camera, 2 * baked.trained.hull.voxel)
+    return Geometry(camera, found.alpha, found.depth)
 
 
 @torch.no_grad()

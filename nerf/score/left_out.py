@@ -93,7 +93,7 @@ def left_out(baked: Baked, seen: Scene, drawn: Scene) -> list[LeftOut]:
     def one(number: int) -> LeftOut:
         camera = small_camera(drawings, number)
         view = render(baked, camera)
-        shown = Geometry(camera, view.alpha, view.depth)
+        shown = view.surface()
         colors = _over_white(view.rgb, view.alpha) if field else None
         return predicted(drawings, number, shown, frames[number], names, colors)
 

@@ -33,7 +33,7 @@ def rendering(drawn: Drawings | None, yaw: float) -> Rendering:
 
     rgb = 0.5 * np.repeat(seen.alpha[..., None], 3, axis=-1)
     shown = FieldView(rgb, seen.alpha, seen.depth, None, shares)
-    return Rendering(seen.camera, field, lambda: shown)
+    return Rendering(seen.camera, field, lambda: shown, lambda: seen)
 
 
 def of(view: Rendering, layer: str = "drawn") -> tuple[list[PaintLayer], np.ndarray]:
