@@ -130,13 +130,12 @@ def _drawn(
     noise = (finer * figure_px / CRUMB_AT) ** 2
     inside = without_crumbs(solid, CRUMB_PX * noise, hole_px * noise)
     cover = np.where(inside == solid, cover, inside).astype(np.float32)
-    cover = cv2.resize(cover, size, interpolation=cv2.INTER_AREA)
-    ink = np.zeros_like(cover)
+    ink = np.zeros(size[::-1], np.float32)
     if width_px > 0:
-        depth = depth_inside(inside).astype(np.float32)
-        line = np.clip(finer * width_px + 0.5 - depth, 0, 1) * inside
+        depth = np.where(inside, depth_inside(inside), 0).astype(np.float32)
+        line = np.clip(finer * width_px + 0.5 - depth, 0, 1) * cover
         ink = cv2.resize(line, size, interpolation=cv2.INTER_AREA)
-    return cover, np.minimum(ink, cover)
+    return cv2.resize(cover, size, interpolation=cv2.INTER_AREA), ink
 
 
 def without_crumbs(
