@@ -189,7 +189,8 @@ def _lines(look: _Look) -> Share:
     off = look.shown.color - look.shown.alpha[..., None] * look.paint
     share = (off * way).sum(axis=-1) / np.maximum(length, 1e-9)
     share = np.where(length > CLEAR**2, share, look.ink)
-    return np.where(dilate(look.ink > 0, NEAR_PX) & (share > FAINT), share, 0)
+    faint = FAINT - 0.5 / 255  # bytes are rounded
+    return np.where(dilate(look.ink > 0, NEAR_PX) & (share > faint), share, 0)
 
 
 def _pure(look: _Look, rest: _Rest, lines: Share) -> list[Bool[np.ndarray, "height width"]]:

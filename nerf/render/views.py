@@ -46,8 +46,8 @@ def render(source: TrainedField | Baked, camera: Camera) -> Rendering:
         camera: where it is seen from.
     """
     baked = source if isinstance(source, Baked) else baked_of(source)
-    casts = (partial(cast_view, baked, camera) for cast_view in (_seen, surface_of))
-    return Rendering(camera, baked.trained, *casts)
+    cast_view, surface = partial(_seen, baked, camera), partial(surface_of, baked, camera)
+    return Rendering(camera, baked.trained, cast_view, surface)
 
 
 @torch.no_grad()
