@@ -31,7 +31,6 @@ from toonset.palette.pixels.labels import UNLABELLED
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
-LOOSE = 1.5  # times STEP that a smoothed place may lie behind a drawing's own surface
 SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
 THIRDS = 2  # further drawings that are asked
 ROOM = 0.03  # of the figure's height, round what is drawn
@@ -261,7 +260,7 @@ def _looks(
     looks = []
     for number, part, weight in sides:
         texture = drawings.textures[number]
-        seen = look_up(texture, points, LOOSE * STEP * drawings.height, CRUMB * figure_px**2)
+        seen = look_up(texture, points, STEP * drawings.height, CRUMB * figure_px**2)
         x, y = seen.moved(flow, part)
         scale = camera.scale / texture.camera.scale
         looks.append(Look(texture, x, y, seen.mask, weight, scale))

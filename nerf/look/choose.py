@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
+from toonset.nerf.look.outline import without_crumbs
 from toonset.raster import distance_to, nearest, sized_parts
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
@@ -29,7 +30,7 @@ OTHER = 0.1  # share of a drawing that does not flank the view
 GOOD = 0.4  # trust from which a drawing may take a feature
 BAND = 0.03  # on either side of a border between patches, in which the seam may move
 FINE = 0.02  # detail is what a blur of this sigma takes away
-STEP, MOST = 40, 200  # levels of three channels: detail is flooded in steps, up to the most
+DETAIL_STEP, MOST_DETAIL = 40, 200  # sums of channels: detail is flooded in steps, up to this
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
@@ -140,10 +141,8 @@ def _without_islands(
     """Return a choice whose small patches show the drawing that shows what is round them."""
     small = np.zeros(chosen.shape, dtype=bool)
     for value in np.unique(chosen[within]):
-        part, areas = sized_parts(within & (chosen == value))
-        few = areas < least_px
-        few[0] = False
-        small |= np.take(few, part)
+        patches = within & (chosen == value)
+        small |= patches & ~without_crumbs(patches, least_px, 0)
     (found,) = filled_from(within & ~small, chosen)
     return np.where(small, found, chosen)
 
@@ -174,7 +173,7 @@ def _flooded(
         soft = cv2.GaussianBlur(look.paint, (0, 0), FINE * figure_px)
         fine = cv2.transform(cv2.absdiff(look.paint, soft), np.full((1, 3), 255, np.float32))
         detail = np.maximum(detail, cv2.dilate(fine, np.ones((3, 3))) * own)
-    order = -(np.minimum(detail, MOST) // STEP).astype(np.int32)
+    order = -(np.minimum(detail, MOST_DETAIL) // DETAIL_STEP).astype(np.int32)
     seeds = np.where(free | (best < 0), 0, best + 1)
     return np.asarray(watershed(order, seeds, mask=within | (seeds > 0))) - 1
 

@@ -60,7 +60,7 @@ class Rendering:
         camera: it is seen from.
         field: that was rendered.
         cast: returns what the camera sees of it.
-        surface: returns what the drawn look needs of it.
+        surface: returns its opacity and depth alone, with fewer rays.
     """
 
     camera: Camera
@@ -99,6 +99,13 @@ class Rendering:
         return self.seen.shares
 
     @cached_property
+    def geometry(self) -> Geometry:
+        """Return what the drawn look needs of the field: nothing where the body is known."""
+        drawings = self.field.drawings
+        known = drawings is not None and drawings.shape is not None
+        return Geometry.of(self.camera) if known else self.surface()
+
+    @cached_property
     def drawn(self) -> DrawnView:
         """Return the view put together from the drawings.
 
@@ -107,10 +114,7 @@ class Rendering:
         """
         if self.field.drawings is None:
             raise BundleError(NO_DRAWINGS)
-        known = self.field.drawings.shape is not None
-        return blend_view(
-            self.field.drawings, Geometry.of(self.camera) if known else self.surface()
-        )
+        return blend_view(self.field.drawings, self.geometry)
 
     def picture(self, layer: str | None = None) -> Layer:
         """Return one layer as RGBA with straight alpha, or as a label map.

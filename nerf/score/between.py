@@ -19,7 +19,7 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.blend import GUESSED, MIRRORED, SOLID, Geometry, blend_view, flanking
+from toonset.nerf.look.blend import GUESSED, MIRRORED, SOLID, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering
@@ -177,12 +177,11 @@ def _apart(drawings: Drawings, view: Rendering, beside: tuple[int, int], tall_px
     """Return how far apart two drawings paint a view, where both see it, over the height."""
     if beside[0] == beside[1]:
         return 0.0
-    geometry = Geometry(view.camera, view.alpha, view.depth)
     fitting = drawings.fitting(view.camera.scale)
-    seen = view.alpha >= SOLID
+    seen = np.ones(view.drawn.alpha.shape, dtype=bool)
     pictures = []
     for number in beside:
-        found = blend_view(_alone(fitting, number), geometry)
+        found = blend_view(_alone(fitting, number), view.geometry)
         seen &= (found.source != GUESSED) & (found.alpha >= SOLID)
         pictures.append(found.paint)
     half = TALL_PX / tall_px

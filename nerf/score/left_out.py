@@ -93,9 +93,8 @@ def left_out(baked: Baked, seen: Scene, drawn: Scene) -> list[LeftOut]:
     def one(number: int) -> LeftOut:
         camera = small_camera(drawings, number)
         view = render(baked, camera)
-        shown = view.surface()
         colors = _over_white(view.rgb, view.alpha) if field else None
-        return predicted(drawings, number, shown, frames[number], names, colors)
+        return predicted(drawings, number, view.geometry, frames[number], names, colors)
 
     return side_by_side([partial(one, i) for i in range(len(frames))])
 

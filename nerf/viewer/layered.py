@@ -31,6 +31,7 @@ AROUND = 5  # pixels, a window's side: paints in it may be in a mixture, the com
 COMMON = 3
 BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is none
 FAR = 16.0  # levels of 255: a colour not so far from its mixture moves as that does
+TWO = np.ones((2, 2), np.uint8)  # pixels: what is thinner the lossy picture of `rest` loses
 ELSE = 3.0  # times LIKE: so much worse is a paint that is neither the label nor around
 
 Map = UInt8[np.ndarray, "height width"]
@@ -175,6 +176,8 @@ def _unmixed(
     ):
         whole.reshape(-1)[at] = values
     rest.reshape(-1, 3)[at] = np.rint(left)
+    kept = cv2.morphologyEx((moved > 0).astype(np.uint8), cv2.MORPH_OPEN, TWO)
+    moved[kept == 0] = 0
     return first, second, part, moved, rest
 
 

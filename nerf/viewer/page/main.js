@@ -55,9 +55,9 @@ function start(blob) {
     poster.hidden = true;
     painter.readAll();
   });
-  const filled = (/** @type {Partial<Shot>} */ shot) => {
+  const filled = (/** @type {Partial<Shot> & {side?: number}} */ { side = scene.figure.size, ...shot }) => {
     const sight = shot.sight ?? scene.figure.start;
-    const size = [scene.figure.size, scene.figure.size];
+    const size = [side, side];
     return {
       camera: turntableCamera(scene.figure, scene.sights[sight].angles, size),
       sight,
@@ -67,7 +67,7 @@ function start(blob) {
       ...shot,
     };
   };
-  const read = (/** @type {Partial<Shot>} */ shot) => painter.read(filled(shot));
+  const read = (/** @type {Partial<Shot> & {side?: number}} */ shot) => painter.read(filled(shot));
   const shot = () => shotOf(scene, store.state);
   Object.assign(globalThis, { toonset: { scene, store, shot, read } });
 }

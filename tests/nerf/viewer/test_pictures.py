@@ -25,6 +25,7 @@ from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.training import train
 from toonset.nerf.viewer.build import SheetDrawings, cameras_of, run_page
 from toonset.nerf.viewer.ring import Ring, ring_through
+from toonset.nerf.viewer.sights import SHRINK
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
 from toonset.raster import dilate
@@ -33,7 +34,8 @@ from toonset.view import over_white
 SIDE, VIEWS = 160, 12
 NEW = (40, 220, 60)
 NEAR = 0.05  # OKLab: a colour so near to another is its like
-LEAST_DB = {"drawn": 36.0, "rgb": 27.0, "normal": 23.0, "depth": 27.0, "source": 30.0}
+# WebP keeps every other pixel's hue, of which normals of so coarse a field are made
+LEAST_DB = {"drawn": 36.0, "rgb": 33.0, "normal": 27.0, "depth": 33.0, "source": 33.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +91,22 @@ def test_a_layer_is_what_render_draws(pages: dict[str, Shown], name: str, layer:
     one = pages[name]
     for i, camera in enumerate(one.cameras):
         if layer == "drawn" or one.ring.layered[i]:
-            found = psnr(shown(one.page, i, layer), render(one.trained, camera).picture(layer))
+            wanted = at_its_size(layer, render(one.trained, camera).picture(layer))
+            found = psnr(shown(one.page, i, layer, side=len(wanted)), wanted)
             assert found >= LEAST_DB[layer], (i, found)
+
+
+def at_its_size(layer: str, picture: UInt8[np.ndarray, "h w 4"]) -> UInt8[np.ndarray, "h w 4"]:
+    """Return a picture at the size that the page keeps a layer at: half, but for the first."""
+    if layer == "drawn":
+        return picture
+    rows, columns = (side // SHRINK * SHRINK for side in picture.shape[:2])
+    straight = picture[:rows, :columns].astype(float)
+    cover = straight[..., 3:] / 255
+    whole = np.dstack([straight[..., :3] * cover, cover])
+    mean = whole.reshape(rows // SHRINK, SHRINK, columns // SHRINK, SHRINK, 4).mean(axis=(1, 3))
+    color = mean[..., :3] / np.maximum(mean[..., 3:], 1e-9)
+    return np.rint(np.dstack([color, 255 * mean[..., 3:]])).astype(np.uint8)
 
 
 @pytest.mark.parametrize("name", ["field", "body"])
@@ -124,15 +140,13 @@ def test_another_colour_changes_only_that_paint(pages: dict[str, Shown], layer: 
     one = pages["field"]
     _, colors = one.recolored(0)
     i = int(np.flatnonzero(one.ring.layered)[1])
-    apart = np.abs(
-        over_white(shown(one.page, i, layer, colors=colors)) - over_white(shown(one.page, i, layer))
-    )
-    moved = apart.max(axis=-1) > 3 / 255
+    after, before = (shown(one.page, i, layer, **more) for more in ({"colors": colors}, {}))
+    moved = np.abs(over_white(after) - over_white(before)).max(axis=-1) > 2 / 255
     view = render(one.trained, one.cameras[i])
     assert view.labels is not None
-    own = (view.labels == 0) | (view.drawn.palette_labels(len(colors)) == 0)
-    assert moved[own].mean() > 0.7
-    assert not moved[~dilate(own, 4)].any()
+    own = view.labels == 0 if layer == "palette" else view.drawn.palette_labels(len(colors)) == 0
+    assert moved[own].mean() > 0.9
+    assert not moved[~dilate(own, 3)].any()
 
 
 def test_lines_are_switched_off(pages: dict[str, Shown]) -> None:
