@@ -19,8 +19,9 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
-from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, fragments, mixed
+from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed
 from toonset.nerf.look.drawings import CRUMB, STEP, Drawings, Texture, crisp_depth, look_up
+from toonset.nerf.look.features import Stamp, stamped, stamps, torn
 from toonset.nerf.look.outline import crisp_outline, inked_outline, without_noise
 from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
@@ -221,12 +222,18 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     scale = looks[0].scale
     alpha, ink = _outlined(drawings, view, looks, border, sight, whole[..., 3], part)
     chosen, counts = choose(looks, alpha > 0, figure_px)
+    features: list[Stamp] = []
+    if sight is None:
+        features, without = stamps(looks, chosen, counts, depth, figure_px)
+        looks = [look.bare(those) for look, those in zip(looks, without, strict=True)]
     color, labels = mixed(looks, chosen, counts)
     shown = (chosen >= 0) & (alpha > 0)
-    kept = shown & ~fragments(looks, np.where(shown, chosen, -1), labels, figure_px)
+    kept = shown & ~torn(color, looks, np.where(shown, chosen, -1), shown, figure_px)
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
     color, labels = filled_from(kept, color, labels)
+    slack = STEP * drawings.height
+    color, labels = stamped(color, labels, looks, features, depth, slack)
     mirrored = np.array([drawings.views[number].mirrored for number in numbers])
     source = np.where(shown, np.where(mirrored[chosen], MIRRORED, DRAWN), GUESSED)
     if sight is not None and drawings.shade is not None:

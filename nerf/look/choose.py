@@ -11,7 +11,7 @@ Sources: watershed by flooding, Meyer 1992; seams that avoid detail, Agarwala et
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
-from toonset.raster import distance_to, nearest, sized_parts
+from toonset.raster import distance_to, nearest
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
@@ -34,8 +34,6 @@ DETAIL_STEP, MOST_DETAIL = 40, 200  # sums of channels: detail is flooded in ste
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
-STRAY = 4e-4  # of the squared height: smaller fragments of what a drawing has larger go
-FRAGMENT = 0.5  # of its area in the drawing
 
 Mask = Bool[np.ndarray, "h w"]
 
@@ -50,6 +48,7 @@ class Look:
         seen: (h, w) it shows the place.
         share: of the view, 0 to 1.
         scale: pixels of the view per pixel of the drawing.
+        without: features of the drawing that its paint goes without; None: it has them all.
     """
 
     texture: Texture
@@ -58,6 +57,7 @@ class Look:
     seen: Mask
     share: float
     scale: float
+    without: Bool[np.ndarray, " features"] | None = None
 
     def every(self, step: int) -> Look:
         """Return the same of every `step`-th pixel and row."""
@@ -66,11 +66,34 @@ class Look:
         )
         return Look(self.texture, x, y, seen, self.share, self.scale / step)
 
+    def bare(self, without: Bool[np.ndarray, " features"]) -> Look:
+        """Return the same, without some features in its paint."""
+        return replace(self, without=without) if without.any() else self
+
     @cached_property
     def paint(self) -> Float[np.ndarray, "h w 3"]:
         """Return the drawing's colours at the places."""
         found = sample_picture(self.texture.paint, (self.x, self.y), cv2.INTER_CUBIC)
+        if self._bare.any():
+            bare = sample_picture(self.texture.features.paint, (self.x, self.y), cv2.INTER_LINEAR)
+            found = np.where(self._bare[..., None], bare, found)
         return np.clip(found, 0, 1, out=found)
+
+    @cached_property
+    def label(self) -> UInt8[np.ndarray, "h w"]:
+        """Return the labels of the drawing's paint at the places."""
+        own, bare = (
+            sample_picture(labels, (self.x, self.y), cv2.INTER_NEAREST)
+            for labels in (self.texture.labels, self.texture.features.labels)
+        )
+        return np.where(self._bare, bare, own)
+
+    @cached_property
+    def _bare(self) -> Mask:
+        if self.without is None or not self.without.any():
+            return np.zeros(self.x.shape, dtype=bool)
+        numbers = self.texture.features.numbers
+        return np.take(self.without, sample_picture(numbers, (self.x, self.y), cv2.INTER_NEAREST))
 
     def trust(self, figure_px: float) -> Float[np.ndarray, "h w"]:
         """Return how well the drawing shows every place, 0 to 1."""
@@ -191,7 +214,7 @@ def mixed(
     for number in used:
         own, look = chosen == number, looks[number]
         color[own] = look.paint[own]
-        label[own] = sample_picture(look.texture.labels, (look.x, look.y), cv2.INTER_NEAREST)[own]
+        label[own] = look.label[own]
     most = np.take_along_axis(counts, chosen.clip(0)[None], 0)[0]
     total, weights = color.copy(), np.ones(chosen.shape, np.float32)
     for number in used:
@@ -202,33 +225,6 @@ def mixed(
         total += weight[..., None] * picture
         weights += weight
     return total / weights[..., None], label
-
-
-def fragments(
-    looks: Sequence[Look],
-    chosen: Int[np.ndarray, "h w"],
-    label: UInt8[np.ndarray, "h w"],
-    figure_px: float,
-) -> Mask:
-    """Return small patches of a label that are larger in the drawings that they come from."""
-    drop = np.zeros(chosen.shape, dtype=bool)
-    there = chosen >= 0
-    theirs = np.zeros(chosen.shape, np.float32)
-    for number, look in enumerate(looks):
-        own = chosen == number
-        areas = sample_picture(look.texture.areas, (look.x, look.y), cv2.INTER_NEAREST)
-        theirs[own] = areas[own] * look.scale**2
-    for value in np.unique(label[there]):
-        part, areas = sized_parts(there & (label == value))
-        small = areas < STRAY * figure_px**2
-        small[0] = False
-        if not small.any():
-            continue
-        largest = np.zeros(len(areas), np.float32)
-        at = np.take(small, part)
-        np.maximum.at(largest, part[at], theirs[at])
-        drop |= np.take(small & (areas < FRAGMENT * largest), part)
-    return drop
 
 
 def filled_from(marked: Mask, *pictures: np.ndarray) -> list[np.ndarray]:

@@ -12,13 +12,14 @@ from jaxtyping import Bool, Float, Float16, Shaped, UInt8
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
+from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.outline import Outline, without_crumbs
 from toonset.nerf.look.paint_labels import paint_labels, repainted
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.silhouette import Rim, rim_of
 from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.palette.palette import Shadow
-from toonset.raster import depth_inside, distance_to, nearest, sized_parts
+from toonset.raster import depth_inside, distance_to, nearest
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
 BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
@@ -236,8 +237,9 @@ class Texture:
         far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it, and
             just behind the steps of a known shape.
         to_edge: (height, width) pixels to the outline or the nearest step in depth.
-        areas: (height, width) pixels of the patch of one label that a pixel belongs to.
         rim: what its outline has beyond the surface's.
+        pen: width in pixels and colour of its lines; None: there are none.
+        figure_px: height of the figure.
     """
 
     camera: Camera
@@ -248,8 +250,15 @@ class Texture:
     labels: UInt8[np.ndarray, "height width"]
     far: Float[np.ndarray, "height width"]
     to_edge: Float[np.ndarray, "height width"]
-    areas: Float[np.ndarray, "height width"]
     rim: Rim
+    pen: tuple[float, tuple[int, int, int]] | None
+    figure_px: float
+
+    @cached_property
+    def features(self) -> Features:
+        """Return what is carried whole."""
+        inside = self.whole[..., 3] > 0.5
+        return features_of(self.paint, self.labels, inside, self.pen, self.figure_px)
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,17 +355,10 @@ def _texture(
         labels,
         far.astype(np.float32),
         to_edge.astype(np.float32),
-        _areas(labels),
         _rim(view, depth, drawings),
+        (drawings.pen.width_px, drawings.pen.rgb) if drawings.pen else None,
+        height * view.camera.scale,
     )
-
-
-def _areas(labels: UInt8[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    found = np.zeros(labels.shape, np.float32)
-    for value in np.unique(labels):
-        part, areas = sized_parts(labels == value)
-        found += np.where(part > 0, areas[part], 0)
-    return found
 
 
 def _rim(view: Drawing, depth: Float[np.ndarray, "height width"], drawings: Drawings) -> Rim:

@@ -17,7 +17,8 @@ from jaxtyping import Bool, Float
 
 from toonset.raster import nearest
 
-LEVEL = 0.0375  # of the figure's height: depths this far apart belong to two surfaces
+# Of the figure's height: depths this far apart belong to two surfaces, in one round after another
+LEVELS = (0.0375, 0.05, 0.075)
 ACROSS, DOWN = 0.025, 0.04  # of the height: sigmas of the blur; rows are rougher than columns
 COARSE = 2.0  # cells per sigma
 BEYOND = 0.01  # of the height: sigma by which the surface goes on beyond the figure
@@ -38,16 +39,31 @@ def smooth_surface(
     """
     if not there.any():
         return depth.astype(np.float32)
-    level = (depth - depth[there].min()) / (LEVEL * height) + 1
+    for level in LEVELS:
+        depth = _smoothed(depth, there, level * height, figure_px)
+    if not there.all():
+        far = depth[nearest(there)].astype(np.float32)
+        depth = np.where(there, depth, cv2.GaussianBlur(far, (0, 0), BEYOND * figure_px))
+    return depth.astype(np.float32)
+
+
+def _smoothed(
+    depth: Depth, there: Bool[np.ndarray, "h w"], apart: float, figure_px: float
+) -> Float[np.ndarray, "h w"]:
+    """Return depth after one round; surfaces that are `apart` world units apart stay."""
+    level = (depth - depth[there].min()) / apart + 1
     count = int(level[there].max()) + 3
     cell = max(1, round(ACROSS * figure_px / COARSE))
     rows, columns = (-(-size // cell) for size in depth.shape)
-    sums = np.zeros((2, count, rows, columns), np.float32)
-    for number in range(count):
-        share = (1 - np.abs(level - number)).clip(0) * there
-        if share.any():
-            for total, values in zip(sums, (share, share * level), strict=True):
-                total[number] = _in_cells(values.astype(np.float32), cell)
+    y, x = np.nonzero(there)
+    own = level[there]
+    low = np.floor(own)
+    at = (low.astype(np.int64) * rows + y // cell) * columns + x // cell
+    sums = np.zeros((2, count * rows * columns), np.float64)
+    for step, share in ((0, 1 - own + low), (1, own - low)):
+        for total, values in zip(sums, (share, share * own), strict=True):
+            total += np.bincount(at + step * rows * columns, values, sums.shape[1])
+    sums = sums.astype(np.float32).reshape(2, count, rows, columns)
     sigmas = (ACROSS * figure_px / cell, DOWN * figure_px / cell)
     for grid in sums.reshape(-1, rows, columns):
         cv2.GaussianBlur(grid, (0, 0), sigmas[0], grid, sigmas[1])
@@ -55,16 +71,7 @@ def smooth_surface(
     mean = total / np.maximum(weight, 1e-9)
     mean = np.where(there & (weight > 1e-6), mean, level)
     mean = level + (mean - level).clip(-1, 1)
-    if not there.all():
-        far = cv2.GaussianBlur(mean[nearest(there)].astype(np.float32), (0, 0), BEYOND * figure_px)
-        mean = np.where(there, mean, far)
-    return ((mean - 1) * (LEVEL * height) + depth[there].min()).astype(np.float32)
-
-
-def _in_cells(values: Float[np.ndarray, "h w"], cell: int) -> Float[np.ndarray, "rows columns"]:
-    rows, columns = (-(-size // cell) for size in values.shape)
-    room = [(0, n * cell - size) for n, size in zip((rows, columns), values.shape, strict=True)]
-    return np.pad(values, room).reshape(rows, cell, columns, cell).mean(axis=(1, 3))
+    return (mean - 1) * apart + depth[there].min()
 
 
 def _sliced(

@@ -1,0 +1,121 @@
+"""Features of drawings are carried whole, once, and what is torn off goes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+
+from toonset.nerf.look.choose import Look
+from toonset.nerf.look.features import features_of, stamped, stamps, torn
+
+HEIGHT = 200  # of the figure, and of the pictures
+SKIN, BLACK = (0.9, 0.7, 0.5), (0.05, 0.05, 0.05)
+FACE = np.zeros((HEIGHT, HEIGHT), bool)
+FACE[5:-5, 5:-5] = True
+
+
+def face(*eyes: tuple[int, int]) -> np.ndarray:
+    """Return a face with eyes of 15 pixels at columns and rows."""
+    picture = np.full((HEIGHT, HEIGHT, 3), SKIN, np.float32)
+    for eye in eyes:
+        cv2.circle(picture, eye, 7, BLACK, -1)
+    return picture
+
+
+def look_at(picture: np.ndarray, share: float, shift: np.ndarray | float = 0.0) -> Look:
+    """Return a view of a drawing in which everything lies `shift` pixels further to the left."""
+    y, x = (axis.astype(np.float32) for axis in np.mgrid[:HEIGHT, :HEIGHT])
+    labels = (picture.mean(axis=2) < 0.4).astype(np.uint8)
+    found = features_of(picture, labels, FACE, None, HEIGHT)
+    texture = SimpleNamespace(paint=picture, labels=labels, features=found)
+    seen = np.ones(FACE.shape, bool)
+    return Look(texture, x + np.float32(shift), y, seen, share, 1.0)  # type: ignore[arg-type]
+
+
+def shown(*looks: Look) -> np.ndarray:
+    """Return the view that the first look's drawing gives, with the features of all."""
+    chosen = np.zeros(FACE.shape, int)
+    counts = np.stack([np.full(FACE.shape, look.share, np.float32) for look in looks])
+    depth = np.zeros(FACE.shape, np.float32)
+    placed, without = stamps(looks, chosen, counts, depth, HEIGHT)
+    bare = [look.bare(those) for look, those in zip(looks, without, strict=True)]
+    color, label = stamped(bare[0].paint, bare[0].label, looks, placed, depth, 1.0)
+    assert ((label == 1) != (color.mean(axis=2) < 0.375)).sum() <= 12  # of 47 at its border
+    return color
+
+
+def eyes_in(color: np.ndarray) -> list[tuple[float, float, int]]:
+    """Return column, row and area of every dark blot."""
+    _, _, boxes, middles = cv2.connectedComponentsWithStats(
+        (color.mean(axis=2) < 0.4).astype(np.uint8)
+    )
+    return [
+        (float(x), float(y), int(area))
+        for (x, y), area in zip(middles[1:], boxes[1:, cv2.CC_STAT_AREA], strict=True)
+    ]
+
+
+def test_an_eye_on_a_torn_surface_is_whole() -> None:
+    step = np.where(np.arange(HEIGHT) < 98, 0.0, 5.0)
+    look = look_at(face((100, 80)), 1.0, step)
+    torn_off = eyes_in(look.paint)
+    (eye,) = eyes_in(shown(look))
+    assert torn_off[0][2] < 130
+    assert abs(eye[2] - 149) < 12
+    assert abs(eye[1] - 80) < 1
+
+
+def test_an_eye_that_two_drawings_put_in_two_places_is_shown_once_between_them() -> None:
+    near, far = look_at(face((100, 80)), 0.75), look_at(face((100, 80)), 0.25, 8.0)
+    (eye,) = eyes_in(shown(near, far))
+    assert abs(eye[0] - 98) < 1
+
+
+def test_two_eyes_stay_two() -> None:
+    near, far = (
+        look_at(face((70, 80), (130, 80)), 0.6),
+        look_at(face((70, 80), (130, 80)), 0.4, 6.0),
+    )
+    assert sorted(round(eye[0]) for eye in eyes_in(shown(near, far))) == [68, 128]
+
+
+def test_what_only_the_other_drawing_has_is_not_added() -> None:
+    assert eyes_in(shown(look_at(face(), 0.7), look_at(face((100, 80)), 0.3))) == []
+
+
+def test_an_eye_seen_from_the_side_is_hidden() -> None:
+    look = look_at(face((100, 80)), 1.0)
+    x = (look.x - 100) * np.float32(6) + 100
+    assert eyes_in(shown(replace(look, x=x))) == []
+
+
+def test_a_hat_in_front_of_an_eye_hides_it() -> None:
+    look = look_at(face((100, 80)), 1.0)
+    chosen, counts = np.zeros(FACE.shape, int), np.ones((1, *FACE.shape), np.float32)
+    depth = np.zeros(FACE.shape, np.float32)
+    placed, without = stamps([look], chosen, counts, depth, HEIGHT)
+    nearer = np.where(np.arange(HEIGHT)[:, None] < 80, -2.0, depth).astype(np.float32)
+    bare = look.bare(without[0])
+    color, _ = stamped(bare.paint, bare.label, [look], placed, nearer, 1.0)
+    (eye,) = eyes_in(color)
+    assert eye[1] > 80
+
+
+def test_blots_that_no_drawing_has_are_torn_and_freckles_are_not() -> None:
+    drawing = face((100, 80))
+    drawing[130:133, 60:63] = BLACK
+    look = look_at(drawing, 1.0)
+    view = drawing.copy()
+    view[150:154, 120:130] = BLACK
+    off = torn(view, [look], np.zeros(FACE.shape, int), FACE, HEIGHT)
+    assert off[150:154, 120:130].all()
+    assert not off[:145].any()
+
+
+def test_a_face_without_features_is_left_as_it_is() -> None:
+    found = features_of(face(), np.zeros(FACE.shape, np.uint8), FACE, (2.0, (0, 0, 0)), HEIGHT)
+    assert found.found == ()
+    assert np.array_equal(found.paint, face())
