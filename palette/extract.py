@@ -16,6 +16,7 @@ from toonset.palette.formats.registry import (
     parse_colors,
     parse_named_colors,
 )
+from toonset.palette.named import with_names
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.features import find_features
@@ -150,6 +151,7 @@ def choose_palette(
 ) -> Palette:
     """Return the palette of pictures whose drawn lines are known; see `extract_palette`."""
     found = _chosen(pictures, contours, options or PaletteOptions(), colors, method)
+    found = with_names(found, pictures)
     return found if colors is None else _as_given(found, colors)
 
 

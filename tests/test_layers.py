@@ -19,10 +19,11 @@ OUTSIDE = ("bench", "tests", "examples")  # of the wheel: no stage imports them
 FLOORS: dict[str, tuple[str, ...]] = {
     "palette": (
         "@colors",
+        "@color_names",
         "@names",
         "@palette",
         "pixels",
-        "@corrections @swatch_image formats paints",
+        "@corrections @named @swatch_image formats paints",
         "@extract",
         "@corrected @coverage @recolor",
     ),
