@@ -22,6 +22,7 @@ from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
 from toonset.dataset.split.warnings import border_warnings, figure_warnings
 from toonset.errors import SheetError
+from toonset.palette.palette import Color
 from toonset.view import Box, View
 
 Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]  # pixels, as split.json may have them
@@ -78,6 +79,19 @@ class LeftOut:
     kind: Annotated[str, Field(max_length=40)]
 
 
+@dataclass(frozen=True)
+class Swatch:
+    """A colour of the palette that a sheet prints.
+
+    Attributes:
+        box: (x, y, width, height) in the sheet.
+        rgb: its colour, 8-bit sRGB.
+    """
+
+    box: InSheet
+    rgb: Color
+
+
 @dataclass(frozen=True, eq=False)
 class Segmentation:
     """The drawings of a sheet.
@@ -89,6 +103,7 @@ class Segmentation:
         warnings: what a person should look at, for a view may be wrong.
         left_out: what was seen but is not a view.
         remarks: what was done besides, for people.
+        swatches: of the palette that the sheet prints, in reading order.
     """
 
     views: tuple[View, ...]
@@ -97,6 +112,7 @@ class Segmentation:
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...] = ()
     remarks: tuple[str, ...] = ()
+    swatches: tuple[Swatch, ...] = ()
 
 
 def split_picture(
@@ -129,6 +145,7 @@ def split_picture(
         border_warnings(ground, found) + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+        _swatches(found),
     )
 
 
@@ -222,6 +239,16 @@ def _left_out(found: SheetLayout) -> tuple[LeftOut, ...]:
     return tuple(
         LeftOut((x * cell, y * cell, width * cell, height * cell), kind)
         for (x, y, width, height), kind in boxes
+    )
+
+
+def _swatches(found: SheetLayout) -> tuple[Swatch, ...]:
+    printed, cell = found.grouping.printed, found.cell_px
+    return tuple(
+        Swatch((x * cell, y * cell, width * cell, height * cell), (red, green, blue))
+        for (x, y, width, height), (red, green, blue) in zip(
+            printed.boxes.tolist(), printed.rgb.tolist(), strict=True
+        )
     )
 
 

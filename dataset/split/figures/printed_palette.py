@@ -1,0 +1,289 @@
+"""Find the palette that a sheet prints: patches of plain colour, alike, side by side.
+
+A swatch is a connected patch of one colour, flat up to the file's noise, that fills its outline: a
+rectangle, rounded or not, or a disc. Swatches of a palette are equally large, or equally high in
+one strip; they stand at even steps in a row, in a column or in rows of a grid, three or more of
+them, in different colours. What a figure's body holds is paint, so nothing is looked for there;
+and what touches much else that is painted (the pixels of a small drawing) is part of that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Int, UInt8
+
+from toonset.dataset.split.figures.blobs import Blobs
+from toonset.dataset.split.figures.text_and_swatches import connected
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
+
+FEWEST = 3  # swatches make a palette, in so many colours
+LEAST_SIDE = 8  # cells
+LEAST_OF_HEIGHT = 0.015  # of a figure's height: its side
+MOST_OF_HEIGHT = 0.6  # of the same
+STEP = 14  # levels between neighbours: more is an edge
+PLAIN = 6  # levels: the median pixel's distance from the colour; JPEG's noise is less
+FILLED = 0.6  # of its box that a swatch's own colour fills: its code may be written on it
+OUTLINE = 0.9  # of its box that a rectangle's outline fills
+DISC = (0.7, 0.86)  # of its box that a disc's or a well rounded square's outline fills
+ROUND = 1.15  # times as long as wide, at most, is a disc
+EQUAL = 0.15  # of its size: others differ by no more
+SOFT = 3  # cells: soft edges take so much more of one than of another
+TOUCHING = 0.12  # of its size: a line between the swatches of a strip is no thicker
+FARTHEST = 3.0  # times its size, from middle to middle
+EVEN = 0.25  # of the median step that others may differ by
+ALONE = 0.6  # of the paint that touches them that swatches, with their outlines, are
+LINE = 4  # cells: an outline with its soft edge is no thicker
+APART = 2 * JUST_NOTICEABLE  # in OKLab: two colours
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Patches of plain colour.
+
+    Attributes:
+        boxes: x, y, width, height in cells.
+        rgb: their colours.
+    """
+
+    boxes: Int[np.ndarray, "n 4"]
+    rgb: UInt8[np.ndarray, "n 3"]
+
+    def of(self, chosen: np.ndarray) -> Patches:
+        """Return some of them."""
+        return Patches(self.boxes[chosen], self.rgb[chosen])
+
+
+def find_printed_palette(
+    rgb: UInt8[np.ndarray, "height width 3"], blobs: Blobs, main_blobs: Int[np.ndarray, " bodies"]
+) -> Patches:
+    """Return the swatches of the palettes that a sheet prints, each palette in reading order.
+
+    Args:
+        rgb: the sheet, in cells.
+        blobs: what is painted on it.
+        main_blobs: the bodies of the views.
+    """
+    height = float(np.median(blobs.boxes[main_blobs, 3])) if len(main_blobs) else 0.0
+    beside = _beside_bodies(blobs, main_blobs)
+    found = _patches(
+        rgb, beside, max(LEAST_SIDE, LEAST_OF_HEIGHT * height), MOST_OF_HEIGHT * height
+    )
+    boxes, colors = [np.zeros((0, 4), dtype=np.int64)], [np.zeros((0, 3), dtype=np.uint8)]
+    for group in _groups(found):
+        own = _with_missed(found.of(group), rgb)
+        if len(_distinct(own.rgb)) >= FEWEST and _stands_alone(own.boxes, rgb, blobs, main_blobs):
+            own = own.of(_reading_order(own.boxes))
+            boxes.append(own.boxes)
+            colors.append(own.rgb)
+    return Patches(np.concatenate(boxes), np.concatenate(colors))
+
+
+def are_swatches(
+    printed: Patches, blobs: Blobs, numbers: Int[np.ndarray, " n"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which patches of paint mostly lie in swatches of a printed palette."""
+    if not len(printed.boxes):
+        return np.zeros(len(numbers), dtype=bool)
+    within = np.zeros(blobs.labels.shape, dtype=bool)
+    for box in printed.boxes:
+        within[_round(box, LINE)] = True
+    own = np.bincount(blobs.labels[within], minlength=len(blobs.areas) + 1)[1:]
+    share: Bool[np.ndarray, " n"] = own[numbers] >= ALONE * blobs.areas[numbers]
+    return share
+
+
+def _beside_bodies(blobs: Blobs, main_blobs: np.ndarray) -> Bool[np.ndarray, "height width"]:
+    """Return the boxes of all that is no body, without the bodies."""
+    beside = np.zeros(blobs.labels.shape, dtype=bool)
+    for number in np.setdiff1d(np.flatnonzero(blobs.areas >= LEAST_SIDE), main_blobs):
+        beside[blobs.window(int(number))] = True
+    is_main = np.zeros(len(blobs.areas) + 1, dtype=bool)
+    is_main[main_blobs + 1] = True
+    return beside & ~is_main[blobs.labels]
+
+
+def _patches(
+    rgb: UInt8[np.ndarray, "height width 3"],
+    where: Bool[np.ndarray, "height width"],
+    least: float,
+    most: float,
+) -> Patches:
+    """Return the patches of plain colour, of a swatch's size and outline."""
+    rgb = cv2.medianBlur(np.ascontiguousarray(rgb), 3)  # JPEG's ringing goes, edges stay
+    flat = where.copy()
+    flat[:, 1:] &= _step(rgb[:, 1:], rgb[:, :-1]) <= STEP
+    flat[1:] &= _step(rgb[1:], rgb[:-1]) <= STEP
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(flat.view(np.uint8), connectivity=4)
+    wide, high, area = stats[:, 2], stats[:, 3], stats[:, 4]
+    able = (np.minimum(wide, high) >= least - 1) & (np.maximum(wide, high) <= most)
+    able &= area >= FILLED * wide * high
+    able[0] = False
+    boxes, colors = [], []
+    for number in np.flatnonzero(able):
+        x, y, width, height = stats[number, :4].tolist()
+        window = slice(y, y + height), slice(x, x + width)
+        own = labels[window] == number
+        pixels = rgb[window][own]
+        color = np.median(pixels, axis=0)
+        fill = _outlined(own)
+        is_disc = DISC[0] <= fill <= DISC[1] and max(width, height) <= ROUND * min(width, height)
+        plain = np.median(np.abs(pixels - color).max(axis=1)) <= PLAIN
+        if plain and (fill >= OUTLINE or is_disc):
+            boxes.append([x, y, width, height])
+            colors.append(np.rint(color))
+    return Patches(
+        np.array(boxes, dtype=np.int64).reshape(-1, 4),
+        np.array(colors, dtype=np.uint8).reshape(-1, 3),
+    )
+
+
+def _step(a: np.ndarray, b: np.ndarray) -> UInt8[np.ndarray, "height width"]:
+    more: np.ndarray = cv2.absdiff(np.ascontiguousarray(a), np.ascontiguousarray(b)).max(axis=2)
+    return more
+
+
+def _outlined(own: Bool[np.ndarray, "height width"]) -> float:
+    """Return the share of its box that a patch fills with all that it encloses."""
+    paths, _ = cv2.findContours(own.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = np.zeros(own.shape, dtype=np.uint8)
+    cv2.drawContours(filled, paths, -1, 1, cv2.FILLED)
+    return float(filled.mean())
+
+
+def _groups(found: Patches) -> list[Int[np.ndarray, " own"]]:
+    """Return the palettes: patches of one shape that stand at even steps, as numbers."""
+    number = len(found.boxes)
+    if number < FEWEST:
+        return []
+    size = found.boxes[:, 2:].astype(float)
+    middle = found.boxes[:, :2] + size / 2
+    bound = EQUAL * np.maximum(size[:, None], size)
+    equal = np.abs(size[:, None] - size) <= np.maximum(bound, SOFT)
+    apart = np.abs(middle[:, None] - middle)
+    between = apart - (size[:, None] + size) / 2
+    near = np.zeros((number, number), dtype=bool)
+    for along, across in ((0, 1), (1, 0)):
+        level = (apart[..., across] <= EQUAL * size[:, across]) & equal[..., across]
+        beside = equal[..., along] & (apart[..., along] <= FARTHEST * size[:, None, along])
+        strip = between[..., along] <= np.maximum(TOUCHING * size[:, None, across], 3)
+        near |= level & (beside | strip)
+    groups = connected(near & near.T)
+    every = [np.flatnonzero(groups == group) for group in range(int(groups.max()) + 1)]
+    return [own for own in every if len(own) >= FEWEST and _is_even(found.boxes[own])]
+
+
+def _is_even(boxes: Int[np.ndarray, "n 4"]) -> bool:
+    """Return whether the gaps between neighbours of most rows or columns are alike."""
+    gaps, sizes = [], []
+    for along, across in ((0, 1), (1, 0)):
+        ends = boxes[:, along] + boxes[:, along + 2]
+        for i, box in enumerate(boxes):
+            level = np.abs(boxes[:, across] - box[across]) <= EQUAL * box[across + 2]
+            after = level & (boxes[:, along] >= ends[i] - 1) & (np.arange(len(boxes)) != i)
+            if after.any():
+                gaps.append(float((boxes[after, along] - ends[i]).min()))
+                sizes.append(float(box[along + 2]))
+        if len(gaps) >= FEWEST - 1:
+            break
+    if len(gaps) < FEWEST - 1:
+        return False
+    off = np.abs(np.array(gaps) - np.median(gaps))
+    return bool((off <= np.maximum(EVEN * (np.median(gaps) + np.median(sizes)), 2)).mean() >= 0.6)
+
+
+def _with_missed(found: Patches, rgb: UInt8[np.ndarray, "height width 3"]) -> Patches:
+    """Return swatches of one line with those between them that noise has hidden.
+
+    One is missed where a step is twice the others or more, and what lies there is plain.
+    """
+    middle = found.boxes[:, :2] + found.boxes[:, 2:] / 2
+    along = int(np.ptp(middle[:, 1]) > np.ptp(middle[:, 0]))
+    order = np.argsort(middle[:, along])
+    steps = np.diff(middle[order, along])
+    if np.ptp(middle[:, 1 - along]) > np.median(found.boxes[:, 3 - along]) / 2 or not steps.min():
+        return found
+    size = np.median(found.boxes[:, 2:], axis=0)
+    boxes, colors = [], []
+    for i, step in zip(order, steps, strict=False):
+        missed = round(float(step / steps.min())) - 1
+        for k in range(1, missed + 1):
+            at = middle[i].copy()
+            at[along] += k * step / (missed + 1)
+            box = np.rint([*(at - size / 2), *size]).astype(np.int64)
+            x, y, width, height = box.tolist()
+            inner = rgb[y + height // 4 : y + height - height // 4]
+            inner = inner[:, x + width // 4 : x + width - width // 4].reshape(-1, 3)
+            color = np.rint(np.median(inner, axis=0))
+            around = rgb[_round(box, LINE + 2)].reshape(-1, 3)
+            edged = (np.abs(around - color).max(axis=1) > STEP).mean() > 1 - OUTLINE
+            if edged and np.median(np.abs(inner - color).max(axis=1)) <= PLAIN:
+                boxes.append(box)
+                colors.append(color.astype(np.uint8))
+    if not boxes:
+        return found
+    return Patches(
+        np.concatenate([found.boxes, np.array(boxes)]),
+        np.concatenate([found.rgb, np.array(colors)]),
+    )
+
+
+def _distinct(rgb: UInt8[np.ndarray, "n 3"]) -> list[int]:
+    """Return the first patch of every colour."""
+    lab = oklab_from_rgb(rgb)
+    kept: list[int] = []
+    for number, place in enumerate(lab):
+        if all(np.linalg.norm(lab[other] - place) > APART for other in kept):
+            kept.append(number)
+    return kept
+
+
+def _stands_alone(
+    boxes: np.ndarray,
+    rgb: UInt8[np.ndarray, "height width 3"],
+    blobs: Blobs,
+    main_blobs: Int[np.ndarray, " bodies"],
+) -> bool:
+    """Return whether what touches the swatches is hardly more than they, or a panel round them."""
+    touched = {int(label) for box in boxes for label in np.unique(blobs.labels[_round(box, LINE)])}
+    touched -= {0}
+    if not touched or touched & set((main_blobs + 1).tolist()):
+        return False
+    within = np.zeros(blobs.labels.shape, dtype=bool)
+    for box in boxes:
+        within[_round(box, LINE)] = True
+    painted = np.isin(blobs.labels, list(touched))
+    return bool(painted[within].sum() >= ALONE * painted.sum()) or _on_one_ground(boxes, rgb)
+
+
+def _on_one_ground(boxes: np.ndarray, rgb: UInt8[np.ndarray, "height width 3"]) -> bool:
+    """Return whether one plain colour lies round every swatch, beyond its outline."""
+    grounds = []
+    for box in boxes:
+        window = rgb[_round(box, LINE + 2)].reshape(-1, 3).astype(int)
+        inner = np.zeros(rgb[_round(box, LINE + 2)].shape[:2], dtype=bool)
+        inner[2:-2, 2:-2] = True
+        ring = window[~inner.ravel()]
+        ground = np.median(ring, axis=0)
+        if (np.abs(ring - ground).max(axis=1) <= STEP).mean() < ALONE:
+            return False
+        grounds.append(ground)
+    return bool(np.ptp(np.array(grounds), axis=0).max() <= STEP)
+
+
+def _round(box: np.ndarray, margin: int) -> tuple[slice, slice]:
+    x, y, width, height = (int(value) for value in box)
+    rows = slice(max(y - margin, 0), y + height + margin)
+    return rows, slice(max(x - margin, 0), x + width + margin)
+
+
+def _reading_order(boxes: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, " n"]:
+    """Return rows from the top, each from left to right."""
+    middle = boxes[:, 1] + boxes[:, 3] / 2
+    order = np.argsort(middle, kind="stable")
+    row = np.zeros(len(boxes), dtype=np.int64)
+    new = np.diff(middle[order]) > boxes[order[:-1], 3] / 2
+    row[order] = np.concatenate([[0], np.cumsum(new)])
+    return np.lexsort((boxes[:, 0], row))
