@@ -28,6 +28,7 @@ from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grai
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
+from toonset.palette.printed import Printed, in_printed_order, occurring, with_printed
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -63,6 +64,7 @@ def extract_palette(
     features: bool | None = None,
     colors: str | None = None,
     method: str = "toonset",
+    swatches: bool | None = None,
 ) -> Palette:
     """Return the colours that make up at least 5 % of a character, the most frequent first.
 
@@ -77,6 +79,9 @@ def extract_palette(
             and names are kept. Where the file has tones in shadow, a sheet's shadow is taken off;
             else name both tones.
         method: "toonset", or "extcolors", the paper's tool.
+        swatches: take the palette that the views' sheets print as the whole palette, as it is;
+            None: keep its colours that the drawings are painted in, and add what else there is;
+            False: do not look at it.
 
     Raises:
         ToonsetError: no opaque pixel, a colour that cannot be understood or found, or arguments
@@ -85,7 +90,9 @@ def extract_palette(
     pictures = [picture_of(view) for view in views]
     contours = find_contours(pictures)
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
-    return choose_palette(pictures, contours, options, colors, method)
+    own = [rgb for view in views if isinstance(view, View) for rgb in view.swatches]
+    printed = Printed(tuple(dict.fromkeys(own)), swatches)
+    return choose_palette(pictures, contours, options, colors, method, printed)
 
 
 def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb") -> Map:
@@ -148,10 +155,25 @@ def choose_palette(
     options: PaletteOptions | None = None,
     colors: str | None = None,
     method: str = "toonset",
+    printed: Printed | None = None,
 ) -> Palette:
-    """Return the palette of pictures whose drawn lines are known; see `extract_palette`."""
-    found = _chosen(pictures, contours, options or PaletteOptions(), colors, method)
+    """Return the palette of pictures whose drawn lines are known; see `extract_palette`.
+
+    Args:
+        pictures: sRGB with straight alpha.
+        contours: how far drawn lines cover their pixels, of 255.
+        options: of the choice.
+        colors: a palette of the user's own.
+        method: "toonset", or "extcolors".
+        printed: the palette that the sheets print, and whether it is to be used.
+    """
+    printed = printed or Printed()
+    if printed.use and colors is None:
+        colors = printed.as_colors()
+    found = _chosen(pictures, contours, options or PaletteOptions(), colors, method, printed)
     found = with_names(found, pictures)
+    if printed.use:
+        found = replace(found, printed=printed.colors)
     return found if colors is None else _as_given(found, colors)
 
 
@@ -171,6 +193,7 @@ def _chosen(
     options: PaletteOptions,
     colors: str | None,
     method: str,
+    printed: Printed,
 ) -> Palette:
     if method not in METHODS:
         raise UsageError(f"--method: {method!r} is none of {', '.join(METHODS)}")
@@ -178,6 +201,8 @@ def _chosen(
         raise UsageError("--colors is the whole palette; leave --keep and --method away")
     if options.keep and method != "toonset":
         raise UsageError("--keep belongs to --method toonset")
+    if printed.use is not None and method != "toonset":
+        raise UsageError("--swatches belongs to --method toonset")
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
     if picked is not None and not names_tones(colors or ""):
@@ -196,7 +221,7 @@ def _chosen(
     if picked is not None:
         palette = pick_palette(lit, picked, lines)
     else:
-        palette = _in_light(lit, options, lines, shadow)
+        palette = _of_sheet(lit, options, lines, shadow, printed)
         if noise_levels(pictures) >= LEAST_LEVELS:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
             palette = read_drawn_colors(palette, pictures, lit, apart)
@@ -204,6 +229,26 @@ def _chosen(
         return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
     return with_tones(palette, shadow, lit, paint)
+
+
+def _of_sheet(
+    pictures: Sequence[Picture],
+    options: PaletteOptions,
+    lines: Sequence[Mask],
+    shadow: Shadow | None,
+    printed: Printed,
+) -> Palette:
+    """Return the palette of pictures in light, with the printed colours that occur in them."""
+    occurs = occurring(pictures, printed.colors) if printed.use is None else ()
+    if not occurs:
+        return _in_light(pictures, options, lines, shadow)
+    found = with_printed(
+        occurs,
+        options,
+        lambda wider: _in_light(pictures, wider, lines, shadow),
+        lambda rgb: pick_palette(pictures, rgb, lines),
+    )
+    return in_printed_order(found, printed.colors)
 
 
 def _in_light(

@@ -22,7 +22,7 @@ from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
 from toonset.dataset.split.warnings import border_warnings, figure_warnings
 from toonset.errors import SheetError
-from toonset.palette.palette import Color
+from toonset.palette.palette import Hex
 from toonset.view import Box, View
 
 Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]  # pixels, as split.json may have them
@@ -85,11 +85,11 @@ class Swatch:
 
     Attributes:
         box: (x, y, width, height) in the sheet.
-        rgb: its colour, 8-bit sRGB.
+        color: 8-bit sRGB.
     """
 
     box: InSheet
-    rgb: Color
+    color: Hex
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +138,7 @@ def split_picture(
     crops = _crops(found, paint, options)
     views, holes = _views(rgba, ground, crops, options)
     by_hand = bool(options.boxes) or options.grid is not None
+    swatches = _swatches(found)
     return Segmentation(
         tuple(views),
         ground.rgb,
@@ -145,7 +146,7 @@ def split_picture(
         border_warnings(ground, found) + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
-        _swatches(found),
+        swatches,
     )
 
 

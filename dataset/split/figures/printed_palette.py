@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.text_and_swatches import connected
@@ -26,13 +26,15 @@ MOST_OF_HEIGHT = 0.6  # of the same
 STEP = 14  # levels between neighbours: more is an edge
 PLAIN = 6  # levels: the median pixel's distance from the colour; JPEG's noise is less
 FILLED = 0.6  # of its box that a swatch's own colour fills: its code may be written on it
-OUTLINE = 0.9  # of its box that a rectangle's outline fills
+OUTLINE = 0.85  # of its box that a rectangle's outline fills
 DISC = (0.7, 0.86)  # of its box that a disc's or a well rounded square's outline fills
 ROUND = 1.15  # times as long as wide, at most, is a disc
 EQUAL = 0.15  # of its size: others differ by no more
 SOFT = 3  # cells: soft edges take so much more of one than of another
 TOUCHING = 0.12  # of its size: a line between the swatches of a strip is no thicker
 FARTHEST = 3.0  # times its size, from middle to middle
+ON_GROUND = 0.4  # of what lies round a swatch of a strip that is ground
+MOST_MISSED = 2  # swatches beyond either end of a line
 EVEN = 0.25  # of the median step that others may differ by
 ALONE = 0.6  # of the paint that touches them that swatches, with their outlines, are
 LINE = 4  # cells: an outline with its soft edge is no thicker
@@ -76,6 +78,8 @@ def find_printed_palette(
         own = _with_missed(found.of(group), rgb)
         if len(_distinct(own.rgb)) >= FEWEST and _stands_alone(own.boxes, rgb, blobs, main_blobs):
             own = own.of(_reading_order(own.boxes))
+            known = np.concatenate(boxes)
+            own = own.of(np.array([not _overlap(box, known).any() for box in own.boxes], bool))
             boxes.append(own.boxes)
             colors.append(own.rgb)
     return Patches(np.concatenate(boxes), np.concatenate(colors))
@@ -195,39 +199,91 @@ def _is_even(boxes: Int[np.ndarray, "n 4"]) -> bool:
 
 
 def _with_missed(found: Patches, rgb: UInt8[np.ndarray, "height width 3"]) -> Patches:
-    """Return swatches of one line with those between them that noise has hidden.
+    """Return swatches with those of their rows or columns that noise has hidden.
 
-    One is missed where a step is twice the others or more, and what lies there is plain.
+    One is missed where the even steps between the others lead, and something plain lies there that
+    is not the ground beside them.
     """
+    ground = _ground(found.boxes, rgb)
+    size = np.rint(np.median(found.boxes[:, 2:], axis=0)).astype(np.int64)
     middle = found.boxes[:, :2] + found.boxes[:, 2:] / 2
     along = int(np.ptp(middle[:, 1]) > np.ptp(middle[:, 0]))
-    order = np.argsort(middle[:, along])
-    steps = np.diff(middle[order, along])
-    if np.ptp(middle[:, 1 - along]) > np.median(found.boxes[:, 3 - along]) / 2 or not steps.min():
-        return found
-    size = np.median(found.boxes[:, 2:], axis=0)
-    boxes, colors = [], []
-    for i, step in zip(order, steps, strict=False):
-        missed = round(float(step / steps.min())) - 1
-        for k in range(1, missed + 1):
-            at = middle[i].copy()
-            at[along] += k * step / (missed + 1)
-            box = np.rint([*(at - size / 2), *size]).astype(np.int64)
-            x, y, width, height = box.tolist()
-            inner = rgb[y + height // 4 : y + height - height // 4]
-            inner = inner[:, x + width // 4 : x + width - width // 4].reshape(-1, 3)
-            color = np.rint(np.median(inner, axis=0))
-            around = rgb[_round(box, LINE + 2)].reshape(-1, 3)
-            edged = (np.abs(around - color).max(axis=1) > STEP).mean() > 1 - OUTLINE
-            if edged and np.median(np.abs(inner - color).max(axis=1)) <= PLAIN:
+    line = _lines(middle[:, 1 - along], float(size[1 - along]))
+    boxes, colors = [*found.boxes], [*found.rgb]
+    for number in range(int(line.max()) + 1):
+        for at in _expected(np.sort(middle[line == number, along])):
+            place = np.full(2, float(np.median(middle[line == number, 1 - along])))
+            place[along] = at
+            box = np.array([*np.rint(place - size / 2).astype(np.int64), *size])
+            color = _plain(rgb, box, ground)
+            if color is not None and not _overlap(box, np.array(boxes)).any():
                 boxes.append(box)
-                colors.append(color.astype(np.uint8))
-    if not boxes:
-        return found
-    return Patches(
-        np.concatenate([found.boxes, np.array(boxes)]),
-        np.concatenate([found.rgb, np.array(colors)]),
-    )
+                colors.append(color)
+    return Patches(np.array(boxes), np.array(colors))
+
+
+def _lines(across: Float[np.ndarray, " n"], size: float) -> Int[np.ndarray, " n"]:
+    """Return the number of the line that each swatch stands in."""
+    order = np.argsort(across, kind="stable")
+    line = np.zeros(len(across), dtype=np.int64)
+    line[order] = np.concatenate([[0], np.cumsum(np.diff(across[order]) > size / 2)])
+    return line
+
+
+def _expected(places: Float[np.ndarray, " n"]) -> list[float]:
+    """Return where more swatches of a line would stand: between those seen, and beyond its ends."""
+    steps = np.diff(places)
+    if len(steps) < FEWEST - 2 or not len(steps):
+        return []
+    step = float(steps.min())
+    times = steps / max(step, 1.0)
+    if np.abs(times - np.rint(times)).max() > EQUAL:
+        return []
+    number = int(np.rint(times).sum())
+    step = float((places[-1] - places[0]) / max(number, 1))
+    return [float(places[0] + k * step) for k in range(-MOST_MISSED, number + 1 + MOST_MISSED)]
+
+
+def _plain(
+    rgb: UInt8[np.ndarray, "height width 3"], box: np.ndarray, ground: np.ndarray
+) -> UInt8[np.ndarray, " 3"] | None:
+    """Return the plain colour within a box; None if it is not plain, or the ground."""
+    x, y, width, height = box.tolist()
+    if x < 0 or y < 0 or x + width > rgb.shape[1] or y + height > rgb.shape[0]:
+        return None
+    inner = rgb[y + height // 4 : y + height - height // 4]
+    inner = inner[:, x + width // 4 : x + width - width // 4].reshape(-1, 3)
+    color = np.rint(np.median(inner, axis=0))
+    is_ground = np.abs(color - ground).max() <= STEP
+    on_ground = (np.abs(_ring(box, rgb) - ground).max(axis=1) <= STEP).mean()
+    if (
+        is_ground
+        or on_ground < ON_GROUND
+        or (np.abs(inner - color).max(axis=1) <= STEP).mean() < OUTLINE
+    ):
+        return None
+    return color.astype(np.uint8)
+
+
+def _ground(boxes: np.ndarray, rgb: UInt8[np.ndarray, "height width 3"]) -> np.ndarray:
+    """Return the median colour beyond the swatches' outlines."""
+    ground: np.ndarray = np.median(np.concatenate([_ring(box, rgb) for box in boxes]), axis=0)
+    return ground
+
+
+def _ring(box: np.ndarray, rgb: UInt8[np.ndarray, "height width 3"]) -> Int[np.ndarray, "n 3"]:
+    """Return the pixels beyond a swatch's outline."""
+    window = rgb[_round(box, LINE + 2)].astype(np.int64)
+    inner = np.zeros(window.shape[:2], dtype=bool)
+    inner[2:-2, 2:-2] = True
+    return window[~inner]
+
+
+def _overlap(box: np.ndarray, boxes: np.ndarray) -> Bool[np.ndarray, " n"]:
+    low = np.maximum(box[:2], boxes[:, :2])
+    high = np.minimum(box[:2] + box[2:], boxes[:, :2] + boxes[:, 2:])
+    own: Bool[np.ndarray, " n"] = (np.maximum(high - low, 0).prod(axis=1)) > 0.3 * box[2:].prod()
+    return own
 
 
 def _distinct(rgb: UInt8[np.ndarray, "n 3"]) -> list[int]:
@@ -260,17 +316,9 @@ def _stands_alone(
 
 def _on_one_ground(boxes: np.ndarray, rgb: UInt8[np.ndarray, "height width 3"]) -> bool:
     """Return whether one plain colour lies round every swatch, beyond its outline."""
-    grounds = []
-    for box in boxes:
-        window = rgb[_round(box, LINE + 2)].reshape(-1, 3).astype(int)
-        inner = np.zeros(rgb[_round(box, LINE + 2)].shape[:2], dtype=bool)
-        inner[2:-2, 2:-2] = True
-        ring = window[~inner.ravel()]
-        ground = np.median(ring, axis=0)
-        if (np.abs(ring - ground).max(axis=1) <= STEP).mean() < ALONE:
-            return False
-        grounds.append(ground)
-    return bool(np.ptp(np.array(grounds), axis=0).max() <= STEP)
+    ground = _ground(boxes, rgb)
+    on_it = [(np.abs(_ring(box, rgb) - ground).max(axis=1) <= STEP).mean() for box in boxes]
+    return min(on_it) >= ALONE
 
 
 def _round(box: np.ndarray, margin: int) -> tuple[slice, slice]:
