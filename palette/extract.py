@@ -24,9 +24,11 @@ from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
+from toonset.palette.pixels.enlarged import common_grids
 from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
+from toonset.palette.pixels.opacity import opaque_inside, see_through_notes
 from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
 from toonset.palette.printed import Printed, in_printed_order, occurring, with_printed
 from toonset.view import View
@@ -170,7 +172,20 @@ def choose_palette(
     printed = printed or Printed()
     if printed.use and colors is None:
         colors = printed.as_colors()
-    found = _chosen(pictures, contours, options or PaletteOptions(), colors, method, printed)
+    solid = [opaque_inside(picture) for picture in pictures]
+    grids = common_grids(solid)
+    read, lines = solid, list(contours)
+    if grids is not None:
+        read = [grid.reduced(picture) for grid, picture in zip(grids, solid, strict=True)]
+        lines = [grid.reduced(contour) for grid, contour in zip(grids, contours, strict=True)]
+    found = _chosen(read, lines, options or PaletteOptions(), colors, method, printed)
+    notes = see_through_notes(pictures)
+    if grids is not None:
+        notes += (
+            f"the drawings are enlarged {grids[0].times} times without smoothing: their colours "
+            "are read at their own size, and places count its pixels",
+        )
+    found = replace(found, warnings=(*notes, *found.warnings))
     found = with_names(found, pictures)
     if printed.use:
         found = replace(found, printed=printed.colors)
@@ -310,7 +325,7 @@ def in_light(
     pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow | None
 ) -> tuple[list[Picture], list[Mask] | None]:
     """Return pictures without grain and shadow, and the shadow's place; None without one."""
-    smooth = remove_grain(pictures)
+    smooth = remove_grain([opaque_inside(picture) for picture in pictures])
     if shadow is None:
         return list(smooth), None
     dark = find_tones(smooth, contours, shadow)
