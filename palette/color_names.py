@@ -262,10 +262,15 @@ def _doubles(names: Sequence[str]) -> set[str]:
 
 
 def _with(names: Sequence[str], more: Sequence[str]) -> list[str]:
-    """Return the names, those that several have with something more in brackets."""
-    again = _doubles(names)
+    """Return the names, with something more in brackets where that tells all of one name apart."""
+    again = {
+        name
+        for name in _doubles(names)
+        if "" not in (own := [e for n, e in zip(names, more, strict=True) if n == name])
+        and not _doubles(own)
+    }
     return [
-        f"{name} ({extra})" if name in again and extra else name
+        f"{name} ({extra})" if name in again else name
         for name, extra in zip(names, more, strict=True)
     ]
 

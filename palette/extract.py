@@ -18,7 +18,7 @@ from toonset.palette.formats.registry import (
 )
 from toonset.palette.named import with_names
 from toonset.palette.paints.extcolors import extcolors_palette
-from toonset.palette.paints.extract import find_palette, pick_palette
+from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
@@ -30,6 +30,8 @@ from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.opacity import opaque_inside, see_through_notes
 from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
+from toonset.palette.pixels.view_gain import gain_notes, view_gains, with_gains
+from toonset.palette.plain_sheets import plain_notes
 from toonset.palette.printed import Printed, in_printed_order, occurring, with_printed
 from toonset.view import View
 
@@ -170,21 +172,27 @@ def choose_palette(
         printed: the palette that the sheets print, and whether it is to be used.
     """
     printed = printed or Printed()
+    if printed.use is not None and method != "toonset":
+        raise UsageError("--swatches belongs to --method toonset")
     if printed.use and colors is None:
         colors = printed.as_colors()
     solid = [opaque_inside(picture) for picture in pictures]
+    gains = view_gains(solid)
+    solid = with_gains(solid, gains)
     grids = common_grids(solid)
     read, lines = solid, list(contours)
     if grids is not None:
         read = [grid.reduced(picture) for grid, picture in zip(grids, solid, strict=True)]
         lines = [grid.reduced(contour) for grid, contour in zip(grids, contours, strict=True)]
     found = _chosen(read, lines, options or PaletteOptions(), colors, method, printed)
-    notes = see_through_notes(pictures)
+    notes = (*see_through_notes(pictures), *gain_notes(gains))
     if grids is not None:
         notes += (
             f"the drawings are enlarged {grids[0].times} times without smoothing: their colours "
             "are read at their own size, and places count its pixels",
         )
+    if colors is None:
+        notes += plain_notes(found, solid)
     found = replace(found, warnings=(*notes, *found.warnings))
     found = with_names(found, pictures)
     if printed.use:
@@ -216,8 +224,6 @@ def _chosen(
         raise UsageError("--colors is the whole palette; leave --keep and --method away")
     if options.keep and method != "toonset":
         raise UsageError("--keep belongs to --method toonset")
-    if printed.use is not None and method != "toonset":
-        raise UsageError("--swatches belongs to --method toonset")
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
     if picked is not None and not names_tones(colors or ""):
@@ -237,7 +243,8 @@ def _chosen(
         palette = pick_palette(lit, picked, lines)
     else:
         palette = _of_sheet(lit, options, lines, shadow, printed)
-        if noise_levels(pictures) >= LEAST_LEVELS:
+        is_picked = palette.rule.startswith(PICKED)
+        if noise_levels(pictures) >= LEAST_LEVELS and not is_picked:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
             palette = read_drawn_colors(palette, pictures, lit, apart)
     if shadow is None:
@@ -254,7 +261,7 @@ def _of_sheet(
     printed: Printed,
 ) -> Palette:
     """Return the palette of pictures in light, with the printed colours that occur in them."""
-    occurs = occurring(pictures, printed.colors) if printed.use is None else ()
+    occurs = occurring(pictures, printed.colors) if printed.use is None else {}
     if not occurs:
         return _in_light(pictures, options, lines, shadow)
     found = with_printed(
@@ -325,7 +332,8 @@ def in_light(
     pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow | None
 ) -> tuple[list[Picture], list[Mask] | None]:
     """Return pictures without grain and shadow, and the shadow's place; None without one."""
-    smooth = remove_grain([opaque_inside(picture) for picture in pictures])
+    solid = [opaque_inside(picture) for picture in pictures]
+    smooth = remove_grain(with_gains(solid, view_gains(solid)))
     if shadow is None:
         return list(smooth), None
     dark = find_tones(smooth, contours, shadow)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toonset.errors import PaletteError
-from toonset.palette.color_names import RGB
+from toonset.palette.color_names import RGB as RGB
 from toonset.palette.color_names import name_of as name_of
 
 MAX_NAME = 64  # characters; a palette row in GIMP or a swatch's label holds no more anyway

@@ -1,14 +1,15 @@
 """Use the palette that a sheet prints: the artist's own list of paints.
 
-A printed colour is in the drawings where enough pixels are of it. If most of the list is, and the
-drawings' own clustering finds a paint near each of these, they are kept as a person would keep
-them, however small; where it does not, as in soft paint that runs together, the printed colours
-are the paints. Either way they come first, in their printed order.
+A printed colour is in the drawings where enough pixels are of it. If most of the list is, the
+paints that are found near these are kept as a person would keep them, however small. Where much is
+of printed colours that no found paint is near, as in soft paint that runs together, the printed
+colours are the paints, with what else was found far from all of them. Either way they come first,
+in their printed order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +28,7 @@ REACH = 2 * JUST_NOTICEABLE  # in OKLab: so far print and paint of one colour ma
 OCCURS = 0.001  # of the figure's pixels: a painted eye
 FITS = 0.6  # of the printed colours that must occur, or the list is another character's
 FEWEST = 3  # that must occur
-OTHER = 5 * REACH  # in OKLab: a found paint so far from every printed one is none of them
+OTHER = 3 * REACH  # in OKLab: a found paint so far from every printed one is none of them
 IN_PRINTED_ORDER = "; in the order that the sheet prints, the others by share"
 
 
@@ -57,22 +58,24 @@ class Printed:
         return ",".join(map(hex_of, self.colors))
 
 
-def occurring(pictures: Sequence[Picture], printed: Sequence[RGB]) -> tuple[RGB, ...]:
-    """Return the printed colours that the drawings are painted in; none if the list does not fit.
+def occurring(pictures: Sequence[Picture], printed: Sequence[RGB]) -> dict[RGB, float]:
+    """Return the printed colours that the drawings are painted in, and their shares of the figure.
+
+    None if the list does not fit.
 
     Args:
         pictures: sRGB with straight alpha.
         printed: 8-bit sRGB.
     """
     if not printed:
-        return ()
-    shares = _shares(pictures, printed)
-    found = tuple(rgb for rgb, share in zip(printed, shares, strict=True) if share >= OCCURS)
-    return found if len(found) >= max(FEWEST, FITS * len(printed)) else ()
+        return {}
+    shares = _shares(pictures, printed).tolist()
+    found = {rgb: share for rgb, share in zip(printed, shares, strict=True) if share >= OCCURS}
+    return found if len(found) >= max(FEWEST, FITS * len(printed)) else {}
 
 
 def with_printed(
-    printed: Sequence[RGB],
+    printed: Mapping[RGB, float],
     options: PaletteOptions,
     find: Callable[[PaletteOptions], Palette],
     pick: Callable[[UInt8[np.ndarray, "colors 3"]], Palette],
@@ -80,24 +83,24 @@ def with_printed(
     """Return the drawings' palette with the printed colours that occur in it.
 
     Args:
-        printed: those that occur.
+        printed: those that occur, with their shares.
         options: of the choice without them.
         find: returns the palette of the drawings by such options.
         pick: returns the palette of given colours.
     """
     plain = find(options)
-    seen = [one.rgb for one in (*plain.colors, *plain.dropped)]
-    meant = [_nearest(rgb, seen) for rgb in printed]
-    near = [number for number, away in meant if away <= REACH]
-    if len(set(near)) >= FITS * len(printed):
-        left_out = [seen[number] for number in near if number >= len(plain.colors)]
-        kept = tuple(dict.fromkeys((*options.keep, *left_out)))
-        room = options.max_colors - len(plain.colors)
-        found = find(replace(options, keep=kept)) if left_out and room >= len(left_out) else plain
-    else:
-        others = [one.rgb for one in plain.colors if _nearest(one.rgb, printed)[1] > OTHER]
-        found = pick(np.array([*printed, *others], dtype=np.uint8))
-    return found
+    seen = [*(one.rgb for one in plain.colors), *(one.rgb for one in plain.dropped)]
+    meant = {rgb: _nearest(rgb, seen) for rgb in printed}
+    lost = sum(share for rgb, share in printed.items() if meant[rgb][1] > REACH)
+    if lost >= options.min_share:
+        colors = list(printed)
+        others = [one.rgb for one in plain.colors if _nearest(one.rgb, colors)[1] > OTHER]
+        return pick(np.array([*colors, *others], dtype=np.uint8))
+    near = [number for number, away in meant.values() if away <= REACH]
+    left_out = [seen[number] for number in near if number >= len(plain.colors)]
+    kept = tuple(dict.fromkeys((*options.keep, *left_out)))
+    room = options.max_colors - len(plain.colors)
+    return find(replace(options, keep=kept)) if left_out and room >= len(left_out) else plain
 
 
 def in_printed_order(found: Palette, printed: Sequence[RGB]) -> Palette:

@@ -23,7 +23,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@names",
         "@palette",
         "pixels",
-        "@corrections @named formats paints",
+        "@corrections @named @plain_sheets formats paints",
         "@printed",
         "@swatch_image",
         "@extract",

@@ -19,8 +19,8 @@ from toonset.raster import dilate
 LARGEST = 32  # times: larger blocks are paint
 ON_GRID = 0.98  # of the steps; those of a picture that was not enlarged lie anywhere
 RIM = 2  # pixels of a cut-out's edge that matting may have changed
-FEW = 2  # pixels of one colour: a blend, or a gradient's
-BLENDS = 0.5  # of the colours that come so rarely; of enlarged pixel art 0.17 at most
+FEW = 4  # pixels of one colour: a blend, or a gradient's; two mirrored halves have it twice
+BLENDS = 0.5  # of the colours that come so rarely; of enlarged pixel art 0.27 at most
 LEAST_COLORS = 64  # fewer are no antialiased drawing
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -50,6 +50,8 @@ class Grid:
 
 def find_grid(rgba: Picture) -> Grid | None:
     """Return the blocks of a drawing with blends that was enlarged; None for others."""
+    if not rgba.size:
+        return None
     words = np.ascontiguousarray(rgba).view("<u4")[..., 0]
     core = ~dilate(rgba[..., 3] < OPAQUE, RIM)
     across = _period(((words[:, 1:] != words[:, :-1]) & core[:, 1:] & core[:, :-1]).sum(axis=0))
@@ -68,7 +70,7 @@ def find_grid(rgba: Picture) -> Grid | None:
 
 def common_grids(pictures: Sequence[Picture]) -> list[Grid] | None:
     """Return the pictures' grids if all were enlarged by the same factor, else None."""
-    grids = []
+    grids: list[Grid] = []
     for picture in pictures:
         grid = find_grid(picture)
         if grid is None or grid.times != (grids or [grid])[0].times:

@@ -16,6 +16,7 @@ from toonset.raster import erode
 
 COVERED = 128  # of 255: alpha from which a pixel is the figure's
 RIM = 2  # pixels: a soft rim, as resampling and matting leave it, is no wider
+LEAST = 0.01  # of a drawing: what matting leaves inside is 0.6 % at most, paint 9 % and more
 WORTH_A_LINE = 0.05  # of the figure: less of it see-through is not worth a warning
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -49,7 +50,8 @@ def see_through_notes(pictures: Sequence[Picture]) -> tuple[str, ...]:
 
 def _see_through(rgba: Picture) -> Bool[np.ndarray, "height width"]:
     alpha = rgba[..., 3]
-    able: Bool[np.ndarray, "height width"] = (alpha >= COVERED) & (alpha < OPAQUE)
-    if not able.any():
-        return able
-    return able & erode(alpha >= COVERED, RIM)
+    covered: Bool[np.ndarray, "height width"] = alpha >= COVERED
+    able = covered & (alpha < OPAQUE)
+    if able.any():
+        able &= erode(covered, RIM)
+    return able if able.sum() >= LEAST * covered.sum() else np.zeros_like(able)
