@@ -68,7 +68,9 @@ def find_printed_palette(
         blobs: what is painted on it.
         main_blobs: the bodies of the views.
     """
-    height = float(np.median(blobs.boxes[main_blobs, 3])) if len(main_blobs) else 0.0
+    if min(rgb.shape[:2]) < LEAST_SIDE or not len(main_blobs):
+        return Patches(np.zeros((0, 4), dtype=np.int64), np.zeros((0, 3), dtype=np.uint8))
+    height = float(np.median(blobs.boxes[main_blobs, 3]))
     beside = _beside_bodies(blobs, main_blobs)
     found = _patches(
         rgb, beside, max(LEAST_SIDE, LEAST_OF_HEIGHT * height), MOST_OF_HEIGHT * height
