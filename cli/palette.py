@@ -19,6 +19,7 @@ from toonset.cli.common.output import (
     QuietFlag,
     VerboseFlag,
 )
+from toonset.errors import UsageError
 from toonset.lock import FOLDERS
 from toonset.write import check_output
 
@@ -45,6 +46,15 @@ def palette(
             "--colors",
             help="Your own: '#aabbcc,#123,white', or a palette file.",
             rich_help_panel=CHOICE_PANEL,
+        ),
+    ] = None,
+    swatches: Annotated[
+        bool | None,
+        typer.Option(
+            "--swatches/--no-swatches",
+            help="The palette that the sheet prints, as it is (default: where it fits the paint).",
+            rich_help_panel=CHOICE_PANEL,
+            show_default=False,
         ),
     ] = None,
     min_share: Annotated[
@@ -151,13 +161,22 @@ def palette(
     else:
         lock.claim(lock.set_of(target / WRITTEN[0]), target)
         check_map_folders(target)
+    if swatches is not None and colors is not None:
+        raise UsageError("--colors is the whole palette; leave --swatches away")
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     drawn = load_pictures(places)
     for note in drawn.notes:
         printer.say(note)
     contours = find_contours(drawn.pictures)
     found, maps, notes = label_drawings(
-        drawn, contours, options, given, colors=colors, method=method, space=space
+        drawn,
+        contours,
+        options,
+        given,
+        colors=colors,
+        swatches=swatches,
+        method=method,
+        space=space,
     )
     for note in notes:
         printer.say(note)
@@ -233,6 +252,7 @@ def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painte
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
     from toonset.palette.extract import choose_palette, paint_maps
     from toonset.palette.pixels.ink_lines import find_contours
+    from toonset.palette.printed import Printed
 
     bundle = bundle_of(places)
     if bundle is not None:
@@ -241,7 +261,7 @@ def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painte
     for note in drawn.notes:
         printer.say(note)
     contours = find_contours(drawn.pictures)
-    found = choose_palette(drawn.pictures, contours)
+    found = choose_palette(drawn.pictures, contours, printed=Printed(drawn.swatches))
     maps = paint_maps(drawn.pictures, contours, found)
     parts = zip(drawn.names, drawn.pictures, maps, contours, strict=True)
     return found, [Painted(*part) for part in parts]

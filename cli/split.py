@@ -80,6 +80,7 @@ def split(
 
 def _say(sheet: Sheet, out: Path, printer: Printer) -> None:
     from toonset.dataset.split_folder.write import split_dict
+    from toonset.palette.names import hex_of
 
     for note in sheet.skipped:
         printer.say(note)
@@ -98,6 +99,9 @@ def _say(sheet: Sheet, out: Path, printer: Printer) -> None:
             printer.say(f"  left out: {listed}")
         for remark in source.remarks:
             printer.say(f"  {remark}")
+        if source.swatches:
+            colors = ", ".join(hex_of(one.color) for one in source.swatches)
+            printer.say(f"  it prints a palette, which `toonset palette` uses: {colors}")
     for warning in sheet.warnings:
         printer.doubt(f"look: {warning}")
     if "drop" in sheet.options:

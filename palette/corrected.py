@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.errors import PaletteError
+from toonset.palette.color_names import with_codes
 from toonset.palette.corrections import PaletteCorrections, Stroke
 from toonset.palette.extract import IN_LIGHT, LINE, PaintMap, in_light, maps_in_light
 from toonset.palette.names import RGB, hex_of, name_of, rgb_of_hex
@@ -91,7 +92,8 @@ def correct_palette(
     labels = [own for own, _ in moved]
     colors = _colors(found, plan, np.sum([counts for _, counts in moved], axis=0))
     names = {plan.number(color, f"names.{color}"): name for color, name in wanted.names.items()}
-    colors = [replace(one, name=names.get(i, one.name)) for i, one in enumerate(colors)]
+    told = with_codes([one.name for one in colors], [one.rgb for one in colors])
+    colors = [replace(one, name=names.get(i, told[i])) for i, one in enumerate(colors)]
     ink, is_paint = _ink(found, plan)
     for number, (own, contour) in enumerate(zip(labels, contours, strict=True)):
         free = (pictures[number][..., 3] >= OPAQUE) & (contour < LINE)

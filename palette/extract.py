@@ -16,17 +16,23 @@ from toonset.palette.formats.registry import (
     parse_colors,
     parse_named_colors,
 )
+from toonset.palette.named import with_names
 from toonset.palette.paints.extcolors import extcolors_palette
-from toonset.palette.paints.extract import find_palette, pick_palette
+from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
+from toonset.palette.pixels.enlarged import common_grids
 from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
+from toonset.palette.pixels.opacity import opaque_inside, see_through_notes
 from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
+from toonset.palette.pixels.view_gain import gain_notes, view_gains, with_gains
+from toonset.palette.plain_sheets import plain_notes
+from toonset.palette.printed import Printed, in_printed_order, occurring, with_printed
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -62,6 +68,7 @@ def extract_palette(
     features: bool | None = None,
     colors: str | None = None,
     method: str = "toonset",
+    swatches: bool | None = None,
 ) -> Palette:
     """Return the colours that make up at least 5 % of a character, the most frequent first.
 
@@ -76,6 +83,9 @@ def extract_palette(
             and names are kept. Where the file has tones in shadow, a sheet's shadow is taken off;
             else name both tones.
         method: "toonset", or "extcolors", the paper's tool.
+        swatches: take the palette that the views' sheets print as the whole palette, as it is;
+            None: keep its colours that the drawings are painted in, and add what else there is;
+            False: do not look at it.
 
     Raises:
         ToonsetError: no opaque pixel, a colour that cannot be understood or found, or arguments
@@ -84,7 +94,9 @@ def extract_palette(
     pictures = [picture_of(view) for view in views]
     contours = find_contours(pictures)
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
-    return choose_palette(pictures, contours, options, colors, method)
+    own = [rgb for view in views if isinstance(view, View) for rgb in view.swatches]
+    printed = Printed(tuple(dict.fromkeys(own)), swatches)
+    return choose_palette(pictures, contours, options, colors, method, printed)
 
 
 def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb") -> Map:
@@ -147,9 +159,44 @@ def choose_palette(
     options: PaletteOptions | None = None,
     colors: str | None = None,
     method: str = "toonset",
+    printed: Printed | None = None,
 ) -> Palette:
-    """Return the palette of pictures whose drawn lines are known; see `extract_palette`."""
-    found = _chosen(pictures, contours, options or PaletteOptions(), colors, method)
+    """Return the palette of pictures whose drawn lines are known; see `extract_palette`.
+
+    Args:
+        pictures: sRGB with straight alpha.
+        contours: how far drawn lines cover their pixels, of 255.
+        options: of the choice.
+        colors: a palette of the user's own.
+        method: "toonset", or "extcolors".
+        printed: the palette that the sheets print, and whether it is to be used.
+    """
+    printed = printed or Printed()
+    if printed.use is not None and method != "toonset":
+        raise UsageError("--swatches belongs to --method toonset")
+    if printed.use and colors is None:
+        colors = printed.as_colors()
+    solid = [opaque_inside(picture) for picture in pictures]
+    gains = view_gains(solid)
+    solid = with_gains(solid, gains)
+    grids = common_grids(solid)
+    read, lines = solid, list(contours)
+    if grids is not None:
+        read = [grid.reduced(picture) for grid, picture in zip(grids, solid, strict=True)]
+        lines = [grid.reduced(contour) for grid, contour in zip(grids, contours, strict=True)]
+    found = _chosen(read, lines, options or PaletteOptions(), colors, method, printed)
+    notes = (*see_through_notes(pictures), *gain_notes(gains))
+    if grids is not None:
+        notes += (
+            f"the drawings are enlarged {grids[0].times} times without smoothing: their colours "
+            "are read at their own size, and places count its pixels",
+        )
+    if colors is None:
+        notes += plain_notes(found, solid)
+    found = replace(found, warnings=(*notes, *found.warnings))
+    found = with_names(found, pictures)
+    if printed.use:
+        found = replace(found, printed=printed.colors)
     return found if colors is None else _as_given(found, colors)
 
 
@@ -169,6 +216,7 @@ def _chosen(
     options: PaletteOptions,
     colors: str | None,
     method: str,
+    printed: Printed,
 ) -> Palette:
     if method not in METHODS:
         raise UsageError(f"--method: {method!r} is none of {', '.join(METHODS)}")
@@ -194,14 +242,35 @@ def _chosen(
     if picked is not None:
         palette = pick_palette(lit, picked, lines)
     else:
-        palette = _in_light(lit, options, lines, shadow)
-        if noise_levels(pictures) >= LEAST_LEVELS:
+        palette = _of_sheet(lit, options, lines, shadow, printed)
+        is_picked = palette.rule.startswith(PICKED)
+        if noise_levels(pictures) >= LEAST_LEVELS and not is_picked:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
             palette = read_drawn_colors(palette, pictures, lit, apart)
     if shadow is None:
         return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
     return with_tones(palette, shadow, lit, paint)
+
+
+def _of_sheet(
+    pictures: Sequence[Picture],
+    options: PaletteOptions,
+    lines: Sequence[Mask],
+    shadow: Shadow | None,
+    printed: Printed,
+) -> Palette:
+    """Return the palette of pictures in light, with the printed colours that occur in them."""
+    occurs = occurring(pictures, printed.colors) if printed.use is None else {}
+    if not occurs:
+        return _in_light(pictures, options, lines, shadow)
+    found = with_printed(
+        occurs,
+        options,
+        lambda wider: _in_light(pictures, wider, lines, shadow),
+        lambda rgb: pick_palette(pictures, rgb, lines),
+    )
+    return in_printed_order(found, printed.colors)
 
 
 def _in_light(
@@ -263,7 +332,8 @@ def in_light(
     pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow | None
 ) -> tuple[list[Picture], list[Mask] | None]:
     """Return pictures without grain and shadow, and the shadow's place; None without one."""
-    smooth = remove_grain(pictures)
+    solid = [opaque_inside(picture) for picture in pictures]
+    smooth = remove_grain(with_gains(solid, view_gains(solid)))
     if shadow is None:
         return list(smooth), None
     dark = find_tones(smooth, contours, shadow)

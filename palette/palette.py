@@ -168,6 +168,7 @@ class Palette:
         evidence: of the number of colours; None where it was not chosen by us.
         shadow: of a sheet that is shaded in two tones; None of a flat one.
         features: those of the colours that are under the rule, but kept: eyes, mouths, buttons.
+        printed: colours that the sheet itself prints as its palette, in that order.
         title: what programs show as the palette's name; "": none was given yet.
     """
 
@@ -179,6 +180,7 @@ class Palette:
     evidence: Evidence | None = None
     shadow: Shadow | None = None
     features: tuple[Hex, ...] = ()
+    printed: tuple[Hex, ...] = ()
     title: Name = ""
 
     def __post_init__(self) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
+from toonset.palette.color_names import meant_by, name_of
 from toonset.palette.extract import IN_SHADOW, PaintMap
 from toonset.palette.formats.hex import is_color, rgb_of_typed
-from toonset.palette.names import RGB, hex_of, name_of
+from toonset.palette.names import RGB, hex_of
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
 
@@ -25,8 +25,8 @@ def change_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] =
 
     Args:
         colors: of the palette.
-        changes: "OLD=NEW", hex colours; OLD must be one of the palette, or the name that `toonset
-            palette` gives one of them and no other.
+        changes: "OLD=NEW", hex colours; OLD must be one of the palette, or words of its name that
+            no other has: "legs" or "brown legs" for "dark brown (legs)".
         names: of the colours, where they have others than their plain ones.
 
     Raises:
@@ -35,7 +35,6 @@ def change_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] =
     old: list[RGB] = [(r, g, b) for r, g, b in colors.tolist()]
     plain = [name_of(color) for color in old]
     shown = list(names) or plain
-    called = _unique(plain, old) | _unique([name.lower() for name in shown], old)
     new = colors.copy()
     replaced: set[RGB] = set()
     for change in changes:
@@ -43,7 +42,9 @@ def change_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] =
         if len(words) != 2:
             raise PaletteError(f"--recolor {change!r}: OLD=NEW is needed, e.g. '#aa0000=#00aa00'")
         source, where = words[0].strip().lower(), f"--recolor {change!r}"
-        known = called.get(source) or (rgb_of_typed(source, where) if is_color(source) else None)
+        known = _meant(source, old, (shown, plain))
+        if known is None and is_color(source):
+            known = rgb_of_typed(source, where)
         if known is None or known not in old:
             pairs = zip(old, shown, strict=True)
             has = ", ".join(f"{hex_of(color)} ({name})" for color, name in pairs)
@@ -55,10 +56,13 @@ def change_colors(colors: Colors, changes: Sequence[str], names: Sequence[str] =
     return new
 
 
-def _unique(names: Sequence[str], colors: Sequence[RGB]) -> dict[str, RGB]:
-    """Return which colour is meant by every name that only one of them has."""
-    count = Counter(names)
-    return {name: color for name, color in zip(names, colors, strict=True) if count[name] == 1}
+def _meant(text: str, colors: Sequence[RGB], names: Sequence[Sequence[str]]) -> RGB | None:
+    """Return the one colour that a name means, by the first list of names in which it means one."""
+    for own in names:
+        found = meant_by(text, own)
+        if len(found) == 1:
+            return colors[found[0]]
+    return None
 
 
 def recolor_drawing(

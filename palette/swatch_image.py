@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from toonset.palette.names import RGB, clean_name, hex_of
 from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
+from toonset.palette.printed import paint_of
 
 PAGE, INK, QUIET, EDGE = (250, 250, 250), (30, 30, 30), (95, 95, 95), (190, 190, 190)
 MARGIN, GAP, STRIP = 28, 20, 36
@@ -47,11 +48,15 @@ LARGE, SMALL = Size((192, 120), 18), Size((132, 64), 15)
 
 @dataclass(frozen=True)
 class Card:
-    """One colour with the lines of its name, and its code and share."""
+    """One colour with the lines of its name, and its code and share.
+
+    With `beside`, the right half shows that colour.
+    """
 
     rgb: RGB
     name: tuple[str, ...]
     fact: str
+    beside: RGB | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,8 @@ class Part:
 def draw_swatches(palette: Palette) -> UInt8[np.ndarray, "height width 3"]:
     """Return a picture of the palette: shares as a strip, then a card for every colour.
 
-    The lines' colour and the left-out colours follow on smaller cards.
+    The lines' colour, the left-out colours and those that the sheet prints, each beside the paint
+    that it is, follow on smaller cards.
     """
     parts = _parts(palette)
     columns = max(FEWEST_COLUMNS, _columns(len(palette.colors)))
@@ -143,6 +149,7 @@ def _parts(palette: Palette) -> list[Part]:
         _part("", palette.colors, LARGE),
         _part("Drawn lines", (palette.contour,) if palette.contour else (), SMALL),
         _part("Left out", palette.dropped, SMALL),
+        Part("Printed on the sheet, beside the paint", _printed_cards(palette), SMALL),
     ]
     return [part for part in parts if part.cards]
 
@@ -157,6 +164,18 @@ def _part(heading: str, colors: Sequence[AnyColor], size: Size) -> Part:
         for color in colors
     )
     return Part(heading, cards, size)
+
+
+def _printed_cards(palette: Palette) -> tuple[Card, ...]:
+    """Return a card per printed colour, in its order, with the paint that it is on its right."""
+    colors = [one.rgb for one in palette.colors]
+    cards = []
+    for rgb in palette.printed:
+        number = paint_of(rgb, colors)
+        name = "not painted" if number is None else palette.colors[number].name
+        lines = broken(name, SMALL.font, SMALL.block_wh[0])
+        cards.append(Card(rgb, lines, hex_of(rgb), None if number is None else colors[number]))
+    return tuple(cards)
 
 
 def _percent(share: float) -> str:
@@ -185,6 +204,10 @@ def _draw_part(pen: ImageDraw.ImageDraw, part: Part, top: int, width: int) -> No
         y = top + i // columns * row_px
         box = (x, y, x + block_width - 1, y + block_height - 1)
         pen.rounded_rectangle(box, radius=8, fill=card.rgb, outline=EDGE)
+        if card.beside is not None:
+            right = (x + block_width // 2, y, x + block_width - 1, y + block_height - 1)
+            corners = (False, True, True, False)
+            pen.rounded_rectangle(right, 8, fill=card.beside, outline=EDGE, corners=corners)
         lines = [*((line, INK) for line in card.name), (card.fact, QUIET)]
         for j, (line, ink) in enumerate(lines):
             pen.text((x, y + block_height + 6 + j * size.line_px), line, fill=ink, font=size.font)

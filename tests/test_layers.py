@@ -19,10 +19,13 @@ OUTSIDE = ("bench", "tests", "examples")  # of the wheel: no stage imports them
 FLOORS: dict[str, tuple[str, ...]] = {
     "palette": (
         "@colors",
+        "@color_names",
         "@names",
         "@palette",
         "pixels",
-        "@corrections @swatch_image formats paints",
+        "@corrections @named @plain_sheets formats paints",
+        "@printed",
+        "@swatch_image",
         "@extract",
         "@corrected @coverage @recolor",
     ),

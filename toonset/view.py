@@ -39,6 +39,8 @@ class View:
         label: what it shows, as a person has said ("front", "3q", "90"); empty where nobody has.
         origin: what it was cut from; None where that is not recorded.
         sheet: the one file that it was cut from; None where that is not recorded.
+        swatches: 8-bit sRGB colours of the palette that its sheet prints, in reading order; empty
+            where it prints none, or nobody has looked.
     """
 
     rgba: UInt8[np.ndarray, "height width 4"]
@@ -50,6 +52,7 @@ class View:
     label: str = ""
     origin: Origin | None = None
     sheet: InputFile | None = None
+    swatches: tuple[tuple[int, int, int], ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse an empty drawing.

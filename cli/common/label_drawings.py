@@ -13,6 +13,7 @@ from toonset.palette.extract import Map, PaintMap, choose_palette
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
+from toonset.palette.printed import Printed
 
 
 def label_drawings(
@@ -22,6 +23,7 @@ def label_drawings(
     given: Given | None = None,
     *,
     colors: str | None = None,
+    swatches: bool | None = None,
     method: str = "toonset",
     space: Space = "rgb",
 ) -> tuple[Palette, list[PaintMap] | None, tuple[str, ...]]:
@@ -33,6 +35,7 @@ def label_drawings(
         options: how colours are chosen, those that corrections keep included.
         given: what a person corrected.
         colors: a palette of the user's own: see `extract_palette`.
+        swatches: see `extract_palette`.
         method: see `extract_palette`.
         space: in which the nearest colour is meant.
 
@@ -41,7 +44,8 @@ def label_drawings(
     """
     wanted = PaletteCorrections() if given is None else given.content.palette
     try:
-        found = choose_palette(drawn.pictures, contours, options, colors, method)
+        printed = Printed(drawn.swatches, swatches)
+        found = choose_palette(drawn.pictures, contours, options, colors, method, printed)
     except ToonsetError as error:
         if given is None or not wanted.keep:
             raise

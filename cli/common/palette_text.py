@@ -15,12 +15,12 @@ def palette_lines(found: Palette, *, verbose: bool) -> list[str]:
     """Return a line per colour, then what is left out; if verbose, the rule and the evidence."""
     lines = [_color_line(color, found) for color in found.colors]
     if not verbose:
-        return [*lines, *_left_out(found)]
+        return [*lines, *_left_out(found), *_printed(found)]
     lines.append(f"shares are of all the character's pixels; rule: {found.rule}")
     if found.shadow is not None:
         factor = ", ".join(f"{value:.2f}" for value in found.shadow.factor)
         lines.append(f"shadow: colours in light times {factor}; colours are those in light")
-    lines += _contour_lines(found)
+    lines += [*_contour_lines(found), *_printed(found)]
     if found.dropped:
         lines.append("left out (with the mean OKLab error that this costs, and the largest patch):")
         lines += [_dropped_line(color, found) for color in found.dropped]
@@ -45,6 +45,19 @@ def _left_out(found: Palette) -> list[str]:
     more = [f"{len(found.dropped) - MOST_NAMED} more"] if len(found.dropped) > MOST_NAMED else []
     first = hex_of(found.dropped[0].rgb)
     return [f"left out by the rule: {', '.join([*names, *more])} (--keep '{first}' keeps one)"]
+
+
+def _printed(found: Palette) -> list[str]:
+    """Return how much of the palette that the sheet prints is painted."""
+    from toonset.palette.names import hex_of
+    from toonset.palette.printed import paint_of
+
+    if not found.printed:
+        return []
+    colors = [color.rgb for color in found.colors]
+    missing = [hex_of(rgb) for rgb in found.printed if paint_of(rgb, colors) is None]
+    lacks = f", not painted: {', '.join(missing)}" if missing else ""
+    return [f"printed on the sheet: {len(found.printed)} colours{lacks} (--no-swatches: unused)"]
 
 
 def _evidence_line(evidence: Evidence) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION, CalibrationFile
 from toonset.errors import BundleError, CameraError
 from toonset.json_file import read_json, validate
+from toonset.palette.names import hex_of
 from toonset.read import schema_version
 from toonset.view import View
 
@@ -33,9 +34,13 @@ def calibration_content(report: Mapping[str, Any], views: Sequence[View]) -> dic
 
 
 def _place(view: View) -> dict[str, Any]:
-    """Return where a drawing lies in which sheet."""
-    sheet = view.sheet and {"name": view.sheet.name, "sha256": view.sheet.sha256}
-    return {"box": [int(side) for side in view.box], **({"sheet": sheet} if sheet else {})}
+    """Return where a drawing lies in which sheet, and the palette that this prints."""
+    place: dict[str, Any] = {"box": [int(side) for side in view.box]}
+    if view.sheet:
+        place["sheet"] = {"name": view.sheet.name, "sha256": view.sheet.sha256}
+    if view.swatches:
+        place["swatches"] = [hex_of(rgb) for rgb in view.swatches]
+    return place
 
 
 def read_calibration(file: Path) -> CalibrationFile:

@@ -15,6 +15,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera, Pair, Rotation, Row
 from toonset.dataset.bundle.transforms_schema import MAX_FRAMES
 from toonset.errors import BundleError
+from toonset.palette.palette import Hex
 
 SCHEMA, VERSION = "toonset-calibration", 2
 SAME_ANGLE_DEG = 1e-3
@@ -98,7 +99,8 @@ class SheetFile(_Record):
 class ViewRecord(_Record):
     """One drawing's camera; what older bundles do not say is None.
 
-    `box` is its picture's (x, y, width, height) in `sheet`, pixels.
+    `box` is its picture's (x, y, width, height) in `sheet`, pixels; `swatches` are the palette that
+    the sheet prints.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=255)]
@@ -116,6 +118,7 @@ class ViewRecord(_Record):
     line_width_px: Spread | None = None
     box: tuple[int, int, int, int] | None = None
     sheet: SheetFile | None = None
+    swatches: Annotated[list[Hex], Field(max_length=255)] = []
 
     def check(self) -> None:
         """Refuse what no calibration writes.

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import UInt8, UInt16
 from PIL import Image, ImageOps, UnidentifiedImageError
 
-from toonset.dataset.images.pixel_modes import rgba_of
+from toonset.dataset.images.pixel_modes import rgba_of, said_of
 from toonset.errors import PictureError
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.read import describe, read_whole
@@ -59,7 +59,7 @@ def decode_rgba(
     with _opened(data, path, max_pixels) as image:
         image.load()
         ImageOps.exif_transpose(image, in_place=True)
-        return rgba_of(image, path)
+        return rgba_of(image, path, said_of(data))
 
 
 def picture_size(path: Path, max_pixels: int = MAX_PIXELS) -> tuple[int, int]:

@@ -11,23 +11,57 @@ from jaxtyping import UInt8
 from PIL import Image, ImageCms
 
 from toonset.errors import PictureError
+from toonset.palette.colors import LINEAR_OF_LEVEL, srgb_from_linear
 
 PLAIN_MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBa", "La", "RGBX", "YCbCr")
 GREY_16_MODES = ("I;16", "I;16L", "I;16B", "I;16N")
 ROWS = 64  # of a picture, copied at once
+PNG_START = b"\x89PNG\r\n\x1a\n"
+SRGB_SAID, P3_SAID = (1, 13), (12, 13)  # primaries and curve by ITU-T H.273
+# Linear light; source: CSS Color 4 (W3C), sample code, lin_P3 to XYZ to lin_sRGB
+SRGB_FROM_P3 = np.array(
+    [[1.2249402, -0.2249402, 0], [-0.0420570, 1.0420570, 0], [-0.0196376, -0.0786361, 1.0982736]]
+)
 SRGB_TOLERANCE = 2  # levels: a profile that moves no colour further is sRGB itself
 
 
-def rgba_of(image: Image.Image, path: Path) -> UInt8[np.ndarray, "height width 4"]:
+def said_of(data: bytes) -> tuple[int, int] | None:
+    """Return the primaries and the curve that a PNG's cICP chunk says; None without one.
+
+    Source: PNG (W3C, third edition), 11.3.2.6; numbers of ITU-T H.273.
+    """
+    at = len(PNG_START)
+    while data.startswith(PNG_START) and at + 8 <= len(data):
+        size, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+        if kind == b"cICP" and size == 4:
+            return data[at + 8], data[at + 9]
+        if kind == b"IDAT":
+            return None
+        at += 12 + size
+    return None
+
+
+def rgba_of(
+    image: Image.Image, path: Path, said: tuple[int, int] | None = None
+) -> UInt8[np.ndarray, "height width 4"]:
     """Return the pixels of a loaded picture as sRGB with straight alpha.
 
     16-bit channels are scaled to 8 bits (never wrapped), palettes and transparent colours are
     resolved, an embedded colour profile is converted to sRGB.
 
+    Args:
+        image: loaded.
+        path: for messages.
+        said: the colours that a cICP chunk names, which goes before a profile; see `said_of`.
+
     Raises:
         PictureError: a mode or profile whose colours cannot be told.
     """
     profile = image.info.get("icc_profile")
+    if said == SRGB_SAID:
+        profile = None
+    elif said is not None:
+        return _p3(image, said, path)
     if image.mode in GREY_16_MODES:
         image = _grey_8(image)
     if image.mode == "CMYK":
@@ -44,6 +78,24 @@ def rgba_of(image: Image.Image, path: Path) -> UInt8[np.ndarray, "height width 4
     if profile:
         grey = image.mode in ("1", "L", "LA", "La")
         rgba[..., :3] = _to_srgb(Image.fromarray(rgba[..., :3]), profile, grey, path)
+    return rgba
+
+
+def _p3(
+    image: Image.Image, said: tuple[int, int], path: Path
+) -> UInt8[np.ndarray, "height width 4"]:
+    """Return a Display P3 picture as sRGB; colours outside of it are clipped."""
+    if said != P3_SAID:
+        raise PictureError(
+            f"{path}: its cICP chunk says colours of kind {said[0]}, {said[1]} (HDR or video), "
+            "which are not supported; save it as an sRGB PNG"
+        )
+    grey = image.mode in ("1", "L", "LA", "La", *GREY_16_MODES)  # P3 and sRGB share white and curve
+    rgba = rgba_of(image, path, SRGB_SAID)
+    if not grey:
+        for top in range(0, len(rgba), ROWS):
+            part = rgba[top : top + ROWS, :, :3]
+            part[...] = np.rint(255 * srgb_from_linear(LINEAR_OF_LEVEL[part] @ SRGB_FROM_P3.T))
     return rgba
 
 

@@ -5,7 +5,7 @@ The cost grows with the number of pixels, plus a little per figure.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -22,6 +22,8 @@ from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
 from toonset.dataset.split.warnings import border_warnings, figure_warnings
 from toonset.errors import SheetError
+from toonset.palette.palette import Hex
+from toonset.palette.pixels.enlarged import Grid, find_grid
 from toonset.view import Box, View
 
 Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]  # pixels, as split.json may have them
@@ -78,6 +80,19 @@ class LeftOut:
     kind: Annotated[str, Field(max_length=40)]
 
 
+@dataclass(frozen=True)
+class Swatch:
+    """A colour of the palette that a sheet prints.
+
+    Attributes:
+        box: (x, y, width, height) in the sheet.
+        color: 8-bit sRGB.
+    """
+
+    box: InSheet
+    color: Hex
+
+
 @dataclass(frozen=True, eq=False)
 class Segmentation:
     """The drawings of a sheet.
@@ -89,6 +104,7 @@ class Segmentation:
         warnings: what a person should look at, for a view may be wrong.
         left_out: what was seen but is not a view.
         remarks: what was done besides, for people.
+        swatches: of the palette that the sheet prints, in reading order.
     """
 
     views: tuple[View, ...]
@@ -97,6 +113,7 @@ class Segmentation:
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...] = ()
     remarks: tuple[str, ...] = ()
+    swatches: tuple[Swatch, ...] = ()
 
 
 def split_picture(
@@ -113,6 +130,10 @@ def split_picture(
             no correction of that name to leave out.
     """
     options = options or SheetOptions()
+    by_hand = bool(options.boxes) or options.grid is not None
+    blocks = None if by_hand else find_grid(rgba)
+    if blocks is not None:
+        return _enlarged(split_picture(blocks.reduced(rgba), options), blocks)
     if options.background_rgb is not None or not is_transparent(rgba):
         rgba = flatten(rgba)
     ground = find_background(rgba, options.background_rgb)
@@ -121,7 +142,7 @@ def split_picture(
     _check(found, ground, options)
     crops = _crops(found, paint, options)
     views, holes = _views(rgba, ground, crops, options)
-    by_hand = bool(options.boxes) or options.grid is not None
+    swatches = _swatches(found)
     return Segmentation(
         tuple(views),
         ground.rgb,
@@ -129,6 +150,33 @@ def split_picture(
         border_warnings(ground, found) + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+        swatches,
+    )
+
+
+def _enlarged(found: Segmentation, blocks: Grid) -> Segmentation:
+    """Return what was found in a sheet at its own size, as it is in the enlarged one."""
+
+    def box_of(box: Box) -> Box:
+        x, y, width, height = box
+        left, right = np.searchsorted(blocks.columns, [x, x + width]).tolist()
+        top, bottom = np.searchsorted(blocks.rows, [y, y + height]).tolist()
+        return left, top, right - left, bottom - top
+
+    views = []
+    for view in found.views:
+        x, y, width, height = box_of(view.box)
+        rows = blocks.rows[y : y + height] - view.box[1]
+        columns = blocks.columns[x : x + width] - view.box[0]
+        rgba, line = view.rgba[rows[:, None], columns], view.line_width_px * blocks.times
+        views.append(replace(view, rgba=rgba, box=(x, y, width, height), line_width_px=line))
+    remark = f"enlarged {blocks.times} times without smoothing: cut at its own size"
+    return replace(
+        found,
+        views=tuple(views),
+        left_out=tuple(replace(one, box=box_of(one.box)) for one in found.left_out),
+        remarks=(remark, *found.remarks),
+        swatches=tuple(replace(one, box=box_of(one.box)) for one in found.swatches),
     )
 
 
@@ -222,6 +270,16 @@ def _left_out(found: SheetLayout) -> tuple[LeftOut, ...]:
     return tuple(
         LeftOut((x * cell, y * cell, width * cell, height * cell), kind)
         for (x, y, width, height), kind in boxes
+    )
+
+
+def _swatches(found: SheetLayout) -> tuple[Swatch, ...]:
+    printed, cell = found.grouping.printed, found.cell_px
+    return tuple(
+        Swatch((x * cell, y * cell, width * cell, height * cell), (red, green, blue))
+        for (x, y, width, height), (red, green, blue) in zip(
+            printed.boxes.tolist(), printed.rgb.tolist(), strict=True
+        )
     )
 
 

@@ -166,8 +166,9 @@ def _with_origin(sheet: Sheet) -> Sheet:
     cut_now = [picture is not None for picture in sheet.pictures]
     papers = [split.sources[of].background if cut_now[of] else None for of in split.source_of]
     sheets = [InputFile(SHEET, source.name, source.sha256) for source in split.sources]
+    printed = [tuple(one.color for one in source.swatches) for source in split.sources]
     views = tuple(
-        replace(view, origin=origin, paper=paper, sheet=sheets[of])
+        replace(view, origin=origin, paper=paper, sheet=sheets[of], swatches=printed[of])
         for view, paper, of in zip(split.views, papers, split.source_of, strict=True)
     )
     return replace(sheet, split=replace(split, views=views))

@@ -15,7 +15,7 @@ from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecor
 from toonset.dataset.bundle.palette_files import palette_title
 from toonset.dataset.bundle.transforms_read import NAMES, picture_paths, place_in, transforms_file
 from toonset.dataset.images.picture import load_rgba
-from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.split.sheet import Swatch, split_picture
 from toonset.dataset.split_folder.places import is_split_folder, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.errors import BundleError, PictureError, SheetError
@@ -35,6 +35,7 @@ class Pictures:
         notes: what a person should know of the files.
         title: what to call the character: its sheet's name, or the folder's.
         places: where each picture lies in which sheet; None where nobody has recorded it.
+        swatches: of the palettes that the sheets print, 8-bit sRGB, in reading order.
     """
 
     names: tuple[str, ...]
@@ -42,6 +43,7 @@ class Pictures:
     notes: tuple[str, ...]
     title: str
     places: tuple[Place | None, ...]
+    swatches: tuple[tuple[int, int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ def load_pictures(places: Sequence[Path]) -> Pictures:
     notes: list[str] = []
     pictures, sheets = [], []
     at_sheet: list[Place | None] = []
+    printed: list[Swatch] = []
     found, skipped = sheet_places([_inner(place) for place in places])
     notes += skipped
     for place in found:
@@ -105,18 +108,22 @@ def load_pictures(places: Sequence[Path]) -> Pictures:
             notes += changed
             pictures += [view.rgba for view in split.views]
             sheets += [source.name for source in split.sources]
+            printed += [one for source in split.sources for one in source.swatches]
             files = [InputFile(SHEET, one.name, one.sha256) for one in split.sources]
             pairs = zip(split.views, split.source_of, strict=True)
             at_sheet += [Place(files[of], view.box) for view, of in pairs]
         else:
-            pictures.append(_loaded(place, notes))
+            picture, swatches = _loaded(place, notes)
+            pictures.append(picture)
+            printed += swatches
             sheets.append(place.name)
             height, width = pictures[-1].shape[:2]
             at_sheet.append(Place(InputFile.of(SHEET, place), (0, 0, width, height)))
     names = tuple(f"{number:03d}.png" for number in range(len(pictures)))
     folder = places[0] if places[0].is_dir() else places[0].parent
     title = palette_title(sheets, folder)
-    return Pictures(names, tuple(pictures), tuple(notes), title, tuple(at_sheet))
+    colors = tuple(dict.fromkeys(one.color for one in printed))
+    return Pictures(names, tuple(pictures), tuple(notes), title, tuple(at_sheet), colors)
 
 
 def _of_bundle(place: Path) -> Pictures:
@@ -125,12 +132,14 @@ def _of_bundle(place: Path) -> Pictures:
     names = tuple(f"{path.stem}.png" for path in paths)
     if len(set(names)) < len(names):
         raise BundleError(f"{place}: two pictures have the same file name; rename one")
-    pictures = tuple(_loaded(path, notes) for path in paths)
+    pictures = tuple(_loaded(path, notes)[0] for path in paths)
     found = _calibration(place)
     sheets = (file.name for file in (found.inputs if found else ()) if file.role == SHEET)
     title = palette_title(sheets, transforms_file(place).parent)
     lies = {view.name: _place(view) for view in found.views} if found else {}
-    return Pictures(names, pictures, tuple(notes), title, tuple(lies.get(p.name) for p in paths))
+    at_sheet = tuple(lies.get(path.name) for path in paths)
+    printed = [rgb for view in found.views for rgb in view.swatches] if found else []
+    return Pictures(names, pictures, tuple(notes), title, at_sheet, tuple(dict.fromkeys(printed)))
 
 
 def _calibration(place: Path) -> CalibrationFile | None:
@@ -161,19 +170,22 @@ def _inner(place: Path) -> Path:
     return images if images.is_dir() and not is_split_folder(place) else place
 
 
-def _loaded(path: Path, notes: list[str]) -> Picture:
-    """Return a picture with its plain background made transparent, if it is opaque."""
+def _loaded(path: Path, notes: list[str]) -> tuple[Picture, tuple[Swatch, ...]]:
+    """Return a picture with its plain background made transparent, if it is opaque.
+
+    With the palette that such a picture prints.
+    """
     picture = load_rgba(path)
     if (picture[..., 3] < 255).any():
-        return picture
+        return picture, ()
     try:
         segmentation = split_picture(picture)
     except SheetError as error:
         notes.append(f"{path.name}: every pixel counts as the character's ({error})")
-        return picture
+        return picture, ()
     whole = np.zeros_like(picture)
     for view in segmentation.views:
         x, y, width, height = view.box
         window = whole[y : y + height, x : x + width]
         window[view.rgba[..., 3] > 0] = view.rgba[view.rgba[..., 3] > 0]
-    return whole
+    return whole, segmentation.swatches

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from toonset.dataset.split.sheet import LeftOut, Length, Segmentation
+from toonset.dataset.split.sheet import LeftOut, Length, Segmentation, Swatch
 from toonset.palette.palette import Hex
 from toonset.view import View
 
@@ -28,6 +28,7 @@ class Source:
         warnings: what was doubtful in it, for people.
         left_out: what was seen in it but is not a view.
         remarks: what was done besides, for people.
+        swatches: of the palette that it prints, in reading order.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Source:
     warnings: tuple[str, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     remarks: tuple[str, ...] = ()
+    swatches: tuple[Swatch, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,8 @@ def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segm
     """
     digest = sha256(data).hexdigest()
     source = Source(
-        name, digest, size_wh, sheet.background, sheet.warnings, sheet.left_out, sheet.remarks
+        *(name, digest, size_wh, sheet.background, sheet.warnings, sheet.left_out),
+        *(sheet.remarks, sheet.swatches),
     )
     return Split((source,), sheet.views, (0,) * len(sheet.views))
 

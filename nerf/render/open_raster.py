@@ -31,7 +31,7 @@ from toonset.errors import PaletteError, UsageError
 from toonset.nerf.fields.trained_field import NO_PALETTE
 from toonset.nerf.render.animation import check_one_size
 from toonset.nerf.render.layers import Rendering
-from toonset.palette.names import hex_of, name_of
+from toonset.palette.color_names import distinct_names, with_codes
 from toonset.raster import dilate, is_uniform, nearest
 from toonset.view import premultiply, straight
 
@@ -263,14 +263,10 @@ def _straight(
 
 
 def _names(look: _Look) -> list[str]:
-    """Return what to call the paints; names that two share have the colour's code, too."""
+    """Return what to call the paints, each otherwise; of several inks each has its code, too."""
     codes = [(r, g, b) for r, g, b in look.paints.tolist()]
-    plain = [name_of(code) for code in codes]
-    plain[len(plain) - look.inks :] = [INK] * look.inks
-    return [
-        f"{name} {hex_of(code)}" if plain.count(name) > 1 else name
-        for name, code in zip(plain, codes, strict=True)
-    ]
+    paints = len(codes) - look.inks
+    return list(with_codes([*distinct_names(codes[:paints]), *[INK] * look.inks], codes))
 
 
 def _cut(name: str, color: Color, share: Share) -> PaintLayer | None:

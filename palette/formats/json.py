@@ -49,6 +49,8 @@ def json_title(data: bytes) -> str:
 def to_json(palette: Palette) -> dict[str, Any]:
     """Return the content of palette.json."""
     content: dict[str, Any] = PALETTE.dump_python(palette, mode="json", by_alias=True)
+    if not content["printed"]:
+        del content["printed"]
     content["colors"] = [one | {"name": one_line(one["name"])} for one in content["colors"]]
     return {"schema": f"{NAME}/{VERSION}", **content}
 

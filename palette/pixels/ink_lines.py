@@ -20,7 +20,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
+from toonset.palette.pixels.enlarged import find_grid
 from toonset.palette.pixels.grain import remove_grain
+from toonset.palette.pixels.opacity import opaque_inside
 
 Morphology = Callable[..., np.ndarray]  # cv2.dilate or cv2.erode
 
@@ -77,7 +79,16 @@ def find_contours(
     pictures: Sequence[UInt8[np.ndarray, "height width 4"]],
 ) -> list[UInt8[np.ndarray, "height width"]]:
     """Return how far the drawn lines cover every pixel of a sheet's drawings, grain taken off."""
-    return [find_contour(picture) for picture in remove_grain(pictures)]
+    solid = [opaque_inside(picture) for picture in pictures]
+    return [_in_blocks(picture) for picture in remove_grain(solid)]
+
+
+def _in_blocks(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width"]:
+    """Return the lines of a drawing; of one that was enlarged without smoothing, by blocks."""
+    grid = find_grid(rgba)
+    if grid is None:
+        return find_contour(rgba)
+    return grid.enlarged(find_contour(np.ascontiguousarray(grid.reduced(rgba))))
 
 
 def outline_line_px(

@@ -15,6 +15,7 @@ from jaxtyping import UInt8
 
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.pixels.antialias import OPAQUE, settle_borders
+from toonset.palette.pixels.enlarged import find_grid
 
 Space = Literal["rgb", "oklab"]
 
@@ -42,6 +43,11 @@ def label_pixels(
         palette: 1 to 255 colours.
         space: in which nearest is meant.
     """
+    grid = find_grid(rgba)
+    if grid is not None:
+        small = np.ascontiguousarray(grid.reduced(rgba))
+        settled = settle_borders(nearest_labels(small, palette, space=space), small, palette)
+        return grid.enlarged(settled)
     return settle_borders(nearest_labels(rgba, palette, space=space), rgba, palette)
 
 

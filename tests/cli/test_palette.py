@@ -49,7 +49,7 @@ def test_a_bundle_gets_its_palette_and_labels(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     palette()
     shown = capsys.readouterr().out.splitlines()
-    colors = ["#c81e28   70.0 %  red", "#143cb4   30.0 %  royal blue"]
+    colors = ["#c81e28   70.0 %  red", "#143cb4   30.0 %  blue"]
     assert shown == [*colors, "bundle: look at palette.png; next: toonset train bundle"]
     palette(verbose=True)
     shown = capsys.readouterr().out.splitlines()
@@ -116,12 +116,12 @@ def test_what_is_dropped_is_printed(tmp_path: Path, capsys: pytest.CaptureFixtur
     bundle = make_bundle(tmp_path / "b")
     palette([bundle], min_share=0.5)
     said = capsys.readouterr().out
-    assert "left out by the rule: #143cb4 royal blue (--keep '#143cb4' keeps one)\n" in said
+    assert "left out by the rule: #143cb4 blue (--keep '#143cb4' keeps one)\n" in said
     palette([bundle], min_share=0.5, verbose=True)
     lines = capsys.readouterr().out.splitlines()
     assert "rule: at least 50 % of the character's pixels" in lines[1]
     assert lines[2].startswith("left out")
-    assert lines[3].startswith("#143cb4   30.0 %  royal blue  0.")
+    assert lines[3].startswith("#143cb4   30.0 %  blue  0.")
 
 
 def test_the_number_of_colours_is_explained_without_empty_figures() -> None:

@@ -11,7 +11,6 @@ from PIL import Image
 from tests.palette.pictures import as_set, block, opaque, ramp, soft_stripes
 from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.names import NAMED, name_of
 from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette
 from toonset.palette.paints.histogram import count_pixels
@@ -90,18 +89,6 @@ def test_oklab_of_known_colours() -> None:
     rgb = np.array([(255, 255, 255), (0, 0, 0), (255, 0, 0), (0, 0, 255)], dtype=np.uint8)
     expected = [(1, 0, 0), (0, 0, 0), (0.62796, 0.22486, 0.12585), (0.45201, -0.03246, -0.31153)]
     np.testing.assert_allclose(oklab_from_rgb(rgb), expected, atol=2e-4)
-
-
-def test_names_name_themselves() -> None:
-    assert all(name_of(rgb) == name for name, rgb in NAMED.items())
-    names = {
-        (12, 9, 11): "black",
-        (36, 28, 48): "dark purple",
-        (27, 25, 43): "dark blue",
-        (42, 42, 42): "dark charcoal",
-        (228, 30, 30): "red",
-    }
-    assert {rgb: name_of(rgb) for rgb in names} == names
 
 
 def test_counts_are_the_pixels() -> None:

@@ -13,6 +13,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs, reading_order
+from toonset.dataset.split.figures.printed_palette import (
+    Patches,
+    are_swatches,
+    find_printed_palette,
+)
 from toonset.dataset.split.figures.text_and_swatches import find_letters, find_swatches
 
 WITHIN = 0.5  # of a patch that lies in a figure's box: its part
@@ -47,11 +52,13 @@ class Grouping:
         count: number of figures.
         kinds: per patch what it is if it is no figure's: see `toonset.dataset.split.sheet.LeftOut`;
             "" for noise that is too small to name.
+        printed: the palette that the sheet prints.
     """
 
     figure_of_blob: Int[np.ndarray, " blobs"]
     count: int
     kinds: tuple[str, ...]
+    printed: Patches
 
 
 def group_blobs(
@@ -70,16 +77,18 @@ def group_blobs(
     figure = np.full(len(blobs.areas), -1)
     figure[main_blobs] = np.arange(len(main_blobs))
     kinds = np.full(len(blobs.areas), "", dtype=object)
+    printed = find_printed_palette(rgb, blobs, main_blobs)
     small = np.flatnonzero((figure < 0) & (blobs.areas >= LEAST_SPECK))
     if len(small):
         nearest, gap = _nearest_main(blobs, main_blobs, small)
         letters = find_letters(blobs.boxes[small], int(np.median(blobs.boxes[main_blobs, 3])))
-        swatches = find_swatches(blobs.boxes[small], blobs.areas[small])
+        in_palette = are_swatches(printed, blobs, small)
+        swatches = in_palette | find_swatches(blobs.boxes[small], blobs.areas[small])
         typical = float(np.median(blobs.areas[main_blobs]))
         bodies = main_blobs[nearest]
         for i, number in enumerate(small):
             within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
-            in_row = bool(letters[i] | swatches[i]) and not within
+            in_row = (bool(letters[i] | swatches[i]) and not within) or bool(in_palette[i])
             if not in_row and _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
                 figure[number] = nearest[i]
         again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(main_blobs), rgb)
@@ -93,7 +102,7 @@ def group_blobs(
                 kinds[number] = "text"
             elif blobs.areas[number] >= LISTED_SPECK * typical:
                 kinds[number] = _kind(blobs, int(number), typical)
-    return Grouping(figure, len(main_blobs), tuple(kinds))
+    return Grouping(figure, len(main_blobs), tuple(kinds), printed)
 
 
 def _nearest_main(

@@ -47,7 +47,7 @@ def find_swatches(
     for along, across in ((0, 1), (1, 0)):
         level = apart[..., across] <= EQUAL * size[:, across]
         near |= level & (apart[..., along] <= 2 * size[:, along])
-    groups = _components(near & equal & equal.T)
+    groups = connected(near & equal & equal.T)
     result[able] = np.bincount(groups)[groups] >= LETTERS
     return result
 
@@ -72,10 +72,10 @@ def _groups(boxes: Int[np.ndarray, "n 4"]) -> Int[np.ndarray, " n"]:
     gap = np.maximum(x, x.T) - np.minimum(x + width, (x + width).T)
     level = np.abs((y + height / 2) - (y + height / 2).T) <= 0.6 * taller
     alike = taller <= 2.5 * np.minimum(height, height.T)
-    return _components(level & alike & (gap <= 1.5 * taller))
+    return connected(level & alike & (gap <= 1.5 * taller))
 
 
-def _components(near: Bool[np.ndarray, "n n"]) -> Int[np.ndarray, " n"]:
+def connected(near: Bool[np.ndarray, "n n"]) -> Int[np.ndarray, " n"]:
     """Return the number of every node's connected component (SciPy's is slower to import)."""
     groups, number = np.full(len(near), -1), 0
     while (rest := groups < 0).any():

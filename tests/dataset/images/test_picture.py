@@ -158,6 +158,25 @@ def test_foreign_profile_is_converted_and_srgb_left_alone(loaded) -> None:
     assert np.abs(found[..., :3].astype(int) - RGB[..., ::-1]).max() <= 2
 
 
+def test_colours_that_cicp_alone_names_are_converted(loaded) -> None:
+    """Display P3 as Photoshop and Icon Composer write it; values of ICC's own P3 profile."""
+    p3, srgb = (12, 13, 0, 1), (1, 13, 0, 1)
+    raw = b"\x00" + bytes([201, 93, 60, 70, 136, 139])  # a row without filter
+    header = struct.pack(">IIBBBBB", 2, 1, 8, 2, 0, 0, 0)
+
+    def told(said: tuple[int, ...] | None) -> np.ndarray:
+        extra = [] if said is None else [chunk(b"cICP", bytes(said))]
+        parts = [chunk(b"IHDR", header), *extra, chunk(b"IDAT", zlib.compress(raw))]
+        return loaded(b"\x89PNG\r\n\x1a\n" + b"".join(parts) + chunk(b"IEND", b""))
+
+    np.testing.assert_allclose(
+        told(p3)[0, :, :3].astype(int), [(217, 84, 48), (38, 138, 140)], atol=2
+    )
+    np.testing.assert_array_equal(told(srgb), told(None))
+    with pytest.raises(PictureError, match="cICP chunk says colours of kind 9, 16"):
+        told((9, 16, 0, 1))
+
+
 @pytest.mark.parametrize("colors", [1, 3, 255])
 def test_labels_come_back_and_carry_their_palette(colors: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(colors)

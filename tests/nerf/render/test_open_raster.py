@@ -75,7 +75,7 @@ def test_layers_together_are_the_view(egg: Drawings, degrees: float) -> None:
 
 
 def test_every_layer_has_its_paint_and_its_name(egg: Drawings) -> None:
-    for yaw, names in ((0.0, ["red", "royal blue", "peach"]), (np.pi, ["green", "red", "peach"])):
+    for yaw, names in ((0.0, ["red", "blue", "peach"]), (np.pi, ["green", "red", "peach"])):
         layers, _ = of(rendering(egg, yaw))
         assert [one.name for one in layers] == ["lines", *names]
         lines, *paints = layers
