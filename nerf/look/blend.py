@@ -21,11 +21,11 @@ from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed
 from toonset.nerf.look.drawings import CRUMB, STEP, Drawings, Texture, crisp_depth, look_up
-from toonset.nerf.look.features import Stamp, stamped, stamps, torn
 from toonset.nerf.look.outline import crisp_outline, inked_outline, without_noise
 from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
 from toonset.nerf.look.silhouette import between_outlines, smooth_outline
+from toonset.nerf.look.stamps import Stamp, stamped, stamps, torn
 from toonset.nerf.look.step_lines import draw_steps
 from toonset.nerf.look.surface import smooth_surface
 from toonset.palette.pixels.labels import UNLABELLED

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+import cv2
 import numpy as np
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import has_figure, mask_of
@@ -15,7 +16,6 @@ from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.look.drawings import STEP, Drawing, Drawings, Original, levels_of
 from toonset.nerf.look.flat_paint import flat_paint
-from toonset.nerf.look.mirrored import denied_places
 from toonset.nerf.look.outline import outline_of
 from toonset.nerf.look.paint_flow import Depths, pair_flows
 
@@ -62,7 +62,7 @@ def drawings_of(
     height = float(np.median([_tall(frame.rgba) / frame.camera.scale for frame in frames]))
     line = outline_of([own.rgba for own in drawn.frames if not own.mirrored])
     flat = flat_paint([frame.rgba for frame in frames], line, sights, height)
-    denied = denied_places(frames, depths, [differs for _, _, differs in rows], STEP * height)
+    denied = _denied_places(frames, depths, [differs for _, _, differs in rows], STEP * height)
     shown = [np.where(out, np.nan, depth) for out, depth in zip(denied, depths, strict=True)]
     views = tuple(
         Drawing(
@@ -79,6 +79,41 @@ def drawings_of(
     found = Drawings(views, (), line, line, palette, height, extent, bent, shape)
     found = replace(found, steps=flat.steps, shade=flat.shade, shadow=ready.shadow)
     return found.with_flows(pair_flows(found, depth_of))
+
+
+def _denied_places(
+    frames: Sequence[Frame],
+    depths: Sequence[Float[np.ndarray, "height width"]],
+    differences: Sequence[Bool[np.ndarray, "height width"] | None],
+    slack: float,
+) -> list[Bool[np.ndarray, "height width"]]:
+    """Return per drawing the pixels that it must not show; none but of mirrored drawings.
+
+    Args:
+        frames: drawings, some of them mirrored.
+        depths: of the surface that each shows, nan where there is none.
+        differences: per drawing of both halves where they differ, None of the others.
+        slack: world units that a place may lie behind the surface that a drawing shows.
+    """
+    judges = [
+        (frame, np.nan_to_num(depth, nan=-np.inf).astype(np.float32), differs.astype(np.uint8))
+        for frame, depth, differs in zip(frames, depths, differences, strict=True)
+        if differs is not None and differs.any()
+    ]
+    found = []
+    for frame, depth in zip(frames, depths, strict=True):
+        denied = np.zeros(depth.shape, dtype=bool)
+        for judge, surface, differs in judges if frame.mirrored else ():
+            points = frame.camera.unproject(frame.camera.pixel_grid(), np.nan_to_num(depth))
+            pixels, behind, front = judge.camera.project(points)
+            x, y = (
+                np.nan_to_num(pixels[..., k] - 0.5, nan=-1e4).astype(np.float32) for k in (0, 1)
+            )
+            there = cv2.remap(surface, x, y, cv2.INTER_NEAREST, borderValue=-np.inf)
+            unlike = cv2.remap(differs, x, y, cv2.INTER_NEAREST, borderValue=0) > 0
+            denied |= unlike & front & (behind <= there + slack) & np.isfinite(depth)
+        found.append(denied)
+    return found
 
 
 def _original(frame: Frame, own: Frame) -> Original | None:

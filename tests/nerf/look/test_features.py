@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 
 from toonset.nerf.look.choose import Look
-from toonset.nerf.look.features import features_of, stamped, stamps, torn
+from toonset.nerf.look.features import features_of
+from toonset.nerf.look.stamps import stamped, stamps, torn
 
 HEIGHT = 200  # of the figure, and of the pictures
 SKIN, BLACK = (0.9, 0.7, 0.5), (0.05, 0.05, 0.05)
