@@ -17,7 +17,7 @@ from toonset.palette.formats.registry import (
     parse_named_colors,
 )
 from toonset.palette.paints.extcolors import extcolors_palette
-from toonset.palette.paints.extract import find_palette, pick_palette
+from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
@@ -27,6 +27,12 @@ from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grai
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
+from toonset.palette.shaded import (
+    find_shaded_palette,
+    is_shaded,
+    pick_shaded_palette,
+    shaded_labels,
+)
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -178,11 +184,15 @@ def _chosen(
         raise UsageError("--keep belongs to --method toonset")
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
-    if picked is not None and not names_tones(colors or ""):
-        return pick_palette(pictures, picked, lines)
     if method == "extcolors":
         return add_places(extcolors_palette(pictures, options), pictures)
     smooth = remove_grain(pictures)
+    if is_shaded(smooth):
+        if picked is not None:
+            return pick_shaded_palette(smooth, picked, PICKED)
+        return add_places(find_shaded_palette(smooth, options), smooth)
+    if picked is not None and not names_tones(colors or ""):
+        return pick_palette(pictures, picked, lines)
     shadow = find_shadow(smooth, contours)
     if picked is not None and shadow is None:
         return pick_palette(pictures, picked, lines)
@@ -278,6 +288,8 @@ def maps_in_light(
     space: Space = "rgb",
 ) -> list[PaintMap]:
     """Return labels and tones of what `in_light` returns."""
+    if palette.has_ramps:
+        return [PaintMap(labels, None) for labels in shaded_labels(pictures, palette)]
     maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
     ink = palette.contour
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:

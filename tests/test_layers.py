@@ -23,6 +23,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@palette",
         "pixels",
         "@corrections @swatch_image formats paints",
+        "@shaded",
         "@extract",
         "@corrected @coverage @recolor",
     ),
