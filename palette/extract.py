@@ -187,7 +187,7 @@ def _chosen(
     if method == "extcolors":
         return add_places(extcolors_palette(pictures, options), pictures)
     smooth = remove_grain(pictures)
-    if is_shaded(smooth):
+    if is_shaded(pictures):
         if picked is not None:
             return pick_shaded_palette(smooth, picked, PICKED)
         return add_places(find_shaded_palette(smooth, options), smooth)

@@ -23,14 +23,15 @@ from toonset.palette.paints.ramps import Moments, join_patches, joined, moments_
 from toonset.palette.paints.select import KEEP_REACH, PaletteOptions
 from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
-from toonset.palette.pixels.labels import UNLABELLED
-from toonset.palette.pixels.patches import Lab, Numbers, Patches, find_patches, smooth_lab
-from toonset.palette.pixels.ramp_labels import Ramp, ramp_labels
+from toonset.palette.pixels.grain import noise_levels
+from toonset.palette.pixels.patches import Lab, Numbers, Patches, find_patches, shrunk, smooth_lab
+from toonset.palette.pixels.ramp_labels import Ramp, enlarged_labels, ramp_labels
 from toonset.raster import dilate, erode
 
-SHADED = 0.95 / 255  # lightness per pixel at `TALL_PX`, the median: less is flat paint
+SHADED = 1.05 / 255  # lightness per pixel at `TALL_PX`, the median: less is flat paint
 EDGE = 6.0 / 255  # lightness per pixel: steeper is an edge
 SLOPE_SIGMA, AWAY_PX = 1.5, 3  # pixels: in which slopes are read, and how far from edges
+OF_GRAIN = np.sqrt(np.log(4)) / (np.sqrt(8 * np.pi) * SLOPE_SIGMA**2)  # median slope of unit noise
 LEAST_INNER = 0.01  # of the pixels are away from edges, or nobody can tell how they are shaded
 QUANTILES = (0.95, 0.75, 0.5, 0.25, 0.05)  # of lightness: a ramp's tones
 AROUND = 0.05  # of a paint's pixels to either side of a quantile are read
@@ -80,15 +81,21 @@ class _Paint:
 
 
 def is_shaded(pictures: Sequence[Picture]) -> bool:
-    """Return whether paint changes its light everywhere, away from edges, too."""
+    """Return whether paint changes its light everywhere, away from edges, too.
+
+    The median slope is looked at, less what fine grain alone gives.
+    """
     slopes = []
-    for lab, opaque in map(smooth_lab, pictures):
-        light = cv2.GaussianBlur(lab[..., 0], (0, 0), SLOPE_SIGMA)
+    for picture in map(shrunk, pictures):
+        opaque = picture[..., 3] >= OPAQUE
+        light = even_oklab_from_rgb(picture[..., :3])[..., 0].astype(np.float32)
+        light = cv2.GaussianBlur(light, (0, 0), SLOPE_SIGMA)
         slope = np.hypot(*(cv2.Sobel(light, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1))))
         inner = ~dilate((slope > EDGE) | ~opaque, AWAY_PX)
         if inner.sum() > LEAST_INNER * opaque.sum():
-            slopes.append(float(np.median(slope[inner])))
-    return bool(slopes) and float(np.mean(slopes)) >= SHADED
+            grain = OF_GRAIN * noise_levels([picture]) / 255
+            slopes.append(float(np.median(slope[inner])) ** 2 - grain**2)
+    return bool(slopes) and float(np.mean(slopes)) >= SHADED**2
 
 
 def find_shaded_palette(pictures: Sequence[Picture], options: PaletteOptions) -> Palette:
@@ -157,14 +164,9 @@ def ramp_of(color: PaletteColor) -> Ramp:
 
 
 def _drawing(picture: Picture) -> _Drawing:
-    lab, opaque = smooth_lab(picture)
-    size = opaque.shape[::-1]
-    small = picture if size == picture.shape[1::-1] else _shrunk(picture, size)
+    small = shrunk(picture)
+    lab, opaque = smooth_lab(small)
     return _Drawing(lab, opaque, small[..., :3], find_patches(lab, opaque))
-
-
-def _shrunk(picture: Picture, size: tuple[int, ...]) -> Picture:
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
 
 
 def _ramps(paints: Moments) -> list[Ramp]:
@@ -324,15 +326,4 @@ def _doubts(palette: Palette) -> tuple[str, ...]:
 
 def _labels(picture: Picture, ramps: Sequence[Ramp]) -> Map:
     """Return a drawing's labels at its own size."""
-    drawing = _drawing(picture)
-    small, _ = drawing.labels(ramps)
-    opaque = picture[..., 3] >= OPAQUE
-    if small.shape == opaque.shape:
-        return small
-    filled = small.copy()
-    if not drawing.opaque.any():
-        return np.full(opaque.shape, UNLABELLED, dtype=np.uint8)
-    size = opaque.shape[::-1]
-    labels = np.asarray(cv2.resize(filled, size, interpolation=cv2.INTER_NEAREST))
-    labels[~opaque] = UNLABELLED
-    return labels
+    return enlarged_labels(_drawing(picture).labels(ramps)[0], picture, ramps)

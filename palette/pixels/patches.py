@@ -58,20 +58,24 @@ class Patches:
     spread: Float[np.ndarray, "patches 3 3"]
 
 
+def shrunk(picture: Picture) -> Picture:
+    """Return a drawing whose figure is no taller than `TALL_PX`."""
+    rows = np.flatnonzero((picture[..., 3] >= OPAQUE).any(axis=1))
+    tall = int(rows[-1] - rows[0] + 1) if len(rows) else 1
+    if tall <= TALL_PX:
+        return picture
+    width, height = (max(1, round(TALL_PX / tall * n)) for n in picture.shape[1::-1])
+    return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+
+
 def smooth_lab(picture: Picture) -> tuple[Lab, Bool[np.ndarray, "height width"]]:
     """Return a drawing's colours without grain in `even_oklab_from_rgb`, and where it is opaque.
 
-    Drawings are shrunk to `TALL_PX`. A figure's rim, which holds paper and line, has the colour
-    beside it, but for parts that are all rim; so has what is not opaque.
+    A figure's rim, which holds paper and line, has the colour beside it, but for parts that are all
+    rim; so has what is not opaque.
     """
-    rows = np.flatnonzero((picture[..., 3] >= OPAQUE).any(axis=1))
-    tall = int(rows[-1] - rows[0] + 1) if len(rows) else 1
-    small = picture
-    if tall > TALL_PX:
-        size = tuple(max(1, round(TALL_PX / tall * n)) for n in picture.shape[1::-1])
-        small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    opaque = small[..., 3] >= OPAQUE
-    rgb = np.ascontiguousarray(small[..., :3])
+    opaque = picture[..., 3] >= OPAQUE
+    rgb = np.ascontiguousarray(picture[..., :3])
     inside = erode(opaque)
     known = inside | (opaque & ~dilate(inside, RIM_PX))
     if known.any():

@@ -16,8 +16,11 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
+from toonset.palette.colors import even_oklab_from_rgb
+from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.patches import DARKEST, Lab, Numbers, Patches
+from toonset.raster import is_uniform
 
 HUE_SPREAD = 0.012  # in OKLab: of pixels off their ramp
 LIGHT_SPREAD = 0.12  # lightness, at least, of a paint's pixels
@@ -77,7 +80,43 @@ def ramp_labels(
     return labels, chance.max(axis=0)
 
 
-def _cost(lab: Lab, ramp: Ramp) -> Float32[np.ndarray, "height width"]:
+def enlarged_labels(
+    small: UInt8[np.ndarray, "small_height small_width"],
+    picture: UInt8[np.ndarray, "height width 4"],
+    ramps: Sequence[Ramp],
+) -> UInt8[np.ndarray, "height width"]:
+    """Return labels of a shrunk drawing at the drawing's own size, borders drawn by its pixels.
+
+    Along borders a pixel gets the ramp among those around that its own colour lies on.
+    """
+    opaque = picture[..., 3] >= OPAQUE
+    if small.shape == opaque.shape:
+        return small
+    size = opaque.shape[::-1]
+    labels = np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_NEAREST))
+    sure = cv2.resize(is_uniform(small).view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    row, column = np.nonzero(opaque & ((sure == 0) | (labels == UNLABELLED)))
+    if len(row):
+        lab = even_oklab_from_rgb(picture[row, column, :3])
+        costs = [
+            _cost(lab, ramp) - 2 * TOGETHER * _around(small == number, size)[row, column]
+            for number, ramp in enumerate(ramps)
+        ]
+        labels[row, column] = np.argmin(costs, axis=0)
+    labels[~opaque] = UNLABELLED
+    return labels
+
+
+def _around(
+    there: Bool[np.ndarray, "small_height small_width"], size: tuple[int, ...]
+) -> Float32[np.ndarray, "height width"]:
+    """Return how much of what is around has a label, enlarged."""
+    share = cv2.GaussianBlur(there.astype(np.float32), (0, 0), REACH_PX)
+    return np.asarray(cv2.resize(share, size, interpolation=cv2.INTER_LINEAR))
+
+
+def _cost(lab: Float[np.ndarray, "*n 3"], ramp: Ramp) -> Float32[np.ndarray, "*n"]:
+    """Return what colours cost as a paint."""
     spread = float(np.hypot(ramp.spread, LIGHT_SPREAD))
     rare = np.log(spread / LIGHT_SPREAD)
     return np.minimum(_squares(lab, ramp, spread) / 2 + rare, MOST).astype(np.float32)
