@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import heapq
 from dataclasses import dataclass
+from math import sqrt
 
 import cv2
 import numpy as np
@@ -142,9 +143,15 @@ def _measured(numbers: Numbers, lab: Lab) -> Patches:
     )
 
 
+Triple = tuple[float, float, float]
+Border = tuple[float, Triple]
+
+
 @dataclass(eq=False)
 class _Areas:
     """Areas while they merge; one that is merged into another is alive no longer.
+
+    Plain numbers: arrays of three take five times as long.
 
     Attributes:
         pixels: of each.
@@ -155,29 +162,31 @@ class _Areas:
     """
 
     pixels: list[float]
-    sums: list[Float[np.ndarray, " 3"]]
-    beside: list[dict[int, tuple[float, Float[np.ndarray, " 3"]]]]
+    sums: list[Triple]
+    beside: list[dict[int, Border]]
     age: list[int]
     parent: list[int]
 
     def strength(self, one: int, other: int) -> float:
         """Return how strong the border between two areas is."""
-        length, steps = self.beside[one][other]
-        noise = NOISE / length**0.5
-        first, second = self.sums[one] / self.pixels[one], self.sums[other] / self.pixels[other]
-        light = max(first[0], DARKEST), max(second[0], DARKEST)
-        hues = (first[1:] / light[0] - second[1:] / light[1]) * min(light)
-        step = float(np.sqrt(steps @ steps)) / length
-        apart = float(np.sqrt(hues @ hues))
+        length, (light, a, b) = self.beside[one][other]
+        first, second = self.pixels[one], self.pixels[other]
+        (l1, a1, b1), (l2, a2, b2) = self.sums[one], self.sums[other]
+        light1, light2 = max(l1 / first, DARKEST), max(l2 / second, DARKEST)
+        hue_a = a1 / (first * light1) - a2 / (second * light2)
+        hue_b = b1 / (first * light1) - b2 / (second * light2)
+        noise = NOISE / sqrt(length)
+        step = sqrt(light * light + a * a + b * b) / length
+        apart = min(light1, light2) * sqrt(hue_a * hue_a + hue_b * hue_b)
         strong = max(step - noise, 0.0) + APART * max(apart - noise, 0.0)
-        small = min(self.pixels[one], self.pixels[other])
+        small = min(first, second)
         return strong * small / (small + SPECK_PX) if small < SMALL_PX else strong
 
     def merge(self, kept: int, gone: int) -> None:
         """Merge an area into another one."""
         self.parent[gone] = kept
         self.age[kept] += 1
-        self.sums[kept] = self.sums[kept] + self.sums[gone]
+        self.sums[kept] = _sum(self.sums[kept], self.sums[gone])
         self.pixels[kept] += self.pixels[gone]
         del self.beside[kept][gone]
         for other, (length, steps) in self.beside[gone].items():
@@ -186,10 +195,18 @@ class _Areas:
             del self.beside[other][gone]
             if other in self.beside[kept]:
                 more, before = self.beside[kept][other]
-                length, steps = length + more, steps + before
+                length, steps = length + more, _sum(steps, before)
             self.beside[kept][other] = length, steps
-            self.beside[other][kept] = length, -steps
+            self.beside[other][kept] = length, _negative(steps)
         self.beside[gone] = {}
+
+
+def _sum(one: Triple, other: Triple) -> Triple:
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]
+
+
+def _negative(one: Triple) -> Triple:
+    return -one[0], -one[1], -one[2]
 
 
 def _merged(basins: Numbers, lab: Lab) -> Numbers:
@@ -238,11 +255,14 @@ def _areas(basins: Numbers, lab: Lab) -> _Areas:
     pairs, own = np.unique(first * count + second, return_inverse=True)
     lengths = np.bincount(own).astype(float)
     total = np.stack([np.bincount(own, channel) for channel in step.T], axis=1)
-    beside: list[dict[int, tuple[float, np.ndarray]]] = [{} for _ in range(count)]
-    for pair, length, steps in zip(pairs.tolist(), lengths.tolist(), total, strict=True):
+    beside: list[dict[int, Border]] = [{} for _ in range(count)]
+    for pair, length, (x, y, z) in zip(
+        pairs.tolist(), lengths.tolist(), total.tolist(), strict=True
+    ):
         one, other = divmod(pair, count)
-        beside[one][other], beside[other][one] = (length, steps), (length, -steps)
-    return _Areas(pixels.tolist(), list(sums), beside, [0] * count, list(range(count)))
+        beside[one][other], beside[other][one] = (length, (x, y, z)), (length, (-x, -y, -z))
+    colors = [(x, y, z) for x, y, z in sums.tolist()]
+    return _Areas(pixels.tolist(), colors, beside, [0] * count, list(range(count)))
 
 
 def _steps(
