@@ -50,6 +50,13 @@ def oklab_from_rgb(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     return np.cbrt(linear @ LMS_FROM_LINEAR.T) @ LAB_FROM_ROOTS.T
 
 
+def rgb_from_oklab(lab: Float[np.ndarray, "*n 3"]) -> UInt8[np.ndarray, "*n 3"]:
+    """Return 8-bit sRGB of OKLab colours, each channel clipped."""
+    roots = lab @ np.linalg.inv(LAB_FROM_ROOTS).T
+    linear = roots**3 @ np.linalg.inv(LMS_FROM_LINEAR).T
+    return np.rint(255 * srgb_from_linear(linear)).astype(np.uint8)
+
+
 def even_oklab_from_rgb(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     """Return OKLab of 8-bit sRGB colours with dark ones drawn together.
 
