@@ -41,6 +41,7 @@ Mask = Bool[np.ndarray, "height width"]
 
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 METHODS = ("toonset", "extcolors")
+NEVER_IN_LIGHT = 0.95  # of a paint's pixels lie in shadow
 IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
 
 
@@ -205,6 +206,11 @@ def _chosen(
         palette = pick_palette(lit, picked, lines)
     else:
         palette = _in_light(lit, options, lines, shadow)
+        invented = None if shadow is None else _never_in_light(lit, dark, palette)
+        if shadow is not None and invented is not None:
+            dark = [shade & ~off for shade, off in zip(dark, invented, strict=True)]
+            lit = lit_pictures(smooth, contours, dark, shadow)
+            palette = _in_light(lit, options, lines, shadow)
         if noise_levels(pictures) >= LEAST_LEVELS:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
             palette = read_drawn_colors(palette, pictures, lit, apart)
@@ -212,6 +218,26 @@ def _chosen(
         return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
     return with_tones(palette, shadow, lit, paint)
+
+
+def _never_in_light(
+    lit: Sequence[Picture], dark: Sequence[Mask], palette: Palette
+) -> list[Mask] | None:
+    """Return where paints lie that have no pixel in light; None without such a paint.
+
+    Their colours in light are no pixel's: what looks like their shadow is another paint's, or they
+    are drawn as they are.
+    """
+    labels = [nearest_labels(picture, palette.rgb) for picture in lit]
+    total, shade = (
+        sum(np.bincount(one[part], minlength=256) for one, part in zip(labels, parts, strict=True))
+        for parts in ([np.ones_like(one) for one in dark], dark)
+    )
+    gone = np.asarray(shade) > NEVER_IN_LIGHT * np.maximum(total, 1)
+    gone[UNLABELLED] = False
+    if not gone.any():
+        return None
+    return [gone[one] for one in labels]
 
 
 def _in_light(

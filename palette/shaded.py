@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
 from toonset.errors import PaletteError
-from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
 from toonset.palette.names import RGB, hex_of, name_of
 from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES
 from toonset.palette.paints.ramps import Moments, join_patches, joined, moments_of
@@ -88,7 +88,7 @@ def is_shaded(pictures: Sequence[Picture]) -> bool:
     slopes = []
     for picture in map(shrunk, pictures):
         opaque = picture[..., 3] >= OPAQUE
-        light = even_oklab_from_rgb(picture[..., :3])[..., 0].astype(np.float32)
+        light = shaded_oklab_from_rgb(picture[..., :3])[..., 0].astype(np.float32)
         light = cv2.GaussianBlur(light, (0, 0), SLOPE_SIGMA)
         slope = np.hypot(*(cv2.Sobel(light, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1))))
         inner = ~dilate((slope > EDGE) | ~opaque, AWAY_PX)
@@ -156,9 +156,9 @@ def shaded_labels(pictures: Sequence[Picture], palette: Palette) -> list[Map]:
 
 def ramp_of(color: PaletteColor) -> Ramp:
     """Return a palette colour's ramp; of one without tones the ray through black."""
-    stops = even_oklab_from_rgb(np.array([t.rgb for t in color.tones] or [color.rgb], np.uint8))
+    stops = shaded_oklab_from_rgb(np.array([t.rgb for t in color.tones] or [color.rgb], np.uint8))
     order = np.argsort(stops[:, 0], kind="stable")
-    light = float(even_oklab_from_rgb(np.array(color.rgb, np.uint8))[0])
+    light = float(shaded_oklab_from_rgb(np.array(color.rgb, np.uint8))[0])
     spread = float(stops[order[-1], 0] - stops[order[0], 0]) / (2 * OF_SPREAD)
     return Ramp(stops[order], light, spread)
 
@@ -186,7 +186,7 @@ def _asked_for(patches: Moments, ramps: Sequence[Ramp], wanted: Sequence[RGB]) -
     """Return ramps of patches near colours to keep that no ramp comes near."""
     found = []
     for rgb in wanted:
-        lab = even_oklab_from_rgb(np.array(rgb, np.uint8))
+        lab = shaded_oklab_from_rgb(np.array(rgb, np.uint8))
         if min(_away(ramp, lab) for ramp in ramps) <= JUST_NOTICEABLE:
             continue
         near = np.linalg.norm(patches.mean - lab, axis=1) <= KEEP_REACH
@@ -274,13 +274,13 @@ def _choose(found: Sequence[_Paint], options: PaletteOptions) -> tuple[list[_Pai
 
 
 def _is_feature(paint: _Paint, kept: Sequence[_Paint], drawings: int) -> bool:
-    lab = even_oklab_from_rgb(np.array(paint.color.rgb, np.uint8))
+    lab = shaded_oklab_from_rgb(np.array(paint.color.rgb, np.uint8))
     unlike = all(_away(ramp_of(one.color), lab) >= JUST_NOTICEABLE for one in kept)
     return unlike and paint.pixels >= LEAST_PX and paint.places >= min(PLACES, drawings)
 
 
 def _nearest(found: Sequence[_Paint], rgb: RGB) -> _Paint:
-    lab = even_oklab_from_rgb(np.array(rgb, np.uint8))
+    lab = shaded_oklab_from_rgb(np.array(rgb, np.uint8))
     away = [_away(ramp_of(one.color), lab) for one in found]
     best = found[int(np.argmin(away))]
     if min(away) > KEEP_REACH:
@@ -293,7 +293,7 @@ def _nearest(found: Sequence[_Paint], rgb: RGB) -> _Paint:
 
 def _dropped(paint: _Paint, kept: Sequence[_Paint]) -> DroppedColor:
     color = paint.color
-    lab = even_oklab_from_rgb(np.array(color.rgb, np.uint8))
+    lab = shaded_oklab_from_rgb(np.array(color.rgb, np.uint8))
     cost = min(_away(ramp_of(one.color), lab) for one in kept)
     return DroppedColor(color.rgb, color.share, color.name, cost)
 

@@ -24,9 +24,9 @@ from jaxtyping import Bool, Float, Int
 
 from toonset.palette.pixels.patches import DARKEST, Patches
 
-HUE_SPREAD = 0.013  # in OKLab: off its ramp a patch of a paint lies by so much
-LIGHT_SPREAD = 0.5  # lightness of a paint's patches
-SLOPE_SPREAD = 0.2  # of a ramp off the ray through black
+HUE_SPREAD = 0.014  # in OKLab: off its ramp a patch of a paint lies by so much
+LIGHT_SPREAD = 0.6  # lightness of a paint's patches
+SLOPE_SPREAD = 0.1  # of a ramp off the ray through black
 UNIT_PX = 16.0  # pixels that count as one: neighbours are copies of each other
 RIM = 0.1  # weight of a patch's pixels next to another patch
 LEAST, MOST = 0.01, 60.0  # weights of patches: a large one's pixels are copies of each other

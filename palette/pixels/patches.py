@@ -2,8 +2,8 @@
 
 Basins of the gradient (watershed) are merged, the softest border first, until every border left is
 an edge. A border's strength is the mean step of colour across it beyond the slope on its sides, a
-ramp's is none, and how far the two areas' hues lie apart. Hue is a and b over lightness: OKLab is a
-cube root of light, so a paint in light and shade lies on one ray through black.
+ramp's is none, and how far the two areas' hues lie apart. Hue is a and b over lightness: a paint in
+light and shade lies on one ray through black (`shaded_oklab_from_rgb`).
 
 Sources: F. Meyer, "Color image segmentation" (1992), watershed; R. Adams and L. Bischof, "Seeded
 region growing" (1994); P. Arbelaez and others, "Contour detection and hierarchical image
@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
-from toonset.palette.colors import even_oklab_from_rgb
+from toonset.palette.colors import shaded_oklab_from_rgb
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.raster import dilate, erode, is_uniform, nearest
 
@@ -49,7 +49,7 @@ class Patches:
     Attributes:
         pixels: of each.
         inner: those of them that have none but its own around.
-        mean: its colour in `even_oklab_from_rgb`.
+        mean: its colour in `shaded_oklab_from_rgb`.
         spread: covariance of its colours.
     """
 
@@ -70,7 +70,7 @@ def shrunk(picture: Picture) -> Picture:
 
 
 def smooth_lab(picture: Picture) -> tuple[Lab, Bool[np.ndarray, "height width"]]:
-    """Return a drawing's colours without grain in `even_oklab_from_rgb`, and where it is opaque.
+    """Return a drawing's colours without grain in `shaded_oklab_from_rgb`, and where it is opaque.
 
     A figure's rim, which holds paper and line, has the colour beside it, but for parts that are all
     rim; so has what is not opaque.
@@ -83,7 +83,7 @@ def smooth_lab(picture: Picture) -> tuple[Lab, Bool[np.ndarray, "height width"]]
         rgb = np.ascontiguousarray(rgb[nearest(known)])
     for _ in range(2):
         rgb = cv2.bilateralFilter(rgb, WINDOW_PX, GRAIN, NEAR_PX)
-    return even_oklab_from_rgb(rgb).astype(np.float32), opaque
+    return shaded_oklab_from_rgb(rgb).astype(np.float32), opaque
 
 
 def find_patches(lab: Lab, opaque: Bool[np.ndarray, "height width"]) -> tuple[Numbers, Patches]:

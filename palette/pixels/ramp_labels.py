@@ -16,13 +16,13 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
-from toonset.palette.colors import even_oklab_from_rgb
+from toonset.palette.colors import shaded_oklab_from_rgb
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.patches import DARKEST, Lab, Numbers, Patches
 from toonset.raster import is_uniform
 
-HUE_SPREAD = 0.012  # in OKLab: of pixels off their ramp
+HUE_SPREAD = 0.01  # in OKLab: of pixels off their ramp
 LIGHT_SPREAD = 0.12  # lightness, at least, of a paint's pixels
 WIDE, LOYAL = 0.5, np.float32(2.0)  # lightness of a paint's patches; what a pixel's patch weighs
 MOST = 12.0  # that a pixel costs: it may be what no paint is
@@ -31,7 +31,7 @@ TOGETHER, REACH_PX, STEPS = 3.0, 1.5, 4  # what neighbours weigh, how far, how o
 
 @dataclass(frozen=True, eq=False)
 class Ramp:
-    """A paint's colours from dark to light, in `even_oklab_from_rgb`.
+    """A paint's colours from dark to light, in `shaded_oklab_from_rgb`.
 
     Attributes:
         stops: at least one; lightness ascending.
@@ -97,7 +97,7 @@ def enlarged_labels(
     sure = cv2.resize(is_uniform(small).view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     row, column = np.nonzero(opaque & ((sure == 0) | (labels == UNLABELLED)))
     if len(row):
-        lab = even_oklab_from_rgb(picture[row, column, :3])
+        lab = shaded_oklab_from_rgb(picture[row, column, :3])
         costs = [
             _cost(lab, ramp) - 2 * TOGETHER * _around(small == number, size)[row, column]
             for number, ramp in enumerate(ramps)
