@@ -78,7 +78,7 @@ def extract_palette(
         max_colors: at most so many, the largest.
         keep: colours to keep however small they are: "#aabbcc,...".
         contour: count drawn lines to their colour; without, only what is painted with it.
-        features: keep eyes, mouths and buttons under that share, too; None: on shaded sheets.
+        features: keep eyes, mouths and buttons under that share, too; None: as True.
         colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file, whose title
             and names are kept. Where the file has tones in shadow, a sheet's shadow is taken off;
             else name both tones.
@@ -246,10 +246,9 @@ def _in_light(
     lines: Sequence[Mask],
     shadow: Shadow | None = None,
 ) -> Palette:
-    """Return the palette of pictures in light, with features if a shadow was taken off."""
-    features = shadow is not None if options.features is None else options.features
+    """Return the palette of pictures in light, with features."""
     palette = find_palette(pictures, options, lines)
-    found = find_features(palette, pictures, shadow) if features else ()
+    found = find_features(palette, pictures, shadow) if options.features is not False else ()
     found = found[: options.max_colors - len(palette.colors)]
     if found:
         wider = replace(options, keep=(*options.keep, *found))

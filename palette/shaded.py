@@ -24,7 +24,15 @@ from toonset.palette.paints.select import KEEP_REACH, PaletteOptions
 from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.grain import noise_levels
-from toonset.palette.pixels.patches import Lab, Numbers, Patches, find_patches, shrunk, smooth_lab
+from toonset.palette.pixels.patches import (
+    TALL_PX,
+    Lab,
+    Numbers,
+    Patches,
+    find_patches,
+    shrunk,
+    smooth_lab,
+)
 from toonset.palette.pixels.ramp_labels import Ramp, enlarged_labels, ramp_labels
 from toonset.raster import dilate, erode
 
@@ -88,13 +96,14 @@ def is_shaded(pictures: Sequence[Picture]) -> bool:
     slopes = []
     for picture in map(shrunk, pictures):
         opaque = picture[..., 3] >= OPAQUE
+        tall = int(opaque.any(axis=1).sum()) / TALL_PX
         light = shaded_oklab_from_rgb(picture[..., :3])[..., 0].astype(np.float32)
         light = cv2.GaussianBlur(light, (0, 0), SLOPE_SIGMA)
         slope = np.hypot(*(cv2.Sobel(light, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1))))
         inner = ~dilate((slope > EDGE) | ~opaque, AWAY_PX)
         if inner.sum() > LEAST_INNER * opaque.sum():
             grain = OF_GRAIN * noise_levels([picture]) / 255
-            slopes.append(float(np.median(slope[inner])) ** 2 - grain**2)
+            slopes.append(tall**2 * (float(np.median(slope[inner])) ** 2 - grain**2))
     return bool(slopes) and float(np.mean(slopes)) >= SHADED**2
 
 
@@ -119,16 +128,13 @@ def find_shaded_palette(pictures: Sequence[Picture], options: PaletteOptions) ->
     ramps += _asked_for(patches, ramps, options.keep)
     found = _paints(drawings, ramps[:MAX_COLORS])
     kept, left = _choose(found, options)
-    colors = _paints(drawings, [ramp_of(one.color) for one in kept])
-    colors = sorted(colors, key=lambda one: (-one.color.share, one.color.rgb))
-    large = [one for one in colors if one.color.share >= options.min_share]
-    wanted = {_nearest(colors, rgb).color.rgb for rgb in options.keep}
-    small = tuple(o.color.rgb for o in colors if o not in large and o.color.rgb not in wanted)
+    now = _paints(drawings, [ramp_of(one.color) for one in kept])
+    colors = [_with_share(*pair) for pair in zip(kept, now, strict=True)]
+    colors.sort(key=lambda color: (-color.share, color.rgb))
+    wanted = {_nearest(kept, rgb).color.rgb for rgb in options.keep}
+    small = tuple(c.rgb for c in colors if c.share < options.min_share and c.rgb not in wanted)
     palette = Palette(
-        tuple(one.color for one in colors),
-        _rule(options),
-        tuple(_dropped(one, kept) for one in left),
-        features=small,
+        tuple(colors), _rule(options), tuple(_dropped(one, kept) for one in left), features=small
     )
     return replace(palette, warnings=_doubts(palette))
 
@@ -180,6 +186,13 @@ def _ramps(paints: Moments) -> list[Ramp]:
         Ramp(np.stack([low, high]), float(middle[0]), float(wide))
         for low, high, middle, wide in zip(mean - reach, mean + reach, mean, spread, strict=True)
     ]
+
+
+def _with_share(paint: _Paint, now: _Paint) -> PaletteColor:
+    """Return a paint's colour and ramp with the share that it has beside those kept."""
+    color, share = paint.color, now.color.share
+    tones = tuple(replace(t, share=t.share * share / color.share) for t in color.tones)
+    return replace(color, share=share, tones=tones, sure=now.color.sure)
 
 
 def _asked_for(patches: Moments, ramps: Sequence[Ramp], wanted: Sequence[RGB]) -> list[Ramp]:
