@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float32, UInt8
 from toonset.errors import PaletteError
 from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
 from toonset.palette.names import RGB, hex_of, name_of
-from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES
+from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES, SMALL
 from toonset.palette.paints.ramps import Moments, join_patches, joined, moments_of
 from toonset.palette.paints.select import KEEP_REACH, PaletteOptions
 from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor, Tone
@@ -289,7 +289,8 @@ def _choose(found: Sequence[_Paint], options: PaletteOptions) -> tuple[list[_Pai
 def _is_feature(paint: _Paint, kept: Sequence[_Paint], drawings: int) -> bool:
     lab = shaded_oklab_from_rgb(np.array(paint.color.rgb, np.uint8))
     unlike = all(_away(ramp_of(one.color), lab) >= JUST_NOTICEABLE for one in kept)
-    return unlike and paint.pixels >= LEAST_PX and paint.places >= min(PLACES, drawings)
+    small = paint.color.share < SMALL
+    return small and unlike and paint.pixels >= LEAST_PX and paint.places >= min(PLACES, drawings)
 
 
 def _nearest(found: Sequence[_Paint], rgb: RGB) -> _Paint:
