@@ -101,7 +101,7 @@ def palette(
         bool | None,
         typer.Option(
             "--features/--no-features",
-            help="Keep eyes, mouths, buttons under that share (default: on shaded sheets).",
+            help="Keep eyes, mouths, buttons under that share (default: keep).",
             rich_help_panel=CHOICE_PANEL,
             show_default=False,
         ),

@@ -48,10 +48,11 @@ def synth(
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],
     condition: Annotated[
-        Literal["plain", "artist", "studio"],
+        Literal["plain", "artist", "studio", "painted"],
         typer.Option(
             help="artist: another body in every drawing, shadow, paper, captions, JPEG. "
             "studio: few drawings of one side, another body in each, height lines, title. "
+            "painted: soft light, hollows, brush strokes, thin tinted lines, JPEG. "
             "Other options override it."
         ),
     ] = "plain",
@@ -102,9 +103,9 @@ def synth(
     """Draw a turnaround sheet of a mesh, with errors of a hand as asked, and write its truth.
 
     Writes sheet.png, views/ with transforms.json, labels/, ink/, mannequin.obj and truth.json;
-    with --condition artist sheet.jpg instead, and shadows/. Both other conditions have 16 exact
-    views in test/ (studio: 8 of the drawn side, then 8 of the other), and MESH.landmarks.json, if
-    there is one, says where head and arms are.
+    with --condition artist or painted sheet.jpg instead, and artist shadows/. All conditions but
+    plain have 16 exact views in test/ (studio and painted: 8 of the drawn side, then 8 of the
+    other), and MESH.landmarks.json, if there is one, says where head and arms are.
     """
     chosen = CONDITIONS[condition]
     artist = replace(chosen.artist, body=chosen.artist.body.scaled(pose_difference))

@@ -27,6 +27,7 @@ LAB_FROM_ROOTS = np.array(
 )
 JUST_NOTICEABLE = 0.02  # Source: CSS Color 4 (W3C), 13.2: "JND" of its gamut mapping in OKLab
 TOE = (0.206, 0.03)
+BLACK = 4  # levels of sRGB
 
 
 def linear_from_srgb(srgb: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
@@ -50,6 +51,13 @@ def oklab_from_rgb(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     return np.cbrt(linear @ LMS_FROM_LINEAR.T) @ LAB_FROM_ROOTS.T
 
 
+def rgb_from_oklab(lab: Float[np.ndarray, "*n 3"]) -> UInt8[np.ndarray, "*n 3"]:
+    """Return 8-bit sRGB of OKLab colours, each channel clipped."""
+    roots = lab @ np.linalg.inv(LAB_FROM_ROOTS).T
+    linear = roots**3 @ np.linalg.inv(LMS_FROM_LINEAR).T
+    return np.rint(255 * srgb_from_linear(linear)).astype(np.uint8)
+
+
 def even_oklab_from_rgb(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     """Return OKLab of 8-bit sRGB colours with dark ones drawn together.
 
@@ -64,3 +72,17 @@ def even_oklab_from_rgb(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n
     toned = (bent + np.sqrt(bent**2 + 4 * TOE[1] * slope * lightness)) / 2
     even: np.ndarray = lab * np.where(lightness > 0, toned / np.maximum(lightness, 1e-9), 0)
     return even
+
+
+def shaded_oklab_from_rgb(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Return lightness, and a and b per lightness as the colour has them in full light, times it.
+
+    L is that of `even_oklab_from_rgb`. Shade that scales levels of sRGB, as painting programs
+    multiply, changes L alone: a / L and b / L are those of the colour scaled up until one channel
+    is full. `BLACK` is added before, for black has no hue.
+    """
+    levels = np.asarray(rgb, dtype=np.float64) + BLACK
+    full = levels / levels.max(axis=-1, keepdims=True)
+    lab = np.cbrt(linear_from_srgb(full) @ LMS_FROM_LINEAR.T) @ LAB_FROM_ROOTS.T
+    light = even_oklab_from_rgb(rgb)[..., :1]
+    return np.concatenate([light, lab[..., 1:] * light / lab[..., :1]], axis=-1)

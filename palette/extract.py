@@ -33,6 +33,12 @@ from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones,
 from toonset.palette.pixels.view_gain import gain_notes, view_gains, with_gains
 from toonset.palette.plain_sheets import plain_notes
 from toonset.palette.printed import Printed, in_printed_order, occurring, with_printed
+from toonset.palette.shaded import (
+    find_shaded_palette,
+    is_shaded,
+    pick_shaded_palette,
+    shaded_labels,
+)
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -41,6 +47,7 @@ Mask = Bool[np.ndarray, "height width"]
 
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 METHODS = ("toonset", "extcolors")
+NEVER_IN_LIGHT = 0.95  # of a paint's pixels lie in shadow
 IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
 
 
@@ -78,7 +85,7 @@ def extract_palette(
         max_colors: at most so many, the largest.
         keep: colours to keep however small they are: "#aabbcc,...".
         contour: count drawn lines to their colour; without, only what is painted with it.
-        features: keep eyes, mouths and buttons under that share, too; None: on shaded sheets.
+        features: keep eyes, mouths and buttons under that share, too; None: as True.
         colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file, whose title
             and names are kept. Where the file has tones in shadow, a sheet's shadow is taken off;
             else name both tones.
@@ -226,11 +233,15 @@ def _chosen(
         raise UsageError("--keep belongs to --method toonset")
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
-    if picked is not None and not names_tones(colors or ""):
-        return pick_palette(pictures, picked, lines)
     if method == "extcolors":
         return add_places(extcolors_palette(pictures, options), pictures)
     smooth = remove_grain(pictures)
+    if is_shaded(pictures):
+        if picked is not None:
+            return pick_shaded_palette(smooth, picked, PICKED)
+        return add_places(find_shaded_palette(smooth, options), smooth)
+    if picked is not None and not names_tones(colors or ""):
+        return pick_palette(pictures, picked, lines)
     shadow = find_shadow(smooth, contours)
     if picked is not None and shadow is None:
         return pick_palette(pictures, picked, lines)
@@ -243,6 +254,11 @@ def _chosen(
         palette = pick_palette(lit, picked, lines)
     else:
         palette = _of_sheet(lit, options, lines, shadow, printed)
+        invented = None if shadow is None else _never_in_light(lit, dark, palette)
+        if shadow is not None and invented is not None:
+            dark = [shade & ~off for shade, off in zip(dark, invented, strict=True)]
+            lit = lit_pictures(smooth, contours, dark, shadow)
+            palette = _of_sheet(lit, options, lines, shadow, printed)
         is_picked = palette.rule.startswith(PICKED)
         if noise_levels(pictures) >= LEAST_LEVELS and not is_picked:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
@@ -273,16 +289,35 @@ def _of_sheet(
     return in_printed_order(found, printed.colors)
 
 
+def _never_in_light(
+    lit: Sequence[Picture], dark: Sequence[Mask], palette: Palette
+) -> list[Mask] | None:
+    """Return where paints lie that have no pixel in light; None without such a paint.
+
+    Their colours in light are no pixel's: what looks like their shadow is another paint's, or they
+    are drawn as they are.
+    """
+    labels = [nearest_labels(picture, palette.rgb) for picture in lit]
+    total, shade = (
+        sum(np.bincount(one[part], minlength=256) for one, part in zip(labels, parts, strict=True))
+        for parts in ([np.ones_like(one) for one in dark], dark)
+    )
+    gone = np.asarray(shade) > NEVER_IN_LIGHT * np.maximum(total, 1)
+    gone[UNLABELLED] = False
+    if not gone.any():
+        return None
+    return [gone[one] for one in labels]
+
+
 def _in_light(
     pictures: Sequence[Picture],
     options: PaletteOptions,
     lines: Sequence[Mask],
     shadow: Shadow | None = None,
 ) -> Palette:
-    """Return the palette of pictures in light, with features if a shadow was taken off."""
-    features = shadow is not None if options.features is None else options.features
+    """Return the palette of pictures in light, with features."""
     palette = find_palette(pictures, options, lines)
-    found = find_features(palette, pictures, shadow) if features else ()
+    found = find_features(palette, pictures, shadow) if options.features is not False else ()
     found = found[: options.max_colors - len(palette.colors)]
     if found:
         wider = replace(options, keep=(*options.keep, *found))
@@ -348,6 +383,8 @@ def maps_in_light(
     space: Space = "rgb",
 ) -> list[PaintMap]:
     """Return labels and tones of what `in_light` returns."""
+    if palette.has_ramps:
+        return [PaintMap(labels, None) for labels in shaded_labels(pictures, palette)]
     maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
     ink = palette.contour
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:

@@ -64,13 +64,16 @@ class PaletteColor:
         rgb: 8-bit sRGB; of a shaded paint its colour in light.
         share: of the character's pixels over all pictures, 0 to 1; all tones together.
         name: a plain name for people.
-        tones: in light and in shadow, where the sheet has a shadow.
+        tones: in light and in shadow, where the sheet has a shadow; where it has none, but is
+            shaded throughout, the paint's ramp from light to dark.
+        sure: of a ramp, how likely its pixels are this paint, the mean; None: nobody asked.
     """
 
     rgb: Color
     share: Share
     name: Name
     tones: tuple[Tone, ...] = ()
+    sure: Share | None = None
 
 
 @dataclass(frozen=True)
@@ -191,6 +194,11 @@ class Palette:
         """
         if not 1 <= len(self.colors) <= MAX_COLORS:
             raise PaletteError(f"palette: {len(self.colors)} colours; 1 to {MAX_COLORS} are needed")
+
+    @property
+    def has_ramps(self) -> bool:
+        """Return whether the sheet is shaded throughout: its paints' tones are ramps."""
+        return self.shadow is None and any(color.tones for color in self.colors)
 
     @property
     def rgb(self) -> UInt8[np.ndarray, "colors 3"]:

@@ -13,6 +13,7 @@ from toonset.palette.extract import IN_SHADOW, PaintMap
 from toonset.palette.formats.hex import is_color, rgb_of_typed
 from toonset.palette.names import RGB, hex_of
 from toonset.palette.palette import Palette
+from toonset.palette.pixels.ramp_recolor import recolor_shaded
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -70,7 +71,8 @@ def recolor_drawing(
 ) -> Picture:
     """Return a drawing in other colours: see `toonset.palette.pixels.recolor`.
 
-    Left-out colours that are no shades of a paint stay as they are, and so do drawn lines.
+    Left-out colours that are no shades of a paint stay as they are, and so do drawn lines. Where
+    paints are ramps, every pixel is some paint's: see `toonset.palette.pixels.ramp_recolor`.
 
     Args:
         picture: the drawing.
@@ -79,6 +81,8 @@ def recolor_drawing(
         palette: of the sheet.
         colors: as many as it has, in its order.
     """
+    if palette.has_ramps:
+        return recolor_shaded(picture, paint.labels, palette.rgb, colors)
     dark = None if paint.tones is None else paint.tones == IN_SHADOW
     tones = tone_map(paint.labels, dark, contour, len(colors))
     old, new = (tones_of(one, palette.shadow) for one in (palette.rgb, colors))

@@ -24,7 +24,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@palette",
         "pixels",
         "@corrections @named @plain_sheets formats paints",
-        "@printed",
+        "@printed @shaded",
         "@swatch_image",
         "@extract",
         "@corrected @coverage @recolor",

@@ -8,6 +8,7 @@ HUNDRED = 100.0
 MOST_NAMED = 6  # left-out colours; more are counted
 PIXELS = 4096  # for which the evidence counts bits
 LEAST_BITS = 1.0  # less decides nothing
+LEAST_SURE = 0.9  # less sure labels are told
 LEAST_SHARE = 0.0005  # what rounds to 0.1 %
 
 
@@ -32,8 +33,22 @@ def palette_lines(found: Palette, *, verbose: bool) -> list[str]:
 def _color_line(color: PaletteColor, found: Palette) -> str:
     """Return a colour's line, with how much of it lies in shadow, and whether it is a feature."""
     notes = [f"{HUNDRED * dark.share:.1f} % in shadow" for dark in color.tones[1:]]
+    if found.has_ramps:
+        notes = _ramp_notes(color)
     notes += ["feature"] if color.rgb in found.features else []
     return _line(color.rgb, color.share, color.name) + (f" ({', '.join(notes)})" if notes else "")
+
+
+def _ramp_notes(color: PaletteColor) -> list[str]:
+    """Return a ramp's ends, and how sure its labels are if they are not."""
+    from toonset.palette.names import hex_of
+
+    notes = []
+    if color.tones:
+        notes.append(f"from {hex_of(color.tones[0].rgb)} to {hex_of(color.tones[-1].rgb)}")
+    if color.sure is not None and color.sure < LEAST_SURE:
+        notes.append(f"{HUNDRED * color.sure:.0f} % sure")
+    return notes
 
 
 def _left_out(found: Palette) -> list[str]:

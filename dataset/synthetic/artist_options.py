@@ -62,6 +62,32 @@ class BodyErrors:
 
 
 @dataclass(frozen=True)
+class Brushwork:
+    """Sizes of a painter's shading; see `soft_shade`.
+
+    Attributes:
+        soft_light: how much of its light paint loses on the side away from the light.
+        hollows: how much more it loses in hollows.
+        strokes: standard deviation of the brush's unevenness, of the light.
+        line_tint: share of the paint's own colour in the lines, which are black without.
+    """
+
+    soft_light: float = 0.0
+    hollows: float = 0.0
+    strokes: float = 0.0
+    line_tint: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse shares without a meaning.
+
+        Raises:
+            SheetError: a number is out of its range.
+        """
+        limits = {"soft_light": (0, 0.9), "hollows": (0, 0.9), "strokes": (0, 0.3)}
+        check_ranges(self, {**limits, "line_tint": (0, 0.9)})
+
+
+@dataclass(frozen=True)
 class ArtistOptions:
     """Sizes of what artists do besides; `SynthOptions` has the rest of a drawing.
 
@@ -79,6 +105,7 @@ class ArtistOptions:
             the head; 0 = none.
         title: the character's name, above the figures.
         jpeg_quality: of the sheet's file; 0 = PNG.
+        brush: a painter's shading.
     """
 
     body: BodyErrors = BodyErrors()
@@ -91,6 +118,7 @@ class ArtistOptions:
     height_lines: int = 0
     title: bool = False
     jpeg_quality: int = 0
+    brush: Brushwork = Brushwork()
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn.

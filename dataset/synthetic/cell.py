@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
+from toonset.dataset.synthetic.artist_options import Brushwork
 from toonset.dataset.synthetic.drawing import Drawing, draw, find_lines
 from toonset.dataset.synthetic.gl_render import render_labels
 from toonset.dataset.synthetic.hand_error import bend, pen_width
 from toonset.dataset.synthetic.options import SynthOptions
-from toonset.dataset.synthetic.shadow import color_factor, shadow_factor, shadow_mask, times
+from toonset.dataset.synthetic.shadow import (
+    Shade,
+    color_factor,
+    shadow_factor,
+    shadow_mask,
+    soft_shade,
+    times,
+)
 from toonset.mesh import Mesh
 from toonset.palette.pixels.labels import UNLABELLED
 
@@ -25,7 +34,8 @@ class Hand:
 
     Attributes:
         bend_seed: of the bend.
-        body, tilt, pen, paint: of the body, the elevation, the lines' widths, the colours.
+        body, tilt, pen, paint, brush: of the body, the elevation, the lines' widths, the colours,
+            the strokes.
     """
 
     bend_seed: int
@@ -33,6 +43,7 @@ class Hand:
     tilt: np.random.Generator
     pen: np.random.Generator
     paint: np.random.Generator
+    brush: np.random.Generator
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,17 +85,38 @@ def draw_cell(
     if strength:
         dark = shadow_mask(mesh, large) & (seen.labels != UNLABELLED)
         toned = np.where(dark, seen.labels + np.uint8(len(palette)), seen.labels)
-    bent, lines = bend(
+    shade = _shade(mesh, camera, options, hand.brush)
+    bent, lines, shade = bend(
         toned,
         lines,
+        shade,
         rms_px=options.warp_percent / 100 * options.cell_px * options.supersample,
         generator=np.random.default_rng(hand.bend_seed),
     )
     factor = color_factor(options.artist.color_error_fraction, hand.paint)
     colors = [times(palette, factor), times(palette, factor * shadow_factor(strength))]
     width = pen_width(options.outline_px, options.artist.line_width_spread, bent.shape, hand.pen)
-    drawing = draw(bent, lines, np.concatenate(colors), width, options.supersample)
+    drawing = draw(
+        bent,
+        lines,
+        np.concatenate(colors),
+        width,
+        options.supersample,
+        shade,
+        options.artist.brush.line_tint,
+    )
     labelled = drawing.labels != UNLABELLED
     shadow = labelled & (drawing.labels >= len(palette))
     labels = np.where(shadow, drawing.labels - np.uint8(len(palette)), drawing.labels)
     return Cell(replace(drawing, labels=labels), shadow, factor, float(np.mean(width)))
+
+
+def _shade(
+    mesh: Mesh, camera: Camera, options: SynthOptions, generator: np.random.Generator
+) -> Shade | None:
+    """Return the painter's shade of a large cell; None where nobody shades."""
+    if options.artist.brush == Brushwork():
+        return None
+    shade = soft_shade(mesh, camera, options.artist.brush, generator)
+    side = options.cell_px * options.supersample
+    return np.asarray(cv2.resize(shade, (side, side), interpolation=cv2.INTER_LINEAR))

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.synthetic.gl_render import LabelPicture
+from toonset.dataset.synthetic.shadow import Shade, shaded
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.raster import distance_to
 
@@ -39,7 +40,8 @@ class Drawing:
     Attributes:
         rgba: (height, width, 4) sRGB, straight alpha.
         labels: (height, width) palette index; 255 on background, ink and mixed pixels. A pixel
-            whose bytes are its colour's is not mixed, however thinly a line or edge grazes it.
+            whose bytes are its colour's is not mixed, however thinly a line or edge grazes it. In
+            shaded paint one that a line grazes is.
         ink: (height, width) coverage of the lines, 0 to 255.
     """
 
@@ -70,6 +72,8 @@ def draw(
     palette: UInt8[np.ndarray, "colors 3"],
     outline_px: float | Float[np.ndarray, "height width"],
     supersample: int,
+    shade: Shade | None = None,
+    line_tint: float = 0.0,
 ) -> Drawing:
     """Return the finished cell, smaller than its input by `supersample`.
 
@@ -80,6 +84,8 @@ def draw(
         outline_px: width of the silhouette line in pixels of the result, in all the large picture
             or at each of its pixels; 0 = no lines.
         supersample: samples per pixel and axis.
+        shade: large picture, how light its paint is; None: as light as the palette's.
+        line_tint: share of the paint's colour in a line over it, 0 = black lines.
     """
     figure = (labels != UNLABELLED).astype(np.float32)
     ink = np.zeros_like(figure)
@@ -88,14 +94,20 @@ def draw(
         for distance, reach in ((lines.silhouette, half), (lines.inner, INNER_LINE * half)):
             ink = np.maximum(ink, np.clip(np.float32(reach + 0.5) - distance, 0, 1))
     flat = _colors(palette)[labels]
+    if shade is not None:
+        flat = shaded(flat.astype(np.float32), shade)
     alpha = _shrink(np.maximum(figure, ink), supersample)
-    colors = _shrink(flat * (figure * (1 - ink))[..., None], supersample)
+    colors = _shrink(flat * (figure * (1 - (1 - line_tint) * ink))[..., None], supersample)
     straight = colors / np.where(alpha > 0, alpha, 1)[..., None]
     rgba = _bytes(np.concatenate([straight, 255 * alpha[..., None]], axis=-1))
     coverage = _bytes(255 * _shrink(ink, supersample))
     sampled = labels[::supersample, ::supersample]
-    same = (rgba[..., :3] == _colors(palette)[sampled]).all(axis=-1) & (rgba[..., 3] == 255)
-    pure = _unmixed(labels, supersample) & same & (coverage < 128)
+    whole = rgba[..., 3] == 255
+    if shade is None:
+        whole &= (rgba[..., :3] == _colors(palette)[sampled]).all(axis=-1) & (coverage < 128)
+    else:
+        whole &= coverage == 0
+    pure = _unmixed(labels, supersample) & whole
     return Drawing(rgba, np.where(pure, sampled, UNLABELLED), coverage)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Shaped, UInt8
 
 from toonset.dataset.synthetic.drawing import Lines
+from toonset.dataset.synthetic.shadow import Shade
 from toonset.palette.pixels.labels import UNLABELLED
 
 HALF_WAVES = 3
@@ -24,18 +25,21 @@ SWELLS = 9  # per side of the cell: how often a line may grow wider and thinner
 def bend(
     labels: UInt8[np.ndarray, "height width"],
     lines: Lines,
+    shade: Shade | None,
     rms_px: float,
     generator: np.random.Generator,
-) -> tuple[UInt8[np.ndarray, "height width"], Lines]:
-    """Return labels and lines of a drawing bent by a random field of `rms_px` over its figure."""
+) -> tuple[UInt8[np.ndarray, "height width"], Lines, Shade | None]:
+    """Return labels, lines and shade of a drawing bent by a random field of `rms_px` (figure)."""
     if rms_px == 0:
-        return labels, lines
+        return labels, lines, shade
     field = displacement_field(generator, labels != UNLABELLED, rms_px)
     far = float(max(labels.shape))
-    return displace(labels, field, UNLABELLED, smooth=False), Lines(
+    bent = Lines(
         displace(lines.silhouette, field, far, smooth=True),
         displace(lines.inner, field, far, smooth=True),
     )
+    moved = None if shade is None else displace(shade, field, 1.0, smooth=True)
+    return displace(labels, field, UNLABELLED, smooth=False), bent, moved
 
 
 def displacement_field(

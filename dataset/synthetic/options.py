@@ -5,7 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from toonset.dataset.synthetic.artist_options import ArtistOptions, BodyErrors, check_ranges
+from toonset.dataset.synthetic.artist_options import (
+    ArtistOptions,
+    BodyErrors,
+    Brushwork,
+    check_ranges,
+)
 from toonset.dataset.synthetic.directions import MOST_OF_HALF, Turn
 from toonset.errors import SheetError
 
@@ -102,7 +107,9 @@ class SynthOptions:
             warp_percent=0.0,
             scale_error_percent=0.0,
             background="white",
-            artist=ArtistOptions(shadow_strength=self.artist.shadow_strength),
+            artist=ArtistOptions(
+                shadow_strength=self.artist.shadow_strength, brush=self.artist.brush
+            ),
         )
 
     @property
@@ -136,6 +143,13 @@ STUDIO = ArtistOptions(
     height_lines=6,
     title=True,
 )
+PAINTER = ArtistOptions(
+    body=BodyErrors(head_turn_deg=3.0, arm_swing_deg=4.0, field_height_fraction=0.006),
+    line_width_spread=0.3,
+    grain_levels=1.0,
+    jpeg_quality=90,
+    brush=Brushwork(soft_light=0.6, hollows=0.5, strokes=0.05, line_tint=0.35),
+)
 CONDITIONS: dict[str, SynthOptions] = {
     "plain": SynthOptions(),
     "artist": SynthOptions(
@@ -155,5 +169,16 @@ CONDITIONS: dict[str, SynthOptions] = {
         label_lines=False,
         warp_percent=0.5,  # of the cell: 0.6 % of a figure's height
         artist=STUDIO,
+    ),
+    "painted": SynthOptions(
+        views=4,
+        turn="half",
+        yaw_jitter_deg=4.0,
+        distance_heights=14.0,  # nearly orthographic
+        outline_px=1.5,  # half as wide as a cartoon's
+        label_lines=False,
+        warp_percent=0.4,
+        background="#f7f6f3",
+        artist=PAINTER,
     ),
 }

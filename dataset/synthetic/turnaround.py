@@ -149,7 +149,7 @@ def _errors(
     factors = 1 + options.scale_error_percent / 100 * sizes.uniform(-1, 1, options.views)
     seeds = bends.integers(2**63, size=options.views)
     paper, *own = artist.spawn(options.views + 1)
-    hands = [Hand(int(s), *hand.spawn(4)) for s, hand in zip(seeds, own, strict=True)]
+    hands = [Hand(int(s), *hand.spawn(5)) for s, hand in zip(seeds, own, strict=True)]
     return yaws, factors, hands, paper
 
 

@@ -128,10 +128,12 @@ def _numbered(
 
     found, numbers = [], np.zeros(int(parts.max()) + 1, np.int16)
     for one, box in enumerate(find_objects(parts), start=1):
-        own = None if box is None else matte[box] * (parts[box] == one)
-        if own is None or own.sum() < 1:
+        if box is None:
             continue
+        own = matte[box] * (parts[box] == one)
         area = float(own.sum())
+        if area < 1:
+            continue
         y, x = np.mgrid[box]
         middle = np.array([(own * x).sum(), (own * y).sum()]) / area
         rgb = (paint[box] * own[..., None]).sum(axis=(0, 1)) / area

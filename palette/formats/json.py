@@ -51,7 +51,11 @@ def to_json(palette: Palette) -> dict[str, Any]:
     content: dict[str, Any] = PALETTE.dump_python(palette, mode="json", by_alias=True)
     if not content["printed"]:
         del content["printed"]
-    content["colors"] = [one | {"name": one_line(one["name"])} for one in content["colors"]]
+    content["colors"] = [
+        {key: value for key, value in one.items() if key != "sure" or value is not None}
+        | {"name": one_line(one["name"])}
+        for one in content["colors"]
+    ]
     return {"schema": f"{NAME}/{VERSION}", **content}
 
 
@@ -83,13 +87,13 @@ def palette_of(content: Any, where: str) -> Palette:
 
 
 def _swatches(entry: Any, where: str) -> list[NamedColor]:
-    """Return an entry's colour, and after it its tones in shadow."""
+    """Return an entry's colour, and after it its tone in shadow, of a ramp the darkest."""
     if not isinstance(entry, dict):
         return [NamedColor(rgb_of_hex(entry, where))]
     name, tones = entry.get("name"), entry.get("tones")
     name = clean_name(name) if isinstance(name, str) else ""
     found = [NamedColor(rgb_of_hex(entry.get("hex"), where), name)]
-    for tone in tones[1:] if isinstance(tones, list) and name else ():
+    for tone in tones[1:][-1:] if isinstance(tones, list) and name else ():
         rgb = rgb_of_hex(tone.get("hex") if isinstance(tone, dict) else tone, where)
         found.append(NamedColor(rgb, name + SUFFIX))
     return found

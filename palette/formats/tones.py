@@ -20,13 +20,14 @@ SUFFIX = ", shadow"
 def swatches_of(palette: Palette) -> list[NamedColor]:
     """Return the colours with their names, each followed by its tone in shadow if it has another.
 
-    Black is black in shadow, too.
+    Black is black in shadow, too. Of a ramp the darkest tone stands for shadow.
     """
     found = []
     for color in palette.colors:
         name = clean_name(color.name)
         found.append(NamedColor(color.rgb, name))
-        dark = [tone.rgb for tone in color.tones[1:] if name and tone.rgb != color.rgb]
+        darkest = color.tones[1:][-1:]
+        dark = [tone.rgb for tone in darkest if name and tone.rgb != color.rgb]
         found += [NamedColor(rgb, name + SUFFIX) for rgb in dark]
     return found
 

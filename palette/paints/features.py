@@ -22,6 +22,7 @@ from toonset.palette.pixels.shadow import apply_shadow
 
 RGB = tuple[int, int, int]
 
+SMALL = 0.05  # of the character: more is no feature, whatever share is asked for
 PLACES = 2  # drawings that show it, or patches in a single one
 THICK = 3  # pixels: a patch of a blend is thinner
 LEAST_PX = 48  # of all patches at that height: two eyes of 5 x 5
@@ -39,7 +40,8 @@ def find_features(
         pictures: the character on transparent ground, in light.
         shadow: that was taken off: what looks like a colour of the palette in it was left there.
     """
-    unlike = [color.rgb for color in palette.dropped if color.cost >= UNLIKE]
+    small = [color for color in palette.dropped if color.share < SMALL]
+    unlike = [color.rgb for color in small if color.cost >= UNLIKE]
     if shadow is not None:
         shades = oklab_from_rgb(apply_shadow(palette.rgb, shadow.factor))
         unlike = [rgb for rgb in unlike if _away(rgb, shades) > LEFT]

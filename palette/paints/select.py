@@ -33,8 +33,7 @@ class PaletteOptions:
         keep: 8-bit sRGB: the found colours nearest to these stay, however small they are.
         contour: count the drawn lines to their colour, as the paper does; False leaves that colour
             to what else is painted with it. Matters only where the lines are given.
-        features: keep small colours that recur at one place of the character; None: on sheets
-            that are shaded.
+        features: keep small colours that recur at one place of the character; None: as True.
     """
 
     min_share: float = 0.05

@@ -123,13 +123,13 @@ def test_small_eyes_are_features_of_a_shaded_sheet() -> None:
     assert few.features == ()
 
 
-def test_features_of_flat_sheets_are_kept_if_wanted() -> None:
+def test_features_of_flat_sheets_are_kept_too() -> None:
     drawn = pictures(drawings(shadow=False, noisy=False))
-    plain = to_json(extract_palette(drawn))
+    plain = to_json(extract_palette(drawn, features=False))
     assert {color["hex"] for color in plain["colors"]} == {hex_of(rgb) for rgb in PAINTS}
     assert (plain["shadow"], plain["features"]) == (None, [])
     assert all(color["tones"] == [] for color in plain["colors"])
-    palette = extract_palette(drawn, features=True)
+    palette = extract_palette(drawn)
     assert palette.features == (EYE,)
     assert {color.rgb for color in palette.colors} == {*PAINTS, EYE}
 
@@ -157,7 +157,7 @@ def _with_spots(spotted: list[np.ndarray], heights: list[int], side: int = 9) ->
     """Draw a white spot into every picture and return their palette."""
     for picture, row in zip(spotted, heights, strict=True):
         picture[row : row + side, 62 : 62 + side] = (*EYE, 255)
-    return extract_palette(spotted)
+    return extract_palette(spotted, features=False)
 
 
 def test_tones_say_which_paint_lies_in_shadow() -> None:

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.cases.bodies import random_body
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import decode_rgba, encode_jpeg, load_rgba
 from toonset.dataset.mannequin.make import Mannequin, default_mannequin
 from toonset.dataset.mesh.load import save_obj
 from toonset.dataset.split.sheet import split_picture
-from toonset.dataset.synthetic.artist_options import ArtistOptions, BodyErrors
+from toonset.dataset.synthetic.artist_options import ArtistOptions, BodyErrors, Brushwork
 from toonset.dataset.synthetic.body_error import deform
 from toonset.dataset.synthetic.body_parts import find_body_parts
 from toonset.dataset.synthetic.files import write_turnaround
@@ -244,3 +245,20 @@ def test_command_takes_a_condition_and_what_is_typed(mannequin, tmp_path, monkey
     assert toonset(*asked, "-o", "marked").code == 0
     assert Path("out/sheet.jpg").read_bytes() != Path("marked/sheet.jpg").read_bytes()
     assert toonset("synth", "m.obj", "-o", "x", "--condition", "artsy").code == 2
+
+
+def test_painted_sheets_are_shaded_softly_and_say_which_paint_is_where() -> None:
+    options = replace(CONDITIONS["painted"], views=2, cell_px=120, supersample=2)
+    made = make_turnaround(random_body(2), options, 0)
+    flat = replace(options, artist=replace(options.artist, brush=Brushwork()))
+    for view, labels, plain in zip(
+        made.views, made.labels, make_turnaround(random_body(2), flat, 0).labels, strict=True
+    ):
+        there = labels < 255
+        assert (labels[there & (plain < 255)] == plain[there & (plain < 255)]).all()
+        number = np.bincount(labels[there]).argmax()
+        seen = view.rgba[labels == number][:, :3].astype(float)
+        assert seen.std(axis=0).max() > 5
+        assert (seen.mean(axis=0) < made.palette[number]).all()
+    with pytest.raises(SheetError, match="soft_light"):
+        Brushwork(soft_light=1.5)

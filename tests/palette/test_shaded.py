@@ -1,0 +1,157 @@
+"""Paints of drawings that are shaded throughout: laws, ramps, labels, recolouring."""
+
+import numpy as np
+import pytest
+
+from toonset.errors import PaletteError
+from toonset.palette.colors import oklab_from_rgb, rgb_from_oklab, shaded_oklab_from_rgb
+from toonset.palette.extract import choose_palette, extract_palette, paint_maps
+from toonset.palette.formats.json import palette_of, to_json
+from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.palette import Palette
+from toonset.palette.pixels.patches import find_patches, smooth_lab
+from toonset.palette.recolor import recolor_drawing
+from toonset.palette.shaded import is_shaded
+
+SKIN, HAIR, COAT, BELT = (230, 180, 145), (110, 64, 42), (50, 96, 160), (190, 40, 44)
+PAINTS = (SKIN, HAIR, COAT, BELT)
+SIZE = 200, 90
+
+
+def _drawing(seed: int, size: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Return a shaded drawing and the number of every pixel's paint, 255 = none."""
+    rng = np.random.default_rng(seed)
+    height, width = SIZE[0] * size, SIZE[1] * size
+    rows, columns = np.mgrid[:height, :width] / size
+    paint = np.full((height, width), 255)
+    body = np.abs(columns - 45) < 34
+    paint[body & (rows > 70)] = 2
+    paint[body & (rows > 120) & (rows < 134)] = 3
+    paint[(columns - 45) ** 2 + (rows - 42) ** 2 < 32**2] = 0
+    paint[((columns - 45) ** 2 + (rows - 42) ** 2 < 32**2) & (rows < 32)] = 1
+    light = 0.55 + 0.45 * np.sin(np.clip(columns / 60, 0, 1.5))
+    light = light * (1 + 0.12 * np.sin(rows / 4 + seed) * np.sin(columns / 5))
+    shade = np.stack([light**1.1, light, light**0.9], axis=-1)
+    table = np.array([*PAINTS, (0, 0, 0)], dtype=float)
+    rgb = table[np.where(paint == 255, 4, paint)] * shade + rng.normal(0, 0.7, (height, width, 1))
+    alpha = np.where(paint == 255, 0, 255)
+    rgba = np.dstack([np.rint(rgb).clip(0, 255), alpha]).astype(np.uint8)
+    return rgba, paint
+
+
+def _found(size: int = 1) -> tuple[list[np.ndarray], list[np.ndarray], Palette]:
+    drawn = [_drawing(seed, size) for seed in range(3)]
+    pictures = [rgba for rgba, _ in drawn]
+    return pictures, [paint for _, paint in drawn], extract_palette(pictures)
+
+
+def test_shade_that_scales_levels_changes_lightness_alone() -> None:
+    rng = np.random.default_rng(1)
+    full = rng.integers(60, 256, (200, 3)).astype(np.uint8)
+    half = np.rint((full + 4.0) * 0.5 - 4).astype(np.uint8)
+    one, other = shaded_oklab_from_rgb(full), shaded_oklab_from_rgb(half)
+    hue = one[:, 1:] / one[:, :1] - other[:, 1:] / other[:, :1]
+    assert np.abs(hue).max() < 0.01
+    assert (other[:, 0] < one[:, 0]).all()
+
+
+def test_oklab_and_back_is_the_same_colour() -> None:
+    rgb = np.random.default_rng(2).integers(0, 256, (500, 3)).astype(np.uint8)
+    assert np.array_equal(rgb_from_oklab(oklab_from_rgb(rgb)), rgb)
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_every_paint_is_found_and_labelled(size: int) -> None:
+    pictures, truth, palette = _found(size)
+    assert is_shaded(pictures)
+    assert palette.has_ramps
+    assert palette.shadow is None
+    maps = paint_maps(pictures, [np.zeros(one.shape, np.uint8) for one in truth], palette)
+    table = np.zeros((256, 256), dtype=int)
+    for own, found in zip(truth, maps, strict=True):
+        assert found.tones is None
+        assert np.array_equal(found.labels == 255, own == 255)
+        np.add.at(table, (own[own < 255], found.labels[own < 255]), 1)
+    best = table[:4].argmax(axis=1)
+    assert len(set(best.tolist())) == 4
+    assert table[range(4), best].sum() / table[:4].sum() > 0.97
+
+
+def test_ramps_go_from_light_to_dark_and_are_colours_that_are_there() -> None:
+    pictures, _, palette = _found()
+    seen = np.concatenate([one[one[..., 3] > 0][:, :3] for one in pictures]).astype(int)
+    for color in palette.colors:
+        light = [float(oklab_from_rgb(np.array(t.rgb, np.uint8))[0]) for t in color.tones]
+        assert light == sorted(light, reverse=True)
+        assert sum(tone.share for tone in color.tones) == pytest.approx(color.share)
+        assert 0 < (color.sure or 0) <= 1
+        for tone in color.tones:
+            assert np.abs(seen - tone.rgb).max(axis=1).min() <= 3
+    again = palette_of(to_json(palette), "palette.json")
+    assert again.has_ramps
+
+
+def test_flat_paint_is_not_shaded_nor_is_grain() -> None:
+    rng = np.random.default_rng(3)
+    _, paint = _drawing(0)
+    table = np.array([*PAINTS, (0, 0, 0)], dtype=float)
+    rgb = table[np.where(paint == 255, 4, paint)]
+    for levels in (0, 4, 12):
+        noisy = np.rint(rgb + rng.normal(0, levels, rgb.shape[:2])[..., None]).clip(0, 255)
+        rgba = np.dstack([noisy, np.where(paint == 255, 0, 255)]).astype(np.uint8)
+        assert not is_shaded([rgba])
+
+
+def test_a_ramp_is_one_patch_and_an_edge_parts_two() -> None:
+    ramp = np.linspace(90, 200, 60)[None, :, None] * np.array([1, 0.8, 0.5]) * np.ones((40, 1, 1))
+    rgba = np.dstack([np.rint(ramp), np.full((40, 60), 255)]).astype(np.uint8)
+    assert len(find_patches(*smooth_lab(rgba))[1].pixels) == 1
+    rgba[20:, :, :3] = rgba[20:, :, 2::-1]
+    assert len(find_patches(*smooth_lab(rgba))[1].pixels) == 2
+
+
+def test_left_out_paints_are_listed_and_come_back() -> None:
+    pictures, _, _ = _found()
+    lines = [np.zeros(one.shape[:2], np.uint8) for one in pictures]
+    plain = choose_palette(pictures, lines, PaletteOptions(min_share=0.2, features=False))
+    belt = min(plain.dropped, key=lambda one: np.abs(np.array(one.rgb) - BELT).sum())
+    assert belt.share < 0.2
+    assert belt.rgb not in [color.rgb for color in plain.colors]
+    for options in (
+        PaletteOptions(min_share=0.2, features=False, keep=(belt.rgb,)),
+        PaletteOptions(min_share=0.01, features=False),
+    ):
+        kept = choose_palette(pictures, lines, options)
+        away = [np.abs(np.array(color.rgb) - belt.rgb).max() for color in kept.colors]
+        assert min(away) <= 6
+    with pytest.raises(PaletteError, match="no such colour"):
+        choose_palette(pictures, lines, PaletteOptions(keep=((0, 255, 0),)))
+
+
+def test_colours_picked_by_hand_get_ramps() -> None:
+    pictures, truth, _ = _found()
+    lines = [np.zeros(one.shape, np.uint8) for one in truth]
+    palette = choose_palette(pictures, lines, colors="#e6b491,#6e402a,#3260a0,#be282c")
+    assert [color.rgb for color in palette.colors] == list(PAINTS)
+    assert all(color.tones for color in palette.colors)
+    assert sum(color.share for color in palette.colors) == pytest.approx(1)
+
+
+def test_recolouring_turns_the_hue_and_keeps_the_order_of_light() -> None:
+    pictures, truth, palette = _found()
+    lines = [np.zeros(one.shape, np.uint8) for one in truth]
+    maps = paint_maps(pictures, lines, palette)
+    coat = min(
+        range(len(palette.colors)),
+        key=lambda n: np.abs(np.array(palette.colors[n].rgb, int) - COAT).sum(),
+    )
+    new = palette.rgb.copy()
+    new[coat] = (150, 110, 30)
+    same = recolor_drawing(pictures[0], maps[0], lines[0], palette, palette.rgb)
+    assert np.array_equal(same, pictures[0])
+    turned = recolor_drawing(pictures[0], maps[0], lines[0], palette, new)
+    inside = truth[0] == 2
+    before, after = oklab_from_rgb(pictures[0][inside, :3]), oklab_from_rgb(turned[inside, :3])
+    assert (after[:, 2] > 0).mean() > 0.999  # was blue
+    assert np.corrcoef(before[:, 0], after[:, 0])[0, 1] > 0.98
+    assert np.array_equal(turned[truth[0] == 1], pictures[0][truth[0] == 1])
