@@ -26,8 +26,11 @@ RED, BLUE, EYE, SKIN, ODD = (
 FIGURE = block((RED, 200), (BLUE, 100), (EYE, 6), (SKIN, 40))
 
 
-def choose(picture: np.ndarray, printed: Printed, **options: str) -> Palette:
-    return choose_palette([picture], find_contours([picture]), printed=printed, **options)
+def choose(
+    picture: np.ndarray, printed: Printed, colors: str | None = None, method: str = "toonset"
+) -> Palette:
+    contours = find_contours([picture])
+    return choose_palette([picture], contours, colors=colors, method=method, printed=printed)
 
 
 def colors(found: Palette) -> list[Rgb]:

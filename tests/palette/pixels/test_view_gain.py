@@ -55,7 +55,7 @@ def test_drawings_in_one_light_have_no_gain() -> None:
 
 def test_other_clothes_and_shadow_are_no_gain() -> None:
     pictures = views()
-    other = block(*((tuple(255 - c for c in color), 40) for color in COLORS))
+    other = block(*(((255 - r, 255 - g, 255 - b), 40) for r, g, b in COLORS))
     assert view_gains([*pictures, other]) is None
     half = pictures[0].copy()
     half[20:, :, :3] = np.rint(0.8 * half[20:, :, :3])
