@@ -283,7 +283,7 @@ def _by_lightness(colors: Sequence[RGB], names: Sequence[str], noun: str) -> lis
     level = np.concatenate([[0], np.cumsum(apart)])  # colours as light as each other share one
     if level[-1] >= len(STEPS) or noun in ("black", "white"):
         return list(names)
-    own = [STEPS.index(names[i].removesuffix(noun)) for i in order.tolist()]
+    own = [STEPS.index(names[int(i)].removesuffix(noun)) for i in order]
     best = min(
         combinations(range(len(STEPS)), int(level[-1]) + 1),
         key=lambda steps: (sum(abs(steps[n] - o) for n, o in zip(level, own, strict=True)), steps),

@@ -106,7 +106,6 @@ def find_patches(lab: Lab, opaque: Bool[np.ndarray, "height width"]) -> tuple[Nu
 
 def _basins(lab: Lab, opaque: Bool[np.ndarray, "height width"]) -> Numbers:
     """Return the basin of the gradient that a pixel is in, from 1; 0 where nothing is drawn."""
-    from scipy.ndimage import label
     from skimage.segmentation import watershed
 
     blurred = cv2.GaussianBlur(lab * np.array([1, HUE, HUE], np.float32), (0, 0), SLOPE_SIGMA)
@@ -117,7 +116,8 @@ def _basins(lab: Lab, opaque: Bool[np.ndarray, "height width"]) -> Numbers:
     levels = np.minimum(np.sqrt(squares) * STEPS, np.iinfo(np.uint16).max).astype(np.uint16)
     levels = cv2.GaussianBlur(levels, (0, 0), BASIN_SIGMA)
     lowest = (levels == cv2.erode(levels, np.ones((3, 3), np.uint8))) & opaque
-    return np.asarray(watershed(levels, label(lowest)[0], mask=opaque)).astype(np.int64)
+    _, seeds = cv2.connectedComponents(lowest.astype(np.uint8), connectivity=4)
+    return np.asarray(watershed(levels, seeds, mask=opaque)).astype(np.int64)
 
 
 def _measured(numbers: Numbers, lab: Lab) -> Patches:
