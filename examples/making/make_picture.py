@@ -41,10 +41,7 @@ def main(demo: Path, docs: Path) -> None:
     save(turn(demo), docs / "turn.png")
     bundle = demo / "bundle"
     save(fitted(over_white(bundle / "overlay.png"), 1000), docs / "demo-overlay.png")
-    save(
-        fitted(over_white(bundle / "palette.png").crop((0, 0, 884, 460)), 500),
-        docs / "demo-palette.png",
-    )
+    save(fitted(over_white(bundle / "palette.png"), 500), docs / "demo-palette.png")
     save(fitted(over_white(bundle / "run" / "preview.png"), 1000), docs / "demo-preview.png")
 
 

@@ -172,7 +172,7 @@ class Drawings:
         )
         parts = zip(self.views, whole, drawn, plain, labels, strict=True)
         return tuple(
-            _texture(replace(view, rgba=rgba, paint=paint[..., :3]), own, label, self)
+            _texture(replace(view, rgba=rgba, paint=paint[..., :3]), own, label, view.paint, self)
             for view, rgba, own, paint, label in parts
         )
 
@@ -240,6 +240,7 @@ class Texture:
         rim: what its outline has beyond the surface's.
         pen: width in pixels and colour of its lines; None: there are none.
         figure_px: height of the figure.
+        in_own: (height, width, 3) the paint in the artist's colours.
     """
 
     camera: Camera
@@ -253,12 +254,14 @@ class Texture:
     rim: Rim
     pen: tuple[float, tuple[int, int, int]] | None
     figure_px: float
+    in_own: UInt8[np.ndarray, "height width 3"]
 
     @cached_property
     def features(self) -> Features:
         """Return what is carried whole."""
         inside = self.whole[..., 3] > 0.5
-        return features_of(self.paint, self.labels, inside, self.pen, self.figure_px)
+        drawn = self.in_own / np.float32(255)
+        return features_of(self.paint, self.labels, inside, self.pen, self.figure_px, drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,6 +339,7 @@ def _texture(
     view: Drawing,
     drawn: UInt8[np.ndarray, "rows columns 4"],
     labels: UInt8[np.ndarray, "height width"],
+    in_own: UInt8[np.ndarray, "height width 3"],
     drawings: Drawings,
 ) -> Texture:
     depth, height = drawings.depth(view), drawings.height
@@ -358,6 +362,7 @@ def _texture(
         _rim(view, depth, drawings),
         (drawings.pen.width_px, drawings.pen.rgb) if drawings.pen else None,
         height * view.camera.scale,
+        in_own,
     )
 
 

@@ -39,7 +39,7 @@ class Feature:
         matte: (rows, columns) how far it covers every pixel, 0 to 1.
         middle: (2,) column and row.
         area: pixels that it covers.
-        rgb: (3,) mean colour in [0, 1].
+        rgb: (3,) mean colour in [0, 1], the artist's.
     """
 
     rows: slice
@@ -75,19 +75,22 @@ def features_of(
     inside: Mask,
     pen: tuple[float, tuple[int, int, int]] | None,
     figure_px: float,
+    drawn: Picture | None = None,
 ) -> Features:
     """Find a drawing's features and take them off.
 
     Args:
-        paint: in [0, 1].
+        paint: in [0, 1], to be shown.
         labels: of the paint.
         inside: pixels of the figure.
         pen: width in pixels and colour of the lines; None: there are none.
         figure_px: height of the figure.
+        drawn: the paint in the artist's colours, by which features are told; None: as shown.
     """
+    drawn = paint if drawn is None else drawn
     shrink = min(1.0, LOOKED_AT_PX / figure_px)
     size = (max(1, round(paint.shape[1] * shrink)), max(1, round(paint.shape[0] * shrink)))
-    small = cv2.resize((paint * 255).astype(np.uint8), size, interpolation=cv2.INTER_AREA)
+    small = cv2.resize((drawn * 255).astype(np.uint8), size, interpolation=cv2.INTER_AREA)
     depth = depth_inside(cv2.resize(inside.view(np.uint8), size) > 0)
     width = pen[0] if pen else 1.0
     every = blots_of(cv2.split(small), depth > 0, LARGEST * (figure_px * shrink) ** 2, LEVELS)
@@ -101,7 +104,7 @@ def features_of(
     whole *= inside
     lined = np.zeros(inside.shape, dtype=bool)
     if pen:
-        apart = np.abs(paint * 255 - np.array(pen[1], np.float32)).max(axis=2)
+        apart = np.abs(drawn * 255 - np.array(pen[1], np.float32)).max(axis=2)
         lined = dilate(apart < INK_LIKE)
     bare = inside & (whole == 0)
     kept = bare & ~lined if (bare & ~lined).any() else bare
@@ -110,14 +113,14 @@ def features_of(
     at = nearest(kept)
     off = whole > 0
     plain = np.where(off[..., None], paint[at], paint)
-    differs = np.abs(paint - plain).max(axis=2)
+    differs = np.abs(drawn - np.where(off[..., None], drawn[at], drawn)).max(axis=2)
     matte = ((differs - MATTE[0]) / MATTE[1]).clip(0, 1)
     matte = cv2.GaussianBlur(cv2.dilate(matte, np.ones((3, 3), np.uint8)), (0, 0), 0.6) * off
-    return _numbered(paint, whole, matte, plain, np.where(off, labels[at], labels), beside)
+    return _numbered(drawn, whole, matte, plain, np.where(off, labels[at], labels), beside)
 
 
 def _numbered(
-    paint: Picture,
+    drawn: Picture,
     parts: Numbers,
     matte: Float[np.ndarray, "height width"],
     plain: Picture,
@@ -136,7 +139,7 @@ def _numbered(
             continue
         y, x = np.mgrid[box]
         middle = np.array([(own * x).sum(), (own * y).sum()]) / area
-        rgb = (paint[box] * own[..., None]).sum(axis=(0, 1)) / area
+        rgb = (drawn[box] * own[..., None]).sum(axis=(0, 1)) / area
         across, down = box[1], box[0]
         found.append(Feature(down, across, own.astype(np.float32), middle, area, rgb))
         numbers[one] = len(found)
