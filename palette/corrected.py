@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.errors import PaletteError
-from toonset.palette.color_names import with_codes
+from toonset.palette.color_names import name_of, with_codes
 from toonset.palette.corrections import PaletteCorrections, Stroke
 from toonset.palette.extract import IN_LIGHT, LINE, PaintMap, in_light, maps_in_light
-from toonset.palette.names import RGB, hex_of, name_of, rgb_of_hex
+from toonset.palette.names import RGB, hex_of, rgb_of_hex
 from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from toonset.errors import PaletteError
-from toonset.palette.color_names import RGB as RGB
-from toonset.palette.color_names import name_of as name_of
 
+RGB = tuple[int, int, int]
 MAX_NAME = 64  # characters; a palette row in GIMP or a swatch's label holds no more anyway
 ROUNDING = 1e-3  # of a range: how far a float may lie outside it before it is no slip of rounding
 HEX = re.compile(r"#?([0-9a-fA-F]{3}|[0-9a-fA-F]{6})")

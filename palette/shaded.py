@@ -16,8 +16,9 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
 from toonset.errors import PaletteError
+from toonset.palette.color_names import name_of
 from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
-from toonset.palette.names import RGB, hex_of, name_of
+from toonset.palette.names import RGB, hex_of
 from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES, SMALL
 from toonset.palette.paints.ramps import Moments, join_patches, joined, moments_of
 from toonset.palette.paints.select import KEEP_REACH, PaletteOptions

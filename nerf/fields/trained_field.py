@@ -15,7 +15,8 @@ from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.look.drawings import Drawings
 from toonset.notebook import MOST_PICTURES, Cell, table
-from toonset.palette.names import hex_of, name_of
+from toonset.palette.color_names import name_of
+from toonset.palette.names import hex_of
 from toonset.view import small_png
 
 STRIP_PX = 960  # of all drawings, in a notebook

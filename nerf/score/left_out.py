@@ -32,7 +32,7 @@ from toonset.nerf.look.blend import SOLID, Geometry, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.views import render
-from toonset.palette.names import name_of
+from toonset.palette.color_names import name_of
 from toonset.view import over_white
 
 TALL_PX = 120.0  # of the figure where pictures are compared

@@ -34,7 +34,7 @@ from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
 from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding, webp
 from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of
-from toonset.palette.names import name_of
+from toonset.palette.color_names import name_of
 from toonset.palette.palette import Palette
 
 FIGURE_PX = 400  # height of the figure, unless told otherwise

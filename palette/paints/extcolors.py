@@ -18,8 +18,8 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
+from toonset.palette.color_names import name_of
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.names import name_of
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import DroppedColor, Palette, PaletteColor
 

@@ -14,8 +14,9 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from toonset.errors import PaletteError
+from toonset.palette.color_names import name_of
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
-from toonset.palette.names import hex_of, name_of
+from toonset.palette.names import hex_of
 from toonset.palette.paints.areas import paint_areas
 from toonset.palette.paints.clusters import Paint, find_paints
 from toonset.palette.paints.histogram import Histogram, count_pixels

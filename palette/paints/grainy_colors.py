@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from toonset.palette.names import name_of
+from toonset.palette.color_names import name_of
 from toonset.palette.paints.histogram import count_pixels
 from toonset.palette.paints.line_color import find_ink, rounded
 from toonset.palette.palette import ContourColor, Palette, PaletteColor

@@ -19,7 +19,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.layers import FieldView, Rendering
 from toonset.nerf.render.open_raster import PaintLayer, check_layered, encode_ora, layered
-from toonset.palette.names import name_of
+from toonset.palette.color_names import name_of
 
 SIZE = 120
 

@@ -15,7 +15,7 @@ from toonset.nerf.render.recolor import recolor_run
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.train.result import Training
-from toonset.palette.names import name_of
+from toonset.palette.color_names import name_of
 
 
 def test_layers_agree_with_the_geometry(training: Training) -> None:
