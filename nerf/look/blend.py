@@ -20,15 +20,24 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed
-from toonset.nerf.look.drawings import CRUMB, STEP, Drawings, Texture, crisp_depth, look_up
+from toonset.nerf.look.drawings import (
+    CRUMB,
+    STEP,
+    Drawings,
+    Texture,
+    crisp_depth,
+    look_up,
+    sample_picture,
+)
 from toonset.nerf.look.outline import crisp_outline, inked_outline, without_noise
 from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
 from toonset.nerf.look.silhouette import between_outlines, smooth_outline
-from toonset.nerf.look.stamps import Stamp, stamped, stamps, torn
+from toonset.nerf.look.stamps import NEARER, Stamp, stamped, stamps, torn
 from toonset.nerf.look.step_lines import draw_steps
 from toonset.nerf.look.surface import smooth_surface
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.raster import dilate, sized_parts
 
 SOLID = 0.5  # opacity from which a pixel shows the surface
 BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
@@ -40,6 +49,7 @@ SAME = 1e-9  # radians: seen from one side
 # Radians off a drawing's own camera, in which the view becomes the drawing; where the others were
 # made to agree and it was bent or moved for that, the less, the steadier
 OWN, OWN_BENT = 0.12, 0.04
+AFLOAT = 0.25  # share of what floats beside a figure: so much of it has to in a drawing, too
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
 SOURCES = ("drawn", "mirrored", "guessed")
 Box = tuple[slice, slice]  # rows and columns
@@ -224,7 +234,8 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     chosen, counts = choose(looks, alpha > 0, figure_px)
     features: list[Stamp] = []
     if sight is None:
-        features, without = stamps(looks, chosen, counts, depth, figure_px)
+        both = flank[0] != flank[1]
+        features, without = stamps(looks, both, camera, chosen, counts, depth, drawings.height)
         looks = [look.bare(those) for look, those in zip(looks, without, strict=True)]
     color, labels = mixed(looks, chosen, counts)
     shown = (chosen >= 0) & (alpha > 0)
@@ -232,8 +243,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
     color, labels = filled_from(kept, color, labels)
-    slack = STEP * drawings.height
-    color, labels = stamped(color, labels, looks, features, depth, slack)
+    color, labels = stamped(color, labels, looks, features, depth, NEARER * drawings.height)
     mirrored = np.array([drawings.views[number].mirrored for number in numbers])
     source = np.where(shown, np.where(mirrored[chosen], MIRRORED, DRAWN), GUESSED)
     if sight is not None and drawings.shade is not None:
@@ -313,7 +323,23 @@ def _outlined(
         angle = float(np.arccos(np.clip(facing, -1, 1)))
         rims.append((look.texture.rim.at(look.x, look.y), look.share, angle))
     inside = between_outlines(smooth_outline(cover, figure_px), rims, figure_px)
+    inside = np.where(_torn_off(inside > 0, looks), -ROOM, inside).astype(np.float32)
     return inked_outline(inside * figure_px, line_px, figure_px)
+
+
+def _torn_off(solid: Bool[np.ndarray, "h w"], looks: list[Look]) -> Bool[np.ndarray, "h w"]:
+    """Return the parts of a figure that float beside it, though no drawing shows them so."""
+    part, areas = sized_parts(solid)
+    if len(areas) < 3:
+        return np.zeros(solid.shape, dtype=bool)
+    kept = np.zeros(len(areas))
+    for look in looks:
+        afloat = sample_picture(look.texture.afloat.view(np.uint8), (look.x, look.y), 0)
+        share = np.bincount(part.ravel(), ((afloat > 0) & look.seen).ravel(), len(areas)) / areas
+        kept = np.maximum(kept, share)
+    kept[[0, areas[1:].argmax() + 1]] = 1
+    off = (kept < AFLOAT)[part]
+    return dilate(off, 2) & (off | ~solid)
 
 
 def _as_drawn(texture: Texture, points: Float[np.ndarray, "h w 3"]) -> Float[np.ndarray, "h w 4"]:

@@ -19,7 +19,7 @@ from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.silhouette import Rim, rim_of
 from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.palette.palette import Shadow
-from toonset.raster import depth_inside, distance_to, nearest
+from toonset.raster import depth_inside, distance_to, nearest, sized_parts
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
 BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
@@ -262,6 +262,21 @@ class Texture:
         inside = self.whole[..., 3] > 0.5
         drawn = self.in_own / np.float32(255)
         return features_of(self.paint, self.labels, inside, self.pen, self.figure_px, drawn)
+
+    @cached_property
+    def afloat(self) -> Bool[np.ndarray, "height width"]:
+        """Return the pixels that it shows apart from its largest part."""
+        part, areas = sized_parts(self.whole[..., 3] > 0.5)
+        return (part > 0) & (part != areas[1:].argmax() + 1)
+
+    @cached_property
+    def anchors(self) -> Float[np.ndarray, "features 3"]:
+        """Return the world points of the surface at which the features' middles lie."""
+        found = self.features.found
+        middles = np.array([feature.middle for feature in found]).reshape(-1, 2)
+        surface = filled(np.where(np.isfinite(self.far), self.far, np.nan))
+        depths = [np.median(surface[one.rows, one.columns][one.matte > 0.5]) for one in found]
+        return self.camera.unproject(middles + 0.5, np.array(depths))
 
 
 @dataclass(frozen=True, eq=False)

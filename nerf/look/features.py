@@ -18,11 +18,17 @@ from jaxtyping import Bool, Float, Int, Int16, UInt8
 from toonset.raster import depth_inside, dilate, distance_to, erode, nearest, sized_parts
 
 LOOKED_AT_PX = 360.0  # height of the figure: features are found in a copy no larger
-LARGEST, LONGEST = 6e-3, 0.2  # of the squared height; of the height
+DISC, RIM = 0.5, 0.01  # roundness of a large one; of the height: from its outline, its line
+# Of the squared height: larger ones are faces or parts of clothes where they have more than so many
+# small blots in them; of the height
+SMALL, LARGEST, MOST_IN = 2e-3, 0.022, 2
+LONGEST, LINE = 0.2, 0.5  # of the height; share of a line that small blots make up
 SMALLEST = 6e-5  # of the squared height
 CONTRAST, LEVELS = 26, 12  # of 255: blots differ so much from what is round them; steps
 ROUND = 1.2  # times the pen's width: the line round a blot is its
+THICK = 2.0  # times the pen's width, from its edge: black so deep is paint
 INK_LIKE = 90  # of 255: such a colour is a line, which is no paint to go on with
+SAME_PAINT, ON_ONE = 0.15, 0.6  # of a channel; share of what is under a feature that is one paint
 MATTE = (0.03, 0.06)  # of 1: what differs less from the paint without it shows none; all, by more
 
 Mask = Bool[np.ndarray, "height width"]
@@ -93,8 +99,11 @@ def features_of(
     small = cv2.resize((drawn * 255).astype(np.uint8), size, interpolation=cv2.INTER_AREA)
     depth = depth_inside(cv2.resize(inside.view(np.uint8), size) > 0)
     width = pen[0] if pen else 1.0
-    every = blots_of(cv2.split(small), depth > 0, LARGEST * (figure_px * shrink) ** 2, LEVELS)
-    blots = _short(every, LONGEST * figure_px * shrink, SMALLEST * (figure_px * shrink) ** 2)
+    tall = figure_px * shrink
+    few, every = (
+        blots_of(cv2.split(small), depth > 0, most * tall**2, LEVELS) for most in (SMALL, LARGEST)
+    )
+    blots = _whole(every, few, tall)
     beside = cv2.resize(dilate(every).view(np.uint8), inside.shape[::-1]) > 0
     part = np.zeros(depth.shape, np.int64)
     if blots.any():
@@ -105,28 +114,29 @@ def features_of(
     lined = np.zeros(inside.shape, dtype=bool)
     if pen:
         apart = np.abs(drawn * 255 - np.array(pen[1], np.float32)).max(axis=2)
-        lined = dilate(apart < INK_LIKE)
+        inky = apart < INK_LIKE
+        thick = depth_inside(inky) > THICK * width  # is paint
+        lined = dilate(inky & (distance_to(thick) > (THICK + 1) * width if thick.any() else True))
     bare = inside & (whole == 0)
     kept = bare & ~lined if (bare & ~lined).any() else bare
     if not kept.any() or not whole.any():
         return Features(np.zeros_like(whole), paint, labels, (), beside)
     at = nearest(kept)
     off = whole > 0
-    plain = np.where(off[..., None], paint[at], paint)
-    differs = np.abs(drawn - np.where(off[..., None], drawn[at], drawn)).max(axis=2)
+    plain, ground = (np.where(off[..., None], one[at], one) for one in (paint, drawn))
+    differs = np.abs(drawn - ground).max(axis=2)
     matte = ((differs - MATTE[0]) / MATTE[1]).clip(0, 1)
     matte = cv2.GaussianBlur(cv2.dilate(matte, np.ones((3, 3), np.uint8)), (0, 0), 0.6) * off
-    return _numbered(drawn, whole, matte, plain, np.where(off, labels[at], labels), beside)
+    numbers, found = _numbered(drawn, whole, matte, ground)
+    return Features(
+        numbers, plain.astype(np.float32), np.where(off, labels[at], labels), found, beside
+    )
 
 
 def _numbered(
-    drawn: Picture,
-    parts: Numbers,
-    matte: Float[np.ndarray, "height width"],
-    plain: Picture,
-    labels: UInt8[np.ndarray, "height width"],
-    beside: Mask,
-) -> Features:
+    drawn: Picture, parts: Numbers, matte: Float[np.ndarray, "height width"], ground: Picture
+) -> tuple[Int16[np.ndarray, "height width"], tuple[Feature, ...]]:
+    """Return features that lie on one paint each, and the number that every pixel has."""
     from scipy.ndimage import find_objects
 
     found, numbers = [], np.zeros(int(parts.max()) + 1, np.int16)
@@ -135,7 +145,9 @@ def _numbered(
             continue
         own = matte[box] * (parts[box] == one)
         area = float(own.sum())
-        if area < 1:
+        under = ground[box][parts[box] == one]
+        like = np.abs(under - np.median(under, axis=0)).max(axis=-1) < SAME_PAINT
+        if area < 1 or like.mean() < ON_ONE:
             continue
         y, x = np.mgrid[box]
         middle = np.array([(own * x).sum(), (own * y).sum()]) / area
@@ -143,7 +155,7 @@ def _numbered(
         across, down = box[1], box[0]
         found.append(Feature(down, across, own.astype(np.float32), middle, area, rgb))
         numbers[one] = len(found)
-    return Features(numbers[parts], plain.astype(np.float32), labels, tuple(found), beside)
+    return numbers[parts], tuple(found)
 
 
 def blots_of(
@@ -171,10 +183,38 @@ def blots_of(
     return marked
 
 
-def _short(marked: Mask, longest: float, least: float = 0.0) -> Numbers:
-    """Return the numbers of connected parts that are no longer, and have so many pixels."""
-    _, part, boxes, _ = cv2.connectedComponentsWithStats(marked.view(np.uint8), connectivity=8)
-    size = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
-    kept = (boxes[:, cv2.CC_STAT_AREA] >= least) & (size <= longest)
+def _whole(every: Mask, small: Mask, tall: float) -> Numbers:
+    """Return the numbers of features among blots, the small ones of which may lie on larger ones.
+
+    What is long is a line, or clothes, hair, a face; and what holds many small ones is a face, too:
+    no feature, but what lies on it may be.
+    """
+    _, part, boxes, _ = cv2.connectedComponentsWithStats(every.view(np.uint8), connectivity=8)
+    count, on, own, _ = cv2.connectedComponentsWithStats(small.view(np.uint8), connectivity=8)
+    areas, area = boxes[:, cv2.CC_STAT_AREA], own[:, cv2.CC_STAT_AREA]
+    lies_on = np.zeros(count, np.int64)
+    lies_on[on[small]] = part[small]
+    deep = np.ones(count, dtype=bool)
+    deep[on[depth_inside(every) <= RIM * tall]] = False  # the line round a blot may be in pieces
+    held = np.bincount(lies_on[1:], deep[1:], len(areas))
+    covered = np.bincount(lies_on[1:], area[1:], len(areas))
+    long, low = (_size(rows) > LONGEST * tall for rows in (boxes, own))
+    under = np.where(long, covered < LINE * areas, held > MOST_IN)
+    for one in np.flatnonzero(~long & ~under & (areas > SMALL * tall**2)):
+        under[one] = _roundness(part == one) < DISC
+    kept = ~long & ~under & (areas >= SMALLEST * tall**2)
     kept[0] = False
-    return kept[part] * part
+    small_kept = ~low & under[lies_on] & (area >= SMALLEST * tall**2)
+    small_kept[0] = False
+    return np.where(kept[part], part, np.where(small_kept[on], on + len(areas), 0))
+
+
+def _roundness(part: Mask) -> float:
+    """Return the area of a part without holes over that of a circle as long as its outline."""
+    outlines, _ = cv2.findContours(part.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    area, length = cv2.contourArea(outlines[0]), cv2.arcLength(outlines[0], True)
+    return 4 * np.pi * area / max(length**2, 1.0)
+
+
+def _size(boxes: Int[np.ndarray, "parts 5"]) -> Int[np.ndarray, " parts"]:
+    return boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)

@@ -17,16 +17,21 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from toonset.camera import Camera
 from toonset.nerf.look.choose import Look
+from toonset.nerf.look.drawings import Texture
 from toonset.nerf.look.features import Feature, blots_of
+from toonset.nerf.look.paint_flow import between
 from toonset.raster import dilate
 
 SEEN = 0.55  # share of a feature that its drawing has to see
 # Times its width in the drawing: narrower ones are hidden, for wider ones the surface is wrong
 GRAZING, WIDEST = 0.22, 2.0
-APART = 0.07  # of the figure's height: farther apart are two
-ALIKE, SIZES = 0.3, 3.3  # of a channel; times the area
+ACROSS, DOWN = 0.12, 0.04  # of the figure's height: features of two drawings farther apart are two
+ALIKE, SIZES = 0.3, 3.3  # of a channel; times the area: the same
 OWN = 0.5  # share of its place that shows its drawing
+NEARER = 0.09  # of the figure's height: what hides a feature is so much nearer
+HIDDEN = 0.25  # share of a feature: where less of it is hidden, it is the surface that errs
 FEWEST_PX = 6  # of a view
 FINE, SOFT = 1.4, 0.4  # pixels of a drawing per pixel of a view: from here on it is blurred; sigma
 STRAY, COARSE = 3e-3, 24  # of the squared height: smaller blots of a view; steps of theirs
@@ -55,53 +60,97 @@ class Stamp:
 
 def stamps(
     looks: Sequence[Look],
+    both: bool,
+    camera: Camera,
     chosen: Int[np.ndarray, "h w"],
     counts: Float[np.ndarray, "looks h w"],
     depth: Float[np.ndarray, "h w"],
-    figure_px: float,
+    height: float,
 ) -> tuple[list[Stamp], list[Bool[np.ndarray, " features"]]]:
     """Return the features that a view shows, and which every drawing's paint has to go without.
 
     Args:
         looks: the drawings.
+        both: the first two flank the view; else the first alone does.
+        camera: of the view.
         chosen: of the drawings, by every pixel; -1: none.
         counts: what each counts there.
         depth: of the surface.
-        figure_px: height of the figure.
+        height: of the figure, world units.
     """
     without = [np.zeros(len(look.texture.features.found) + 1, dtype=bool) for look in looks]
-    places = []
+    alone: dict[tuple[int, int], _Place] = {}
     for number, look in enumerate(looks):
-        places += _places(number, look, chosen == number, counts[number], depth, without[number])
-    places.sort(key=lambda place: -place.count)
-    shown, left = [], places
-    while left:
-        first = left[0]
-        group = [first]
-        for number in range(len(looks)):
-            same = [
-                one for one in left if one.stamp.drawing == number and _same(first, one, figure_px)
-            ]
-            if number != first.stamp.drawing and same:
-                group.append(min(same, key=lambda one: _apart(first, one)))
-        left = [one for one in left if one not in group]
-        if len(group) == 1 and first.own < OWN:
-            continue
-        for one in group:
-            without[one.stamp.drawing][one.number] = True
-        shares = np.array([max(looks[one.stamp.drawing].share, 1e-6) for one in group])
-        middles = np.stack([one.stamp.middle for one in group])
-        shown.append(replace(first.stamp, middle=shares @ middles / shares.sum()))
-    return shown[::-1], without
+        for place in _places(
+            number, look, chosen == number, counts[number], depth, without[number]
+        ):
+            alone[number, place.number] = place
+    shown = []
+    for pair in _same_features(looks[0].texture, looks[1].texture, height) if both else ():
+        places = [alone.pop(key) for key in enumerate(pair) if key in alone]
+        if places:
+            shown.append(_joined(places, pair, looks, camera))
+            for own, number in zip(without, pair, strict=False):
+                own[number] = True
+    for place in alone.values():
+        without[place.stamp.drawing][place.number] = True
+        if place.own >= OWN:
+            shown.append(place)
+    shown.sort(key=lambda place: place.count)
+    return [place.stamp for place in shown], without
+
+
+def _joined(
+    places: Sequence[_Place], pair: tuple[int, int], looks: Sequence[Look], camera: Camera
+) -> _Place:
+    """Return the place of a feature that both flanking drawings have, between both places.
+
+    It is that of the one which counts more. Where the view shows one of them only, the other's is
+    as far from it as their surfaces tell.
+    """
+    first = max(places, key=lambda place: place.count)
+    share = looks[1].share / max(looks[0].share + looks[1].share, 1e-6)
+    if len(places) == 2:
+        apart = places[1].stamp.middle - places[0].stamp.middle
+    else:
+        anchors = [look.texture.anchors[k - 1] for look, k in zip(looks, pair, strict=False)]
+        apart = np.subtract(*camera.project(np.stack(anchors))[0][::-1])
+    moved = share - first.stamp.drawing  # along the way from the first drawing's to the second's
+    return replace(first, stamp=replace(first.stamp, middle=first.stamp.middle + moved * apart))
+
+
+def _same_features(first: Texture, second: Texture, height: float) -> list[tuple[int, int]]:
+    """Return the numbers of the features that two drawings have in common, one to one.
+
+    Hands and cameras err sideways, where nothing holds a drawing, more than in height.
+
+    Source: linear assignment, Crouse 2016 (`scipy.optimize.linear_sum_assignment`).
+    """
+    sides = [texture.features.found for texture in (first, second)]
+    if not all(sides):
+        return []
+    from scipy.optimize import linear_sum_assignment
+
+    half_way = between(first.camera, second.camera, 1.0, height)
+    at, other = (half_way.project(texture.anchors)[0] for texture in (first, second))
+    rgb = [np.stack([feature.rgb for feature in side]) for side in sides]
+    area = [np.log([feature.area for feature in side]) for side in sides]
+    area[1] += 2 * np.log(first.figure_px / second.figure_px)
+    apart = np.abs(at[:, None] - other[None]) / (ACROSS, DOWN)
+    unlike = np.abs(rgb[0][:, None] - rgb[1][None]).max(axis=-1) / ALIKE
+    larger = np.abs(area[0][:, None] - area[1][None]) / np.log(SIZES)
+    terms = np.dstack([apart, unlike, larger])
+    price = np.where((terms < 1).all(axis=-1), (terms**2).sum(axis=-1) - terms.shape[-1], 0)
+    found = zip(*linear_sum_assignment(price), strict=True)
+    return [(int(i) + 1, int(j) + 1) for i, j in found if price[i, j] < 0]
 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where a view shows a feature; its number; pixels there; what it counts; share that is its."""
+    """Where a view shows a feature; its number; what it counts there; share that is its."""
 
     stamp: Stamp
     number: int
-    area: float
     count: float
     own: float
 
@@ -144,23 +193,8 @@ def _places(
         middle = np.array([pixels[1].mean(), pixels[0].mean()]) + np.linalg.solve(slopes, off)
         stamp = Stamp(number, feature, middle, slopes, float(np.median(depth[pixels])))
         count, share = float(counts[pixels].mean()), float(own[pixels].mean())
-        found.append(_Place(stamp, k, feature.area / (wide * tall), count, share))
+        found.append(_Place(stamp, k, count, share))
     return found
-
-
-def _apart(first: _Place, other: _Place) -> float:
-    return float(np.hypot(*(first.stamp.middle - other.stamp.middle)))
-
-
-def _same(first: _Place, other: _Place, figure_px: float) -> bool:
-    """Return whether two drawings show one feature."""
-    a, b = first.stamp, other.stamp
-    ratio = first.area / other.area
-    return (
-        _apart(first, other) < APART * figure_px
-        and 1 / SIZES < ratio < SIZES
-        and float(np.abs(a.feature.rgb - b.feature.rgb).max()) < ALIKE
-    )
 
 
 def stamped(
@@ -169,7 +203,7 @@ def stamped(
     looks: Sequence[Look],
     shown: Sequence[Stamp],
     depth: Float[np.ndarray, "h w"],
-    slack: float,
+    nearer: float,
 ) -> tuple[Float[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
     """Return colours and labels with features on them.
 
@@ -179,7 +213,7 @@ def stamped(
         looks: its drawings.
         shown: the features, what counts most last.
         depth: of the surface.
-        slack: world units by which what hides a feature is nearer.
+        nearer: world units by which what hides a feature is nearer.
     """
     color, label = color.copy(), label.copy()
     last = np.array(label.shape[::-1])
@@ -205,7 +239,9 @@ def stamped(
         edge = cv2.BORDER_REPLICATE
         rgb = cv2.remap(picture[..., :3], *places, cv2.INTER_LINEAR, borderMode=edge)
         cover = cv2.remap(picture[..., 3], *places, cv2.INTER_LINEAR)
-        cover = cover * (depth[box] > stamp.depth - slack)
+        hidden = (depth[box] <= stamp.depth - nearer) & (cover > 0.5)
+        if hidden.sum() > HIDDEN * (cover > 0.5).sum():
+            cover = cover * ~hidden
         own = texture.labels[feature.rows, feature.columns]
         new = cv2.remap(own, *places, cv2.INTER_NEAREST, borderMode=edge)
         color[box] += cover[..., None] * (rgb - color[box])

@@ -8,12 +8,14 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
+from toonset.camera import Camera
 from toonset.nerf.look.choose import Look
-from toonset.nerf.look.features import features_of
+from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.stamps import stamped, stamps, torn
 
 HEIGHT = 200  # of the figure, and of the pictures
 SKIN, BLACK = (0.9, 0.7, 0.5), (0.05, 0.05, 0.05)
+CAMERA = Camera.looking_at(np.zeros(3), 0.0, 0.0, 1.0, (HEIGHT, HEIGHT))
 FACE = np.zeros((HEIGHT, HEIGHT), bool)
 FACE[5:-5, 5:-5] = True
 
@@ -26,12 +28,25 @@ def face(*eyes: tuple[int, int]) -> np.ndarray:
     return picture
 
 
+def found_middles(found: Features) -> np.ndarray:
+    """Return column and row of every feature."""
+    return np.array([feature.middle for feature in found.found]).reshape(-1, 2)
+
+
 def look_at(picture: np.ndarray, share: float, shift: np.ndarray | float = 0.0) -> Look:
     """Return a view of a drawing in which everything lies `shift` pixels further to the left."""
     y, x = (axis.astype(np.float32) for axis in np.mgrid[:HEIGHT, :HEIGHT])
     labels = (picture.mean(axis=2) < 0.4).astype(np.uint8)
     found = features_of(picture, labels, FACE, None, HEIGHT)
-    texture = SimpleNamespace(paint=picture, labels=labels, features=found)
+    aside = found_middles(found) + (0.5 - np.mean(shift), 0.5)
+    texture = SimpleNamespace(
+        paint=picture,
+        labels=labels,
+        features=found,
+        camera=CAMERA,
+        figure_px=float(HEIGHT),
+        anchors=CAMERA.unproject(aside, np.zeros(len(aside))),
+    )
     seen = np.ones(FACE.shape, bool)
     return Look(texture, x + np.float32(shift), y, seen, share, 1.0)  # type: ignore[arg-type]
 
@@ -41,7 +56,7 @@ def shown(*looks: Look) -> np.ndarray:
     chosen = np.zeros(FACE.shape, int)
     counts = np.stack([np.full(FACE.shape, look.share, np.float32) for look in looks])
     depth = np.zeros(FACE.shape, np.float32)
-    placed, without = stamps(looks, chosen, counts, depth, HEIGHT)
+    placed, without = stamps(looks, len(looks) > 1, CAMERA, chosen, counts, depth, HEIGHT)
     bare = [look.bare(those) for look, those in zip(looks, without, strict=True)]
     color, label = stamped(bare[0].paint, bare[0].label, looks, placed, depth, 1.0)
     assert ((label == 1) != (color.mean(axis=2) < 0.375)).sum() <= 12  # of 47 at its border
@@ -83,6 +98,31 @@ def test_two_eyes_stay_two() -> None:
     assert sorted(round(eye[0]) for eye in eyes_in(shown(near, far))) == [68, 128]
 
 
+def test_an_eye_that_two_drawings_put_far_apart_sideways_is_one_and_in_height_two() -> None:
+    near, far = look_at(face((100, 80)), 0.6), look_at(face((100, 80)), 0.4, 20.0)
+    (eye,) = eyes_in(shown(near, far))
+    assert abs(eye[0] - 92) < 1
+    lower = look_at(face((100, 95)), 0.4)
+    assert [round(eye[1]) for eye in eyes_in(shown(near, lower))] == [80]
+
+
+def test_a_large_round_eye_is_a_feature_and_a_face_with_eyes_is_not() -> None:
+    picture = np.full((HEIGHT, HEIGHT, 3), SKIN, np.float32)
+    for column in (60, 140):
+        cv2.circle(picture, (column, 80), 16, BLACK, -1)
+        cv2.circle(picture, (column, 80), 14, (1, 1, 1), -1)
+        cv2.circle(picture, (column + 3, 80), 4, BLACK, -1)
+    found = features_of(picture, np.zeros(FACE.shape, np.uint8), FACE, (2.0, (13, 13, 13)), HEIGHT)
+    assert sorted(round(one.middle[0]) for one in found.found) == [60, 140]
+    assert all(one.area > 600 for one in found.found)
+    hood = np.full((HEIGHT, HEIGHT, 3), (0.2, 0.3, 0.6), np.float32)
+    cv2.circle(hood, (100, 80), 14, SKIN, -1)
+    for at in ((94, 77), (106, 77), (100, 86)):
+        cv2.circle(hood, at, 2, BLACK, -1)
+    found = features_of(hood, np.zeros(FACE.shape, np.uint8), FACE, None, HEIGHT)
+    assert len(found.found) == 3
+
+
 def test_what_only_the_other_drawing_has_is_not_added() -> None:
     assert eyes_in(shown(look_at(face(), 0.7), look_at(face((100, 80)), 0.3))) == []
 
@@ -97,7 +137,7 @@ def test_a_hat_in_front_of_an_eye_hides_it() -> None:
     look = look_at(face((100, 80)), 1.0)
     chosen, counts = np.zeros(FACE.shape, int), np.ones((1, *FACE.shape), np.float32)
     depth = np.zeros(FACE.shape, np.float32)
-    placed, without = stamps([look], chosen, counts, depth, HEIGHT)
+    placed, without = stamps([look], False, CAMERA, chosen, counts, depth, HEIGHT)
     nearer = np.where(np.arange(HEIGHT)[:, None] < 80, -2.0, depth).astype(np.float32)
     bare = look.bare(without[0])
     color, _ = stamped(bare.paint, bare.label, [look], placed, nearer, 1.0)
