@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+LONG_REACH = 24  # pixels, from which on OpenCV's distances are as fast
+
 Mask = Bool[np.ndarray, "height width"]
 Places = Int[np.ndarray, "height width"]
 
@@ -54,6 +56,28 @@ def distance_to(marked: Mask) -> Float[np.ndarray, "height width"]:
 def depth_inside(mask: Mask) -> Float[np.ndarray, "height width"]:
     """Return how far inside a mask every pixel's centre lies; beyond the picture is outside."""
     return distance_to(np.pad(~mask, 1, constant_values=True))[1:-1, 1:-1] - 0.5
+
+
+def depth_near_edge(mask: Mask, reach: int) -> Float[np.ndarray, "height width"]:
+    """Return `depth_inside` up to `reach` pixels, and that of `reach` farther in.
+
+    For lines along an edge: exact, by whole numbers, and faster as long as `reach` is short.
+    """
+    if reach > LONG_REACH:
+        return depth_inside(mask).astype(np.float32)
+    inside = np.pad(mask, 1).view(np.uint8)
+    across, row = inside.copy(), np.ones((1, 3), np.uint8)
+    for _ in range(reach - 1):
+        inside = cv2.erode(inside, row, borderValue=0)
+        across += inside
+    square = across.astype(np.uint16)
+    square *= square
+    found = square.copy()
+    for by in range(1, reach + 1):
+        away = square + np.uint16(by * by)
+        for here, there in ((slice(by, None), slice(-by)), (slice(-by), slice(by, None))):
+            np.minimum(found[here], away[there], out=found[here])
+    return np.sqrt(found[1:-1, 1:-1], dtype=np.float32) - np.float32(0.5)
 
 
 def nearest(
