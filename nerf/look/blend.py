@@ -27,6 +27,7 @@ from toonset.nerf.look.drawings import (
     Texture,
     crisp_depth,
     look_up,
+    places_in,
     sample_picture,
 )
 from toonset.nerf.look.outline import crisp_outline, inked_outline, without_noise
@@ -266,6 +267,7 @@ def _looks(
     first, second, share = flank
     figure_px = drawings.height * camera.scale
     found = drawings.flow(first, second) if first != second else None
+    points = np.moveaxis(np.moveaxis(points, -1, 0).copy(), 0, -1)  # axis by axis: see `places_in`
     flow = None if found is None else np.float32(found[1]) * found[0].at(points)
     sides = [(first, -(1 - share), share)]
     if second != first:
@@ -344,9 +346,8 @@ def _torn_off(solid: Bool[np.ndarray, "h w"], looks: list[Look]) -> Bool[np.ndar
 
 def _as_drawn(texture: Texture, points: Float[np.ndarray, "h w 3"]) -> Float[np.ndarray, "h w 4"]:
     """Return a drawing as it is on the sheet where surface points lie in it, premultiplied."""
-    pixels, _, _ = texture.drawn_by.project(points)
-    x, y = (np.nan_to_num(pixels[..., k] - 0.5, nan=-1e4).astype(np.float32) for k in (0, 1))
-    x, y = np.round(x, 3), np.round(y, 3)  # at the drawing's own camera its very pixels
+    places, _, _ = places_in(texture.drawn_by, points)
+    x, y = (np.round(at, 3) for at in places)  # at the drawing's own camera its very pixels
     return np.asarray(cv2.remap(texture.drawn, x, y, cv2.INTER_CUBIC).clip(0, 1))
 
 
@@ -361,8 +362,9 @@ def _with_lines(
     """Return colour, premultiplied, and coverage of paint with its lines; `whole`: see above."""
     pen = drawings.pen
     drawn_with = np.array(pen.rgb if pen else (0, 0, 0), np.float32) / np.float32(255)
-    rgb = paint * (alpha - ink)[..., None] + ink[..., None] * drawn_with
-    if pen == drawings.outline:  # the drawing's own line, too
+    rgb = paint * (alpha - ink)[..., None]
+    rgb += ink[..., None] * drawn_with
+    if part > 0 and pen == drawings.outline:  # the drawing's own line, too
         drawn = np.minimum(whole[..., :3], whole[..., 3:])
         mix = part * whole[..., 3:] * alpha[..., None]
         rgb = rgb * (1 - part * whole[..., 3:]) + mix * drawn / np.maximum(whole[..., 3:], 1e-6)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Shaped, UInt8
 
-from toonset.camera import Camera
+from toonset.camera import MIN_RELATIVE_DEPTH, Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.look.features import Features, features_of
@@ -92,9 +92,8 @@ class PairFlow:
         self, points: Float[np.ndarray, "rows columns 3"]
     ) -> Float[np.ndarray, "rows columns 2"]:
         """Return F at world points; beyond the picture that of its edge."""
-        pixels, _, _ = self.camera.project(points)
-        x, y = (np.nan_to_num(pixels[..., k] - 0.5).astype(np.float32) for k in (0, 1))
-        return sample_picture(self.flow.astype(np.float32), (x, y), cv2.INTER_LINEAR)
+        places, _, _ = places_in(self.camera, points)
+        return sample_picture(self.flow.astype(np.float32), places, cv2.INTER_LINEAR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -406,13 +405,33 @@ def look_up(
         slack: world units that a place may lie behind the drawing's own surface.
         least_px: smaller patches and pinholes of what it shows are noise.
     """
-    pixels, depth, front = texture.camera.project(points)
-    x, y = (np.nan_to_num(pixels[..., k] - 0.5, nan=-1e4).astype(np.float32) for k in (0, 1))
+    (x, y), depth, front = places_in(texture.camera, points)
     border = cv2.BORDER_CONSTANT
     far = cv2.remap(texture.far, x, y, cv2.INTER_NEAREST, borderMode=border, borderValue=-np.inf)
     covered = cv2.remap(texture.whole[..., 3], x, y, cv2.INTER_LINEAR, borderMode=border)
     mask = front & (covered > 0.5) & (depth <= far + slack)
     return Seen(x, y, without_crumbs(mask, least_px))
+
+
+def places_in(
+    camera: Camera, points: Float[np.ndarray, "h w 3"]
+) -> tuple[Places, Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
+    """Return where world points lie in a picture, their depth, and which are in front.
+
+    That is `Camera.project`, fast for many points, the first pixel's centre at 0; points behind
+    a pinhole lie far beyond the picture.
+    """
+    world = np.moveaxis(points, -1, 0).reshape(3, -1)
+    local = camera.rotation @ world - (camera.rotation @ camera.target)[:, None]
+    across, down, depth = local.reshape(3, *points.shape[:-1])
+    relative = 1 + camera.k * depth
+    front = relative > MIN_RELATIVE_DEPTH
+    relative[~front] = np.inf
+    x, y = (
+        np.where(front, at * (scale / relative) + (middle - 0.5), -1e4).astype(np.float32)
+        for at, scale, middle in zip((across, down), camera.scale_uv, camera.center, strict=True)
+    )
+    return (x, y), depth, front
 
 
 def sample_picture(

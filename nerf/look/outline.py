@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from skimage.measure import find_contours
 
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.look.strokes import FEWEST_OUTLINED, ink_color, mean_width, outline_width
-from toonset.raster import depth_inside, nearest, sized_parts
+from toonset.raster import depth_inside, depth_near_edge, nearest, sized_parts
 
 FINER, COARSER, LARGE_PX = 3, 2, 520.0  # samples per pixel and axis; of figures from this height on
 SMOOTH = 0.7 / 260  # sigma over the figure's height: what is finer in a field's opacity is noise
@@ -132,8 +133,9 @@ def _drawn(
     cover = np.where(inside == solid, cover, inside).astype(np.float32)
     ink = np.zeros(size[::-1], np.float32)
     if width_px > 0:
-        depth = np.where(inside, depth_inside(inside), 0).astype(np.float32)
-        line = np.clip(finer * width_px + 0.5 - depth, 0, 1) * cover
+        reach = finer * width_px + 0.5
+        depth = np.maximum(depth_near_edge(inside, math.ceil(reach + 0.5)), 0)
+        line = np.clip(reach - depth, 0, 1) * cover
         ink = cv2.resize(line, size, interpolation=cv2.INTER_AREA)
     return cv2.resize(cover, size, interpolation=cv2.INTER_AREA), ink
 

@@ -11,9 +11,11 @@ grid".
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from toonset.raster import nearest
 
@@ -21,6 +23,7 @@ from toonset.raster import nearest
 LEVELS = (0.0375, 0.05, 0.075)
 ACROSS, DOWN = 0.025, 0.04  # of the height: sigmas of the blur; rows are rougher than columns
 COARSE = 2.0  # cells per sigma
+ONE = np.ones(1)  # blurs nothing
 BEYOND = 0.01  # of the height: sigma by which the surface goes on beyond the figure
 
 Depth = Float[np.ndarray, "h w"]
@@ -39,53 +42,75 @@ def smooth_surface(
     """
     if not there.any():
         return depth.astype(np.float32)
+    grid = _Grid.of(there, figure_px)
     for level in LEVELS:
-        depth = _smoothed(depth, there, level * height, figure_px)
+        depth = grid.smoothed(depth, level * height)
     if not there.all():
         far = depth[nearest(there)].astype(np.float32)
         depth = np.where(there, depth, cv2.GaussianBlur(far, (0, 0), BEYOND * figure_px))
     return depth.astype(np.float32)
 
 
-def _smoothed(
-    depth: Depth, there: Bool[np.ndarray, "h w"], apart: float, figure_px: float
-) -> Float[np.ndarray, "h w"]:
-    """Return depth after one round; surfaces that are `apart` world units apart stay."""
-    level = (depth - depth[there].min()) / apart + 1
-    count = int(level[there].max()) + 3
-    cell = max(1, round(ACROSS * figure_px / COARSE))
-    rows, columns = (-(-size // cell) for size in depth.shape)
-    y, x = np.nonzero(there)
-    own = level[there]
-    low = np.floor(own)
-    at = (low.astype(np.int64) * rows + y // cell) * columns + x // cell
-    sums = np.zeros((2, count * rows * columns), np.float64)
-    for step, share in ((0, 1 - own + low), (1, own - low)):
-        for total, values in zip(sums, (share, share * own), strict=True):
-            total += np.bincount(at + step * rows * columns, values, sums.shape[1])
-    sums = sums.astype(np.float32).reshape(2, count, rows, columns)
-    sigmas = (ACROSS * figure_px / cell, DOWN * figure_px / cell)
-    for grid in sums.reshape(-1, rows, columns):
-        cv2.GaussianBlur(grid, (0, 0), sigmas[0], grid, sigmas[1])
-    weight, total = (_sliced(grid, np.where(there, level, 0), cell) for grid in sums)
-    mean = total / np.maximum(weight, 1e-9)
-    mean = np.where(there & (weight > 1e-6), mean, level)
-    mean = level + (mean - level).clip(-1, 1)
-    return (mean - 1) * apart + depth[there].min()
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Cells of a view's pixels.
 
+    Attributes:
+        there: (h, w) pixels that count.
+        cells: (n,) the cell, row after row, of each of these.
+        size: rows and columns of cells.
+        at: (h, w) column and row of every pixel between the cells' centres.
+        blurs: (k, 1) along columns and along rows of cells.
+    """
 
-def _sliced(
-    grid: Float[np.ndarray, "levels rows columns"], level: Float[np.ndarray, "h w"], cell: int
-) -> Float[np.ndarray, "h w"]:
-    """Return a grid's values at every pixel's place and level, linear in all three."""
-    rows, columns = level.shape
-    y, x = ((np.arange(size, dtype=np.float32) + 0.5) / cell - 0.5 for size in (rows, columns))
-    y, x = y.clip(0, grid.shape[1] - 1)[:, None], x.clip(0, grid.shape[2] - 1)[None]
-    x = np.broadcast_to(x, level.shape).astype(np.float32)
-    tall = grid.reshape(-1, grid.shape[2])
-    low = np.floor(level).clip(0, len(grid) - 2)
-    found = np.zeros(level.shape, np.float32)
-    for step in (0, 1):
-        at = (y + (low + step) * grid.shape[1]).astype(np.float32)
-        found += (1 - np.abs(level - low - step)) * cv2.remap(tall, x, at, cv2.INTER_LINEAR)
-    return found
+    there: Bool[np.ndarray, "h w"]
+    cells: Int[np.ndarray, " n"]
+    size: tuple[int, int]
+    at: tuple[Depth, Depth]
+    blurs: tuple[Float[np.ndarray, "k 1"], Float[np.ndarray, "j 1"]]
+
+    @classmethod
+    def of(cls, there: Bool[np.ndarray, "h w"], figure_px: float) -> _Grid:
+        """Return the cells of a view whose figure is `figure_px` tall."""
+        cell = max(1, round(ACROSS * figure_px / COARSE))
+        y, x = (np.arange(size) for size in there.shape)
+        rows, columns = (-(-size // cell) for size in there.shape)
+        cells = (y // cell * columns)[:, None] + x // cell
+        v, u = (
+            ((at + 0.5) / cell - 0.5).clip(0, most - 1).astype(np.float32)
+            for at, most in ((y, rows), (x, columns))
+        )
+        across, down = (sigma * figure_px / cell for sigma in (ACROSS, DOWN))
+        kernels = (cv2.getGaussianKernel(round(8 * at + 1) | 1, at) for at in (across, down))
+        places = (np.broadcast_to(u, there.shape).copy(), np.broadcast_to(v[:, None], there.shape))
+        return cls(there, cells[there], (rows, columns), places, (next(kernels), next(kernels)))
+
+    def smoothed(self, depth: Depth, apart: float) -> Depth:
+        """Return depth after one round; surfaces that are `apart` world units apart stay."""
+        least = depth[self.there].min()
+        level = np.where(self.there, (depth - least) / apart, 0).astype(np.float32) + 1
+        own, (rows, columns) = level[self.there], self.size
+        low = np.floor(own)
+        count, part = int(own.max()) + 3, own - low
+        at = low.astype(np.int64) * rows * columns + self.cells
+        sums = np.zeros((2, count * rows * columns))
+        for step, share in ((0, 1 - part), (1, part)):
+            for total, values in zip(sums, (share, share * own), strict=True):
+                total += np.bincount(at + step * rows * columns, values, sums.shape[1])
+        # both blurs at once of all levels, side by side and then below each other
+        wide = sums.astype(np.float32).reshape(2 * count, rows, columns).swapaxes(0, 1)
+        across, down = self.blurs
+        wide = cv2.sepFilter2D(wide.reshape(rows, -1), -1, ONE, down)
+        tall = wide.reshape(rows, 2 * count, columns).swapaxes(0, 1).reshape(-1, columns)
+        sums = cv2.sepFilter2D(tall, -1, across, ONE).reshape(2, -1, columns)
+        u, v = self.at
+        low, below = np.floor(level), level - np.floor(level)
+        first = v + low * np.float32(rows)
+        weight, total = (
+            (1 - below) * cv2.remap(one, u, first, cv2.INTER_LINEAR)
+            + below * cv2.remap(one, u, first + np.float32(rows), cv2.INTER_LINEAR)
+            for one in sums
+        )
+        known = self.there & (weight > 1e-6)
+        off = (total / np.maximum(weight, 1e-9) - level).clip(-1, 1)
+        return (np.where(known, level + off, level) - 1) * apart + least

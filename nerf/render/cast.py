@@ -28,16 +28,18 @@ OPAQUE_FROM = 0.98  # opacity at which a ray ends; the colour seen until then st
 FAINTEST = 1e-12  # weight of steps whose mean place is asked for
 
 
-def cast(sight: ViewRays, pixels: Float[Tensor, "2 rays"]) -> Float[Tensor, "5 rays"]:
+def cast(
+    sight: ViewRays, pixels: Float[Tensor, "2 rays"], *, colored: bool = True
+) -> Float[Tensor, "5 rays"]:
     """Return premultiplied colour, opacity, and depth times opacity of rays through pixels.
 
-    A ray that reaches OPAQUE_FROM ends and counts as opaque.
+    A ray that reaches OPAQUE_FROM ends and counts as opaque. Without colours all is black.
     """
     between = sight.between(pixels)
     result = torch.zeros(5, pixels.shape[1])
     for part in (between[0] <= between[1]).nonzero()[:, 0].split(RAYS_PER_CHUNK):
         paths = sight.paths(pixels.index_select(1, part), between.index_select(1, part))
-        result.scatter_(1, part.expand(5, -1), _cast(sight.baked, paths))
+        result.scatter_(1, part.expand(5, -1), _cast(sight.baked, paths, colored))
     return result
 
 
@@ -67,7 +69,7 @@ class _Rays:
         """Return some of them."""
         return _Rays(*(part.index_select(-1, index) for part in vars(self).values()))
 
-    def advanced(self, baked: Baked, steps: int) -> _Rays:
+    def advanced(self, baked: Baked, steps: int, colored: bool) -> _Rays:
         """Return them some steps on, and over what is empty behind these."""
         number = torch.arange(steps, dtype=torch.float32)[:, None]
         place, ahead = self.place[:, None], self.ahead[:, None]
@@ -77,9 +79,10 @@ class _Rays:
         left.neg_().exp_().mul_(self.left)
         weights, moments = (_sums(steps) @ left).view(2, -1, len(self.ray))
         mean = moments / weights.clamp_min(FAINTEST)
-        rgb = baked.rgb(torch.addcmul(place, ahead, mean)).mul_(weights).sum(dim=1)
-        away = moments.sum(dim=0).addcmul_(weights.sum(dim=0), self.number)
-        seen = self.seen + torch.cat([rgb, away[None]])
+        seen = self.seen.clone()
+        if colored:
+            seen[:3] += baked.rgb(torch.addcmul(place, ahead, mean)).mul_(weights).sum(dim=1)
+        seen[3] += moments.sum(dim=0).addcmul_(weights.sum(dim=0), self.number)
         passed = torch.full_like(self.left, steps)
         lost = (left[-1] == self.left).nonzero()[:, 0]  # nothing was met: look how far that goes
         ended = torch.add(self.place, self.ahead, alpha=steps).index_select(1, lost)
@@ -95,7 +98,7 @@ class _Rays:
         )
 
 
-def _cast(baked: Baked, paths: Paths) -> Float[Tensor, "5 rays"]:
+def _cast(baked: Baked, paths: Paths, colored: bool) -> Float[Tensor, "5 rays"]:
     count = len(paths.entry)
     place = torch.addcmul(paths.first, paths.ahead, paths.entry)
     nothing, light = torch.zeros(4, count), torch.ones(count)
@@ -103,7 +106,7 @@ def _cast(baked: Baked, paths: Paths) -> Float[Tensor, "5 rays"]:
     result = torch.zeros(5, count)
     while len(rays.ray):
         steps = min(max(STEPS_PER_ROUND // len(rays.ray), FEWEST_STEPS), MOST_STEPS)
-        rays = rays.advanced(baked, steps // STEPS_PER_COLOR * STEPS_PER_COLOR)
+        rays = rays.advanced(baked, steps // STEPS_PER_COLOR * STEPS_PER_COLOR, colored)
         on = (rays.number < rays.last) & (rays.left > 1 - OPAQUE_FROM)
         ended = rays.at((~on).nonzero()[:, 0])
         result.scatter_(1, ended.ray.expand(5, -1), torch.cat([ended.seen, ended.left[None]]))

@@ -16,11 +16,12 @@ def normals_of(
     Each is the cross product of the surface's ways right and down, each way over the nearer of the
     two neighbours in depth, so that it does not reach across an edge.
     """
-    points = camera.unproject(camera.pixel_grid(), depth)
-    right, down = (_nearer_difference(points, depth, axis) for axis in (1, 0))
-    normal = np.cross(down, right)  # axes are right, down, forward: this points back at the viewer
-    length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    return normal / np.where(length > 0, length, np.nan)
+    points = np.moveaxis(camera.unproject(camera.pixel_grid(), depth), -1, 0).copy()
+    (a, b, c), (d, e, f) = (_nearer_difference(points, depth, axis) for axis in (0, 1))
+    # down x right: axes are right, down, forward, so that this points back at the viewer
+    normal = np.stack([b * f - c * e, c * d - a * f, a * e - b * d])
+    length = np.sqrt((normal**2).sum(axis=0))
+    return np.moveaxis(normal / np.where(length > 0, length, np.nan), 0, -1)
 
 
 def normal_picture(
@@ -39,26 +40,26 @@ def normal_picture(
         in_camera: red is right, green up, blue towards the viewer, as paint programs and engines
             read tangent space; else the world's x, y, z.
     """
-    normal = normals_of(depth, camera)
+    picture = np.full((*depth.shape, 4), (128, 128, 128, 0), np.uint8)
+    rows, columns = (np.flatnonzero(np.isfinite(depth).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return picture
+    box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+    size = (int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1)
+    normal = normals_of(depth[box], camera.moved((columns[0], rows[0]), size))
     if in_camera:
         normal = normal @ camera.rotation.T * np.array([1.0, -1.0, -1.0])
     known = np.isfinite(normal).all(axis=-1)
-    color = np.where(np.expand_dims(known, -1), normal, 0) / 2 + 0.5
-    seen = np.where(known, alpha, 0)[..., None]
-    return (np.concatenate([color, seen], axis=-1).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+    color = np.where(known[..., None], normal, 0) / 2 + 0.5
+    seen = np.where(known, alpha[box], 0)
+    picture[box] = (np.dstack([color, seen]).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+    return picture
 
 
 def _nearer_difference(
-    points: Float[np.ndarray, "height width 3"], depth: Float[np.ndarray, "height width"], axis: int
-) -> Float[np.ndarray, "height width 3"]:
-    step, leap = np.diff(points, axis=axis), np.abs(np.diff(depth, axis=axis))
-    after, before = (_padded(step, axis, end) for end in (True, False))
-    after_leap, before_leap = (_padded(leap, axis, end) for end in (True, False))
-    nearer = np.nan_to_num(after_leap, nan=np.inf) <= np.nan_to_num(before_leap, nan=np.inf)
-    return np.where(np.expand_dims(nearer, -1), after, before)
-
-
-def _padded(values: np.ndarray, axis: int, end: bool) -> np.ndarray:
-    sides = [(0, 0)] * values.ndim
-    sides[axis] = (0, 1) if end else (1, 0)
-    return np.pad(values, sides, constant_values=np.nan)
+    points: Float[np.ndarray, "3 height width"], depth: Float[np.ndarray, "height width"], axis: int
+) -> Float[np.ndarray, "3 height width"]:
+    """Return the way to the next place along an axis, or from the one before, if that is nearer."""
+    step = np.diff(points, axis=axis + 1, append=np.nan)
+    leap = np.nan_to_num(np.abs(np.diff(depth, axis=axis, append=np.nan)), nan=np.inf)
+    return np.where(leap <= np.roll(leap, 1, axis), step, np.roll(step, 1, axis + 1))

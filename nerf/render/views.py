@@ -56,7 +56,8 @@ def surface_of(baked: Baked, camera: Camera) -> Geometry:
     """Return opacity and depth alone, a ray per voxel: the drawn look smooths more away."""
     small = camera.resized(min(1.0, 1 / max(_detail(baked.trained) * camera.scale, 1e-9)))
     width, height = small.size_wh
-    seen = cast(ViewRays.of(baked, small), _grid(height, width)).view(5, height, width)
+    rays = _grid(height, width)
+    seen = cast(ViewRays.of(baked, small), rays, colored=False).view(5, height, width)
     found = _field_view(seen.numpy(), None)
     if small.size_wh != camera.size_wh:
         found = enlarged(found, small, camera, 2 * baked.trained.hull.voxel)

@@ -87,7 +87,7 @@ def _layer(view: Rendering, layer: str, shrink: int) -> Record | None:
         parts = np.dstack([view.shares, view.alpha])
         height, width = (side // shrink for side in view.alpha.shape)
         blocks = parts[: height * shrink, : width * shrink]
-        mean = blocks.reshape(height, shrink, width, shrink, -1).mean(axis=(1, 3))
+        mean = cv2.resize(blocks, (width, height), interpolation=cv2.INTER_AREA)
         return layered_record(layered_shares(mean[..., :-1], mean[..., -1]), shrink)
     return picture_record(view.picture(layer), shrink)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from toonset.raster import median_inside
+from toonset.raster import LONG_REACH, depth_inside, depth_near_edge, median_inside, sized_parts
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
@@ -15,3 +15,23 @@ def test_a_counted_median_is_the_sorted_one(kind: type, count: int) -> None:
     mask[rng.permutation(600)[:count]] = True
     mask = mask.reshape(20, 30)
     assert median_inside(levels, mask) == np.median(levels[mask])
+
+
+@pytest.mark.parametrize("reach", [1, 2, 7, LONG_REACH, LONG_REACH + 1])
+@pytest.mark.parametrize("share", [0.0, 0.9, 0.99, 1.0])
+def test_depth_near_an_edge_is_the_depth_inside(reach: int, share: float) -> None:
+    mask = np.random.default_rng(reach).random((37, 52)) < share
+    found, whole = depth_near_edge(mask, reach), depth_inside(mask)
+    shallow = whole < reach - 0.5
+    np.testing.assert_allclose(found[shallow], whole[shallow], atol=1e-6)
+    assert (found[~shallow] >= reach - 0.5 - 1e-6).all()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 1.0])
+def test_areas_of_parts_are_counts(share: float) -> None:
+    mask = np.random.default_rng(0).random((37, 52)) < share
+    numbers, areas = sized_parts(mask)
+    np.testing.assert_array_equal(areas, np.bincount(numbers.ravel()))
+    lone = np.zeros((5, 6), dtype=bool)
+    lone[1:3, 2:4] = True
+    np.testing.assert_array_equal(sized_parts(lone)[1], [26, 4])
