@@ -122,30 +122,62 @@ def _places(
     rows, columns = np.nonzero(at)
     order = np.argsort(at[rows, columns], kind="stable")
     rows, columns = rows[order], columns[order]
-    starts = np.searchsorted(at[rows, columns], np.arange(1, len(features.found) + 2))
-    steps = [np.gradient(look.x, axis=1), np.gradient(look.x, axis=0), np.gradient(look.y, axis=0)]
+    numbers = at[rows, columns]
+    starts = np.searchsorted(numbers, np.arange(1, len(features.found) + 2))
+    sizes = np.bincount(features.numbers.ravel(), minlength=len(starts))
+    x, y = look.x, look.y
+    values = [*(_steps(*each, rows, columns) for each in ((x, 1), (x, 0), (y, 0)))]
+    medians = [_medians(each, numbers, starts) for each in (*values, depth[rows, columns])]
+    ends = [columns, rows, x[rows, columns], y[rows, columns], counts[rows, columns]]
+    ends.append(own[rows, columns])
+    sums = [np.concatenate([[0.0], np.cumsum(each, dtype=np.float64)]) for each in ends]
+    means = [np.diff(each[starts]) / np.maximum(np.diff(starts), 1) for each in sums]
     found = []
     for k, feature in enumerate(features.found, start=1):
-        here = slice(starts[k - 1], starts[k])
-        pixels = (rows[here], columns[here])
-        if here.stop - here.start < FEWEST_PX:
+        pixels = int(starts[k] - starts[k - 1])
+        if pixels < FEWEST_PX:
             continue
-        wide, shear, tall = (float(np.median(step[pixels])) for step in steps)
+        wide, shear, tall, deep = (float(each[k - 1]) for each in medians)
         if wide * look.scale > 1 / GRAZING:
             hidden[k] = True
             continue
         if min(wide, tall) * look.scale < 1 / WIDEST or abs(shear) > wide:
             continue
-        slopes = np.array([[wide, shear], [0, tall]])
-        size = (features.numbers[feature.rows, feature.columns] == k).sum() / (wide * tall)
-        if len(pixels[0]) < SEEN * size:
+        if pixels < SEEN * sizes[k] / (wide * tall):
             continue
-        off = feature.middle - (look.x[pixels].mean(), look.y[pixels].mean())
-        middle = np.array([pixels[1].mean(), pixels[0].mean()]) + np.linalg.solve(slopes, off)
-        stamp = Stamp(number, feature, middle, slopes, float(np.median(depth[pixels])))
-        count, share = float(counts[pixels].mean()), float(own[pixels].mean())
+        u, v, in_x, in_y, count, share = (float(each[k - 1]) for each in means)
+        slopes = np.array([[wide, shear], [0, tall]])
+        middle = np.array([u, v]) + np.linalg.solve(slopes, feature.middle - (in_x, in_y))
+        stamp = Stamp(number, feature, middle, slopes, deep)
         found.append(_Place(stamp, k, feature.area / (wide * tall), count, share))
     return found
+
+
+def _steps(
+    values: Float[np.ndarray, "h w"],
+    axis: int,
+    rows: Int[np.ndarray, " n"],
+    columns: Int[np.ndarray, " n"],
+) -> Float[np.ndarray, " n"]:
+    """Return the slopes of `np.gradient` at some pixels."""
+    at, last = (rows, columns)[axis], values.shape[axis] - 1
+    ends = (at - 1).clip(0), (at + 1).clip(max=last)
+    low, high = (values[(end, columns) if axis == 0 else (rows, end)] for end in ends)
+    return (high - low) / np.maximum(ends[1] - ends[0], 1).astype(np.float32)
+
+
+def _medians(
+    values: Float[np.ndarray, " n"],
+    groups: Int[np.ndarray, " n"],
+    starts: Int[np.ndarray, " groups+1"],
+) -> Float[np.ndarray, " groups"]:
+    """Return the median of every group; they follow each other. 0 of an empty one."""
+    if not len(values):
+        return np.zeros(len(starts) - 1)
+    ordered = values[np.lexsort((values, groups))]
+    few, many = ((starts[:-1] + starts[1:] - off) // 2 for off in (1, 0))
+    last = len(values) - 1
+    return (ordered[few.clip(0, last)].astype(np.float64) + ordered[many.clip(0, last)]) / 2
 
 
 def _apart(first: _Place, other: _Place) -> float:
