@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
-from toonset.raster import distance_to, nearest
+from toonset.raster import broad_blur, distance_to, nearest
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
@@ -150,7 +150,8 @@ def _choose(
     trusts = [look.trust(figure_px) for look in looks]
     counts = np.stack(
         [
-            cv2.GaussianBlur(look.share * trust, (0, 0), max(0.3, SPREAD * figure_px)) * look.seen
+            broad_blur((look.share * trust).astype(np.float32), max(0.3, SPREAD * figure_px))
+            * look.seen
             for look, trust in zip(looks, trusts, strict=True)
         ]
     )
@@ -203,7 +204,7 @@ def _flooded(
     for look, own in zip(looks, good, strict=True):
         if not (own & free).any():
             continue
-        soft = cv2.GaussianBlur(look.paint, (0, 0), FINE * figure_px)
+        soft = broad_blur(look.paint, FINE * figure_px)
         fine = cv2.transform(cv2.absdiff(look.paint, soft), np.full((1, 3), 255, np.float32))
         detail = np.maximum(detail, cv2.dilate(fine, np.ones((3, 3))) * own)
     order = -(np.minimum(detail, MOST_DETAIL) // DETAIL_STEP).astype(np.int32)
