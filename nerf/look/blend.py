@@ -218,18 +218,20 @@ def _box(mask: Bool[np.ndarray, "height width"], room: int) -> Box | None:
 
 def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     camera, figure_px = view.camera, drawings.height * view.camera.scale
-    sight, depth = None, crisp_depth(view.depth)
+    sight = None
     if drawings.shape is not None:
         sight = drawings.shape.seen(camera, normals=drawings.shade is not None)
         view = replace(view, alpha=sight.alpha, depth=sight.depth)
         depth = crisp_depth(view.depth)
     else:
-        depth = smooth_surface(depth, np.isfinite(view.depth), drawings.height, figure_px)
+        depth = smooth_surface(view.depth, drawings.height, figure_px)
     points = camera.unproject(camera.pixel_grid(), depth)
     flank = flanking([texture.camera for texture in drawings.textures], camera)
     numbers, looks = _looks(drawings, camera, points, flank)
     own, part = _own_part(drawings, camera)
-    whole = _as_drawn(drawings.textures[own], points)
+    whole = np.zeros((*depth.shape, 4), np.float32)
+    if part > 0:
+        whole = _as_drawn(drawings.textures[own], points)
     scale = looks[0].scale
     alpha, ink = _outlined(drawings, view, looks, border, sight, whole[..., 3], part)
     chosen, counts = choose(looks, alpha > 0, figure_px)

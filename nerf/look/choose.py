@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
-from toonset.raster import distance_to, nearest
+from toonset.raster import broad_blur, distance_to, nearest
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
@@ -68,16 +68,24 @@ class Look:
 
     def bare(self, without: Bool[np.ndarray, " features"]) -> Look:
         """Return the same, without some features in its paint."""
-        return replace(self, without=without) if without.any() else self
+        if not without.any():
+            return self
+        found = replace(self, without=without)
+        found.__dict__["_whole"] = self._whole  # not read again
+        return found
+
+    @cached_property
+    def _whole(self) -> Float[np.ndarray, "h w 3"]:
+        found = sample_picture(self.texture.paint, (self.x, self.y), cv2.INTER_CUBIC)
+        return np.clip(found, 0, 1, out=found)
 
     @cached_property
     def paint(self) -> Float[np.ndarray, "h w 3"]:
         """Return the drawing's colours at the places."""
-        found = sample_picture(self.texture.paint, (self.x, self.y), cv2.INTER_CUBIC)
-        if self._bare.any():
-            bare = sample_picture(self.texture.features.paint, (self.x, self.y), cv2.INTER_LINEAR)
-            found = np.where(self._bare[..., None], bare, found)
-        return np.clip(found, 0, 1, out=found)
+        if not self._bare.any():
+            return self._whole
+        bare = sample_picture(self.texture.features.paint, (self.x, self.y), cv2.INTER_LINEAR)
+        return cv2.copyTo(bare.clip(0, 1), self._bare.view(np.uint8), self._whole.copy())
 
     @cached_property
     def label(self) -> UInt8[np.ndarray, "h w"]:
@@ -142,7 +150,8 @@ def _choose(
     trusts = [look.trust(figure_px) for look in looks]
     counts = np.stack(
         [
-            cv2.GaussianBlur(look.share * trust, (0, 0), max(0.3, SPREAD * figure_px)) * look.seen
+            broad_blur((look.share * trust).astype(np.float32), max(0.3, SPREAD * figure_px))
+            * look.seen
             for look, trust in zip(looks, trusts, strict=True)
         ]
     )
@@ -163,9 +172,11 @@ def _without_islands(
 ) -> Int[np.ndarray, "h w"]:
     """Return a choice whose small patches show the drawing that shows what is round them."""
     small = np.zeros(chosen.shape, dtype=bool)
-    for value in np.unique(chosen[within]):
+    for value in np.flatnonzero(np.bincount(chosen[within] + 1)) - 1:
         patches = within & (chosen == value)
         small |= patches & ~without_crumbs(patches, least_px, 0)
+    if not small.any():
+        return chosen
     (found,) = filled_from(within & ~small, chosen)
     return np.where(small, found, chosen)
 
@@ -193,12 +204,14 @@ def _flooded(
     for look, own in zip(looks, good, strict=True):
         if not (own & free).any():
             continue
-        soft = cv2.GaussianBlur(look.paint, (0, 0), FINE * figure_px)
+        soft = broad_blur(look.paint, FINE * figure_px)
         fine = cv2.transform(cv2.absdiff(look.paint, soft), np.full((1, 3), 255, np.float32))
         detail = np.maximum(detail, cv2.dilate(fine, np.ones((3, 3))) * own)
     order = -(np.minimum(detail, MOST_DETAIL) // DETAIL_STEP).astype(np.int32)
-    seeds = np.where(free | (best < 0), 0, best + 1)
-    return np.asarray(watershed(order, seeds, mask=within | (seeds > 0))) - 1
+    near = cv2.dilate(free.view(np.uint8), np.ones((3, 3), np.uint8)) > 0  # floods come from there
+    seeds = np.where(free | ~near, 0, best + 1)
+    found = np.asarray(watershed(order, seeds, mask=free | (seeds > 0))) - 1
+    return np.where(free, found, best)
 
 
 def mixed(
@@ -212,16 +225,16 @@ def mixed(
     label = np.zeros(chosen.shape, np.uint8)
     used = [number for number in range(len(looks)) if (chosen == number).any()]
     for number in used:
-        own, look = chosen == number, looks[number]
-        color[own] = look.paint[own]
-        label[own] = look.label[own]
+        own, look = (chosen == number).view(np.uint8), looks[number]
+        color, label = cv2.copyTo(look.paint, own, color), cv2.copyTo(look.label, own, label)
     most = np.take_along_axis(counts, chosen.clip(0)[None], 0)[0]
     total, weights = color.copy(), np.ones(chosen.shape, np.float32)
-    for number in used:
+    for number in used if len(used) > 1 else ():
         picture = looks[number].paint
-        like = 1 - cv2.absdiff(picture, color).max(axis=-1) / LIKE
-        weight = (counts[number] / np.maximum(most, 1e-6)).clip(0, 1) * like.clip(0, 1)
-        weight *= (chosen != number) & (chosen >= 0)
+        red, green, blue = cv2.split(cv2.absdiff(picture, color))
+        like = (1 - cv2.max(cv2.max(red, green), blue) / LIKE).clip(0, 1)
+        like *= (chosen != number) & (chosen >= 0)
+        weight = like * (counts[number] / np.maximum(most, 1e-6)).clip(0, 1).astype(np.float32)
         total += weight[..., None] * picture
         weights += weight
     return total / weights[..., None], label

@@ -450,12 +450,16 @@ def filled(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "heigh
 
 
 def crisp_depth(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    """Return depth without gaps and without mixtures of near and far.
+    """Return depth without gaps and without mixtures of near and far."""
+    return crisp(filled(depth))
+
+
+def crisp(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
+    """Return depth, which has no gaps, without mixtures of near and far.
 
     A pixel on a step shows the mean of both sides; it goes to the side that it is nearer to.
     """
-    whole = filled(depth)
-    low, high = cv2.erode(whole, SQUARE), cv2.dilate(whole, SQUARE)
-    nearer = np.minimum(whole, (whole + low) / 2)
-    farther = np.maximum(whole, (whole + high) / 2)
-    return np.where(whole - low < high - whole, nearer, farther)
+    low, high = cv2.erode(depth, SQUARE), cv2.dilate(depth, SQUARE)
+    nearer = np.minimum(depth, (depth + low) / 2)
+    farther = np.maximum(depth, (depth + high) / 2)
+    return np.where(depth - low < high - depth, nearer, farther)

@@ -167,33 +167,36 @@ def _places(
     features = look.texture.features
     if not features.found:
         return []
+    from scipy import ndimage
+
     at = cv2.remap(features.numbers, look.x, look.y, cv2.INTER_NEAREST) * look.seen
-    rows, columns = np.nonzero(at)
-    order = np.argsort(at[rows, columns], kind="stable")
-    rows, columns = rows[order], columns[order]
-    starts = np.searchsorted(at[rows, columns], np.arange(1, len(features.found) + 2))
+    y, x = np.nonzero(at)
+    numbers = at[y, x]
+    pixels, sizes = (
+        np.bincount(each.ravel(), minlength=len(hidden)) for each in (numbers, features.numbers)
+    )
+    index = np.flatnonzero((pixels >= FEWEST_PX) & (np.arange(len(pixels)) > 0))
+    if not len(index):
+        return []
     steps = [np.gradient(look.x, axis=1), np.gradient(look.x, axis=0), np.gradient(look.y, axis=0)]
+    levels = [ndimage.median(each[y, x], numbers, index) for each in (*steps, depth)]
+    values = (x, y, *(each[y, x] for each in (look.x, look.y, counts, own)))
+    means = [ndimage.mean(each, numbers, index) for each in values]
     found = []
-    for k, feature in enumerate(features.found, start=1):
-        here = slice(starts[k - 1], starts[k])
-        pixels = (rows[here], columns[here])
-        if here.stop - here.start < FEWEST_PX:
-            continue
-        wide, shear, tall = (float(np.median(step[pixels])) for step in steps)
+    for place, k in enumerate(index.tolist()):
+        feature = features.found[k - 1]
+        wide, shear, tall, deep = (float(each[place]) for each in levels)
         if wide * look.scale > 1 / GRAZING:
             hidden[k] = True
             continue
         if min(wide, tall) * look.scale < 1 / WIDEST or abs(shear) > wide:
             continue
-        slopes = np.array([[wide, shear], [0, tall]])
-        size = (features.numbers[feature.rows, feature.columns] == k).sum() / (wide * tall)
-        if len(pixels[0]) < SEEN * size:
+        if pixels[k] < SEEN * sizes[k] / (wide * tall):
             continue
-        off = feature.middle - (look.x[pixels].mean(), look.y[pixels].mean())
-        middle = np.array([pixels[1].mean(), pixels[0].mean()]) + np.linalg.solve(slopes, off)
-        stamp = Stamp(number, feature, middle, slopes, float(np.median(depth[pixels])))
-        count, share = float(counts[pixels].mean()), float(own[pixels].mean())
-        found.append(_Place(stamp, k, count, share))
+        u, v, in_x, in_y, count, share = (float(each[place]) for each in means)
+        slopes = np.array([[wide, shear], [0, tall]])
+        middle = np.array([u, v]) + np.linalg.solve(slopes, feature.middle - (in_x, in_y))
+        found.append(_Place(Stamp(number, feature, middle, slopes, deep), k, count, share))
     return found
 
 

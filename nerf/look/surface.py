@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from toonset.nerf.look.drawings import crisp
 from toonset.raster import nearest
 
 # Of the figure's height: depths this far apart belong to two surfaces, in one round after another
@@ -29,25 +30,24 @@ BEYOND = 0.01  # of the height: sigma by which the surface goes on beyond the fi
 Depth = Float[np.ndarray, "h w"]
 
 
-def smooth_surface(
-    depth: Depth, there: Bool[np.ndarray, "h w"], height: float, figure_px: float
-) -> Float[np.ndarray, "h w"]:
+def smooth_surface(depth: Depth, height: float, figure_px: float) -> Float[np.ndarray, "h w"]:
     """Return a view's depth, smoothed over every surface and gone on beyond the figure.
 
     Args:
-        depth: world units, without gaps.
-        there: where it is the figure's; elsewhere it is not read.
+        depth: world units, nan beyond the figure.
         height: of the figure, world units.
         figure_px: the same in pixels.
     """
+    there = np.isfinite(depth)
     if not there.any():
-        return depth.astype(np.float32)
-    grid = _Grid.of(there, figure_px)
+        return np.zeros(depth.shape, np.float32)
+    at = nearest(there)
+    depth, grid = crisp(depth[at].astype(np.float32)), _Grid.of(there, figure_px)
     for level in LEVELS:
         depth = grid.smoothed(depth, level * height)
     if not there.all():
-        far = depth[nearest(there)].astype(np.float32)
-        depth = np.where(there, depth, cv2.GaussianBlur(far, (0, 0), BEYOND * figure_px))
+        far = cv2.GaussianBlur(depth[at].astype(np.float32), (0, 0), BEYOND * figure_px)
+        depth = np.where(there, depth, far)
     return depth.astype(np.float32)
 
 

@@ -38,7 +38,7 @@ def look_at(picture: np.ndarray, share: float, shift: np.ndarray | float = 0.0) 
     y, x = (axis.astype(np.float32) for axis in np.mgrid[:HEIGHT, :HEIGHT])
     labels = (picture.mean(axis=2) < 0.4).astype(np.uint8)
     found = features_of(picture, labels, FACE, None, HEIGHT)
-    aside = found_middles(found) + (0.5 - np.mean(shift), 0.5)
+    aside = found_middles(found) + np.array([0.5 - np.mean(shift), 0.5])
     texture = SimpleNamespace(
         paint=picture,
         labels=labels,
