@@ -1,11 +1,11 @@
 """Choose which drawing every pixel of a view shows: few, whole patches of one drawing each.
 
 A drawing counts by its share of the view, by how squarely it saw the place and by how far the place
-is from its edges. Where one patch meets the next the seam goes round eyes, lines and buttons: both
-patches are flooded over detail first, so that whichever comes first takes a feature as a whole.
+is from its edges. Where two count alike the seam between their patches goes where they are most
+alike, and with it round what only one of them has: a minimal cut through a graph of pixels.
 
-Sources: watershed by flooding, Meyer 1992; seams that avoid detail, Agarwala et al. 2004
-("Interactive digital photomontage").
+Sources: seams by graph cuts, Kwatra et al. 2003; Agarwala et al. 2004 ("Interactive digital
+photomontage").
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -20,17 +21,15 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
-from toonset.raster import broad_blur, distance_to, nearest
+from toonset.raster import broad_blur, dilate, nearest
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
 SQUARE_ON = 0.8  # of a pixel of the drawing per pixel of the view: from here on it saw enough
 SPREAD = 0.04  # sigma over which drawings are compared
 OTHER = 0.1  # share of a drawing that does not flank the view
-GOOD = 0.4  # trust from which a drawing may take a feature
-BAND = 0.03  # on either side of a border between patches, in which the seam may move
-FINE = 0.02  # detail is what a blur of this sigma takes away
-DETAIL_STEP, MOST_DETAIL = 40, 200  # sums of channels: detail is flooded in steps, up to this
+CLEAR = 0.15  # trust from which a drawing may take a place
+LEVEL = 4.0  # times as much as another: up to here the seam is free
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
@@ -160,10 +159,15 @@ def _choose(
     best = _without_islands(best, within, ISLAND * figure_px**2)
     if len(looks) == 1:
         return best, counts
-    good = np.stack([trust > GOOD for trust in trusts])
-    flooded = _flooded(best, looks, good, within, figure_px)
-    may = np.take_along_axis(good, flooded.clip(0)[None], 0)[0] & (flooded >= 0)
-    found = np.where(may, flooded, best)
+    clear = [trust > CLEAR for trust in trusts]
+    found = best.copy()
+    used = np.flatnonzero(np.bincount(best[within] + 1)[1:]).tolist()
+    for one, other in combinations(used, 2):
+        either = within & clear[one] & clear[other] & ((found == one) | (found == other))
+        most, least = np.maximum(counts[one], counts[other]), np.minimum(counts[one], counts[other])
+        free = either & (most < LEVEL * least)
+        if free.any():
+            _cut(found, free, (one, other), (looks[one].paint, looks[other].paint))
     return _without_islands(found, within, ISLAND * figure_px**2), counts
 
 
@@ -181,37 +185,29 @@ def _without_islands(
     return np.where(small, found, chosen)
 
 
-def _flooded(
-    best: Int[np.ndarray, "h w"],
-    looks: Sequence[Look],
-    good: Bool[np.ndarray, "looks h w"],
-    within: Mask,
-    figure_px: float,
-) -> Int[np.ndarray, "h w"]:
-    """Return patches whose seams go round detail; -1 beyond the figure."""
-    from skimage.segmentation import watershed  # 0.1 s, which other verbs do not need
+def _cut(
+    chosen: Int[np.ndarray, "h w"],
+    free: Mask,
+    pair: tuple[int, int],
+    paints: tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w 3"]],
+) -> None:
+    """Move, in place, the seam of two drawings to where they are most alike.
 
-    edge = np.zeros(best.shape, dtype=bool)
-    for axis in (0, 1):
-        apart = np.diff(best, axis=axis) != 0
-        room = [(0, 1), (0, 0)] if axis == 0 else [(0, 0), (0, 1)]
-        edge |= np.pad(apart, room) | np.pad(apart, [side[::-1] for side in room])
-    free = (distance_to(edge) <= BAND * figure_px) & (good.sum(axis=0) > 1)
-    free &= np.take_along_axis(good, best.clip(0)[None], 0)[0] & (best >= 0)
-    if not free.any():
-        return best
-    detail = np.zeros(best.shape, np.float32)
-    for look, own in zip(looks, good, strict=True):
-        if not (own & free).any():
-            continue
-        soft = broad_blur(look.paint, FINE * figure_px)
-        fine = cv2.transform(cv2.absdiff(look.paint, soft), np.full((1, 3), 255, np.float32))
-        detail = np.maximum(detail, cv2.dilate(fine, np.ones((3, 3))) * own)
-    order = -(np.minimum(detail, MOST_DETAIL) // DETAIL_STEP).astype(np.int32)
-    near = cv2.dilate(free.view(np.uint8), np.ones((3, 3), np.uint8)) > 0  # floods come from there
-    seeds = np.where(free | ~near, 0, best + 1)
-    found = np.asarray(watershed(order, seeds, mask=free | (seeds > 0))) - 1
-    return np.where(free, found, best)
+    Args:
+        chosen: of the drawings.
+        free: pixels in which the seam may lie.
+        pair: the drawings.
+        paints: their colours.
+    """
+    rows, columns = (np.flatnonzero(dilate(free).any(axis=axis)) for axis in (1, 0))
+    box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+    masks = [((chosen == one) | free)[box].astype(np.uint8) * 255 for one in pair]
+    pictures = [np.ascontiguousarray(paint[box] * np.float32(255)) for paint in paints]
+    finder = cv2.detail.GraphCutSeamFinder("COST_COLOR")
+    corners = [(0, 0), (0, 0)]
+    masks = finder.find([*map(cv2.UMat, pictures)], corners, [*map(cv2.UMat, masks)])
+    for one, mask in zip(pair, masks, strict=True):
+        chosen[box][free[box] & (mask.get() > 0)] = one
 
 
 def mixed(
