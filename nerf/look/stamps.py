@@ -192,6 +192,7 @@ def _places(
         if min(wide, tall) * look.scale < 1 / WIDEST or abs(shear) > wide:
             continue
         if pixels[k] < SEEN * sizes[k] / (wide * tall):
+            hidden[k] = True
             continue
         u, v, in_x, in_y, count, share = (float(each[place]) for each in means)
         slopes = np.array([[wide, shear], [0, tall]])
@@ -221,7 +222,8 @@ def stamped(
     color, label = color.copy(), label.copy()
     last = np.array(label.shape[::-1])
     for stamp in shown:
-        feature, texture = stamp.feature, looks[stamp.drawing].texture
+        feature, look = stamp.feature, looks[stamp.drawing]
+        texture = look.texture
         low = np.array([feature.columns.start, feature.rows.start]) - 1
         high = np.array([feature.columns.stop, feature.rows.stop])
         corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
@@ -242,7 +244,7 @@ def stamped(
         edge = cv2.BORDER_REPLICATE
         rgb = cv2.remap(picture[..., :3], *places, cv2.INTER_LINEAR, borderMode=edge)
         cover = cv2.remap(picture[..., 3], *places, cv2.INTER_LINEAR)
-        hidden = (depth[box] <= stamp.depth - nearer) & (cover > 0.5)
+        hidden = (depth[box] <= stamp.depth - nearer) & ~look.seen[box] & (cover > 0.5)
         if hidden.sum() > HIDDEN * (cover > 0.5).sum():
             cover = cover * ~hidden
         own = texture.labels[feature.rows, feature.columns]

@@ -138,9 +138,10 @@ def test_a_hat_in_front_of_an_eye_hides_it() -> None:
     chosen, counts = np.zeros(FACE.shape, int), np.ones((1, *FACE.shape), np.float32)
     depth = np.zeros(FACE.shape, np.float32)
     placed, without = stamps([look], False, CAMERA, chosen, counts, depth, HEIGHT)
-    nearer = np.where(np.arange(HEIGHT)[:, None] < 80, -2.0, depth).astype(np.float32)
-    bare = look.bare(without[0])
-    color, _ = stamped(bare.paint, bare.label, [look], placed, nearer, 1.0)
+    hat = np.broadcast_to(np.arange(HEIGHT)[:, None] < 80, FACE.shape)
+    nearer = np.where(hat, -2.0, depth).astype(np.float32)
+    bare = replace(look, seen=~hat).bare(without[0])
+    color, _ = stamped(bare.paint, bare.label, [bare], placed, nearer, 1.0)
     (eye,) = eyes_in(color)
     assert eye[1] > 80
 
