@@ -237,8 +237,8 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     chosen, counts = choose(looks, alpha > 0, figure_px)
     features: list[Stamp] = []
     if sight is None:
-        both = flank[0] != flank[1]
-        features, without = stamps(looks, both, camera, chosen, counts, depth, drawings.height)
+        both, solid = flank[0] != flank[1], np.where(alpha > SOLID, chosen, -1)
+        features, without = stamps(looks, both, camera, solid, counts, depth, drawings.height)
         looks = [look.bare(those) for look, those in zip(looks, without, strict=True)]
     color, labels = mixed(looks, chosen, counts)
     shown = (chosen >= 0) & (alpha > 0)

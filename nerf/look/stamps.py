@@ -24,7 +24,7 @@ from toonset.nerf.look.features import Feature, blots_of
 from toonset.nerf.look.paint_flow import between
 from toonset.raster import dilate
 
-SEEN = 0.55  # share of a feature that its drawing has to see
+SEEN = 0.35  # share of a feature that its drawing has to see
 # Times its width in the drawing: narrower ones are hidden, for wider ones the surface is wrong
 GRAZING, WIDEST = 0.22, 2.0
 ACROSS, DOWN = 0.12, 0.04  # of the figure's height: features of two drawings farther apart are two
@@ -96,8 +96,24 @@ def stamps(
         without[place.stamp.drawing][place.number] = True
         if place.own >= OWN:
             shown.append(place)
-    shown.sort(key=lambda place: place.count)
-    return [place.stamp for place in shown], without
+    placed = [_moved_in(place.stamp, chosen >= 0) for place in shown]
+    kept = [stamp for stamp in placed if stamp is not None]
+    return sorted(kept, key=lambda stamp: -stamp.depth), without
+
+
+def _moved_in(stamp: Stamp, inside: Mask) -> Stamp | None:
+    """Return a stamp moved sideways onto the figure; None if it is half beside it."""
+    x, y = stamp.middle
+    row = inside[int(np.clip(round(y), 0, len(inside) - 1))]
+    runs = np.flatnonzero(np.diff(np.pad(row, 1).view(np.int8))).reshape(-1, 2)
+    if not len(runs):
+        return None
+    half = (stamp.feature.matte.max(axis=0) > 0.5).sum() / 2 / stamp.slopes[0, 0]
+    start, stop = min(runs, key=lambda run: max(run[0] - x, x - run[1] + 1, 0))
+    near = min(start + half, (start + stop) / 2) - 0.5
+    far = max(stop - half, (start + stop) / 2) - 0.5
+    moved = float(np.clip(x, near, far))
+    return replace(stamp, middle=np.array([moved, y])) if abs(moved - x) <= half else None
 
 
 def _joined(
@@ -215,7 +231,7 @@ def stamped(
         color: of the view, in [0, 1].
         label: of it.
         looks: its drawings.
-        shown: the features, what counts most last.
+        shown: the features, the nearest last.
         depth: of the surface.
         nearer: world units by which what hides a feature is nearer.
     """

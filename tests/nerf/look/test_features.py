@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
+import pytest
 
 from toonset.camera import Camera
 from toonset.nerf.look.choose import Look
@@ -144,6 +145,15 @@ def test_a_hat_in_front_of_an_eye_hides_it() -> None:
     color, _ = stamped(bare.paint, bare.label, [bare], placed, nearer, 1.0)
     (eye,) = eyes_in(color)
     assert eye[1] > 80
+
+
+def test_an_eye_over_the_rim_is_moved_in_and_one_beside_the_figure_is_hidden() -> None:
+    look = look_at(face((30, 80)), 1.0)
+    counts, depth = np.ones((1, *FACE.shape), np.float32), np.zeros(FACE.shape, np.float32)
+    for rim, middles in ((28, [35.0]), (40, [])):
+        chosen = np.where(np.arange(HEIGHT) < rim, -1, 0) + np.zeros(FACE.shape, int)
+        placed, _ = stamps([look], False, CAMERA, chosen, counts, depth, HEIGHT)
+        assert [stamp.middle[0] for stamp in placed] == pytest.approx(middles, abs=1.5)
 
 
 def test_blots_that_no_drawing_has_are_torn_and_freckles_are_not() -> None:

@@ -1,0 +1,49 @@
+"""Seams between drawings go where both are alike, and what floats off a figure goes."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from toonset.nerf.look.blend import _torn_off
+from toonset.nerf.look.choose import Look, choose
+
+SIZE = 120
+Y, X = (axis.astype(np.float32) for axis in np.mgrid[:SIZE, :SIZE])
+INSIDE = np.ones((SIZE, SIZE), bool)
+
+
+def look_at(paint: np.ndarray, share: float, afloat: np.ndarray = ~INSIDE) -> Look:
+    """Return a view that sees all of a drawing, straight on."""
+    far = np.full(INSIDE.shape, 50.0, np.float32)
+    texture = SimpleNamespace(paint=paint, to_edge=far, afloat=afloat)
+    return Look(texture, X, Y, INSIDE, share, 1.0)  # type: ignore[arg-type]
+
+
+def test_a_seam_goes_round_what_only_one_drawing_has() -> None:
+    plain = np.full((*INSIDE.shape, 3), 0.6, np.float32)
+    arm = plain.copy()
+    arm[50:70, 52:76] = (0.9, 0.1, 0.1)
+    slope = np.float32(0.5) + ((X - 60) / 120).clip(-0.45, 0.45)
+    looks = [look_at(arm, 0.5), look_at(plain, 0.5)]
+    looks = [
+        Look(look.texture, look.x, look.y, look.seen, share, 1.0)  # type: ignore[arg-type]
+        for look, share in zip(looks, (1 - slope, slope), strict=True)
+    ]
+    chosen, _ = choose(looks, INSIDE, float(SIZE))
+    assert {0, 1} == set(np.unique(chosen))
+    assert len(set(np.unique(chosen[50:70, 52:76]))) == 1
+    assert (chosen[:, :20] == 0).all()
+    assert (chosen[:, -20:] == 1).all()
+
+
+def test_a_hand_that_floats_goes_unless_a_drawing_shows_it_so() -> None:
+    solid = np.zeros(INSIDE.shape, bool)
+    solid[10:110, 10:60] = solid[20:40, 80:100] = True
+    hand = solid & (X >= 80)
+    paint = np.zeros((*INSIDE.shape, 3), np.float32)
+    off = _torn_off(solid, [look_at(paint, 1.0)])
+    assert off[hand].all()
+    assert not off[solid & ~hand].any()
+    assert not _torn_off(solid, [look_at(paint, 0.5), look_at(paint, 0.5, hand)]).any()
