@@ -44,7 +44,8 @@ def repainted(
     if np.array_equal(old, new):
         return list(pictures)
     lit, dark, contours = _in_light(pictures, shadow)
-    tones = tones_of(old, shadow), tones_of(new, shadow)
+    factor = None if shadow is None else shadow.factor
+    tones = tones_of(old, factor), tones_of(new, factor)
     found = []
     for picture, light, shade, contour in zip(pictures, lit, dark, contours, strict=True):
         own = tone_map(label_pixels(light, old), shade, contour, len(old))
