@@ -21,7 +21,7 @@ Colors = UInt8[np.ndarray, "paints 3"]
 
 
 def paint_labels(pictures: Sequence[Picture], paints: Colors, shadow: Shadow | None) -> list[Map]:
-    """Return every opaque pixel's paint: the nearest to its colour in light, or whose ramp it is on.
+    """Return every opaque pixel's paint: nearest to its colour in light, or whose ramp it is on.
 
     Args:
         pictures: drawings of one sheet.
