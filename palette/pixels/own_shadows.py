@@ -2,10 +2,10 @@
 
     colour in shadow = factor of the paint * colour in light
 
-One factor fits a sheet's paints only about (`toonset.palette.pixels.shadow`). A colour is another
-one's shadow if its ratio to it lies within `ALIKE` of the sheet's factor, and the borders between
-both, without a line, have the light on the side where the sheet has it, drawing by drawing: the
-bits that this saves exceed those that say whose shadow the colour is.
+One factor fits a sheet's paints only about (`toonset.palette.pixels.shadow`): it is the middle of
+a prior for theirs. A colour is another one's shadow if the borders between both, without a line,
+have the light on the side where the sheet has it, drawing by drawing: the bits that this saves
+exceed those that say whose shadow the colour is, and how far its factor is off the sheet's.
 
 Sources: ratios across shadow borders, Barnard and Finlayson, "Shadow identification using colour
 ratios" (2000); J. Rissanen, "Modeling by shortest data description" (1978).
@@ -30,7 +30,10 @@ from toonset.palette.pixels.labels import (
     nearest_colors,
     nearest_labels,
 )
-from toonset.palette.pixels.shadow import ALIKE, FLOOR, LEAST_PIECE, LINE, apply_shadow
+from toonset.palette.pixels.shadow import FLOOR, LEAST_PIECE, LINE, apply_shadow
+
+SPREAD = 0.1  # logarithms: of paints' factors about the sheet's
+MOST_OFF = 3  # deviations
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -58,9 +61,8 @@ def with_own_shadows(
         for picture, contour in zip(lit, contours, strict=True)
     ]
     side = np.sign(sum(_sheet_side(*both) for both in zip(maps, dark, strict=True)))
-    price = np.log2(len(palette.colors))
     whose: dict[int, int] = {}
-    for shade, light in _candidates(palette, stay):
+    for shade, light, price in _candidates(palette, stay):
         bits = _side_bits([side * _net_side(labels == light, labels == shade) for labels in maps])
         free = shade not in {*whose, *whose.values()} and light not in whose
         if free and bits > price and len(palette.colors) + 2 * len(whose) < MAX_COLORS:
@@ -126,18 +128,24 @@ def _drawn(color: PaletteColor) -> tuple[RGB, bool]:
     return main.rgb, main.rgb == color.rgb
 
 
-def _candidates(palette: Palette, stay: Sequence[RGB]) -> list[tuple[int, int]]:
-    """Return pairs of colours of which the first may be the other's shadow, the nearest first."""
+def _candidates(palette: Palette, stay: Sequence[RGB]) -> list[tuple[int, int, float]]:
+    """Return pairs of colours of which the first may be the other's shadow, and the bits it costs.
+
+    The cheapest first.
+    """
     assert palette.shadow is not None
     drawn = [_drawn(color) for color in palette.colors]
     logs = np.log(np.array([rgb for rgb, _ in drawn]) / 255 + FLOOR)
-    off = np.abs(logs[:, None] - logs[None, :] - np.log(palette.shadow.factor)).max(axis=-1)
+    drop = logs[:, None] - logs[None, :]
+    off = np.abs(drop - np.log(palette.shadow.factor)).max(axis=-1)
+    price = np.log2(len(drawn)) + (off / SPREAD) ** 2 / (2 * np.log(2))
+    possible = (drop < 0).all(axis=-1) & (off < MOST_OFF * SPREAD)
     pairs = [
-        (shade, light)
-        for shade, light in zip(*np.nonzero(off < ALIKE), strict=True)
-        if shade != light and drawn[light][1] and palette.colors[shade].rgb not in stay
+        (int(shade), int(light), float(price[shade, light]))
+        for shade, light in zip(*np.nonzero(possible), strict=True)
+        if drawn[light][1] and palette.colors[shade].rgb not in stay
     ]
-    return sorted(((int(a), int(b)) for a, b in pairs), key=lambda pair: off[pair])
+    return sorted(pairs, key=lambda pair: pair[2])
 
 
 def _net_side(light: Mask, shade: Mask) -> float:
