@@ -260,15 +260,14 @@ def _chosen(
             dark = [shade & ~off for shade, off in zip(dark, invented, strict=True)]
             lit = lit_pictures(smooth, contours, dark, shadow)
             palette = _of_sheet(lit, options, lines, shadow, printed)
-        is_picked = palette.rule.startswith(PICKED)
-        if noise_levels(pictures) >= LEAST_LEVELS and not is_picked:
+        if noise_levels(pictures) >= LEAST_LEVELS and palette.evidence is not None:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
             palette = read_drawn_colors(palette, pictures, lit, apart)
     if shadow is None:
         return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
     palette = with_tones(palette, shadow, lit, paint)
-    if picked is not None or palette.rule.startswith(PICKED):
+    if palette.evidence is None:  # the colours were picked
         return palette
     return with_own_shadows(palette, lit, paint, contours, options.keep)
 
