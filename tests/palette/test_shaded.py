@@ -166,7 +166,9 @@ def test_a_look_of_shaded_drawings_keeps_no_old_hue() -> None:
     coat = int(np.abs(old.astype(int) - COAT).sum(axis=1).argmin())
     new = old.copy()
     new[coat] = (170, 90, 30)
-    for before, after, paint in zip(pictures, repainted(pictures, old, new, None), truth, strict=True):
+    for before, after, paint in zip(
+        pictures, repainted(pictures, old, new, None), truth, strict=True
+    ):
         own = erode(paint == 2, 3)
         light = [oklab_from_rgb(one[own, :3])[:, 0] for one in (before, after)]
         assert (after[own, 0] > after[own, 2]).all()
