@@ -172,7 +172,7 @@ def test_a_look_of_shaded_drawings_keeps_no_old_hue() -> None:
         own = erode(paint == 2, 3)
         light = [oklab_from_rgb(one[own, :3])[:, 0] for one in (before, after)]
         assert (after[own, 0] > after[own, 2]).all()
-        assert np.corrcoef(*light)[0, 1] > 0.99
+        assert np.corrcoef(light[0], light[1])[0, 1] > 0.99
         assert np.array_equal(after[erode(paint == 0, 3)], before[erode(paint == 0, 3)])
 
 
