@@ -3,7 +3,7 @@
 Every colour that was found has colours that it becomes: itself; the one that it is merged into;
 those that it is split into; all that are left, if it is dropped. A pixel that was labelled with it
 gets the nearest of them, so no other pixel changes. Shares and tones go the same way. Labels are
-numbered anew, since colours stand by their share.
+numbered anew, since colours stand by their share, after those that the sheet prints in their order.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
 from toonset.palette.pixels.shadow import apply_shadow
+from toonset.palette.printed import printed_places
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -102,7 +103,8 @@ def correct_palette(
             own[_covered(stroke, own.shape) & free] = color
         if not is_paint:
             own[contour >= LINE] = UNLABELLED
-    order = sorted(range(len(colors)), key=lambda i: -colors[i].share)
+    place, last = printed_places([one.rgb for one in colors], found.printed), len(found.printed)
+    order = sorted(range(len(colors)), key=lambda i: (place.get(i, last), -colors[i].share))
     anew = np.full(256, UNLABELLED, dtype=np.uint8)
     anew[order] = np.arange(len(order))
     palette = replace(
@@ -205,11 +207,13 @@ def _colors(
         name = name_of(rgb) if same is None else found.colors[same].name
         share, in_shadow = float(total[number]), float(dark[number])
         tones: tuple[Tone, ...] = ()
+        factor = None if same is None else found.colors[same].factor
         if found.shadow is not None:
-            red, green, blue = apply_shadow(np.array(rgb), found.shadow.factor).tolist()
+            dark_rgb = apply_shadow(np.array(rgb), factor or found.shadow.factor)
+            red, green, blue = dark_rgb.tolist()
             both = Tone(rgb, share - in_shadow), Tone((red, green, blue), in_shadow)
             tones = both if in_shadow > 0 else both[:1]
-        colors.append(PaletteColor(rgb, share, name, tones))
+        colors.append(PaletteColor(rgb, share, name, tones, factor=factor))
     return colors
 
 

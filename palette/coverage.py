@@ -13,6 +13,7 @@ from toonset.palette.extract import IN_SHADOW, PaintMap
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.mixtures import LINE, NONE, colors_as_drawn, find_mixtures
+from toonset.palette.pixels.own_shadows import factors_of
 from toonset.palette.pixels.recolor import tone_map, tones_of
 from toonset.raster import is_uniform
 
@@ -38,7 +39,7 @@ def coverage_map(
     dark = None if paint.tones is None else paint.tones == IN_SHADOW
     tones = tone_map(paint.labels, dark, contour, count)
     inside = is_uniform(tones)
-    drawn = colors_as_drawn(picture, tones, inside, tones_of(palette.rgb, palette.shadow))
+    drawn = colors_as_drawn(picture, tones, inside, tones_of(palette.rgb, factors_of(palette)))
     pure = (tones != NONE) & inside & (contour < LINE)
     mixed = (picture[..., 3] > 0) & ~pure
     found = find_mixtures(picture, tones, inside, contour, drawn, mixed)

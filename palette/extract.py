@@ -29,6 +29,7 @@ from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grai
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.opacity import opaque_inside, see_through_notes
+from toonset.palette.pixels.own_shadows import own_shadow_maps, with_own_shadows
 from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
 from toonset.palette.pixels.view_gain import gain_notes, view_gains, with_gains
 from toonset.palette.plain_sheets import plain_notes
@@ -259,14 +260,16 @@ def _chosen(
             dark = [shade & ~off for shade, off in zip(dark, invented, strict=True)]
             lit = lit_pictures(smooth, contours, dark, shadow)
             palette = _of_sheet(lit, options, lines, shadow, printed)
-        is_picked = palette.rule.startswith(PICKED)
-        if noise_levels(pictures) >= LEAST_LEVELS and not is_picked:
+        if noise_levels(pictures) >= LEAST_LEVELS and palette.evidence is not None:
             apart = [line | shade for line, shade in zip(lines, dark, strict=True)]
             palette = read_drawn_colors(palette, pictures, lit, apart)
     if shadow is None:
         return palette
     paint = [shade & ~line for shade, line in zip(dark, lines, strict=True)]
-    return with_tones(palette, shadow, lit, paint)
+    palette = with_tones(palette, shadow, lit, paint)
+    if palette.evidence is None:  # the colours were picked
+        return palette
+    return with_own_shadows(palette, lit, paint, contours, options.keep)
 
 
 def _of_sheet(
@@ -385,7 +388,11 @@ def maps_in_light(
     """Return labels and tones of what `in_light` returns."""
     if palette.has_ramps:
         return [PaintMap(labels, None) for labels in shaded_labels(pictures, palette)]
-    maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
+    if dark is not None and palette.shadow is not None:
+        both = own_shadow_maps(pictures, dark, palette, space)
+        maps, dark = [labels for labels, _ in both], [shade for _, shade in both]
+    else:
+        maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
     ink = palette.contour
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:
         for labels, contour in zip(maps, contours, strict=True):

@@ -67,6 +67,8 @@ class PaletteColor:
         tones: in light and in shadow, where the sheet has a shadow; where it has none, but is
             shaded throughout, the paint's ramp from light to dark.
         sure: of a ramp, how likely its pixels are this paint, the mean; None: nobody asked.
+        factor: of levels of sRGB in shadow, red, green and blue, where the paint has its own; None:
+            the sheet's.
     """
 
     rgb: Color
@@ -74,6 +76,7 @@ class PaletteColor:
     name: Name
     tones: tuple[Tone, ...] = ()
     sure: Share | None = None
+    factor: tuple[Factor, Factor, Factor] | None = None
 
 
 @dataclass(frozen=True)

@@ -105,17 +105,22 @@ def with_printed(
 
 def in_printed_order(found: Palette, printed: Sequence[RGB]) -> Palette:
     """Return a palette with the paints that are printed first, in that order."""
-    place: dict[int, int] = {}
-    colors = [one.rgb for one in found.colors]
-    for at, rgb in enumerate(printed):
-        number, away = _nearest(rgb, colors)
-        if away <= REACH:
-            place.setdefault(number, at)
-    order = sorted(range(len(colors)), key=lambda i: (place.get(i, len(printed)), i))
+    place = printed_places([one.rgb for one in found.colors], printed)
+    order = sorted(range(len(found.colors)), key=lambda i: (place.get(i, len(printed)), i))
     rule = found.rule + (IN_PRINTED_ORDER if place else "")
     return replace(
         found, colors=tuple(found.colors[i] for i in order), rule=rule, printed=tuple(printed)
     )
+
+
+def printed_places(colors: Sequence[RGB], printed: Sequence[RGB]) -> dict[int, int]:
+    """Return the places in the printed list of those of a palette's colours that are printed."""
+    place: dict[int, int] = {}
+    for at, rgb in enumerate(printed):
+        number, away = _nearest(rgb, colors)
+        if away <= REACH:
+            place.setdefault(number, at)
+    return place
 
 
 def paint_of(rgb: RGB, colors: Sequence[RGB]) -> int | None:

@@ -13,6 +13,7 @@ from toonset.palette.extract import IN_SHADOW, PaintMap
 from toonset.palette.formats.hex import is_color, rgb_of_typed
 from toonset.palette.names import RGB, hex_of
 from toonset.palette.palette import Palette
+from toonset.palette.pixels.own_shadows import factors_of
 from toonset.palette.pixels.ramp_recolor import recolor_shaded
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
 
@@ -85,5 +86,6 @@ def recolor_drawing(
         return recolor_shaded(picture, paint.labels, palette.rgb, colors)
     dark = None if paint.tones is None else paint.tones == IN_SHADOW
     tones = tone_map(paint.labels, dark, contour, len(colors))
-    old, new = (tones_of(one, palette.shadow) for one in (palette.rgb, colors))
+    factors = factors_of(palette)
+    old, new = (tones_of(one, factors) for one in (palette.rgb, colors))
     return recolor(picture, tones, contour, old, new)

@@ -145,7 +145,13 @@ def pick_shaded_palette(
 ) -> Palette:
     """Return colours picked by hand with the ramps that shaded drawings have of them."""
     picked = [PaletteColor((r, g, b), 0.0, name_of((r, g, b))) for r, g, b in rgb.tolist()]
-    found = _paints([_drawing(one) for one in pictures], [ramp_of(color) for color in picked])
+    drawings = [_drawing(one) for one in pictures]
+    first = _paints(drawings, [ramp_of(color) for color in picked])
+    ramps = [
+        ramp_of(own.color if own.color.tones else color)
+        for color, own in zip(picked, first, strict=True)
+    ]
+    found = _paints(drawings, ramps)
     colors = tuple(
         replace(color, share=own.color.share, tones=own.color.tones, sure=own.color.sure)
         for color, own in zip(picked, found, strict=True)

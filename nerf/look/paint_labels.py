@@ -1,4 +1,4 @@
-"""Label drawings by paint, and repaint them; shadows count to their paint."""
+"""Label drawings by paint, and repaint them; shadows and ramps count to their paint."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from toonset.palette.extract import in_light
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import label_pixels, nearest_labels
+from toonset.palette.pixels.ramp_recolor import recolor_shaded
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
+from toonset.palette.shaded import is_shaded, pick_shaded_palette, shaded_labels
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -19,13 +21,15 @@ Colors = UInt8[np.ndarray, "paints 3"]
 
 
 def paint_labels(pictures: Sequence[Picture], paints: Colors, shadow: Shadow | None) -> list[Map]:
-    """Return every opaque pixel's nearest paint, that of its colour in light.
+    """Return every opaque pixel's paint: nearest to its colour in light, or whose ramp it is on.
 
     Args:
         pictures: drawings of one sheet.
         paints: at most 255.
         shadow: that lies on the drawings; None: there is none.
     """
+    if shadow is None and is_shaded(pictures):
+        return _ramp_labels(pictures, paints)
     lit = pictures if shadow is None else _in_light(pictures, shadow)[0]
     return [nearest_labels(picture, paints) for picture in lit]
 
@@ -33,7 +37,7 @@ def paint_labels(pictures: Sequence[Picture], paints: Colors, shadow: Shadow | N
 def repainted(
     pictures: Sequence[Picture], old: Colors, new: Colors, shadow: Shadow | None
 ) -> list[Picture]:
-    """Return drawings in other paints: see `toonset.palette.pixels.recolor`.
+    """Return drawings in other paints: see `toonset.palette.pixels.recolor`, `ramp_recolor`.
 
     Args:
         pictures: drawings of one sheet.
@@ -43,13 +47,21 @@ def repainted(
     """
     if np.array_equal(old, new):
         return list(pictures)
+    if shadow is None and is_shaded(pictures):
+        parts = zip(pictures, _ramp_labels(pictures, old), strict=True)
+        return [recolor_shaded(picture, labels, old, new) for picture, labels in parts]
     lit, dark, contours = _in_light(pictures, shadow)
-    tones = tones_of(old, shadow), tones_of(new, shadow)
+    factor = None if shadow is None else shadow.factor
+    tones = tones_of(old, factor), tones_of(new, factor)
     found = []
     for picture, light, shade, contour in zip(pictures, lit, dark, contours, strict=True):
         own = tone_map(label_pixels(light, old), shade, contour, len(old))
         found.append(recolor(picture, own, contour, *tones))
     return found
+
+
+def _ramp_labels(pictures: Sequence[Picture], paints: Colors) -> list[Map]:
+    return shaded_labels(pictures, pick_shaded_palette(pictures, paints, "the run's palette"))
 
 
 def _in_light(

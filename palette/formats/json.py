@@ -17,6 +17,7 @@ from toonset.read import parse_json, read_whole, schema_version
 
 NAME, VERSION = "toonset-palette", 1  # toonset.palette.palette says what may change
 MAX_BYTES = 2**20
+SELDOM = ("sure", "factor")  # of a colour: written where known
 PALETTE = TypeAdapter(Palette)
 
 
@@ -52,7 +53,7 @@ def to_json(palette: Palette) -> dict[str, Any]:
     if not content["printed"]:
         del content["printed"]
     content["colors"] = [
-        {key: value for key, value in one.items() if key != "sure" or value is not None}
+        {k: value for k, value in one.items() if k not in SELDOM or value is not None}
         | {"name": one_line(one["name"])}
         for one in content["colors"]
     ]

@@ -7,7 +7,10 @@ with it, about a / L and b / L times as much. What a paint's patches cost, in sq
     + sum n (L - mean L)^2 / LIGHT_SPREAD^2
 
 Two paints become one while that costs less than `PRICE`, what a paint costs to describe. Hue is
-told fine, light is not: every part of a paint may be lit as it likes.
+told fine, light is not: every part of a paint may be lit as it likes. A price is paid by pixels: of
+a large paint, two halves that nobody can tell apart would each be worth theirs. So two paints are
+one, too, whose ramps differ by less than `SAME` half-way between their middles, each unit of
+lightness between these counted `SAME_LIGHT` times.
 
 Sources: J. H. Ward, "Hierarchical grouping to optimize an objective function" (1963); J. Rissanen,
 "Modeling by shortest data description" (1978); G. D. Finlayson and others, "Entropy minimization
@@ -31,6 +34,7 @@ UNIT_PX = 16.0  # pixels that count as one: neighbours are copies of each other
 RIM = 0.1  # weight of a patch's pixels next to another patch
 LEAST, MOST = 0.01, 60.0  # weights of patches: a large one's pixels are copies of each other
 PRICE = 50.0
+SAME, SAME_LIGHT = 0.01, 0.1  # in OKLab; of lightness: ramps nearer to each other are one
 
 Weights = Float[np.ndarray, " n"]
 Sums = Float[np.ndarray, "n 3"]
@@ -112,7 +116,7 @@ def join_patches(patches: Moments) -> Int[np.ndarray, " patches"]:
         rows = np.flatnonzero(stale)
         best[rows] = table[rows].argmin(axis=1)
         least[rows] = table[rows, best[rows]]
-    return np.unique(group, return_inverse=True)[1]
+    return _alike_united(patches, np.unique(group, return_inverse=True)[1])
 
 
 def joined(patches: Moments, group: Int[np.ndarray, " patches"]) -> Moments:
@@ -123,6 +127,24 @@ def joined(patches: Moments, group: Int[np.ndarray, " patches"]) -> Moments:
     np.add.at(total, group, patches.total)
     np.add.at(square, group, patches.square)
     return Moments(weight, total, square)
+
+
+def _alike_united(
+    patches: Moments, group: Int[np.ndarray, " patches"]
+) -> Int[np.ndarray, " patches"]:
+    """Return groups of patches, those as one that are the same ramp in the same light."""
+    while True:
+        paints = joined(patches, group)
+        light, hue = paints.mean[:, 0], paints.mean[:, 1:]
+        between = (light[None, :] - light[:, None]) / 2
+        there = hue[:, None] + paints.slope[:, None] * between[..., None]
+        apart = np.linalg.norm(there - there.transpose(1, 0, 2), axis=-1)
+        apart += SAME_LIGHT * 2 * np.abs(between)
+        np.fill_diagonal(apart, np.inf)
+        one, other = np.unravel_index(int(apart.argmin()), apart.shape)
+        if apart[one, other] > SAME:
+            return group
+        group = np.unique(np.where(group == other, one, group), return_inverse=True)[1]
 
 
 def costs(paints: Moments) -> Weights:

@@ -12,11 +12,12 @@ from twice that on. Grain, soft edges and soft borders of shadows stay what they
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Bool, Float, Int16, UInt8
 
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.mixtures import LINE, NONE, colors_as_drawn, find_mixtures
 from toonset.palette.pixels.shadow import DRAWN, FLOOR, apply_shadow
@@ -32,9 +33,17 @@ Tones = Int16[np.ndarray, "height width"]
 Colors = UInt8[np.ndarray, "n 3"]
 
 
-def tones_of(colors: UInt8[np.ndarray, "colors 3"], shadow: Shadow | None) -> Colors:
-    """Return colours in light, then in shadow; within 8 bits."""
-    dark = colors if shadow is None else apply_shadow(colors, shadow.factor)
+def tones_of(
+    colors: UInt8[np.ndarray, "colors 3"],
+    factors: Sequence[float] | Float[np.ndarray, "colors 3"] | None,
+) -> Colors:
+    """Return colours in light, then in shadow; within 8 bits.
+
+    Args:
+        colors: in light.
+        factors: of colours in shadow, one for all or one each; None: there is no shadow.
+    """
+    dark = colors if factors is None else apply_shadow(colors, factors)
     return np.concatenate([colors, dark])
 
 

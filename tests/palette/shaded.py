@@ -40,7 +40,13 @@ class Drawing:
 
 
 def drawings(
-    *, shadow: bool, noisy: bool, views: int = 8, eyes: bool = True, light: int = 1
+    *,
+    shadow: bool,
+    noisy: bool,
+    views: int = 8,
+    eyes: bool = True,
+    light: int = 1,
+    tunic: float = 1.0,
 ) -> list[Drawing]:
     """Return a character's drawings.
 
@@ -50,13 +56,25 @@ def drawings(
         views: how many; each is a little different.
         eyes: white ones on the face.
         light: -1: on the right.
+        tunic: its shadow is so many times as light as the other paints'.
     """
     rng = np.random.default_rng(3)
-    return [_drawing(rng, shadow=shadow, noisy=noisy, eyes=eyes, light=light) for _ in range(views)]
+    factors = np.tile(FACTOR, (256, 1))
+    factors[1] *= tunic
+    return [
+        _drawing(rng, factors, shadow=shadow, noisy=noisy, eyes=eyes, light=light)
+        for _ in range(views)
+    ]
 
 
 def _drawing(
-    rng: np.random.Generator, *, shadow: bool, noisy: bool, eyes: bool, light: int
+    rng: np.random.Generator,
+    factors: np.ndarray,
+    *,
+    shadow: bool,
+    noisy: bool,
+    eyes: bool,
+    light: int,
 ) -> Drawing:
     y, x = np.mgrid[:240, :172] + 0.5
     paint = np.full(y.shape, 255, dtype=np.uint8)
@@ -69,7 +87,7 @@ def _drawing(
     for cx, cy in EYES if eyes else ():
         paint[((x - cx) / 6) ** 2 + ((y - cy) / 8) ** 2 < 1] = 4
     table = np.array([*PAINTS, EYE, *([(255, 255, 255)] * 251)], dtype=np.float64)
-    rgb = table[paint] * np.where(dark[..., None], FACTOR, 1)
+    rgb = table[paint] * np.where(dark[..., None], factors[paint], 1)
     alpha = np.where(paint < 255, 255, 0).astype(np.uint8)
     if noisy:
         rgb += rng.normal(0, 3, (*y.shape, 1))

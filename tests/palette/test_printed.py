@@ -7,6 +7,8 @@ import pytest
 
 from tests.palette.pictures import block
 from toonset.errors import PaletteError, UsageError
+from toonset.palette.corrected import correct_palette
+from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import choose_palette, extract_palette
 from toonset.palette.formats.json import to_json
 from toonset.palette.palette import Palette
@@ -97,3 +99,10 @@ def test_the_card_shows_print_and_paint_side_by_side() -> None:
     off = (SKIN, (EYE[0] + 3, EYE[1], EYE[2]), RED)
     with_card = draw_swatches(choose(FIGURE, Printed(off)))
     assert (with_card == off[1]).all(axis=2).sum() > 1000
+
+
+def test_corrections_leave_the_printed_order() -> None:
+    found = choose(FIGURE, Printed((SKIN, EYE, RED)))
+    wanted = PaletteCorrections(names={"#f0c8a0": "face"})
+    changed, _ = correct_palette([FIGURE], find_contours([FIGURE]), found, wanted)
+    assert colors(changed) == [SKIN, EYE, RED, BLUE]

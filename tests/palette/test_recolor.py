@@ -98,7 +98,7 @@ def test_soft_edges_are_mixed_as_before_and_lines_and_eyes_stay() -> None:
 def test_a_shadow_of_a_new_colour_stays_within_8_bits() -> None:
     shadow = Shadow(FACTOR, (0.0, 0.0, 0.0), 0.0)
     black_and_white = np.array([(0, 0, 0), (255, 255, 255)], dtype=np.uint8)
-    tones = tones_of(black_and_white, shadow)
+    tones = tones_of(black_and_white, shadow.factor)
     assert np.array_equal(tones[:2], black_and_white)
     assert np.array_equal(tones[2], (0, 0, 0))
     np.testing.assert_allclose(tones[3], np.multiply(255, FACTOR), atol=2)

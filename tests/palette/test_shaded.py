@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 
 from toonset.errors import PaletteError
+from toonset.nerf.look.paint_labels import repainted
 from toonset.palette.colors import oklab_from_rgb, rgb_from_oklab, shaded_oklab_from_rgb
 from toonset.palette.extract import choose_palette, extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
+from toonset.palette.paints.ramps import join_patches, moments_of
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.patches import find_patches, smooth_lab
+from toonset.palette.pixels.patches import Patches, find_patches, smooth_lab
 from toonset.palette.recolor import recolor_drawing
 from toonset.palette.shaded import is_shaded
+from toonset.raster import erode
 
 SKIN, HAIR, COAT, BELT = (230, 180, 145), (110, 64, 42), (50, 96, 160), (190, 40, 44)
 PAINTS = (SKIN, HAIR, COAT, BELT)
@@ -155,3 +158,42 @@ def test_recolouring_turns_the_hue_and_keeps_the_order_of_light() -> None:
     assert (after[:, 2] > 0).mean() > 0.999  # was blue
     assert np.corrcoef(before[:, 0], after[:, 0])[0, 1] > 0.98
     assert np.array_equal(turned[truth[0] == 1], pictures[0][truth[0] == 1])
+
+
+def test_a_look_of_shaded_drawings_keeps_no_old_hue() -> None:
+    pictures, truth, palette = _found()
+    old = palette.rgb
+    coat = int(np.abs(old.astype(int) - COAT).sum(axis=1).argmin())
+    new = old.copy()
+    new[coat] = (170, 90, 30)
+    for before, after, paint in zip(
+        pictures, repainted(pictures, old, new, None), truth, strict=True
+    ):
+        own = erode(paint == 2, 3)
+        light = [oklab_from_rgb(one[own, :3])[:, 0] for one in (before, after)]
+        assert (after[own, 0] > after[own, 2]).all()
+        assert np.corrcoef(light[0], light[1])[0, 1] > 0.99
+        assert np.array_equal(after[erode(paint == 0, 3)], before[erode(paint == 0, 3)])
+
+
+def _patches(colors: list[tuple[float, float, float]]) -> Patches:
+    """Return a hundred large patches of every colour, each lit a little differently."""
+    rng = np.random.default_rng(4)
+    mean = np.repeat(np.array(colors), 100, axis=0)
+    mean *= rng.uniform(0.8, 1.2, (len(mean), 1))
+    pixels = np.full(len(mean), 2000)
+    return Patches(pixels, pixels, mean, np.zeros((len(mean), 3, 3)))
+
+
+@pytest.mark.parametrize(
+    ("colors", "paints"),
+    [
+        ([(0.5, 0.05, -0.1), (0.5, 0.055, -0.104)], 1),  # nobody can tell these apart
+        ([(0.5, 0.05, -0.1), (0.5, 0.03, -0.07)], 2),
+        ([(0.5, 0.01, 0.01), (0.25, 0.001, 0.001)], 2),  # two greys
+    ],
+)
+def test_two_paints_that_nobody_can_tell_apart_are_one(
+    colors: list[tuple[float, float, float]], paints: int
+) -> None:
+    assert len(np.unique(join_patches(moments_of([_patches(colors)])))) == paints

@@ -193,3 +193,28 @@ def test_a_file_with_tones_gives_the_same_paints_of_the_sheet(
     content = to_json(found)
     assert content["shadow"]
     assert to_json(palette_of(content, "palette.json")) == content
+
+
+@pytest.mark.parametrize("tunic", [0.86, 1.16])
+def test_a_paint_whose_shadow_is_lighter_or_deeper_is_one_paint(tunic: float) -> None:
+    drawn = drawings(shadow=True, noisy=True, tunic=tunic)
+    palette = extract_palette(pictures(drawn))
+    large = [color for color in palette.colors if color.share >= 0.05]
+    assert len(large) == len(PAINTS)
+    found = min(large, key=lambda color: away(color.rgb, PAINTS[1]))
+    dark = np.rint(np.array(PAINTS[1]) * np.array(FACTOR) * tunic).astype(int)
+    assert np.abs(np.array(found.tones[1].rgb) - dark).max() <= 8
+    palette = palette_of(to_json(palette), "palette.json")
+    number = [color.rgb for color in palette.colors].index(found.rgb)
+    for one, own in zip(drawn, paint_maps(pictures(drawn), contours(drawn), palette), strict=True):
+        sure = inner(one.paint) & inner(one.dark.astype(np.uint8)) & (one.paint == 1)
+        assert (own.labels == number)[sure].mean() > 0.98
+        assert own.tones is not None
+        assert (own.tones == one.dark)[sure].mean() > 0.95
+
+
+def test_a_colour_that_is_to_be_kept_is_no_shadow() -> None:
+    drawn = drawings(shadow=True, noisy=False, tunic=1.16)
+    dark = np.rint(np.array(PAINTS[1]) * np.array(FACTOR) * 1.16).astype(int)
+    palette = extract_palette(pictures(drawn), keep=hex_of(tuple(dark.tolist())))
+    assert all(color.factor is None for color in palette.colors)
