@@ -22,7 +22,7 @@ DISC, RIM = 0.5, 0.01  # roundness of a large one; of the height: from its outli
 # Of the squared height: larger ones are faces or parts of clothes where they have more than so many
 # small blots in them; of the height
 SMALL, LARGEST, MOST_IN = 2e-3, 0.022, 2
-LONGEST, LINE = 0.2, 0.5  # of the height; share of a line that small blots make up
+LONGEST, LINE = 0.17, 0.5  # of the height; share of a line that small blots make up
 SMALLEST = 6e-5  # of the squared height
 CONTRAST, LEVELS = 26, 12  # of 255: blots differ so much from what is round them; steps
 ROUND = 1.2  # times the pen's width: the line round a blot is its
