@@ -18,10 +18,11 @@ from jaxtyping import Bool, Float, Int, Int16, UInt8
 from toonset.raster import depth_inside, dilate, distance_to, erode, nearest, sized_parts
 
 LOOKED_AT_PX = 360.0  # height of the figure: features are found in a copy no larger
-DISC, RIM = 0.5, 0.01  # roundness of a large one; of the height: from its outline, its line
-# Of the squared height: larger ones are faces or parts of clothes where they have more than so many
-# small blots in them; of the height
+# Of the squared height. What is larger than SMALL is a feature if it is round and holds no more than
+# MOST_IN small blots: else it is a face or a part of clothes, and they may be features
 SMALL, LARGEST, MOST_IN = 2e-3, 0.022, 2
+DISC = 0.5  # area over that of a circle as long as the outline: so round
+RIM = 0.01  # of the height: small blots so near a blot's outline are its line in pieces
 LONGEST, LINE = 0.17, 0.5  # of the height; share of a line that small blots make up
 SMALLEST = 6e-5  # of the squared height
 CONTRAST, LEVELS = 26, 12  # of 255: blots differ so much from what is round them; steps
