@@ -18,8 +18,8 @@ from jaxtyping import Bool, Float, Int, Int16, UInt8
 from toonset.raster import depth_inside, dilate, distance_to, erode, nearest, sized_parts
 
 LOOKED_AT_PX = 360.0  # height of the figure: features are found in a copy no larger
-# Of the squared height. What is larger than SMALL is a feature if it is round and holds no more than
-# MOST_IN small blots: else it is a face or a part of clothes, and they may be features
+# Of the squared height. What is larger than SMALL is a feature if it is round and holds at most
+# MOST_IN small blots; else it is a face or a part of clothes, and they may be features
 SMALL, LARGEST, MOST_IN = 2e-3, 0.022, 2
 DISC = 0.5  # area over that of a circle as long as the outline: so round
 RIM = 0.01  # of the height: small blots so near a blot's outline are its line in pieces
