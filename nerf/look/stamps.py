@@ -26,7 +26,7 @@ from toonset.raster import dilate
 
 SEEN = 0.35  # share of a feature that its drawing has to see
 # Times its width in the drawing: narrower ones are hidden, for wider ones the surface is wrong
-GRAZING, WIDEST = 0.22, 2.0
+GRAZING, WIDEST, LARGER = 0.22, 4.0, 1.25
 ACROSS, DOWN = 0.12, 0.04  # of the figure's height: features of two drawings farther apart are two
 ALIKE, SIZES = 0.3, 3.3  # of a channel; times the area: the same
 OWN = 0.5  # share of its place that shows its drawing
@@ -207,6 +207,7 @@ def _places(
             continue
         if min(wide, tall) * look.scale < 1 / WIDEST or abs(shear) > wide:
             continue
+        wide, tall = (max(slope, 1 / (LARGER * look.scale)) for slope in (wide, tall))
         if pixels[k] < SEEN * sizes[k] / (wide * tall):
             hidden[k] = True
             continue
