@@ -341,7 +341,7 @@ def _torn_off(solid: Bool[np.ndarray, "h w"], looks: list[Look]) -> Bool[np.ndar
         afloat = sample_picture(look.texture.afloat.view(np.uint8), (look.x, look.y), 0)
         share = np.bincount(part.ravel(), ((afloat > 0) & look.seen).ravel(), len(areas)) / areas
         kept = np.maximum(kept, share)
-    kept[[0, areas[1:].argmax() + 1]] = 1
+    kept[0] = kept[1 + int(areas[1:].argmax())] = 1
     off = (kept < AFLOAT)[part]
     return dilate(off, 2) & (off | ~solid)
 

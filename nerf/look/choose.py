@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import cv2
 import numpy as np
@@ -201,13 +202,13 @@ def _cut(
     """
     rows, columns = (np.flatnonzero(dilate(free).any(axis=axis)) for axis in (1, 0))
     box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
-    masks = [((chosen == one) | free)[box].astype(np.uint8) * 255 for one in pair]
-    pictures = [np.ascontiguousarray(paint[box] * np.float32(255)) for paint in paints]
+    held: Any = cv2.UMat  # its type does not know of arrays
+    masks = [held(((chosen == one) | free)[box].astype(np.uint8) * 255) for one in pair]
+    pictures = [held(paint[box] * np.float32(255)) for paint in paints]
     finder = cv2.detail.GraphCutSeamFinder("COST_COLOR")
-    corners = [(0, 0), (0, 0)]
-    masks = finder.find([*map(cv2.UMat, pictures)], corners, [*map(cv2.UMat, masks)])
-    for one, mask in zip(pair, masks, strict=True):
-        chosen[box][free[box] & (mask.get() > 0)] = one
+    found = finder.find(pictures, [(0, 0), (0, 0)], masks)
+    for one, mask in zip(pair, found, strict=True):
+        chosen[box][free[box] & (np.asarray(mask.get()) > 0)] = one
 
 
 def mixed(

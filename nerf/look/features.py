@@ -192,6 +192,7 @@ def _whole(every: Mask, small: Mask, tall: float) -> Numbers:
     """
     _, part, boxes, _ = cv2.connectedComponentsWithStats(every.view(np.uint8), connectivity=8)
     count, on, own, _ = cv2.connectedComponentsWithStats(small.view(np.uint8), connectivity=8)
+    part, on, boxes, own = (np.asarray(each, np.int64) for each in (part, on, boxes, own))
     areas, area = boxes[:, cv2.CC_STAT_AREA], own[:, cv2.CC_STAT_AREA]
     lies_on = np.zeros(count, np.int64)
     lies_on[on[small]] = part[small]

@@ -49,7 +49,7 @@ def normal_picture(
     normal = normals_of(depth[box], camera.moved((columns[0], rows[0]), size))
     if in_camera:
         normal = normal @ camera.rotation.T * np.array([1.0, -1.0, -1.0])
-    known = np.isfinite(normal).all(axis=-1)
+    known = np.asarray(np.isfinite(normal).all(axis=-1))
     color = np.where(known[..., None], normal, 0) / 2 + 0.5
     seen = np.where(known, alpha[box], 0)
     picture[box] = (np.dstack([color, seen]).clip(0, 1) * 255 + 0.5).astype(np.uint8)
