@@ -105,7 +105,8 @@ def features_of(
         blots_of(cv2.split(small), depth > 0, most * tall**2, LEVELS) for most in (SMALL, LARGEST)
     )
     blots = _whole(every, few, tall)
-    beside = cv2.resize(dilate(every).view(np.uint8), inside.shape[::-1]) > 0
+    anywhere = blots_of(cv2.split(small), np.ones_like(every), LARGEST * tall**2, LEVELS)
+    beside = cv2.resize(dilate(every | anywhere).view(np.uint8), inside.shape[::-1]) > 0
     part = np.zeros(depth.shape, np.int64)
     if blots.any():
         near = (distance_to(blots > 0) <= max(1.0, ROUND * width * shrink + 1)) & (depth > 0)
