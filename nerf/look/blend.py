@@ -269,7 +269,7 @@ def _looks(
     first, second, share = flank
     figure_px = drawings.height * camera.scale
     found = drawings.flow(first, second) if first != second else None
-    points = np.moveaxis(np.moveaxis(points, -1, 0).copy(), 0, -1)  # axis by axis: see `places_in`
+    points = np.moveaxis(np.moveaxis(points, -1, 0).copy(), 0, -1)  # axis by axis is faster
     flow = None if found is None else np.float32(found[1]) * found[0].at(points)
     sides = [(first, -(1 - share), share)]
     if second != first:
@@ -327,18 +327,20 @@ def _outlined(
         angle = float(np.arccos(np.clip(facing, -1, 1)))
         rims.append((look.texture.rim.at(look.x, look.y), look.share, angle))
     inside = between_outlines(smooth_outline(cover, figure_px), rims, figure_px)
-    inside = np.where(_torn_off(inside > 0, looks), -ROOM, inside).astype(np.float32)
+    inside = np.where(_afloat(inside > 0, looks), -ROOM, inside).astype(np.float32)
     return inked_outline(inside * figure_px, line_px, figure_px)
 
 
-def _torn_off(solid: Bool[np.ndarray, "h w"], looks: list[Look]) -> Bool[np.ndarray, "h w"]:
+def _afloat(solid: Bool[np.ndarray, "h w"], looks: list[Look]) -> Bool[np.ndarray, "h w"]:
     """Return the parts of a figure that float beside it, though no drawing shows them so."""
     part, areas = sized_parts(solid)
     if len(areas) < 3:
         return np.zeros(solid.shape, dtype=bool)
     kept = np.zeros(len(areas))
     for look in looks:
-        afloat = sample_picture(look.texture.afloat.view(np.uint8), (look.x, look.y), 0)
+        afloat = sample_picture(
+            look.texture.afloat.view(np.uint8), (look.x, look.y), cv2.INTER_NEAREST
+        )
         share = np.bincount(part.ravel(), ((afloat > 0) & look.seen).ravel(), len(areas)) / areas
         kept = np.maximum(kept, share)
     kept[0] = kept[1 + int(areas[1:].argmax())] = 1

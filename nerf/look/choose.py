@@ -5,7 +5,7 @@ is from its edges. Where two count alike the seam between their patches goes whe
 alike, and with it round what only one of them has: a minimal cut through a graph of pixels.
 
 Sources: seams by graph cuts, Kwatra et al. 2003; Agarwala et al. 2004 ("Interactive digital
-photomontage").
+photomontage"); maximal flows, Dinic 1970 (`scipy.sparse.csgraph.maximum_flow`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Any
 
 import cv2
 import numpy as np
@@ -29,8 +28,8 @@ LEAST_TRUST = 0.1
 SQUARE_ON = 0.8  # of a pixel of the drawing per pixel of the view: from here on it saw enough
 SPREAD = 0.04  # sigma over which drawings are compared
 OTHER = 0.1  # share of a drawing that does not flank the view
-CLEAR = 0.15  # trust from which a drawing may take a place
 LEVEL = 2.0  # times as much as another: up to here the seam is free
+EVEN = 100.0  # squares of levels, as differences of colour: a pixel of seam, e times the count
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
@@ -68,24 +67,22 @@ class Look:
 
     def bare(self, without: Bool[np.ndarray, " features"]) -> Look:
         """Return the same, without some features in its paint."""
-        if not without.any():
-            return self
-        found = replace(self, without=without)
-        found.__dict__["_whole"] = self._whole  # not read again
-        return found
+        return replace(self, without=without) if without.any() else self
 
     @cached_property
-    def _whole(self) -> Float[np.ndarray, "h w 3"]:
-        found = sample_picture(self.texture.paint, (self.x, self.y), cv2.INTER_CUBIC)
-        return np.clip(found, 0, 1, out=found)
+    def in_own(self) -> Float[np.ndarray, "h w 3"]:
+        """Return the colours at the places in which the artist drew them, of 255."""
+        places = (self.x, self.y)
+        return sample_picture(self.texture.in_own, places, cv2.INTER_LINEAR).astype(np.float32)
 
     @cached_property
     def paint(self) -> Float[np.ndarray, "h w 3"]:
         """Return the drawing's colours at the places."""
-        if not self._bare.any():
-            return self._whole
-        bare = sample_picture(self.texture.features.paint, (self.x, self.y), cv2.INTER_LINEAR)
-        return cv2.copyTo(bare.clip(0, 1), self._bare.view(np.uint8), self._whole.copy())
+        found = sample_picture(self.texture.paint, (self.x, self.y), cv2.INTER_CUBIC)
+        if self._bare.any():
+            bare = sample_picture(self.texture.features.paint, (self.x, self.y), cv2.INTER_LINEAR)
+            found = cv2.copyTo(bare, self._bare.view(np.uint8), found)
+        return np.clip(found, 0, 1, out=found)
 
     @cached_property
     def label(self) -> UInt8[np.ndarray, "h w"]:
@@ -160,15 +157,14 @@ def _choose(
     best = _without_islands(best, within, ISLAND * figure_px**2)
     if len(looks) == 1:
         return best, counts
-    clear = [trust > CLEAR for trust in trusts]
     found = best.copy()
     used = np.flatnonzero(np.bincount(best[within] + 1)[1:]).tolist()
     for one, other in combinations(used, 2):
-        either = within & clear[one] & clear[other] & ((found == one) | (found == other))
+        either = within & ((found == one) | (found == other))
         most, least = np.maximum(counts[one], counts[other]), np.minimum(counts[one], counts[other])
         free = either & (most < LEVEL * least)
         if free.any():
-            _cut(found, free, (one, other), (looks[one].paint, looks[other].paint))
+            _cut(found, free, (one, other), looks, counts)
     return _without_islands(found, within, ISLAND * figure_px**2), counts
 
 
@@ -190,7 +186,8 @@ def _cut(
     chosen: Int[np.ndarray, "h w"],
     free: Mask,
     pair: tuple[int, int],
-    paints: tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w 3"]],
+    looks: Sequence[Look],
+    counts: Float[np.ndarray, "looks h w"],
 ) -> None:
     """Move, in place, the seam of two drawings to where they are most alike.
 
@@ -198,17 +195,40 @@ def _cut(
         chosen: of the drawings.
         free: pixels in which the seam may lie.
         pair: the drawings.
-        paints: their colours.
+        looks: all drawings, told by the artist's colours: a recoloured view has the same seams.
+        counts: what each counts.
     """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+
     rows, columns = (np.flatnonzero(dilate(free).any(axis=axis)) for axis in (1, 0))
     box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
-    held: Any = cv2.UMat  # its type does not know of arrays
-    masks = [held(((chosen == one) | free)[box].astype(np.uint8) * 255) for one in pair]
-    pictures = [held(paint[box] * np.float32(255)) for paint in paints]
-    finder = cv2.detail.GraphCutSeamFinder("COST_COLOR")
-    found = finder.find(pictures, [(0, 0), (0, 0)], masks)
-    for one, mask in zip(pair, found, strict=True):
-        chosen[box][free[box] & (np.asarray(mask.get()) > 0)] = one
+    own, inner = chosen[box], free[box]
+    node = np.where(own == pair[0], 0, np.where(own == pair[1], 1, -1))
+    node[inner] = np.arange(2, 2 + np.count_nonzero(inner))
+    paints = [looks[one].in_own[box] for one in pair]
+    unlike = ((paints[0] - paints[1]) ** 2).sum(axis=-1)
+    sides = []
+    for here, there in (
+        ((slice(None), slice(-1)), (slice(None), slice(1, None))),
+        ((slice(-1), slice(None)), (slice(1, None), slice(None))),
+    ):
+        first, second = node[here], node[there]
+        joined = (np.minimum(first, second) >= 0) & (np.maximum(first, second) >= 2)
+        price = (unlike[here] + unlike[there] + EVEN)[joined]
+        sides.append((first[joined], second[joined], price))
+    ratio = EVEN * np.log(counts[pair[0]][box][inner] / counts[pair[1]][box][inner])
+    sides.append((np.where(ratio > 0, 0, 1), node[inner], np.abs(ratio)))
+    first, second, price = (np.concatenate(each) for each in zip(*sides, strict=True))
+    both = (np.concatenate([first, second]), np.concatenate([second, first]))
+    size = int(node.max()) + 1
+    weights = np.concatenate([price, price]).astype(np.int32)
+    graph = coo_matrix((weights, both), shape=(size, size)).tocsr()
+    left = graph - maximum_flow(graph, 0, 1).flow
+    left.eliminate_zeros()
+    behind = np.ones(size, dtype=bool)
+    behind[breadth_first_order(left, 0, return_predecessors=False)] = False
+    own[inner] = np.where(behind[node[inner]], pair[1], pair[0])
 
 
 def mixed(

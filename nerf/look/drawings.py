@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Shaped, UInt8
 
-from toonset.camera import MIN_RELATIVE_DEPTH, Camera
+from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.look.features import Features, features_of
@@ -418,19 +418,10 @@ def places_in(
 ) -> tuple[Places, Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
     """Return where world points lie in a picture, their depth, and which are in front.
 
-    That is `Camera.project`, fast for many points, the first pixel's centre at 0; points behind
-    a pinhole lie far beyond the picture.
+    The first pixel's centre is at 0; points behind a pinhole lie far beyond the picture.
     """
-    world = np.moveaxis(points, -1, 0).reshape(3, -1)
-    local = camera.rotation @ world - (camera.rotation @ camera.target)[:, None]
-    across, down, depth = local.reshape(3, *points.shape[:-1])
-    relative = 1 + camera.k * depth
-    front = relative > MIN_RELATIVE_DEPTH
-    relative[~front] = np.inf
-    x, y = (
-        np.where(front, at * (scale / relative) + (middle - 0.5), -1e4).astype(np.float32)
-        for at, scale, middle in zip((across, down), camera.scale_uv, camera.center, strict=True)
-    )
+    pixels, depth, front = camera.project(points)
+    x, y = (np.nan_to_num(pixels[..., k] - 0.5, nan=-1e4).astype(np.float32) for k in (0, 1))
     return (x, y), depth, front
 
 

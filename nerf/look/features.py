@@ -18,12 +18,9 @@ from jaxtyping import Bool, Float, Int, Int16, UInt8
 from toonset.raster import depth_inside, dilate, distance_to, erode, nearest, sized_parts
 
 LOOKED_AT_PX = 360.0  # height of the figure: features are found in a copy no larger
-# Of the squared height. What is larger than SMALL is a feature if it is round and holds at most
-# MOST_IN small blots; else it is a face or a part of clothes, and they may be features
-SMALL, LARGEST, MOST_IN = 2e-3, 0.022, 2
+SMALL, LARGEST = 2e-3, 0.022  # of the squared height: what is between is a feature if it is round
 DISC = 0.5  # area over that of a circle as long as the outline: so round
-RIM = 0.01  # of the height: small blots so near a blot's outline are its line in pieces
-LONGEST, LINE = 0.17, 0.5  # of the height; share of a line that small blots make up
+LONGEST = 0.17  # of the height
 SMALLEST = 6e-5  # of the squared height
 CONTRAST, LEVELS = 26, 12  # of 255: blots differ so much from what is round them; steps
 ROUND = 1.2  # times the pen's width: the line round a blot is its
@@ -66,7 +63,7 @@ class Features:
         paint: (height, width, 3) without features, in [0, 1].
         labels: (height, width) of this paint.
         found: the features, the first with number 1.
-        blots: (height, width) small blots of any size, and what is beside them.
+        blots: (height, width) blots of any form, at the outline too, and what is beside them.
     """
 
     numbers: Int16[np.ndarray, "height width"]
@@ -101,12 +98,11 @@ def features_of(
     depth = depth_inside(cv2.resize(inside.view(np.uint8), size) > 0)
     width = pen[0] if pen else 1.0
     tall = figure_px * shrink
-    few, every = (
-        blots_of(cv2.split(small), depth > 0, most * tall**2, LEVELS) for most in (SMALL, LARGEST)
-    )
+    channels, sizes = cv2.split(small), [SMALL * tall**2, LARGEST * tall**2]
+    few, every = blots_of(channels, depth > 0, sizes, LEVELS)
     blots = _whole(every, few, tall)
-    anywhere = blots_of(cv2.split(small), np.ones_like(every), LARGEST * tall**2, LEVELS)
-    beside = cv2.resize(dilate(every | anywhere).view(np.uint8), inside.shape[::-1]) > 0
+    (anywhere,) = blots_of(channels, np.ones_like(every), sizes[1:], LEVELS)
+    beside = cv2.resize(dilate(anywhere).view(np.uint8), inside.shape[::-1]) > 0
     part = np.zeros(depth.shape, np.int64)
     if blots.any():
         near = (distance_to(blots > 0) <= max(1.0, ROUND * width * shrink + 1)) & (depth > 0)
@@ -161,55 +157,59 @@ def _numbered(
 
 
 def blots_of(
-    channels: Sequence[UInt8[np.ndarray, "height width"]], inside: Mask, most_px: float, step: int
-) -> Mask:
+    channels: Sequence[UInt8[np.ndarray, "height width"]],
+    inside: Mask,
+    most_px: Sequence[float],
+    step: int,
+) -> list[Mask]:
     """Return blots that are darker or lighter than all round them, away from the outline.
 
     Args:
         channels: of a picture.
         inside: pixels of the figure.
-        most_px: their area is smaller.
+        most_px: their area is smaller than each of these.
         step: between the levels at which they are looked for.
     """
     rim = inside & ~erode(inside)
-    marked = np.zeros(inside.shape, dtype=bool)
+    marked = [np.zeros(inside.shape, dtype=bool) for _ in most_px]
     for channel in channels:
         for values in (channel, 255 - channel):
             for level in range(CONTRAST, 256, step):
                 part, areas = sized_parts((values <= level) & inside)
-                few = areas < most_px
-                few[part[rim]] = False
-                few[0] = False
-                if few.any():
-                    marked |= few[part] & (values <= level - CONTRAST)
+                at_rim = part[rim]
+                for most, found in zip(most_px, marked, strict=True):
+                    few = areas < most
+                    few[at_rim] = False
+                    few[0] = False
+                    if few.any():
+                        found |= few[part] & (values <= level - CONTRAST)
     return marked
 
 
 def _whole(every: Mask, small: Mask, tall: float) -> Numbers:
     """Return the numbers of features among blots, the small ones of which may lie on larger ones.
 
-    What is long is a line, or clothes, hair, a face; and what holds many small ones is a face, too:
-    no feature, but what lies on it may be.
+    What is long, or large and not round, is a line, hair, a face or clothes: no feature, but what
+    lies on it may be.
     """
-    _, part, boxes, _ = cv2.connectedComponentsWithStats(every.view(np.uint8), connectivity=8)
-    count, on, own, _ = cv2.connectedComponentsWithStats(small.view(np.uint8), connectivity=8)
-    part, on, boxes, own = (np.asarray(each, np.int64) for each in (part, on, boxes, own))
-    areas, area = boxes[:, cv2.CC_STAT_AREA], own[:, cv2.CC_STAT_AREA]
-    lies_on = np.zeros(count, np.int64)
-    lies_on[on[small]] = part[small]
-    deep = np.ones(count, dtype=bool)
-    deep[on[depth_inside(every) <= RIM * tall]] = False  # the line round a blot may be in pieces
-    held = np.bincount(lies_on[1:], deep[1:], len(areas))
-    covered = np.bincount(lies_on[1:], area[1:], len(areas))
-    long, low = (_size(rows) > LONGEST * tall for rows in (boxes, own))
-    under = np.where(long, covered < LINE * areas, held > MOST_IN)
-    for one in np.flatnonzero(~long & ~under & (areas > SMALL * tall**2)):
+    (part, size, areas), (on, own_size, own_areas) = _measured(every), _measured(small)
+    under = size > LONGEST * tall
+    for one in np.flatnonzero(~under & (areas > SMALL * tall**2)):
         under[one] = _roundness(part == one) < DISC
-    kept = ~long & ~under & (areas >= SMALLEST * tall**2)
-    kept[0] = False
-    small_kept = ~low & under[lies_on] & (area >= SMALLEST * tall**2)
-    small_kept[0] = False
-    return np.where(kept[part], part, np.where(small_kept[on], on + len(areas), 0))
+    kept = ~under & (areas >= SMALLEST * tall**2)
+    lies_on = np.zeros(len(own_areas), np.int64)
+    lies_on[on[small]] = part[small]
+    own_kept = under[lies_on] & (own_size <= LONGEST * tall) & (own_areas >= SMALLEST * tall**2)
+    kept[0] = own_kept[0] = False
+    return np.where(kept[part], part, np.where(own_kept[on], on + len(areas), 0))
+
+
+def _measured(marked: Mask) -> tuple[Numbers, Int[np.ndarray, " parts"], Int[np.ndarray, " parts"]]:
+    """Return the number of every pixel's connected part, the parts' longer sides and areas."""
+    _, part, boxes, _ = cv2.connectedComponentsWithStats(marked.view(np.uint8), connectivity=8)
+    boxes = np.asarray(boxes, np.int64)
+    size = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+    return np.asarray(part, np.int64), size, boxes[:, cv2.CC_STAT_AREA]
 
 
 def _roundness(part: Mask) -> float:
@@ -217,7 +217,3 @@ def _roundness(part: Mask) -> float:
     outlines, _ = cv2.findContours(part.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     area, length = cv2.contourArea(outlines[0]), cv2.arcLength(outlines[0], True)
     return 4 * np.pi * area / max(length**2, 1.0)
-
-
-def _size(boxes: Int[np.ndarray, "parts 5"]) -> Int[np.ndarray, " parts"]:
-    return boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)

@@ -25,13 +25,12 @@ from toonset.nerf.look.paint_flow import between
 from toonset.raster import dilate
 
 SEEN = 0.35  # share of a feature that its drawing has to see
-# Times its width in the drawing: narrower ones are hidden, for wider ones the surface is wrong
-GRAZING, WIDEST, LARGER = 0.22, 4.0, 1.25
+# Times its width in the drawing: narrower ones are hidden, and what is larger is shown so large
+GRAZING, LARGER = 0.22, 1.25
 ACROSS, DOWN = 0.12, 0.04  # of the figure's height: features of two drawings farther apart are two
 ALIKE, SIZES = 0.3, 3.3  # of a channel; times the area: the same
 OWN = 0.5  # share of its place that shows its drawing
 NEARER = 0.09  # of the figure's height: what hides a feature is so much nearer
-HIDDEN = 0.25  # share of a feature: where less of it is hidden, it is the surface that errs
 FEWEST_PX = 6  # of a view
 FINE, SOFT = 1.4, 0.4  # pixels of a drawing per pixel of a view: from here on it is blurred; sigma
 STRAY, COARSE = 3e-3, 24  # of the squared height: smaller blots of a view; steps of theirs
@@ -205,7 +204,7 @@ def _places(
         if wide * look.scale > 1 / GRAZING:
             hidden[k] = True
             continue
-        if min(wide, tall) * look.scale < 1 / WIDEST or abs(shear) > wide:
+        if tall <= 0 or abs(shear) > wide:  # the surface is folded
             continue
         wide, tall = (max(slope, 1 / (LARGER * look.scale)) for slope in (wide, tall))
         if pixels[k] < SEEN * sizes[k] / (wide * tall):
@@ -261,9 +260,7 @@ def stamped(
         edge = cv2.BORDER_REPLICATE
         rgb = cv2.remap(picture[..., :3], *places, cv2.INTER_LINEAR, borderMode=edge)
         cover = cv2.remap(picture[..., 3], *places, cv2.INTER_LINEAR)
-        hidden = (depth[box] <= stamp.depth - nearer) & ~look.seen[box] & (cover > 0.5)
-        if hidden.sum() > HIDDEN * (cover > 0.5).sum():
-            cover = cover * ~hidden
+        cover = cover * ((depth[box] > stamp.depth - nearer) | look.seen[box])
         own = texture.labels[feature.rows, feature.columns]
         new = cv2.remap(own, *places, cv2.INTER_NEAREST, borderMode=edge)
         color[box] += cover[..., None] * (rgb - color[box])
@@ -280,7 +277,7 @@ def torn(
 ) -> Mask:
     """Return small blots of a view that the drawings do not have there, and what is beside them."""
     light = cv2.cvtColor((color * 255).astype(np.uint8), cv2.COLOR_RGB2GRAY)
-    blots = blots_of([light], inside, STRAY * figure_px**2, COARSE)
+    (blots,) = blots_of([light], inside, [STRAY * figure_px**2], COARSE)
     for number, look in enumerate(looks):
         own = chosen == number
         if (blots & own).any():

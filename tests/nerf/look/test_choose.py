@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from toonset.nerf.look.blend import _torn_off
+from toonset.nerf.look.blend import _afloat
 from toonset.nerf.look.choose import Look, choose
 
 SIZE = 120
@@ -17,7 +17,8 @@ INSIDE = np.ones((SIZE, SIZE), bool)
 def look_at(paint: np.ndarray, share: float, afloat: np.ndarray = ~INSIDE) -> Look:
     """Return a view that sees all of a drawing, straight on."""
     far = np.full(INSIDE.shape, 50.0, np.float32)
-    texture = SimpleNamespace(paint=paint, to_edge=far, afloat=afloat)
+    drawn = (paint * 255).astype(np.uint8)
+    texture = SimpleNamespace(paint=paint, in_own=drawn, to_edge=far, afloat=afloat)
     return Look(texture, X, Y, INSIDE, share, 1.0)  # type: ignore[arg-type]
 
 
@@ -43,7 +44,7 @@ def test_a_hand_that_floats_goes_unless_a_drawing_shows_it_so() -> None:
     solid[10:110, 10:60] = solid[20:40, 80:100] = True
     hand = solid & (X >= 80)
     paint = np.zeros((*INSIDE.shape, 3), np.float32)
-    off = _torn_off(solid, [look_at(paint, 1.0)])
+    off = _afloat(solid, [look_at(paint, 1.0)])
     assert off[hand].all()
     assert not off[solid & ~hand].any()
-    assert not _torn_off(solid, [look_at(paint, 0.5), look_at(paint, 0.5, hand)]).any()
+    assert not _afloat(solid, [look_at(paint, 0.5), look_at(paint, 0.5, hand)]).any()
