@@ -18,6 +18,8 @@ from toonset.cli.common.cutting import (
     CorrectionsOption,
     DropOption,
     GridOption,
+    GroupOption,
+    OutfitOption,
 )
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
@@ -133,6 +135,8 @@ def calibrate(
     grid: GridOption = "",
     background: BackgroundOption = "",
     drop: DropOption = "",
+    group: GroupOption = None,
+    outfit: OutfitOption = "",
     corrections: CorrectionsOption = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Bundle folder.", rich_help_panel=OUTPUT_PANEL)
@@ -162,7 +166,7 @@ def calibrate(
     hints.check()
     if front is not None and (labels or landmarks_only):
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
-    Cutting(boxes, grid, background, drop).check()
+    Cutting(boxes, grid, background, drop, group, outfit).check()
     printer = Printer(as_json, quiet, verbose)
     _check_files(sheets, hints, boxes, front=front is not None)
     given = None if str(mesh) == NO_BODY else mesh
@@ -176,6 +180,8 @@ def calibrate(
         drop=drop,
         labels=labels,
         corrections=corrections,
+        group=group,
+        outfit=outfit,
     )
     if front is not None:
         hints = replace(hints, labels=front_label(front, len(sheet.views)))

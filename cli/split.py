@@ -15,6 +15,8 @@ from toonset.cli.common.cutting import (
     BoxesOption,
     DropOption,
     GridOption,
+    GroupOption,
+    OutfitOption,
 )
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
 from toonset.write import check_output
@@ -38,6 +40,8 @@ def split(
     grid: GridOption = "",
     background: BackgroundOption = "",
     drop: DropOption = "",
+    group: GroupOption = None,
+    outfit: OutfitOption = "",
     labels: Annotated[
         str,
         typer.Option(
@@ -64,13 +68,20 @@ def split(
     from toonset.errors import PictureError, SheetError
     from toonset.read import check_there
 
-    Cutting(boxes, grid, background, drop).check()
+    Cutting(boxes, grid, background, drop, group, outfit).check()
     printer = Printer(as_json, quiet)
     check_there(sheets, "picture", PictureError)
     check_there([boxes], "boxes", SheetError)
     check_output(out, [*sheets, boxes], WRITTEN, force=force)
     sheet = split_sheet(
-        sheets, boxes=boxes, grid=grid, background=background, drop=drop, labels=labels
+        sheets,
+        boxes=boxes,
+        grid=grid,
+        background=background,
+        drop=drop,
+        labels=labels,
+        group=group,
+        outfit=outfit,
     )
     write_split(out, sheet.split, draw_sheet(sheet), sheet.options, force=force)
     _say(sheet, out, printer)
@@ -97,6 +108,10 @@ def _say(sheet: Sheet, out: Path, printer: Printer) -> None:
         if kinds:
             listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
             printer.say(f"  left out: {listed}")
+        if len(source.groups) > 1:
+            for number, one in enumerate(source.groups, start=1):
+                how = "taken" if one.taken else f"--group {number}"
+                printer.say(f"  group {number}: {one.why} ({how})")
         for remark in source.remarks:
             printer.say(f"  {remark}")
         if source.swatches:

@@ -15,6 +15,9 @@ from bench.messy.figure import (
     Rgb,
     Stamp,
     as_line_art,
+    bent,
+    bust_of,
+    mirrored,
     resized,
     shaded,
     with_colored_lines,
@@ -148,6 +151,14 @@ def compose_rows(
     if "props" in chosen:
         for prop in _props(brief.figure_px, rng):
             _insert(rows, prop, rng)
+    if "outfits" in chosen:
+        rows = [*rows, *(_dressed(row, rng) for row in rows * int(rng.integers(1, 3)))]
+    if "glued study" in chosen:
+        _glue(rows, cast, rng)
+    for name, make in (("busts", _busts), ("poses", _poses)):
+        if name in chosen:
+            items = make(cast, rng)
+            rows = [*rows, items] if rng.random() < 0.8 else [items, *rows]
     if "heads" in chosen:
         rows = _with_heads(rows, _studies(cast, brief.figure_px, rng), rng)
     return rows
@@ -205,6 +216,47 @@ def _studies(cast: Cast, figure_px: int, rng: np.random.Generator) -> list[Figur
     tallest = max(head.height for head in cast.heads)
     factor = min(share * figure_px / tallest, 1.0)
     return [resized(head, factor) for head in cast.heads[:count]]
+
+
+def _busts(cast: Cast, rng: np.random.Generator) -> list[Item]:
+    """Return a row of heads and shoulders, some of one drawing."""
+    share, scale = float(rng.uniform(0.35, 0.6)), float(rng.uniform(0.6, 1.0))
+    views = rng.integers(min(len(cast.figures), 3), size=int(rng.integers(3, 7)))
+    return [
+        Item(resized(bust_of(cast.figures[i], share), scale), is_view=False) for i in views.tolist()
+    ]
+
+
+def _poses(cast: Cast, rng: np.random.Generator) -> list[Item]:
+    """Return a row of small action poses, some with a bag at the hand."""
+    scale, made = float(rng.uniform(0.55, 0.85)), []
+    for i in rng.integers(len(cast.figures), size=int(rng.integers(3, 9))).tolist():
+        figure = mirrored(cast.figures[i]) if rng.random() < 0.5 else cast.figures[i]
+        lean = float(rng.choice([-1, 1]) * rng.uniform(0.1, 0.3))
+        pose = bent(figure, lean, float(rng.choice([0, rng.uniform(0, 0.6)])))
+        made.append(Item(resized(pose, scale), is_view=False))
+    return made
+
+
+def _glue(rows: list[list[Item]], cast: Cast, rng: np.random.Generator) -> None:
+    """Put a bust beside a figure so that the two touch, at the figure's head, hand or feet."""
+    bust = resized(bust_of(cast.figures[0], float(rng.uniform(0.25, 0.4))), 0.9)
+    row = rows[int(rng.integers(len(rows)))]
+    lifted = float(rng.choice([0.0, rng.uniform(0.5, 1.0)]))
+    study = Item(bust, is_view=False, closer_px=int(rng.integers(1, 4)), lifted=lifted)
+    row.insert(int(rng.integers(1, len(row) + 1)), study)
+
+
+def _dressed(row: list[Item], rng: np.random.Generator) -> list[Item]:
+    """Return the same drawings in other colours."""
+    order, level = rng.permutation(3), rng.uniform(0.6, 1.0, size=3)
+    items = []
+    for item in row:
+        assert isinstance(item.picture, Figure)
+        rgba = item.picture.rgba.copy()
+        rgba[..., :3] = np.rint(rgba[..., order] * level)
+        items.append(replace(item, picture=replace(item.picture, rgba=rgba)))
+    return items
 
 
 def _with_heads(

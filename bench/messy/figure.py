@@ -84,6 +84,45 @@ def resized(figure: Figure, factor: float) -> Figure:
     return Figure(rgba, ink, paper)
 
 
+def mirrored(figure: Figure) -> Figure:
+    """Return the figure as in a mirror."""
+    return Figure(figure.rgba[:, ::-1], figure.ink[:, ::-1], figure.paper[:, ::-1])
+
+
+def bust_of(figure: Figure, share: float) -> Figure:
+    """Return the upper share of the figure, cut off level."""
+    rows = max(round(share * figure.height), 1)
+    top = Figure(figure.rgba[:rows], figure.ink[:rows], figure.paper[:rows])
+    window = tight_window(top.rgba[..., 3])
+    return Figure(top.rgba[window], top.ink[window], top.paper[window])
+
+
+def bent(figure: Figure, lean: float, crouch: float) -> Figure:
+    """Return the figure in another pose: the body leans in a curve, the legs are shorter.
+
+    Args:
+        figure: standing.
+        lean: how far the head goes to the side, share of the height.
+        crouch: by how much the lower half is shortened, 0 to 1.
+    """
+    height, width = figure.height, figure.width
+    half = height // 2
+    lower = max(round((height - half) * (1 - crouch)), 1)
+    source = np.concatenate([np.arange(half), np.linspace(half, height - 1, lower)])
+    room = int(np.ceil(abs(lean) * height))
+    up = 1 - np.arange(len(source)) / len(source)
+    shift = lean * height * up**2
+    x = np.arange(width + 2 * room, dtype=np.float32)[None] - room - shift[:, None]
+    y = np.broadcast_to(source[:, None], x.shape)
+    places = x.astype(np.float32), y.astype(np.float32)
+    rgba = straight(cv2.remap(premultiply(figure.rgba), *places, cv2.INTER_LINEAR))
+    ink, paper = (
+        cv2.remap(layer, *places, cv2.INTER_LINEAR) for layer in (figure.ink, figure.paper)
+    )
+    window = tight_window(rgba[..., 3])
+    return Figure(rgba[window], ink[window], paper[window])
+
+
 def as_line_art(figure: Figure, ink_rgb: Rgb) -> Figure:
     """Return the figure's lines alone; what they enclose is paper, but still the figure."""
     alpha = figure.rgba[..., 3]

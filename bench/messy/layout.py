@@ -133,11 +133,14 @@ def _offsets(row: Sequence[Item], spacing: Spacing, cell: int) -> list[int]:
     if spacing.cells:
         return [i * cell + (cell - item.rgba.shape[1]) // 2 for i, item in enumerate(row)]
     xs = [0]
+    tallest = max(len(item.rgba) for item in row)
     for left, right in pairwise(row):
         if right.closer_px is None:
             step = left.rgba.shape[1] + spacing.gap
         else:
-            step = reach(left.rgba, right.rgba) - right.closer_px
+            hangs = round(right.lifted * (tallest - len(right.rgba)))
+            lifted = np.pad(right.rgba, ((0, hangs), (0, 0), (0, 0)))
+            step = reach(left.rgba, lifted) - right.closer_px
         xs.append(xs[-1] + step)
     return xs
 

@@ -33,7 +33,8 @@ OTHERS = (
     "open contour",
     "signature",
 )
-DIFFICULTIES = (*GROUNDS, *OTHERS)
+BESIDE = ("poses", "busts", "outfits", "glued study")  # drawn alone; no part of a mixture
+DIFFICULTIES = (*GROUNDS, *OTHERS, *BESIDE)
 GROUND_SHARES = (0.25, 0.2, 0.15, 0.1, 0.15, 0.15)  # of a mixture
 # the earlier one stays where both are drawn
 EXCLUSIVE = (
@@ -46,6 +47,7 @@ EXCLUSIVE = (
     ("overlap", "cells"),
     ("open contour", "line art"),  # open contours are line art already
     ("overlap", "touching"),
+    ("rows", "outfits"),
 )
 
 

@@ -44,6 +44,24 @@ GridOption = Annotated[
         rich_help_panel=CORRECTIONS_PANEL,
     ),
 ]
+GroupOption = Annotated[
+    int | None,
+    typer.Option(
+        "--group",
+        metavar="N",
+        help="Another group of equal figures, as listed: 2 is the second likeliest turnaround.",
+        rich_help_panel=CORRECTIONS_PANEL,
+    ),
+]
+OutfitOption = Annotated[
+    str,
+    typer.Option(
+        "--outfit",
+        metavar="LETTER",
+        help="One row of the group, where rows show other clothes: A is the uppermost.",
+        rich_help_panel=CORRECTIONS_PANEL,
+    ),
+]
 CorrectionsOption = Annotated[
     Path | None,
     typer.Option(

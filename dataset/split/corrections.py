@@ -7,20 +7,41 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import (
-    Blobs,
-    add_blocks,
-    find_blobs,
-    find_main_blobs,
-    remove_strangers,
-)
+from toonset.dataset.split.figures.blobs import Blobs, add_blocks, find_blobs, remove_strangers
+from toonset.dataset.split.figures.rows import Group, find_groups
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Which figures of a sheet are wanted.
+
+    Attributes:
+        group: number of the group, from 0, the likeliest turnaround.
+        outfit: number of its row, from 0; None: all of them.
+    """
+
+    group: int = 0
+    outfit: int | None = None
+
+    def of(self, groups: tuple[Group, ...]) -> Int[np.ndarray, " bodies"]:
+        """Return the figures' numbers; none where there is no such group or row."""
+        if self.group >= len(groups):
+            return np.zeros(0, dtype=int)
+        group = groups[self.group]
+        if self.outfit is None:
+            return group.members
+        return group.rows[self.outfit] if self.outfit < len(group.rows) else np.zeros(0, dtype=int)
+
+
+LIKELIEST = Taken()
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +58,8 @@ class SheetState:
         shadow: cells of cast shadows.
         paper: cells that the border reaches through background.
         blobs: patches of figures and other things.
-        bodies: numbers of the patches that are bodies of views; None: as `find_main_blobs` says.
+        taken: which group of figures is wanted.
+        bodies: numbers of the patches that are bodies of views; None: those of that group.
         cuts: where touching figures were cut apart.
     """
 
@@ -50,6 +72,7 @@ class SheetState:
     shadow: Bool[np.ndarray, "rows columns"]
     paper: Bool[np.ndarray, "rows columns"]
     blobs: Blobs
+    taken: Taken
     bodies: Int[np.ndarray, " bodies"] | None = None
     cuts: tuple[Cut, ...] = ()
 
@@ -62,17 +85,23 @@ class SheetState:
         painted: Bool[np.ndarray, "rows columns"],
         ring: Bool[np.ndarray, "rows columns"],
         ruled: Bool[np.ndarray, "rows columns"],
+        taken: Taken,
     ) -> SheetState:
         """Return what is known before anything is corrected."""
         paper = joined(~painted | ruled, ring)
         shadow = np.zeros_like(painted)
         known = rgba, ground, tolerance, painted, ring, ruled, shadow
-        return cls(*known, paper, find_blobs(~paper))
+        return cls(*known, paper, find_blobs(~paper), taken)
 
-    @property
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Return the groups of equal figures, the likeliest turnaround first."""
+        return find_groups(self.blobs)
+
+    @cached_property
     def main_blobs(self) -> Int[np.ndarray, " bodies"]:
         """Return the numbers of the patches that are bodies of views."""
-        return find_main_blobs(self.blobs) if self.bodies is None else self.bodies
+        return self.taken.of(self.groups) if self.bodies is None else self.bodies
 
 
 def remove_shadows(state: SheetState) -> SheetState | None:
@@ -90,7 +119,7 @@ def remove_shadows(state: SheetState) -> SheetState | None:
 def cut_touching_figures(state: SheetState) -> SheetState | None:
     """Propose touching figures apart."""
     painted = state.painted & ~state.ruled & ~state.shadow
-    blobs, cuts = part_touching(state.blobs, painted, state.rgba[..., :3])
+    blobs, cuts = part_touching(state.blobs, state.main_blobs, painted, state.rgba[..., :3])
     return replace(state, blobs=blobs, cuts=tuple(cuts)) if cuts else None
 
 

@@ -14,9 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.background import Background, difference, ring_of, with_final_tolerance
-from toonset.dataset.split.corrections import CORRECTIONS, SheetState
+from toonset.dataset.split.corrections import CORRECTIONS, LIKELIEST, SheetState, Taken
 from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.grouping import Grouping, group_blobs
+from toonset.dataset.split.figures.rows import Group
 from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
 from toonset.dataset.split.touching.cut import Cut
 from toonset.errors import SheetError
@@ -40,6 +41,8 @@ class SheetLayout:
         blobs: patches of figures and other things.
         grouping: which patch is whose.
         cuts: where touching figures were cut apart.
+        groups: equal figures, the likeliest turnaround first.
+        taken: which of them are the views.
     """
 
     cell_px: int
@@ -50,6 +53,8 @@ class SheetLayout:
     blobs: Blobs
     grouping: Grouping
     cuts: tuple[Cut, ...]
+    groups: tuple[Group, ...]
+    taken: Taken
 
 
 def find_paint(
@@ -73,11 +78,19 @@ def find_layout(
     paint: Bool[np.ndarray, "height width"],
     ground: Background,
     without: Sequence[str] = (),
+    taken: Taken = LIKELIEST,
 ) -> SheetLayout:
-    """Segment a sheet; `without` names corrections that are left out.
+    """Segment a sheet.
+
+    Args:
+        rgba: the sheet.
+        paint: pixels that are not background.
+        ground: the background.
+        without: names of corrections that are left out.
+        taken: which figures are wanted.
 
     Raises:
-        SheetError: there is no such correction.
+        SheetError: there is no such correction, group or row.
     """
     for name in without:
         if name not in CORRECTIONS:
@@ -94,15 +107,27 @@ def find_layout(
         painted,
         ring_of(painted.shape[0], painted.shape[1], ground.inset),
         line_pixels(painted, lines),
+        taken,
     )
     for name, propose in CORRECTIONS.items():
         if name not in without:
             state = propose(state) or state
+    if not len(state.main_blobs) and state.groups:
+        raise SheetError(_not_there(state.taken, state.groups))
     grouping = group_blobs(state.blobs, state.main_blobs, state.rgba[..., :3])
     return SheetLayout(
         *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
-        *(state.blobs, grouping, state.cuts),
+        *(state.blobs, grouping, state.cuts, state.groups, state.taken),
     )
+
+
+def _not_there(taken: Taken, groups: tuple[Group, ...]) -> str:
+    if taken.group >= len(groups):
+        return f"--group: the sheet has {len(groups)} groups of figures, numbered from 1"
+    rows = len(groups[taken.group].rows)
+    if rows == 1:
+        return "--outfit: the group has one row of figures; leave --outfit away"
+    return f"--outfit: the group has {rows} rows of figures, A to {chr(ord('A') + rows - 1)}"
 
 
 def in_cells(

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from toonset.dataset.silhouettes.line_width import contour_width_px
 from toonset.dataset.split.background import Background, find_background, flatten, is_transparent
+from toonset.dataset.split.corrections import LIKELIEST, Taken
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
@@ -29,6 +30,7 @@ from toonset.view import Box, View
 Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]  # pixels, as split.json may have them
 Place = Annotated[int, Field(strict=True, ge=0, le=10**6)]
 InSheet = tuple[Place, Place, Length, Length]
+LISTED = 0.02  # of the merit of the likeliest turnaround: groups with less are props
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
 
 NAMES = {
@@ -53,6 +55,7 @@ class SheetOptions:
         boxes: (x, y, width, height) of the figures where a person gives them; one view each, in
             this order.
         grid: columns and rows of equal cells, one view per cell that is not empty.
+        taken: which group of figures, where a person knows better than its evidence.
         without: names of corrections that are left out, of
             `toonset.dataset.split.corrections.CORRECTIONS`.
     """
@@ -63,6 +66,7 @@ class SheetOptions:
     background_rgb: tuple[int, int, int] | None = None
     boxes: tuple[Box, ...] = ()
     grid: tuple[int, int] | None = None
+    taken: Taken = LIKELIEST
     without: tuple[str, ...] = ()
 
 
@@ -93,6 +97,25 @@ class Swatch:
     color: Hex
 
 
+@dataclass(frozen=True)
+class FigureGroup:
+    """Equal figures of a sheet: a turnaround, or a row of busts, poses or props.
+
+    Attributes:
+        rows: (x, y, width, height) in the sheet of the figures of every row, from the top.
+        why: what speaks for it, for people.
+        likely: what speaks for it as a turnaround, beside the likeliest group: 0 to 1.
+        outfits: its rows show the same directions, so in other clothes.
+        taken: its figures are the views.
+    """
+
+    rows: tuple[tuple[InSheet, ...], ...]
+    why: Annotated[str, Field(max_length=200)]
+    likely: Annotated[float, Field(ge=0, le=1)]
+    outfits: bool = False
+    taken: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Segmentation:
     """The drawings of a sheet.
@@ -105,6 +128,7 @@ class Segmentation:
         left_out: what was seen but is not a view.
         remarks: what was done besides, for people.
         swatches: of the palette that the sheet prints, in reading order.
+        groups: of equal figures, the likeliest turnaround first.
     """
 
     views: tuple[View, ...]
@@ -114,6 +138,7 @@ class Segmentation:
     left_out: tuple[LeftOut, ...] = ()
     remarks: tuple[str, ...] = ()
     swatches: tuple[Swatch, ...] = ()
+    groups: tuple[FigureGroup, ...] = ()
 
 
 def split_picture(
@@ -138,7 +163,7 @@ def split_picture(
         rgba = flatten(rgba)
     ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
-    found = find_layout(rgba, paint, ground, options.without)
+    found = find_layout(rgba, paint, ground, options.without, options.taken)
     _check(found, ground, options)
     crops = _crops(found, paint, options)
     views, holes = _views(rgba, ground, crops, options)
@@ -151,6 +176,7 @@ def split_picture(
         () if by_hand else _left_out(found),
         _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
         swatches,
+        () if by_hand else _groups(found),
     )
 
 
@@ -177,6 +203,10 @@ def _enlarged(found: Segmentation, blocks: Grid) -> Segmentation:
         left_out=tuple(replace(one, box=box_of(one.box)) for one in found.left_out),
         remarks=(remark, *found.remarks),
         swatches=tuple(replace(one, box=box_of(one.box)) for one in found.swatches),
+        groups=tuple(
+            replace(one, rows=tuple(tuple(map(box_of, row)) for row in one.rows))
+            for one in found.groups
+        ),
     )
 
 
@@ -283,10 +313,37 @@ def _swatches(found: SheetLayout) -> tuple[Swatch, ...]:
     )
 
 
+def _groups(found: SheetLayout) -> tuple[FigureGroup, ...]:
+    """Return the groups of figures without props and single drawings, in order."""
+    cell, most = found.cell_px, max((group.merit for group in found.groups), default=1.0)
+    worth = [len(one.members) > 1 and one.merit >= LISTED * most for one in found.groups]
+    shown = max(1, found.taken.group + 1, sum(worth[1:]) + 1)
+
+    def in_sheet(box: np.ndarray) -> InSheet:
+        x, y, width, height = (int(value) * cell for value in box)
+        return x, y, width, height
+
+    listed = []
+    for number, group in enumerate(found.groups[:shown]):
+        figures, rows = len(group.members), len(group.rows)
+        why = f"{figures} figure{'s' * (figures > 1)}" + (f" in {rows} rows" if rows > 1 else "")
+        why += f", {group.height * cell:.0f} px high"
+        if len(found.groups) > 1 and figures > 1:
+            why += f", outlines {100 * group.likeness**0.5:.0f} % alike"
+        boxes = tuple(tuple(map(in_sheet, found.blobs.boxes[row])) for row in group.rows)
+        listed.append(
+            FigureGroup(boxes, why, group.merit / most, group.outfits, number == found.taken.group)
+        )
+    return tuple(listed)
+
+
 def _remarks(ground: Background, found: SheetLayout, holes: int, cuts: int) -> tuple[str, ...]:
     said = [] if ground.kind in ("plain", "transparent") else [str(ground)]
     kinds = found.grouping.kinds
     said += [f"{NAMES[kind]} left out ({kinds.count(kind)})" for kind in NAMES if kind in kinds]
+    if found.groups and found.groups[found.taken.group].outfits and found.taken.outfit is None:
+        last = chr(ord("A") + len(found.groups[found.taken.group].rows) - 1)
+        said.append(f"the rows show the same directions: take one with --outfit A to {last}")
     if found.lines:
         said.append(f"ruled lines were taken for paper ({len(found.lines)})")
     if found.shadow.any():

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.split.background import Background
-from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
+from toonset.dataset.split.figures.blobs import Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
+from toonset.dataset.split.figures.rows import LOWEST
 from toonset.dataset.split.segment import SheetLayout
 from toonset.view import View
 
@@ -17,6 +18,7 @@ PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the na
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
+AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
 WIDE = 1.8  # times the median width: two figures that touch
 
 
@@ -35,6 +37,7 @@ def figure_warnings(
         *_cuts(found),
         *_wide_views(views),
         *_near_parts(found, views),
+        *_other_groups(found),
         *_like_views(found, views, rgba),
     )
 
@@ -100,14 +103,34 @@ def _gap(blobs: Blobs, part: int, body: int) -> float:
     return float(max(left + columns[0] - x - width, x - left - columns[-1] - 1, 0) / tall)
 
 
+def _other_groups(found: SheetLayout) -> list[str]:
+    """Return a line for every other group that may be the turnaround, too."""
+    taken = found.groups[found.taken.group]
+    said = []
+    for number, group in enumerate(found.groups):
+        if group is taken or group.merit < AS_LIKELY * taken.merit or found.taken.group:
+            continue
+        x, y = (int(v) * found.cell_px for v in found.blobs.boxes[group.members, :2].min(axis=0))
+        said.append(
+            f"{len(group.members)} drawings from {x}, {y} on may be the turnaround, too: take "
+            f"them with --group {number + 1}"
+        )
+    return said
+
+
 def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
-    """Return a line for every drawing left out that is as high as a view, or like a small one."""
+    """Return a line for every drawing left out that is as high as a view, or like a small one.
+
+    Drawings of another row of equal figures are poses or busts, which the row says.
+    """
+    rows = [row for group in found.groups for row in group.rows if len(row) > 1]
+    in_rows = set(np.concatenate([np.zeros(0, int), *rows]).tolist())
     usual = float(np.median([view.figure_box[3] for view in views]))
     shapes = [view.figure_box[2] / view.figure_box[3] for view in views]
     colors = [view.rgba[view.mask][:, :3] for view in views]
     said, cell = [], found.cell_px
     for number, kind in enumerate(found.grouping.kinds):
-        if kind != "study":
+        if kind != "study" or number in in_rows:
             continue
         x, y, width, height = (int(value) * cell for value in found.blobs.boxes[number])
         if height < NEARLY_A_VIEW * usual:

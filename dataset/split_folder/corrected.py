@@ -55,6 +55,8 @@ class Given:
         said = {
             "boxes": ("boxes", self.content.boxes),
             "grid": ("boxes", self.content.boxes),
+            "group": ("boxes", self.content.boxes),
+            "outfit": ("boxes", self.content.boxes),
             "background": ("background", self.content.background),
             "drop": ("views.exclude", any(view.exclude for view in self.content.views)),
             "views": ("views.label", any(view.label for view in self.content.views)),

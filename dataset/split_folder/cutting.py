@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from toonset.dataset.split.corrections import Taken
 from toonset.errors import PaletteError, SheetError, UsageError
 from toonset.palette.formats.hex import rgb_of_typed
 
@@ -22,12 +23,16 @@ class Cutting:
         grid: columns and rows of equal cells, "8x1".
         background: colour of the paper.
         drop: numbers of views to leave out, "3,5" or "3-5".
+        group: number of the group of figures, from 1; None: the likeliest turnaround.
+        outfit: letter of a row of the group, "A" is the uppermost; "": all rows.
     """
 
     boxes: Path | None = None
     grid: str = ""
     background: str = ""
     drop: str = ""
+    group: int | None = None
+    outfit: str = ""
 
     def check(self) -> None:
         """Refuse what contradicts itself or cannot be understood, before any file is read.
@@ -38,7 +43,11 @@ class Cutting:
         """
         if self.boxes is not None and self.grid:
             raise UsageError("--boxes and --grid both say where the figures are; drop one")
-        _ = self.dropped, self.background_rgb, self.cells
+        by_hand = "--boxes" if self.boxes is not None else "--grid" if self.grid else ""
+        for name, value in (("--group", self.group), ("--outfit", self.outfit)):
+            if value and by_hand:
+                raise UsageError(f"{by_hand} and {name} both say which figures count; drop one")
+        _ = self.dropped, self.background_rgb, self.cells, self.taken
 
     @property
     def dropped(self) -> frozenset[int]:
@@ -75,9 +84,28 @@ class Cutting:
         return columns, rows
 
     @property
+    def taken(self) -> Taken:
+        """Return which group of figures is wanted."""
+        if self.group is not None and self.group < 1:
+            raise SheetError(f"--group: {self.group} is no group; the first one is 1")
+        letter = self.outfit.strip().upper()
+        if letter and not re.fullmatch("[A-Z]", letter):
+            raise SheetError(
+                f"--outfit: {self.outfit!r} is no row; write a letter, as in --outfit A"
+            )
+        row = ord(letter) - ord("A") if letter else None
+        return Taken(0 if self.group is None else self.group - 1, row)
+
+    @property
     def given(self) -> tuple[str, ...]:
         """Return the names of the options that say how a sheet is cut."""
-        named = {"--boxes": self.boxes, "--background": self.background, "--grid": self.grid}
+        named = {
+            "--boxes": self.boxes,
+            "--background": self.background,
+            "--grid": self.grid,
+            "--group": self.group,
+            "--outfit": self.outfit,
+        }
         return tuple(name for name, value in named.items() if value)
 
     def as_options(self) -> dict[str, Any]:
@@ -87,6 +115,8 @@ class Cutting:
             "drop": self.drop,
             "background": self.background,
             "grid": self.grid,
+            "group": self.group or "",
+            "outfit": self.outfit,
         }
         return {name: value for name, value in named.items() if value}
 

@@ -86,6 +86,8 @@ def split_sheet(
     drop: str = "",
     labels: str = "",
     corrections: str | Path | None = None,
+    group: int | None = None,
+    outfit: str = "",
 ) -> Sheet:
     """Return the drawings of a character sheet, cut out with alpha.
 
@@ -98,6 +100,9 @@ def split_sheet(
         drop: leave these out, as numbered without it: "3,5" or "3-5".
         labels: what each view shows, in sheet order: "front,3q,side,back", yaws in degrees, "?".
         corrections: file of what a person corrected of one of the sheets (docs/formats.md).
+        group: number of the group of equal figures, from 1, as split.json lists them; None: the
+            likeliest turnaround.
+        outfit: letter of a row of the group, "A" is the uppermost; "": all rows.
 
     Raises:
         ToonsetError: a file is not a picture or shows no figure, is given twice, a split folder is
@@ -106,11 +111,19 @@ def split_sheet(
     paths = [sheet] if isinstance(sheet, str | Path) else sheet
     if not paths:
         raise UsageError("split_sheet: no sheet; give a picture, several, or a folder")
-    cutting = Cutting(None if boxes is None else Path(boxes), grid, background, drop)
+    cutting = Cutting(None if boxes is None else Path(boxes), grid, background, drop, group, outfit)
     cutting.check()
     given = None if corrections is None else Given.of(corrections)
     if given is not None:
-        given.check_beside(boxes=boxes, grid=grid, background=background, drop=drop, views=labels)
+        given.check_beside(
+            boxes=boxes,
+            grid=grid,
+            background=background,
+            drop=drop,
+            views=labels,
+            group=group,
+            outfit=outfit,
+        )
     return _labelled(_load([Path(path) for path in paths], cutting, given), labels)
 
 
@@ -182,7 +195,9 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOp
         raise SheetError(
             f"{cutting.given[0]}: {folder} is cut already; give the sheet that it was cut from"
         )
-    common = SheetOptions(background_rgb=cutting.background_rgb, grid=cutting.cells)
+    common = SheetOptions(
+        background_rgb=cutting.background_rgb, grid=cutting.cells, taken=cutting.taken
+    )
     options = [None if cut else common for cut in is_cut]
     if cutting.boxes is None:
         return options

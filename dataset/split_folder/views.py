@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from toonset.dataset.split.sheet import LeftOut, Length, Segmentation, Swatch
+from toonset.dataset.split.sheet import FigureGroup, LeftOut, Length, Segmentation, Swatch
 from toonset.palette.palette import Hex
 from toonset.view import View
 
@@ -29,6 +29,7 @@ class Source:
         left_out: what was seen in it but is not a view.
         remarks: what was done besides, for people.
         swatches: of the palette that it prints, in reading order.
+        groups: of equal figures, the likeliest turnaround first.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Source:
     left_out: tuple[LeftOut, ...] = ()
     remarks: tuple[str, ...] = ()
     swatches: tuple[Swatch, ...] = ()
+    groups: tuple[FigureGroup, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segm
     digest = sha256(data).hexdigest()
     source = Source(
         *(name, digest, size_wh, sheet.background, sheet.warnings, sheet.left_out),
-        *(sheet.remarks, sheet.swatches),
+        *(sheet.remarks, sheet.swatches, sheet.groups),
     )
     return Split((source,), sheet.views, (0,) * len(sheet.views))
 

@@ -1,8 +1,4 @@
-"""Find the connected components that are the drawn views' bodies, in reading order.
-
-The views of a turnaround show one character, so they are about equally high: of all heights the one
-counts that explains most of what is drawn, tall things first.
-"""
+"""Hold the connected patches of a sheet, and compare what is painted in them."""
 
 from __future__ import annotations
 
@@ -12,11 +8,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.dataset.split.figures.text_and_swatches import find_letters
 from toonset.view import Box
 
-LOWEST = 0.75  # of the views' median height: lower drawings are studies or props
-HIGHEST = 1.45  # of the same: higher ones, too
 LEAST_AREA = 0.25  # of the views' median area: a side view is rarely below a third of a front view
 SMALLER = 0.85  # of the views' median height or area
 STRANGE = 0.6  # of what the views commonly share of their colours: less is another thing
@@ -64,20 +57,6 @@ def as_box(numbers: Int[np.ndarray, " 4"]) -> Box:
     """Return x, y, width, height as plain numbers."""
     x, y, width, height = (int(value) for value in numbers)
     return x, y, width, height
-
-
-def find_main_blobs(blobs: Blobs) -> Int[np.ndarray, " main_blobs"]:
-    """Return the numbers of the patches that are the bodies of the views, in no order."""
-    large = np.flatnonzero(blobs.areas >= LEAST_SPECK)
-    letters = np.zeros(len(blobs.areas), dtype=bool)
-    letters[large] = find_letters(blobs.boxes[large], int(blobs.boxes[:, 3].max(initial=0)))
-    fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
-    drawn = large[~letters[large]]
-    figurative = drawn[fill[drawn] < RECTANGLE]
-    for candidates in (figurative, drawn, large):  # a sheet of boxes still has views
-        if len(candidates):
-            return candidates[_of_one_height(blobs.boxes[candidates, 3], blobs.areas[candidates])]
-    return large
 
 
 def add_blocks(
@@ -149,10 +128,10 @@ def _look(colors: UInt8[np.ndarray, "_ 3"]) -> Float[np.ndarray, " 64"]:
     return np.bincount(codes, minlength=64) / max(len(codes), 1)
 
 
-def reading_order(
+def rows_of(
     boxes: Int[np.ndarray, "n 4"], centers: Float[np.ndarray, "n 2"]
-) -> Int[np.ndarray, " n"]:
-    """Return the order of boxes: rows from the top, from left to right within each.
+) -> list[Int[np.ndarray, " row"]]:
+    """Return the numbers of boxes row by row from the top, from left to right within each.
 
     A box belongs to a row if it shares at least half of the smaller height with the row's first.
     """
@@ -167,22 +146,11 @@ def reading_order(
                 break
         else:
             rows.append([int(index)])
-    return np.array(
-        [i for row in rows for i in sorted(row, key=lambda i: centers[i, 0])], dtype=int
-    )
+    return [np.array(sorted(row, key=lambda i: centers[i, 0])) for row in rows]
 
 
-def _of_one_height(
-    heights: Int[np.ndarray, " n"], areas: Int[np.ndarray, " n"]
-) -> Bool[np.ndarray, " n"]:
-    """Return which patches are of the height that explains most: area, number, and tallness."""
-    best, merit = np.zeros(len(heights), dtype=bool), -1.0
-    for height in np.unique(heights[areas >= 0.02 * areas.max()]):
-        alike = (heights >= LOWEST * height) & (heights <= height / LOWEST)
-        alike &= areas >= LEAST_AREA * np.median(areas[alike])
-        middle = float(np.median(heights[alike]))
-        alike &= (heights >= LOWEST * middle) & (heights <= HIGHEST * middle)
-        score = float(areas[alike].sum()) * int(alike.sum()) * middle**2
-        if score > merit:
-            best, merit = alike, score
-    return best
+def reading_order(
+    boxes: Int[np.ndarray, "n 4"], centers: Float[np.ndarray, "n 2"]
+) -> Int[np.ndarray, " n"]:
+    """Return the order of boxes: `rows_of` one after the other."""
+    return np.concatenate([np.zeros(0, dtype=int), *rows_of(boxes, centers)])

@@ -1,7 +1,8 @@
 """Group connected components into views, and classify the rest.
 
 A patch that is no body of a view is a part of one (a floating hat, a hand apart) if it lies within
-or close to it, or if most views have the like at the same level; else it is left out under a name.
+or close to it and between the head and ground lines of its row, or if most views have the like at
+the same level; else it is left out under a name.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import Blobs, reading_order
+from toonset.dataset.split.figures.blobs import LEVEL, Blobs, reading_order, rows_of
 from toonset.dataset.split.figures.printed_palette import (
     Patches,
     are_swatches,
@@ -86,10 +87,13 @@ def group_blobs(
         swatches = in_palette | find_swatches(blobs.boxes[small], blobs.areas[small])
         typical = float(np.median(blobs.areas[main_blobs]))
         bodies = main_blobs[nearest]
+        out = _off_level(blobs, small, bodies, _levels(blobs, main_blobs)[nearest])
         for i, number in enumerate(small):
             within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
             in_row = (bool(letters[i] | swatches[i]) and not within) or bool(in_palette[i])
-            if not in_row and _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
+            if in_row or out[i] > LEVEL:
+                continue
+            if _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
                 figure[number] = nearest[i]
         again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(main_blobs), rgb)
         figure[small[again]] = nearest[again]
@@ -129,6 +133,35 @@ def _nearest_main(
         nearest.append(main_of_zone[zones[window].flat[place]])
         gaps.append(gap.flat[place])
     return np.array(nearest), np.array(gaps)
+
+
+def _levels(
+    blobs: Blobs, main_blobs: Int[np.ndarray, " main_blobs"]
+) -> Float[np.ndarray, "main_blobs 2"]:
+    """Return the head line and the ground line of every body's row: medians."""
+    ends = blobs.boxes[main_blobs, 1:2] + np.outer(blobs.boxes[main_blobs, 3], [0, 1])
+    levels = np.empty(ends.shape)
+    for row in rows_of(blobs.boxes[main_blobs], blobs.centers[main_blobs]):
+        alone = len(row) == 1  # nothing is known of its lines
+        levels[row] = (-np.inf, np.inf) if alone else np.median(ends[row], axis=0)
+    return levels
+
+
+def _off_level(
+    blobs: Blobs,
+    numbers: Int[np.ndarray, " n"],
+    bodies: Int[np.ndarray, " n"],
+    levels: Float[np.ndarray, "n 2"],
+) -> Float[np.ndarray, " n"]:
+    """Return how far patches rise over the head line of their row or hang below its ground line.
+
+    In heights of their figures, which may rise and hang themselves.
+    """
+    top, body_top = blobs.boxes[numbers, 1], blobs.boxes[bodies, 1]
+    bottom, body_bottom = top + blobs.boxes[numbers, 3], body_top + blobs.boxes[bodies, 3]
+    over = np.minimum(levels[:, 0], body_top) - top
+    below = bottom - np.maximum(levels[:, 1], body_bottom)
+    return np.maximum(over, below) / blobs.boxes[bodies, 3]
 
 
 def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) -> bool:

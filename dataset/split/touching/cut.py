@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import Blobs, find_main_blobs
+from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.touching.costs import look_at
 from toonset.dataset.split.touching.profiles import flanks, largest_piece
 from toonset.dataset.split.touching.selection import WIDE_ALONE, Option, best_option, find_options
@@ -78,6 +78,7 @@ class _Patches:
 
 def part_touching(
     blobs: Blobs,
+    main_blobs: Int[np.ndarray, " main_blobs"],
     painted: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
 ) -> tuple[Blobs, list[Cut]]:
@@ -87,10 +88,11 @@ def part_touching(
 
     Args:
         blobs: the patches.
+        main_blobs: those that may be several figures.
         painted: pixels that are not of the background's colour.
         rgb: the sheet.
     """
-    main_blobs, cuts = find_main_blobs(blobs), list[Cut]()
+    cuts = list[Cut]()
     patches = _Patches(blobs.labels.copy(), painted, rgb, {}, {})
     for number in main_blobs:
         patches.measure(int(number) + 1, blobs.window(int(number)))

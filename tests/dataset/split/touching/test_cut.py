@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from toonset.dataset.split.figures.blobs import find_blobs
+from toonset.dataset.split.figures.rows import find_groups
 from toonset.dataset.split.touching.costs import look_at
 from toonset.dataset.split.touching.cut import Cut, part_touching
 from toonset.dataset.split.touching.profiles import CAP, flanks, right_flank, unlikeness
@@ -35,7 +36,9 @@ def row(width: int, *people: tuple[int, int, int]) -> np.ndarray:
 def parted(rgb: np.ndarray) -> tuple[list[tuple[int, ...]], list[Cut]]:
     """Return the boxes of the patches from left to right, and the cuts."""
     painted = (rgb != 255).any(axis=-1)
-    blobs, cuts = part_touching(find_blobs(painted), painted, rgb)
+    found = find_blobs(painted)
+    groups = find_groups(found)
+    blobs, cuts = part_touching(found, groups[0].members, painted, rgb)
     return sorted(tuple(int(v) for v in box) for box in blobs.boxes), cuts
 
 

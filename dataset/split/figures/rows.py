@@ -1,0 +1,186 @@
+"""Find groups of equal figures: rows of one height on one ground line, and rank them.
+
+A turnaround is a group: a row of whole drawings, or several rows as high. Beside it a page shows
+busts, expressions, poses and props, often more of them. Three things tell the turnaround: it is
+drawn largest, it is several, and its outlines come again, mirrored from behind or from the other
+side, as those of poses do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from toonset.dataset.split.figures.blobs import LEAST_AREA, LEAST_SPECK, RECTANGLE, Blobs, rows_of
+from toonset.dataset.split.figures.text_and_swatches import find_letters
+
+LOWEST = 0.75  # of the group's median height: lower drawings are studies or props
+HIGHEST = 1.45  # of the same: higher ones, too
+LARGE = 0.02  # of the largest patch's area: smaller things make no group
+AS_HIGH = 0.88  # of a row's height: another row that is lower is no part of its group
+MOST_COUNTED = 4  # figures of a group: more speak no more for a turnaround
+ALONE = 0.5  # likeness of a figure alone, to set beside that of figures in a row
+LEAST_COLUMNS = 2  # figures of a row that may be one outfit of several
+SAME_OUTLINE = 0.75  # IoU of two drawings of one direction in other clothes
+CLEARLY_SAME = 0.06  # IoU, mean of a row: so much more alike as they are than mirrored
+ROWS = 64  # at which outlines are compared
+SHIFTED = 0.25  # of the height: so far outlines are shifted to lie on each other
+MOST_COMPARED = 64  # figures of one group
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Equal figures of a sheet.
+
+    Attributes:
+        rows: from the top, numbers of the patches of each row from left to right.
+        height: median of the figures' heights, in cells.
+        likeness: mean square of how well each figure's outline covers that of the most like other
+            one, mirrored or not: IoU, 0 to 1; `ALONE` squared where there is nothing to compare.
+        outfits: its rows show the same directions, so in other clothes.
+    """
+
+    rows: tuple[Int[np.ndarray, " row"], ...]
+    height: float
+    likeness: float
+    outfits: bool
+
+    @property
+    def members(self) -> Int[np.ndarray, " figures"]:
+        """Return the numbers of all its patches, in reading order."""
+        return np.concatenate(self.rows)
+
+    @property
+    def merit(self) -> float:
+        """Return how much speaks for a turnaround: size, number, and outlines that come again."""
+        counted = min(len(self.members), MOST_COUNTED)
+        return counted * self.height**3 * self.likeness
+
+
+def find_groups(blobs: Blobs) -> tuple[Group, ...]:
+    """Return the groups of figures, the likeliest turnaround first; () where nothing is drawn.
+
+    After the first, single drawings come last.
+    """
+    candidates = _candidates(blobs)
+    if not len(candidates):
+        return ()
+    rows = [
+        part
+        for row in rows_of(blobs.boxes[candidates], blobs.centers[candidates])
+        for part in _of_one_height(blobs, candidates[row])
+    ]
+    joined = list[list[np.ndarray]]()
+    for row in sorted(rows, key=lambda row: -_weight(blobs, row)):
+        height = float(np.median(blobs.boxes[row, 3]))
+        for others in joined:
+            first = float(np.median(blobs.boxes[others[0], 3]))
+            if AS_HIGH <= height / first <= 1 / AS_HIGH:
+                others.append(row)
+                break
+        else:
+            joined.append([row])
+    groups = [_group(blobs, rows, alone=len(joined) == 1) for rows in joined]
+    best, *others = sorted(groups, key=lambda group: -group.merit)
+    return (best, *sorted(others, key=lambda group: len(group.members) == 1))
+
+
+def _candidates(blobs: Blobs) -> Int[np.ndarray, " candidates"]:
+    """Return the patches that may be figures."""
+    large = np.flatnonzero(blobs.areas >= LEAST_SPECK)
+    letters = np.zeros(len(blobs.areas), dtype=bool)
+    letters[large] = find_letters(blobs.boxes[large], int(blobs.boxes[:, 3].max(initial=0)))
+    fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
+    drawn = large[~letters[large]]
+    figurative = drawn[fill[drawn] < RECTANGLE]
+    for candidates in (figurative, drawn, large):  # a sheet of boxes still has views
+        if len(candidates):
+            areas = blobs.areas[candidates]
+            return candidates[areas >= LARGE * areas.max()]
+    return large
+
+
+def _of_one_height(blobs: Blobs, row: Int[np.ndarray, " row"]) -> list[Int[np.ndarray, " figures"]]:
+    """Return the parts of a row whose patches are about equally high, the weightiest first."""
+    parts, rest = [], row
+    while len(rest):
+        heights, areas = blobs.boxes[rest, 3], blobs.areas[rest]
+        best, most = np.zeros(len(rest), dtype=bool), -1.0
+        for height in np.unique(heights):
+            alike = (heights >= LOWEST * height) & (heights <= height / LOWEST)
+            alike &= areas >= LEAST_AREA * np.median(areas[alike])
+            middle = float(np.median(heights[alike]))
+            alike &= (heights >= LOWEST * middle) & (heights <= HIGHEST * middle)
+            weight = _weight(blobs, rest[alike])
+            if weight > most:
+                best, most = alike, weight
+        parts.append(rest[best])
+        rest = rest[~best]
+    return parts
+
+
+def _weight(blobs: Blobs, row: Int[np.ndarray, " row"]) -> float:
+    """Return how much a row explains: area, number, and height."""
+    if not len(row):
+        return 0.0
+    return float(blobs.areas[row].sum() * len(row) * np.median(blobs.boxes[row, 3]) ** 2)
+
+
+def _group(blobs: Blobs, parts: list[np.ndarray], *, alone: bool) -> Group:
+    """Return rows as a group; the only one of a sheet need not be compared with others."""
+    members = np.concatenate(parts)
+    order = rows_of(blobs.boxes[members], blobs.centers[members])
+    rows = tuple(members[row] for row in order)
+    outlines = {int(n): _outline(blobs, int(n)) for n in members[:MOST_COMPARED]}
+    likeness = ALONE**2
+    if not alone and len(members) > 1:
+        likeness = float(np.mean(_likeness([*outlines.values()]) ** 2))
+    height = float(np.median(blobs.boxes[members, 3]))
+    return Group(rows, height, likeness, _are_outfits(rows, outlines))
+
+
+def _are_outfits(rows: tuple[np.ndarray, ...], outlines: dict[int, np.ndarray]) -> bool:
+    """Return whether the rows show the same directions one below the other.
+
+    A second row of a turnaround goes on turning: its outlines are mirror images of the first's.
+    """
+    counts = {len(row) for row in rows}
+    if len(rows) < 2 or len(counts) > 1 or len(rows[0]) < LEAST_COLUMNS:
+        return False
+    if sum(len(row) for row in rows) > len(outlines):
+        return False
+    for row in rows[1:]:
+        pairs = [(outlines[int(a)], outlines[int(b)]) for a, b in zip(rows[0], row, strict=True)]
+        same = np.array([_overlap(a, b) for a, b in pairs])
+        turned = np.array([_overlap(a, b[:, ::-1]) for a, b in pairs])
+        if same.min() < SAME_OUTLINE or (same - turned).mean() < CLEARLY_SAME:
+            return False
+    return True
+
+
+def _outline(blobs: Blobs, number: int) -> Bool[np.ndarray, "rows width"]:
+    """Return a patch with what it encloses, `ROWS` high."""
+    mask = np.ascontiguousarray(blobs.mask(number)).view(np.uint8)
+    width = max(1, round(mask.shape[1] * ROWS / mask.shape[0]))
+    return cv2.resize(255 * mask, (width, ROWS), interpolation=cv2.INTER_AREA) > 127
+
+
+def _likeness(outlines: list[np.ndarray]) -> Float[np.ndarray, " figures"]:
+    """Return per outline its best overlap with another one, mirrored or not."""
+    found = np.zeros(len(outlines))
+    for i, j in combinations(range(len(outlines)), 2):
+        both = max(_overlap(outlines[i], other) for other in (outlines[j], outlines[j][:, ::-1]))
+        found[i], found[j] = max(found[i], both), max(found[j], both)
+    return found
+
+
+def _overlap(a: Bool[np.ndarray, "rows _"], b: Bool[np.ndarray, "rows _"]) -> float:
+    """Return the largest IoU of two outlines that are shifted sideways."""
+    length = a.shape[1] + b.shape[1]
+    spectra = [np.fft.rfft(mask.astype(np.float32), length, axis=1) for mask in (a, b)]
+    shared = np.fft.irfft((spectra[0] * spectra[1].conj()).sum(axis=0), length).max()
+    return float(shared / (a.sum() + b.sum() - shared))
