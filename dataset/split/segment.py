@@ -114,7 +114,8 @@ def find_layout(
             state = propose(state) or state
     if not len(state.main_blobs) and state.groups:
         raise SheetError(_not_there(state.taken, state.groups))
-    grouping = group_blobs(state.blobs, state.main_blobs, state.rgba[..., :3])
+    studies = [cut.study for cut in state.cuts if cut.study is not None]
+    grouping = group_blobs(state.blobs, state.main_blobs, state.rgba[..., :3], studies)
     return SheetLayout(
         *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
         *(state.blobs, grouping, state.cuts, state.groups, state.taken),

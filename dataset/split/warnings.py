@@ -46,8 +46,9 @@ def _cuts(found: SheetLayout) -> list[str]:
     said = []
     for cut in (cut for cut in found.cuts if cut.in_doubt):
         x, y, width, height = (value * found.cell_px for value in cut.box)
+        two = "two figures touch" if cut.study is None else "a figure and a study touch"
         said.append(
-            f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "
+            f"{two} within {width} x {height} px at {x}, {y}; they were cut apart "
             f"through {100 * cut.crossed:.1f} % of their height: look whether the cut is right"
         )
     return said

@@ -7,6 +7,7 @@ the same level; else it is left out under a name.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -26,6 +27,7 @@ NEAR = 0.02  # of the figure's height: a part this near to the figure is the fig
 ABOVE = 0.08  # of the figure's height: so near something above may be its part
 BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
 FARTHEST = 0.3  # of the figure's height: a part that most views have is no farther
+HAT = 0.25  # of the figure's height: a part over the head line of the row is no higher
 FEET = 0.95  # of the figure's height from its top: no part's middle lies lower
 SAME_LEVEL = 0.08  # of the figure's height
 SAME_SIZE = 2.5  # times, of shares of the figure's area
@@ -66,6 +68,7 @@ def group_blobs(
     blobs: Blobs,
     main_blobs: Int[np.ndarray, " main_blobs"],
     rgb: UInt8[np.ndarray, "height width 3"],
+    studies: Sequence[int] = (),
 ) -> Grouping:
     """Return which figure every patch belongs to, and what the others are.
 
@@ -73,6 +76,7 @@ def group_blobs(
         blobs: the patches.
         main_blobs: those that are the bodies of the views.
         rgb: the sheet.
+        studies: patches that are known to be drawings of their own.
     """
     main_blobs = main_blobs[reading_order(blobs.boxes[main_blobs], blobs.centers[main_blobs])]
     figure = np.full(len(blobs.areas), -1)
@@ -91,11 +95,13 @@ def group_blobs(
         for i, number in enumerate(small):
             within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
             in_row = (bool(letters[i] | swatches[i]) and not within) or bool(in_palette[i])
-            if in_row or out[i] > LEVEL:
+            if in_row or out[i] > LEVEL or number in studies:
                 continue
             if _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
                 figure[number] = nearest[i]
-        again = ~letters & ~swatches & _come_again(blobs, small, bodies, gap, len(main_blobs), rgb)
+        hat = (out <= LEVEL) | (blobs.boxes[small, 3] <= HAT * blobs.boxes[bodies, 3])
+        again = ~letters & ~swatches & hat & ~np.isin(small, studies)
+        again &= _come_again(blobs, small, bodies, gap, len(main_blobs), rgb)
         figure[small[again]] = nearest[again]
         for i, number in enumerate(small):
             if figure[number] >= 0:

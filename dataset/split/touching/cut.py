@@ -19,6 +19,7 @@ from toonset.dataset.split.touching.selection import WIDE_ALONE, Option, best_op
 from toonset.view import Box
 
 WORST = 25.0  # of a cut's badness: what is worse goes through a single figure
+WORST_STUDY = 10.0  # the same of a cut between a figure and a study: right ones have 2 to 8
 LEAST_HEIGHT = 24  # cells: in a lower patch no two figures can be told
 THROUGH = 0.7  # of an enclosed patch's height that a cut runs through: a gap between two figures
 MOST_ENCLOSED = 0.25  # of a patch in the background's colour: more is a line drawing
@@ -33,11 +34,13 @@ class Cut:
         box: (x, y, width, height) of the two together, in the cells of the labels.
         crossed: paint that the cut goes through, as a share of the height.
         sure: chance that it is right, among the cuts that were found between the two.
+        study: number of the patch that is no figure but a smaller drawing, or None.
     """
 
     box: Box
     crossed: float
     sure: float
+    study: int | None = None
 
     @property
     def in_doubt(self) -> bool:
@@ -105,7 +108,7 @@ def part_touching(
         cut = _part(patches, label, top + 1)
         if cut is not None:
             top += 1
-            queue += [label, top]
+            queue += [one for one in (label, top) if one - 1 != cut.study]
             cuts.append(cut)
     return (_measured(patches.labels, top) if cuts else blobs), cuts
 
@@ -123,11 +126,10 @@ def _part(patches: _Patches, label: int, new: int) -> Cut | None:
     options = find_options(
         cut_costs, small, [side for two in patches.sides.values() for side in two]
     )
+    options = [one for one in options if one.badness <= (WORST_STUDY if one.study else WORST)]
     if not options:
         return None
     best, sure = best_option(options, cut_costs.drawn > 0.5)
-    if best.badness > WORST:
-        return None
     box = patches.boxes[label]
     columns = _enlarged(best, mask.shape)
     labels = patches.labels[window]
@@ -135,7 +137,8 @@ def _part(patches: _Patches, label: int, new: int) -> Cut | None:
     labels[_crossed(mask & ~paint, columns)] = 0
     patches.measure(label, window)
     patches.measure(new, window)
-    return Cut(box, best.crossed, sure)
+    study = {"left": label - 1, "right": new - 1}.get(best.study)
+    return Cut(box, best.crossed, sure, study)
 
 
 def _enlarged(option: Option, shape: tuple[int, ...]) -> Int[np.ndarray, " height"]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
@@ -24,6 +25,8 @@ DEAREST = 0.3  # of the height in paint: a way that costs more is not looked at
 MOST_CROSSED = 0.4  # of the height in paint, lines or not: figures touch, they do not merge
 AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
 AS_LARGE = 0.3  # of the patch's area: the same, for two figures of equal size less
+HEAD = 0.12  # of the patch's height: a head is as thick, an arm is not
+MOST_STUDY = 0.6  # of the figure's area: a study beside it has no more
 WIDE_ALONE = 0.5  # times its own height: what is wider may be two figures
 TWO_WIDE = 0.7  # times its own height: what is narrower is rarely two figures
 ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
@@ -46,6 +49,7 @@ class Option:
             ends on a straight side, unlikeness of its left and its right side: all 0 at best.
         crossed: paint that it goes through, in heights.
         ends: in heights, where the left figure ends and where the right one begins.
+        study: "left" or "right" where that piece is a smaller drawing, "" where both are figures.
     """
 
     seam: Seam
@@ -53,6 +57,7 @@ class Option:
     evidence: tuple[float, float, float, float, float]
     crossed: float
     ends: tuple[float, float]
+    study: str = ""
 
     @property
     def badness(self) -> float:
@@ -96,13 +101,34 @@ def _option(
     if not (inside & right).any() or not (inside & ~right).any():
         return None
     one, two = largest_piece(inside & ~right), largest_piece(inside & right)
-    if not _are_figures(inside, one, two) or shared_colors(colors[one], colors[two]) < ALIKE:
+    figures = _are_figures(inside, one, two)
+    study = "" if figures else _study(one, two)
+    if not (figures or study) or shared_colors(colors[one], colors[two]) < ALIKE:
         return None
     sides = right_flank(one), right_flank(two[:, ::-1])
-    unlike = unlikeness(sides[0], [*others, sides[1]]), unlikeness(sides[1], [*others, sides[0]])
+    if study:
+        lone = unlikeness(sides[study == "left"], others)
+        unlike = lone, lone
+    else:
+        unlike = (
+            unlikeness(sides[0], [*others, sides[1]]),
+            unlikeness(sides[1], [*others, sides[0]]),
+        )
     ends = np.flatnonzero(one.any(axis=0))[-1], np.flatnonzero(two.any(axis=0))[0]
     evidence = (*_crossing(cut_costs, seam), *unlike)
-    return Option(seam, right, evidence, crossed, (ends[0] / height, ends[1] / height))
+    return Option(seam, right, evidence, crossed, (ends[0] / height, ends[1] / height), study)
+
+
+def _study(one: np.ndarray, two: np.ndarray) -> str:
+    """Return which piece is a head or a bust beside a figure, "left", "right" or "" for none."""
+    height = len(one)
+    for side, piece, other in (("left", one, two), ("right", two, one)):
+        rows = np.flatnonzero(other.any(axis=1))
+        depth = cv2.distanceTransform(np.pad(piece, 1).view(np.uint8), cv2.DIST_L2, 3).max()
+        if rows[-1] + 1 - rows[0] >= AS_HIGH * height and 2 * depth >= HEAD * height:
+            if piece.sum() <= MOST_STUDY * other.sum():
+                return side
+    return ""
 
 
 def _are_same(a: Option, b: Option, cut_costs: CutCosts) -> bool:

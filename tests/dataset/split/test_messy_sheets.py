@@ -16,7 +16,7 @@ from toonset.errors import SheetError
 
 WHITE, RED, BLUE, SKIN = (255, 255, 255), (200, 30, 40), (20, 60, 180), (236, 188, 155)
 GREY, BLACK = (80, 80, 80), (10, 10, 10)
-HARD = ("touching", "overlap")  # not always right: see `python -m bench split`
+HARD = ("touching", "overlap", "glued study")  # not always right: see `python -m bench split`
 
 
 def paper(width: int, height: int) -> np.ndarray:
