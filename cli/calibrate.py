@@ -253,7 +253,13 @@ def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Prin
 
 
 def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
-    from toonset.calib.verdict.report import evidence_line, model_line, undrawn_line, view_line
+    from toonset.calib.verdict.report import (
+        evidence_line,
+        lying_line,
+        model_line,
+        undrawn_line,
+        view_line,
+    )
 
     for fit in found.landmarks:
         if fit.misplaced:
@@ -267,6 +273,8 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
         printer.say(view_line(view))
     if undrawn := undrawn_line(found):
         printer.say(undrawn)
+    if lying := lying_line(found):
+        printer.doubt(lying)
     verdict = f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else "")
     (printer.say if found.is_certain else printer.doubt)(verdict)
     after = shlex.join(["toonset", "palette", str(out)])

@@ -175,7 +175,7 @@ def file_name(place: str) -> str:
 
 def _whole(files: Any, path: str) -> list[str]:
     """Return a file behind a URL, and, of a mesh, those in its folder that it is read with."""
-    from toonset.dataset.mesh.named_files import ends_of, matches
+    from toonset.dataset.mesh.mtl import ends_of, matches
     from toonset.dataset.mesh.obj import material_files
 
     if not path.lower().endswith(".obj"):
@@ -211,7 +211,7 @@ def _files(root: Path) -> list[Path]:
 
 def _with_materials(mesh: Path) -> list[Path]:
     """Return a mesh, and the files in its folder that it is read with."""
-    from toonset.dataset.mesh.named_files import beside
+    from toonset.dataset.mesh.mtl import beside
     from toonset.dataset.mesh.obj import material_files
 
     def find(name: str) -> str | None:

@@ -34,6 +34,7 @@ from toonset.errors import LandmarkError
 from toonset.view import View
 
 LEAST_POINTS = 3  # fewer leave the camera's turn open
+UNTURNED = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,7 @@ def read_landmarks(
 
 
 def read_known_points(
-    mesh_path: Path, world_from_file: Float[np.ndarray, "3 3"] = np.eye(3)
+    mesh_path: Path, world_from_file: Float[np.ndarray, "3 3"] = UNTURNED
 ) -> dict[str, Numbers]:
     """Return the named points beside a mannequin's file, turned as it was; empty without them.
 

@@ -133,8 +133,10 @@ def _pieces(file: GltfFile) -> tuple[list[RawTriangles], list[str]]:
                 raise MeshError(f"{file.path}: {name} has strips; export it as plain triangles")
             if mode == TRIANGLES:
                 piece = _piece(file, index, primitive, world, name)
+                if piece is None or piece.remarks:
+                    own = _material_name(file, primitive) or name
+                    unseen.append(own if piece is None else f"parts of {own}")
                 if piece is None:
-                    unseen.append(_material_name(file, primitive) or name)
                     continue
                 pieces.append(piece)
                 vertices += len(piece.vertices)
@@ -175,9 +177,12 @@ def _piece(
         mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
     shown = whole(len(faces)) if cut is None else cut
     colors = surface.colors(shown.parents, shown.middles)
+    said: tuple[str, ...] = ()
     if cut is not None:
         vertices, faces = cut.apply(vertices, faces)
-    return RawTriangles(vertices, faces[:, ::-1] if mirrored else faces, colors, None, (name,))
+        said = ("cut",)
+    faces = faces[:, ::-1] if mirrored else faces
+    return RawTriangles(vertices, faces, colors, None, (name,), said)
 
 
 def _morphed(

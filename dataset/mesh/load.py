@@ -26,6 +26,7 @@ from toonset.read import describe, read_whole
 
 MAX_BYTES = 256 * 2**20
 MAX_FACES = 1_000_000
+LYING = 1.5  # times its height: a deeper mesh may lie on its back (docs/decisions.md)
 READERS = {
     **{"obj": read_obj, "ply": read_ply, "stl": read_stl, "glb": read_gltf, "gltf": read_gltf},
     "off": read_off,
@@ -62,7 +63,7 @@ def load_mesh(
     if up == "z":
         raw = raw.turned(Z_UP)
     mesh = without_surroundings(weld_mesh(raw, path))
-    return replace(mesh, sha256=sha256(data).hexdigest())
+    return replace(mesh, sha256=sha256(data).hexdigest(), remarks=(*mesh.remarks, *_lying(mesh)))
 
 
 def save_obj(mesh: Mesh) -> bytes:
@@ -85,6 +86,15 @@ def save_obj(mesh: Mesh) -> bytes:
         lines.append(f"o {'_'.join(mesh.part_names[part].split()) or 'part'}")
         lines += [f"f {a} {b} {c}" for a, b, c in (faces[parts == part] + 1).tolist()]
     return ("\n".join(lines) + "\n").encode()
+
+
+def _lying(mesh: Mesh) -> tuple[str, ...]:
+    """Return a line if the mesh is so much deeper than high that it may lie on its back."""
+    _, height, depth = np.ptp(mesh.vertices, axis=0).tolist()
+    if mesh.up == "z" or depth < LYING * height:
+        return ()
+    deep = f"is {depth:.3g} deep and {height:.3g} high"
+    return (f"{mesh.name}: {deep}: if it lies on its back, +Z is up in the file: give --up z",)
 
 
 def _kind(data: bytes, path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Read Wavefront MTL: what a material's colour, texture and opacity are.
+"""Read Wavefront MTL: what a material's colour, texture and opacity are, and where its files lie.
 
 newmtl NAME
 Kd r g b                  colour
@@ -10,8 +10,12 @@ map_d [options] FILE      opacity's texture: the alpha, or else the grey
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+import unicodedata
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -23,6 +27,7 @@ OPTIONS = {  # of a texture, and the most words that follow each
     **dict.fromkeys(("-o", "-s", "-t"), 3),
 }
 SEVERAL = ("-mm", "-o", "-s", "-t")  # as many numbers as follow
+MOST_FOLDERS = 16  # of a path that are tried
 
 Color = tuple[int, ...]
 
@@ -185,3 +190,61 @@ def _rgb(words: list[str]) -> Color:
     except ValueError:  # too few, no numbers, or NaN
         return UNKNOWN_COLOR
     return red, green, blue
+
+
+def beside(mesh_path: Path, name: str) -> Path | None:
+    """Return the file below the mesh's own folder that a name means; None if there is none."""
+    folder = os.path.realpath(mesh_path.parent)
+
+    def names_in(place: str) -> Sequence[str]:
+        try:
+            return os.listdir(os.path.join(folder, place))
+        except OSError:
+            return ()
+
+    for found in matches(name, names_in):
+        file = os.path.realpath(os.path.join(folder, found))
+        if os.path.commonpath([folder, file]) == folder and os.path.isfile(file):
+            return Path(file)
+    return None
+
+
+def matches(name: str, names_in: Callable[[str], Sequence[str]]) -> Iterator[str]:
+    """Yield the paths below a folder that a name may mean, the likeliest first.
+
+    Args:
+        name: as a file has it.
+        names_in: returns the names in a folder below that folder, "" for itself.
+    """
+    for written in dict.fromkeys([name, unquote(name)]):
+        for end in ends_of(written):
+            found = ""
+            for part in end:
+                names = names_in(found)
+                own = part if part in names else _alike(part, names)
+                if own is None:
+                    break
+                found = f"{found}/{own}" if found else own
+            else:
+                yield found
+
+
+def ends_of(name: str) -> Iterator[list[str]]:
+    """Yield the ends of a path, folder by folder, the longest first; nothing of one to no file."""
+    path = name.strip().strip("\"'").replace("\\", "/")
+    parts = [part for part in path.split("/") if part not in ("", ".")]
+    if "\0" in name or not parts:
+        return
+    for start in range(max(0, len(parts) - MOST_FOLDERS), len(parts)):
+        if ".." not in parts[start:]:
+            yield parts[start:]
+
+
+def _alike(name: str, names: Sequence[str]) -> str | None:
+    """Return the name that differs in capitals or in how its accents are written only."""
+    wanted = _plain(name)
+    return next((one for one in sorted(names) if _plain(one) == wanted), None)
+
+
+def _plain(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()

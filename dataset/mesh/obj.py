@@ -156,9 +156,14 @@ def _with_materials(
         colors = colors[cut.parents]
     if cut is None:
         return replace(raw, colors=colors)
+    whole = np.zeros(len(of_face), dtype=bool)
+    whole[cut.parents[cut.whole]] = True
+    lost = [materials[number] for number in np.unique(of_face[~whole])]
+    said = f"left out what is transparent of {listed(lost)}"
     vertices, faces = cut.apply(raw.vertices, raw.faces)
     parts = None if raw.parts is None else raw.parts[cut.parents]
-    return replace(raw, vertices=vertices, faces=faces, colors=colors, parts=parts)
+    remarks = (*raw.remarks, said)
+    return replace(raw, vertices=vertices, faces=faces, colors=colors, parts=parts, remarks=remarks)
 
 
 def _words(line: str) -> list[str]:
@@ -168,7 +173,7 @@ def _words(line: str) -> list[str]:
 
 def _rest(line: str) -> str:
     """Return what follows the first word of a line, as it is."""
-    return (line.split(None, 1) + [""])[1].strip()
+    return line.strip().partition(line.split(None, 1)[0])[2].strip()
 
 
 def _text(data: bytes) -> str:

@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.images.picture import load_rgba
-from toonset.dataset.mesh.mtl import UNKNOWN_COLOR, Map, Material, library_names, read_mtl
-from toonset.dataset.mesh.named_files import beside
+from toonset.dataset.mesh.mtl import UNKNOWN_COLOR, Map, Material, beside, library_names, read_mtl
 from toonset.dataset.mesh.texture import Cut, Texture, cut_away, whole
 from toonset.errors import MeshError
 from toonset.read import read_whole

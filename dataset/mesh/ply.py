@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int, UInt8
@@ -231,7 +232,7 @@ class _Binary:
 
     def _dtype(self, element: Element) -> np.dtype:
         """Return the record of all rows if their lists are as long as those of the first."""
-        fields: list[tuple] = []
+        fields: list[Any] = []
         for each in element.properties:
             kind = np.dtype(self.order + each.kind)
             if not each.length_kind:

@@ -21,7 +21,7 @@ FLAT = 0.1  # of its width: a slab may be so thick
 LARGE = 0.5  # of the mesh's largest extent: less is never wider than the rest is tall
 ASIDE = 0.05  # of the rest's height: feet sink so far into a floor
 LEVEL, UPRIGHT = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))  # of a normal's height
-LEAST_REST = 0.2  # of a backdrop's height: a smaller rest is not what stands before it
+LEAST_REST = 0.1  # of a backdrop's height: a smaller rest is not what stands before it
 
 
 def without_surroundings(mesh: Mesh) -> Mesh:
@@ -124,11 +124,8 @@ def connected_pieces(mesh: Mesh) -> tuple[Int[np.ndarray, " faces"], Int[np.ndar
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    parts = (
-        np.zeros(len(mesh.faces), dtype=np.int64) if mesh.face_parts is None else mesh.face_parts
-    )
-    corners = mesh.faces.astype(np.int64)
-    if mesh.face_parts is not None:
+    parts, corners = mesh.face_parts, mesh.faces.astype(np.int64)
+    if parts is not None:
         keys = parts[:, None] * len(mesh.vertices) + corners
         corners = np.unique(keys, return_inverse=True)[1].reshape(-1, 3)
     count = int(corners.max()) + 1
@@ -138,7 +135,7 @@ def connected_pieces(mesh: Mesh) -> tuple[Int[np.ndarray, " faces"], Int[np.ndar
     of_corner = connected_components(graph, directed=False)[1]
     found, pieces = np.unique(of_corner[corners[:, 0]], return_inverse=True)
     part_of = np.zeros(len(found), dtype=np.int64)
-    part_of[pieces] = parts
+    part_of[pieces] = 0 if parts is None else parts
     return pieces, part_of
 
 
