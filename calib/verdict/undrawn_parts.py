@@ -19,16 +19,16 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 HEIGHT_PX = 200  # of the pictures in which it is looked for
-LARGE = 0.15  # of the mesh's largest extent: smaller parts bend no camera
-MOST_PARTS = 12  # the largest are looked at
+LARGE = 0.15  # of the second largest part's extent: smaller ones bend no camera
+MOST_PARTS = 12  # are looked at
 AWAY = 0.05  # of the figure's height: a part must stick out so far to be missed
 SPILL = 0.02  # of the figure's height: paint beside a drawn part
-MOST_DRAWN = 0.2  # of what only the part shows: less is chance
+MOST_MISSED = 0.5  # of what only the part shows (docs/decisions.md)
 POINTS = 400  # of a part
 
 
 def undrawn_part(mesh: Mesh, cameras: Sequence[Camera], drawings: Sequence[View]) -> str:
-    """Return the name of the largest part that is in no drawing; "" if all are drawn.
+    """Return the name of a part that is in no drawing; "" if all are drawn.
 
     Args:
         mesh: the mannequin as it was fitted.
@@ -47,7 +47,7 @@ def undrawn_part(mesh: Mesh, cameras: Sequence[Camera], drawings: Sequence[View]
             seen += int(alone.sum())
             missed += int((alone & (outside > SPILL)).sum())
             farthest = max(farthest, float(outside[alone].max(initial=0)))
-        if seen and farthest > AWAY and missed > (1 - MOST_DRAWN) * seen:
+        if seen and farthest > AWAY and missed > MOST_MISSED * seen:
             return name
     return ""
 
@@ -89,29 +89,41 @@ class _Drawn:
 
 
 def _parts(mesh: Mesh) -> Iterator[tuple[str, Bool[np.ndarray, " faces"]]]:
-    """Yield name and faces of the largest parts and loose pieces, none of them the most of it."""
+    """Yield name and faces of parts and loose pieces, those that matter most to the outline."""
     pieces, part_of = connected_pieces(mesh)
     if len(part_of) == 1:
         return
-    groups: list[tuple[float, str, Int[np.ndarray, " faces"]]] = []
     numberings = [(pieces, False)]
     if mesh.face_parts is not None:
         numberings.append((part_of[pieces], True))
-    widest = float(np.ptp(mesh.vertices, axis=0).max())
+    groups: list[tuple[float, str, Int[np.ndarray, " faces"]]] = []
     for numbers, is_part in numberings:
         order = np.argsort(numbers, kind="stable")
-        for own in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1):
-            corners = mesh.vertices[mesh.faces[own]].reshape(-1, 3)
-            extent = float(np.ptp(corners, axis=0).max())
-            if extent >= LARGE * widest and len(own) < len(mesh.faces):
+        faces = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
+        extents, overhangs = _sizes(mesh, faces)
+        least = LARGE * np.sort(extents)[-2]  # the largest may be a scene around all others
+        for own, extent, overhang in zip(faces, extents, overhangs, strict=True):
+            if extent >= least:
                 part = mesh.part_names[part_of[pieces[own[0]]]]
                 named = is_part or len(mesh.part_names) > 1
-                groups.append((extent, part if named else f"a piece of {len(own)} faces", own))
+                name = part if named else f"piece of {len(own)} faces"
+                groups.append((float(extent + overhang), name, own))
     groups.sort(key=lambda group: -group[0])
     for _, name, own in groups[:MOST_PARTS]:
-        faces = np.zeros(len(mesh.faces), dtype=bool)
-        faces[own] = True
-        yield name, faces
+        chosen = np.zeros(len(mesh.faces), dtype=bool)
+        chosen[own] = True
+        yield name, chosen
+
+
+def _sizes(
+    mesh: Mesh, groups: Sequence[Int[np.ndarray, " faces"]]
+) -> tuple[Float[np.ndarray, " groups"], Float[np.ndarray, " groups"]]:
+    """Return the extent of every group of faces, and how far it leaves the box of all others."""
+    corners = [mesh.vertices[mesh.faces[own]].reshape(-1, 3) for own in groups]
+    high = np.array([[*own.max(axis=0), *-own.min(axis=0)] for own in corners])
+    first, second = np.sort(high, axis=0)[-1], np.sort(high, axis=0)[-2]
+    overhangs = np.where(high == first, first - second, 0).max(axis=1)
+    return (high[:, :3] + high[:, 3:]).max(axis=1), overhangs
 
 
 def _points(mesh: Mesh, faces: Bool[np.ndarray, " faces"]) -> Float[np.ndarray, "points 3"]:
