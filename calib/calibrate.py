@@ -21,7 +21,6 @@ from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
 from toonset.calib.result import Calibration
 from toonset.calib.verdict.checks import check_names, off_labels
-from toonset.calib.verdict.undrawn_parts import undrawn_part
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.mannequin_world import in_mannequin_world
@@ -111,10 +110,6 @@ def calibrate(
             if better is not None:
                 origin = _origin(views, body, hints, seed, options)
                 refused = in_mannequin_world(better, views, body.mesh)
-                cameras = [view.camera for view in found.views]
-                if part := undrawn_part(body.mesh, cameras, views):
-                    reason = f"{refused.reason}; no drawing shows its {part}"
-                    refused = replace(refused, reason=reason)
                 return replace(refused, drawings=tuple(views), origin=origin)
     drawings, found = at_cuts(views, found)
     drawings, filled = fill_false_holes(drawings, found.views, found.mannequin)

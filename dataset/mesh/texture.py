@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-FINEST = 16  # pieces along an edge of a triangle that is cut
+FINEST = 32  # pieces along an edge of a triangle that is cut (docs/decisions.md)
 TEXELS = 2.0  # along an edge per piece: a finer cut would follow single texels
 MOST_PIECES = 200_000  # of all triangles that are cut: more cards are cut more coarsely
 SLICE = 1 << 18  # pieces that are looked at together

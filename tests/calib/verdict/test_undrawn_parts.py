@@ -48,7 +48,7 @@ def drawn(mesh: Mesh, at: list[Camera]) -> list[View]:
     for number, camera in enumerate(at):
         mask = np.isfinite(depth_map(mesh.vertices, mesh.faces, camera))
         rgba = np.where(mask[..., None], np.uint8(255), np.uint8(0)).repeat(4, axis=2)
-        views.append(View(f"{number:03}.png", rgba, (0, 0, *camera.size_wh)))
+        views.append(View(rgba, (0, 0, *camera.size_wh), 0.0, f"{number:03}.png"))
     return views
 
 

@@ -97,7 +97,8 @@ def test_concave_polygons_of_files(kind: str, tmp_path: Path) -> None:
         + " ".join(map(str, range(1, count + 1)))
         + "\n",
         "ply": f"ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\n"
-        "property float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "property float y\nproperty float z\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n"
         f"{rows}{count} {indices}\n",
         "off": f"OFF\n{count} 1 0\n{rows}{count} {indices}\n",
     }[kind]
