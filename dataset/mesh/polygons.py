@@ -67,7 +67,7 @@ def _not_convex(
     corners, polygons = corners[several], polygons[several]
     if not len(polygons):
         return polygons
-    inside = (indices >= 0) & (indices < len(vertices))
+    inside = np.asarray((indices >= 0) & (indices < len(vertices)))
     known = inside[corners].all(axis=1)
     a, b, c = (vertices[np.where(inside, indices, 0)[corners[:, i]]] for i in range(3))
     with np.errstate(invalid="ignore", over="ignore"):

@@ -44,7 +44,7 @@ class Texture:
         moved = uvs
         if self.offset.any() or not np.array_equal(self.matrix, np.eye(2)):
             moved = uvs @ self.matrix.T + self.offset
-        finite = np.isfinite(moved).all(axis=1)
+        finite = np.asarray(np.isfinite(moved).all(axis=1))
         height, width = self.rgba.shape[:2]
         u, v = np.where(finite[:, None], moved, 0.0).T % 1.0
         column = np.minimum((u * width).astype(int), width - 1)

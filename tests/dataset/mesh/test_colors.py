@@ -231,12 +231,14 @@ def uri_of(kind: str = "PNG") -> str:
     """Return a picture as a data URI: red on the left, teal on the right."""
     data = io.BytesIO()
     Image.fromarray(np.array([[RED, TEAL]] * 2, dtype=np.uint8).repeat(8, 0).repeat(8, 1)).save(
-        data, kind, **({"lossless": True} if kind == "WEBP" else {})
+        data, kind, lossless=True
     )
     return "data:image/x;base64," + base64.b64encode(data.getvalue()).decode()
 
 
-def painted(material: dict[str, Any], tmp_path: Path, kind: str = "PNG", **root: Any) -> Mesh:
+def painted(
+    material: dict[str, Any], tmp_path: Path, kind: str = "PNG", *, root: Any = None
+) -> Mesh:
     """Return a mesh whose texture coordinates lie on the left, second ones on the right."""
     left = np.array([[0.2, 0.5], [0.3, 0.5], [0.25, 0.4], [0.2, 0.4]], dtype=np.float32)
     document = {
@@ -244,9 +246,9 @@ def painted(material: dict[str, Any], tmp_path: Path, kind: str = "PNG", **root:
         "textures": [{"source": 0}],
         "materials": [material],
         "meshes": one_primitive(TEXCOORD_0=2, TEXCOORD_1=3, material=0),
-        **root,
+        **(root or {}),
     }
-    arrays = (POINTS, FACES, left, left + np.float32([0.5, 0]))
+    arrays = (POINTS, FACES, left, left + np.array([0.5, 0], dtype=np.float32))
     return load(tmp_path, "a.gltf", json.dumps(gltf(ONE_NODE | document, *arrays)))
 
 
@@ -280,14 +282,14 @@ TEXTURED = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
 
 def test_gltf_webp_and_other_textures(tmp_path: Path) -> None:
     webp = {"textures": [{"extensions": {"EXT_texture_webp": {"source": 0}}}]}
-    assert color_of(painted(TEXTURED, tmp_path, "WEBP", **webp)) == RED
+    assert color_of(painted(TEXTURED, tmp_path, "WEBP", root=webp)) == RED
     both = {"textures": [{"source": 0, "extensions": {"KHR_texture_basisu": {"source": 7}}}]}
-    assert color_of(painted(TEXTURED, tmp_path, **both)) == RED
+    assert color_of(painted(TEXTURED, tmp_path, root=both)) == RED
     for name in ("KHR_texture_basisu", "MSFT_texture_dds"):
         alone = {"textures": [{"extensions": {name: {"source": 0}}}]}
         with pytest.raises(MeshError, match=f"has textures of {name}, which are not read"):
-            painted(TEXTURED, tmp_path, **alone)
-    assert color_of(painted(TEXTURED, tmp_path, textures=[{}])) == (255, 255, 255)
+            painted(TEXTURED, tmp_path, root=alone)
+    assert color_of(painted(TEXTURED, tmp_path, root={"textures": [{}]})) == (255, 255, 255)
 
 
 SPECULAR = "KHR_materials_pbrSpecularGlossiness"
