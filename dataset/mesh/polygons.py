@@ -68,7 +68,7 @@ def _not_convex(
     if not len(polygons):
         return polygons
     inside = np.asarray((indices >= 0) & (indices < len(vertices)))
-    known = inside[corners].all(axis=1)
+    known = np.asarray(inside[corners].all(axis=1))
     a, b, c = (vertices[np.where(inside, indices, 0)[corners[:, i]]] for i in range(3))
     with np.errstate(invalid="ignore", over="ignore"):
         crosses = np.where(known[:, None], np.cross(b - a, c - a), np.nan)
