@@ -193,7 +193,9 @@ class _Body:
             return {}
         if self.given is None:
             return {name: tuple(at.tolist()) for name, at in self._default.landmarks.items()}
-        return {} if self.given.path is None else read_known_points(self.given.path)
+        if self.given.path is None:
+            return {}
+        return read_known_points(self.given.path, self.given.world_from_file)
 
 
 def _check_upright(mesh: Mesh) -> None:
@@ -228,9 +230,10 @@ def _origin(
     said = [InputFile.of(*each) for each in _hint_files(mesh, hints)]
     files += [file for file in said if file not in files]  # corrections may be the sheet's, too
     cut = origins[0].options if origins else {}
+    turned = {} if mesh is None or mesh.up == "y" else {"up": mesh.up}
     made = {} if body is None or body.looks is None else {"mannequin": asdict(body.looks)}
     return {
-        "options": _recorded(options) | hints.as_options(views) | dict(cut) | made,
+        "options": _recorded(options) | hints.as_options(views) | dict(cut) | made | turned,
         "seed": seed,
         "versions": {name: version(name) for name in PACKAGES},
         "inputs": [  # views may come from files of the same name in several folders

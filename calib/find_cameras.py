@@ -85,6 +85,7 @@ class _Fitted:
         turn: where the views are meant to be seen from.
         rigid: the fit with the mannequin as it is.
         cuts: parts of figures that their pictures lack.
+        mesh: the mannequin.
     """
 
     problem: Problem
@@ -92,6 +93,7 @@ class _Fitted:
     turn: Turn
     rigid: SheetFit
     cuts: tuple[CutOff, ...]
+    mesh: Mesh
 
 
 def _fitted(
@@ -113,7 +115,7 @@ def _fitted(
         progress("joint", 0.0)
         whole = problem.rigid(coarse_fit, turn)
         problem, rigid, cuts = problem.cut_off(whole, turn)
-    return _Fitted(problem, candidates, turn, rigid, cuts)
+    return _Fitted(problem, candidates, turn, rigid, cuts, mesh)
 
 
 def _judged(fitted: _Fitted, tried: Sequence[ModelTest], seconds: dict[str, float]) -> Calibration:
@@ -168,6 +170,7 @@ def _judged_one_by_one(fitted: _Fitted, bent: SheetFit) -> JudgedSheet:
         problem.pulled(joint, model, fitted.turn),
         problem.sheet.faces_contradict(final),
         model.bends_mannequin,
+        replace(fitted.mesh, vertices=joint.body.surface.vertices + problem.surface.middle),
     )
 
 

@@ -28,6 +28,7 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     SeedOption,
+    UpOption,
     VerboseFlag,
 )
 from toonset.symmetric import Symmetric
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from toonset.calib.hints import Hints
     from toonset.calib.result import Calibration
     from toonset.dataset.split_folder.load import Sheet
-    from toonset.mesh import Mesh
+    from toonset.mesh import Mesh, Up
 
 NO_BODY: Literal["none"] = "none"
 UNCERTAIN = 3  # exit code: files are written, but a view is not certain
@@ -67,11 +68,12 @@ def calibrate(
         typer.Option(
             "--mesh",
             metavar="FILE",
-            help="Posed mannequin: obj, ply, stl, glb, off; none: no body (default: the drawings "
-            "alone, or a plain body where they are not sure).",
+            help="Posed mannequin: obj, ply, stl, glb, vrm, off; none: no body (default: the "
+            "drawings alone, or a plain body where they are not sure).",
             rich_help_panel=KNOWN_PANEL,
         ),
     ] = None,
+    up: UpOption = "y",
     labels: Annotated[
         str,
         typer.Option("--views", metavar="LABELS", help=LABELS_HELP, rich_help_panel=KNOWN_PANEL),
@@ -170,7 +172,7 @@ def calibrate(
     printer = Printer(as_json, quiet, verbose)
     _check_files(sheets, hints, boxes, front=front is not None)
     given = None if str(mesh) == NO_BODY else mesh
-    body = _body(mesh)
+    body = _body(mesh, up)
     check_output(out, [*sheets, given, landmarks, init, boxes, corrections], WRITTEN, force=force)
     sheet = split_sheet(
         sheets,
@@ -210,13 +212,13 @@ def _check_files(sheets: list[Path], hints: Hints, boxes: Path | None, *, front:
         transforms_file(Path(hints.init))
 
 
-def _body(mesh: Path | None) -> Mesh | Literal["none"] | None:
+def _body(mesh: Path | None, up: Up) -> Mesh | Literal["none"] | None:
     """Return the mannequin that --mesh names."""
     from toonset.dataset.mesh.load import load_mesh
 
     if mesh is None:
         return None
-    return NO_BODY if str(mesh) == NO_BODY else load_mesh(mesh)
+    return NO_BODY if str(mesh) == NO_BODY else load_mesh(mesh, up=up)
 
 
 def _fitted(
@@ -240,7 +242,8 @@ def _fitted(
 def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Printer) -> None:
     from toonset.dataset.mannequin.options import MannequinOptions
 
-    for note in (*sheet.skipped, *sheet.warnings):
+    remarks = mesh.remarks if mesh is not None and not isinstance(mesh, str) else ()
+    for note in (*sheet.skipped, *sheet.warnings, *remarks):
         printer.say(note)
     looks = MannequinOptions()
     body = "no mannequin"
@@ -256,7 +259,13 @@ def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Prin
 
 
 def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
-    from toonset.calib.verdict.report import evidence_line, model_line, undrawn_line, view_line
+    from toonset.calib.verdict.report import (
+        evidence_line,
+        lying_line,
+        model_line,
+        undrawn_line,
+        view_line,
+    )
 
     for fit in found.landmarks:
         if fit.misplaced:
@@ -270,6 +279,8 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
         printer.say(view_line(view))
     if undrawn := undrawn_line(found):
         printer.say(undrawn)
+    if lying := lying_line(found):
+        printer.doubt(lying)
     verdict = f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else "")
     (printer.say if found.is_certain else printer.doubt)(verdict)
     after = shlex.join(["toonset", "palette", str(out)])

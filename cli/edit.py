@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag, UpOption
 from toonset.lock import hold
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def edit(
             help="Posed mannequin, as `calibrate` takes it; none: no body (default: the bundle's).",
         ),
     ] = None,
+    up: UpOption = "y",
     out: Annotated[
         Path,
         typer.Option("-o", "--out", help="Bundle folder of a sheet.", rich_help_panel=OUTPUT_PANEL),
@@ -70,7 +71,7 @@ def edit(
     folder = folder_of(place, out)
     body: Any = NO_BODY if str(mesh) == NO_BODY else mesh
     with Server(folder.resolve().name) as server, hold(folder):
-        session = open_session(place, folder, body, printer.progress)
+        session = open_session(place, folder, body, printer.progress, up)
         ended = _ended()
         server.tell_address = lambda address: printer.say(f"for another tab: {address}")
         thread = server.serve(session)

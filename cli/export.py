@@ -17,6 +17,7 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     SeedOption,
+    UpOption,
 )
 from toonset.write import check_output
 
@@ -40,6 +41,7 @@ def export(
     mesh: Annotated[
         Path | None, typer.Option("--mesh", help="The mannequin (default: the bundle's own).")
     ] = None,
+    up: UpOption = "y",
     text: Annotated[
         bool,
         typer.Option("--text", help="Write .txt files, not .bin.", rich_help_panel=COLMAP_PANEL),
@@ -80,7 +82,7 @@ def export(
 
     printer, target = Printer(as_json, quiet), TARGETS[to]
     views = read_views(bundle)
-    body = mannequin_of(transforms_file(bundle).parent, mesh)
+    body = mannequin_of(transforms_file(bundle).parent, mesh, up=up)
     check_output(out, [bundle, mesh], target.written, force=force)
     if centre:
         views = tuple(centre_view(view) for view in views)
@@ -89,6 +91,8 @@ def export(
         printer.progress("colouring points")
         points = _points(body, views, seed, is_given=mesh is not None)
     job = Job(out, views, points, body, text, layout == "old", force)
+    for remark in () if mesh is None or body is None else body.remarks:
+        printer.say(remark)
     _report(printer, to, job, target.write(job))
 
 

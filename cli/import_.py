@@ -62,6 +62,8 @@ def import_(
     body = mannequin_of(path.parent if path.is_file() else path, mesh)
     check_output(out, [path, images, masks, mesh], WRITTEN, force=force)
     report = write_imported(out, imported, body, z_up=up == "z", force=force)
+    for remark in () if mesh is None or body is None else body.remarks:
+        printer.say(remark)
     printer.say(_summary(imported, report, has_mannequin=body is not None))
     values = {"bundle": out, "format": imported.program, "views": list(report.views)}
     printer.result({**values, "opaque": list(report.opaque), "masked": report.masked}, str(out))

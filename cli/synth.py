@@ -15,6 +15,7 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     SeedOption,
+    UpOption,
 )
 from toonset.dataset.synthetic.artist_options import ArtistOptions
 from toonset.dataset.synthetic.options import CONDITIONS, SynthOptions
@@ -43,7 +44,9 @@ TEST_VIEWS = 16
 
 def synth(
     context: typer.Context,
-    mesh: Annotated[Path, typer.Argument(help="Character: obj, ply, stl, glb, off; colours kept.")],
+    mesh: Annotated[
+        Path, typer.Argument(help="Character: obj, ply, stl, glb, vrm, off; colours kept.")
+    ],
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
     ],
@@ -95,6 +98,7 @@ def synth(
     ] = DEFAULT.background,
     cell: Annotated[int, typer.Option(help="Side of a drawing's cell, px.")] = DEFAULT.cell_px,
     columns: Annotated[int, typer.Option(help="Drawings in a row; 0 = all.")] = DEFAULT.columns,
+    up: UpOption = "y",
     seed: SeedOption = 0,
     force: ForceFlag = False,
     as_json: JsonFlag = False,
@@ -111,14 +115,17 @@ def synth(
     artist = replace(chosen.artist, body=chosen.artist.body.scaled(pose_difference))
     given = {**_typed(context), "following_parts": tuple(following or ())}
     options = replace(chosen, artist=artist, **given)
+    from toonset.dataset.mannequin.landmark_file import read_known_points
     from toonset.dataset.mesh.load import load_mesh
     from toonset.dataset.synthetic.files import write_turnaround
     from toonset.dataset.synthetic.turnaround import make_turnaround
 
     printer = Printer(as_json, quiet)
-    body = load_mesh(mesh)
+    body = load_mesh(mesh, up=up)
     check_output(out, [mesh], WRITTEN, force=force)
-    made = make_turnaround(body, options, seed, _landmarks(mesh))
+    for remark in body.remarks:
+        printer.say(remark)
+    made = make_turnaround(body, options, seed, read_known_points(mesh, body.world_from_file))
     test = None
     if options.artist != ArtistOptions():
         test = make_turnaround(body, options.without_error(TEST_VIEWS), seed)
@@ -138,12 +145,3 @@ def _typed(context: typer.Context) -> dict[str, Any]:
 def _is_typed(context: typer.Context, name: str) -> bool:
     source = context.get_parameter_source(name)
     return source is not None and source.name not in ("DEFAULT", "DEFAULT_MAP")
-
-
-def _landmarks(mesh: Path) -> dict[str, tuple[float, ...]]:
-    """Return the named points of the landmark file beside a mesh; none without one."""
-    from toonset.dataset.mannequin.files import landmarks_path
-    from toonset.dataset.mannequin.landmark_formats import read_landmark_file
-
-    path = landmarks_path(mesh)
-    return read_landmark_file(path).points if path.is_file() else {}

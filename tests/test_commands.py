@@ -37,6 +37,7 @@ from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
+from toonset.mesh import Z_UP
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACEHOLDER = re.compile(r"\.\.\.|(?<![\w#-])[A-Z]{3,}(?![\w-])")  # of a command's form, not of one
@@ -147,6 +148,7 @@ def _eight_small(folder: Path) -> None:
     (folder / "sheet.png").write_bytes(encode_png(made.sheet))
     for name in ("mannequin.obj", "m.obj"):
         (folder / name).write_bytes(save_obj(made.mesh))
+    trimesh.Trimesh(made.mesh.vertices @ Z_UP, made.mesh.faces).export(folder / "lying.stl")
     boxes = [view.box for view in made.views]
     _bundle(folder / "other", list(zip(made.cameras, boxes, strict=True)))
     vertices = load_mesh(folder / "m.obj").vertices
@@ -182,7 +184,7 @@ GIVEN = {  # what lies in a document's folder before its first command
     "docs/formats.md": "bundle sheet.png views",
     "docs/guide_batch.md": "library",
     "docs/guide_cameras.md": "eight/sheet.png eight/mannequin.obj eight/m.obj eight/points.json"
-    " eight/other colmap_folder",
+    " eight/lying.stl eight/other colmap_folder",
     "docs/guide_corrections.md": "small/sheet.png small/mannequin.obj small/corrections.json",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
     "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from toonset.errors import MeshError
+
+Up = Literal["y", "z"]
+Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # ours from a world with +Z up, front -Y
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +29,8 @@ class Mesh:
         name: where it came from, for messages.
         path: its file, if it has one.
         sha256: of the file's bytes.
+        remarks: what was done to it as it was read that people should know, one line each.
+        world_from_file: how the file's coordinates were turned.
     """
 
     vertices: Float[np.ndarray, "vertices 3"]
@@ -35,6 +41,8 @@ class Mesh:
     name: str = "mesh"
     path: Path | None = None
     sha256: str = ""
+    remarks: tuple[str, ...] = ()
+    world_from_file: Float[np.ndarray, "3 3"] = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         """Refuse arrays that are not a surface.
@@ -66,6 +74,11 @@ class Mesh:
             raise MeshError(
                 f"{where}: extent {extent:g} world units, 1e-4 to 1e6 is needed; rescale it"
             )
+
+    @property
+    def up(self) -> Up:
+        """Return the axis of the file that points up."""
+        return "z" if np.array_equal(self.world_from_file[1], [0, 0, 1]) else "y"
 
     @property
     def bounds(self) -> Float[np.ndarray, "2 3"]:

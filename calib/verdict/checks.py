@@ -16,8 +16,10 @@ from toonset.calib.result import SEVERITY, ViewCalibration
 from toonset.calib.verdict.judge import outlines_apart
 from toonset.calib.verdict.one_character import other_character
 from toonset.calib.verdict.repeated import repeated_drawings
+from toonset.calib.verdict.undrawn_parts import undrawn_part
 from toonset.dataset.split_folder.view_labels import Label
 from toonset.errors import UsageError
+from toonset.mesh import Mesh
 from toonset.view import View
 
 Views = tuple[ViewCalibration, ...]
@@ -38,6 +40,7 @@ class JudgedSheet:
         pulled: (views,) radians that views turn where nothing is locked; None: nothing is.
         faces_contradict: probability that faces are not where the cameras have the front.
         bent: the mannequin was another body, its proportions were fitted.
+        mesh: the mannequin as it was fitted; None without a body.
     """
 
     views: Views
@@ -48,6 +51,7 @@ class JudgedSheet:
     pulled: Float[np.ndarray, " views"] | None = None
     faces_contradict: float = 0.0
     bent: bool = False
+    mesh: Mesh | None = None
 
 
 def check_even_steps(sheet: JudgedSheet) -> Views | None:
@@ -75,6 +79,15 @@ def check_elevations(sheet: JudgedSheet) -> Views | None:
     reason = f"the sheet looks down by {abs(level):.0f} degrees: mirrored?"
     far = np.abs(elevations - level) > limits.far_from_level_deg
     return _weakened(sheet.views, (reason if doubt else "" for doubt in far))
+
+
+def check_parts(sheet: JudgedSheet) -> Views | None:
+    """Doubt all views where a part of the mannequin is in no drawing: cameras bend to hide it."""
+    if sheet.mesh is None:
+        return None
+    part = undrawn_part(sheet.mesh, [view.camera for view in sheet.views], sheet.drawings)
+    reason = f"no drawing shows the mannequin's {part}: leave it out of the mesh"
+    return _weakened(sheet.views, [reason] * len(sheet.views)) if part else None
 
 
 def check_labels(sheet: JudgedSheet) -> Views | None:
@@ -202,6 +215,7 @@ OF_DRAWINGS: Mapping[str, Callable[[JudgedSheet], Views | None]] = {
 CHECKS: Mapping[str, Callable[[JudgedSheet], Views | None]] = {
     "even steps": check_even_steps,
     "elevations": check_elevations,
+    "parts": check_parts,
     "labels": check_labels,
     "locks": check_locks,
     "sheet": check_sheet,

@@ -11,6 +11,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION
 
 FACING = math.radians(60.0)  # of yaw: what is turned away farther shows hardly any of a side
+FROM_ABOVE = math.radians(50.0)  # sheets look down by 35 degrees at most (docs/decisions.md)
 STRETCHED_BY = 0.005  # of height over width: less is how pictures are rounded to pixels
 
 
@@ -120,6 +121,20 @@ def undrawn_line(calibration: Calibration) -> str:
     return (
         f"nobody drew the {' and the '.join(missing)}: `toonset train` goes on with the paint "
         "beside it; add a drawing from there to have it your way"
+    )
+
+
+def lying_line(calibration: Calibration) -> str:
+    """Return what to do if doubtful cameras look at the mannequin from far above, for people."""
+    mesh = calibration.mesh
+    if mesh is None or mesh.up == "z" or calibration.is_certain:
+        return ""
+    elevations = [abs(view.camera.angles[1]) for view in calibration.views]
+    if sum(elevation > FROM_ABOVE for elevation in elevations) * 2 <= len(elevations):
+        return ""
+    return (
+        "these cameras look at the mannequin from far above or below: does it lie on its back? if "
+        "+Z is up in its file, give --up z"
     )
 
 

@@ -8,7 +8,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import Annotated, Any, Literal, TextIO
 
 import typer
 
@@ -31,6 +31,10 @@ VerboseFlag = Annotated[
 ]
 SeedOption = Annotated[
     int, typer.Option("--seed", help="Seed of everything random.", min=0, max=2**63 - 1)
+]
+UpOption = Annotated[
+    Literal["y", "z"],
+    typer.Option("--up", help="z: the mesh has +Z up, front -Y, as Blender and slicers have it."),
 ]
 ForceFlag = Annotated[
     bool, typer.Option("--force", help="Replace an existing output.", rich_help_panel=OUTPUT_PANEL)

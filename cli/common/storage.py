@@ -175,19 +175,26 @@ def file_name(place: str) -> str:
 
 def _whole(files: Any, path: str) -> list[str]:
     """Return a file behind a URL, and, of a mesh, those in its folder that it is read with."""
+    from toonset.dataset.mesh.mtl import ends_of, matches
     from toonset.dataset.mesh.obj import material_files
 
     if not path.lower().endswith(".obj"):
         return [path]
     folder = path.rsplit("/", 1)[0]
 
-    def read(name: str) -> bytes | None:
-        there = f"{folder}/{name}"
-        is_inside = name and ".." not in name.split("/") and "\\" not in name
-        return files.cat_file(there) if is_inside and files.isfile(there) else None
+    def names_in(place: str) -> list[str]:
+        try:
+            found = files.ls(f"{folder}/{place}".rstrip("/"), detail=False)
+        except (OSError, NotImplementedError):
+            return []
+        return [there.rstrip("/").rsplit("/", 1)[-1] for there in found]
 
-    named = material_files(files.cat_file(path), read)
-    return [path, *(f"{folder}/{name}" for name in dict.fromkeys(named) if read(name) is not None)]
+    def find(name: str) -> str | None:
+        ends = ("/".join(end) for end in ends_of(name))
+        paths = (f"{folder}/{end}" for end in (*ends, *matches(name, names_in)))
+        return next((there for there in paths if files.isfile(there)), None)
+
+    return [path, *material_files(files.cat_file(path), find, files.cat_file)]
 
 
 def _files(root: Path) -> list[Path]:
@@ -204,14 +211,17 @@ def _files(root: Path) -> list[Path]:
 
 def _with_materials(mesh: Path) -> list[Path]:
     """Return a mesh, and the files in its folder that it is read with."""
-    from toonset.dataset.mesh.obj import beside, material_files
+    from toonset.dataset.mesh.mtl import beside
+    from toonset.dataset.mesh.obj import material_files
 
-    def read(name: str) -> bytes | None:
+    def find(name: str) -> str | None:
         file = beside(mesh, name)
-        return None if file is None else file.read_bytes()
+        return None if file is None else str(file)
 
-    found = (beside(mesh, name) for name in material_files(mesh.read_bytes(), read))
-    return [mesh, *dict.fromkeys(file for file in found if file is not None)]
+    def read(file: str) -> bytes:
+        return Path(file).read_bytes()
+
+    return [mesh, *map(Path, material_files(mesh.read_bytes(), find, read))]
 
 
 def _stat(file: Path) -> tuple[int, int, int]:

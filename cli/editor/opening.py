@@ -12,6 +12,7 @@ from toonset.cli.editor.refit import (
     BY_HAND,
     CORRECTIONS,
     NOTHING,
+    Body,
     Changed,
     DrawnSheet,
     Subject,
@@ -32,7 +33,7 @@ from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
 from toonset.errors import BundleError, SheetError, ToonsetError
 from toonset.lock import hold
-from toonset.mesh import Mesh
+from toonset.mesh import Mesh, Up
 from toonset.palette.names import hex_of
 from toonset.read import check_there, parse_json, read_whole
 from toonset.view import SHEET
@@ -65,7 +66,7 @@ def folder_of(place: Path, out: Path) -> Path:
 
 
 def open_session(
-    place: Path, folder: Path, mesh: MeshOption, tell: Callable[[str], None]
+    place: Path, folder: Path, mesh: MeshOption, tell: Callable[[str], None], up: Up = "y"
 ) -> Session:
     """Return the session; a sheet, or corrections that no bundle follows yet, are fitted first.
 
@@ -78,7 +79,7 @@ def open_session(
 
     if not (folder / CALIBRATION).is_file():
         check_output(folder, [place], WRITTEN, force=False)
-        subject = Subject(place, load_mesh(mesh) if isinstance(mesh, Path) else mesh, folder)
+        subject = Subject(place, _given(mesh, up, tell), folder)
         drawn, new = make_bundle(subject, NOTHING, ALL, None, progress)
         folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.is_dir():
@@ -87,7 +88,7 @@ def open_session(
         clear_workshop(subject)
         return Session(subject, drawn, NOTHING, NOTHING, tell)
     found = read_calibration(place_in(folder, CALIBRATION))
-    subject = _subject(place, folder, mesh, found)
+    subject = _subject(place, folder, found, _given(mesh, up, tell))
     clear_workshop(subject)
     for name in (CORRECTIONS, CALIBRATION, PAGE):
         with hold(folder / name):  # what a write left that was killed goes
@@ -135,8 +136,18 @@ def _session(
     return Session(subject, DrawnSheet.of(sheet), corrections, corrections, tell)
 
 
-def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile) -> Subject:
-    """Return what a bundle was made of."""
+def _given(mesh: MeshOption, up: Up, tell: Callable[[str], None]) -> Body:
+    """Return the body that is asked for, and tell what was done to it."""
+    if not isinstance(mesh, Path):
+        return mesh
+    body = load_mesh(mesh, up=up)
+    for remark in body.remarks:
+        tell(remark)
+    return body
+
+
+def _subject(place: Path, folder: Path, found: CalibrationFile, given: Body) -> Subject:
+    """Return what a bundle was made of, or is to be made with another body."""
     sheets = [one for one in found.inputs if one.role not in (MESH, BY_HAND, *BESIDE_MESH)]
     if len(sheets) != 1 or sheets[0].role != SHEET:
         raise BundleError(
@@ -148,8 +159,8 @@ def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile
             f"{folder}: was made of {sheets[0].name}, which is not beside it; run `toonset edit "
             f"{sheets[0].name} -o {folder}` with that file's place"
         )
-    if mesh is not None:
-        return Subject(sheet, load_mesh(mesh) if isinstance(mesh, Path) else mesh, folder)
+    if given is not None:
+        return Subject(sheet, given, folder)
     record = next((one for one in found.inputs if one.role == MESH), None)
     if record is None:
         return Subject(sheet, None if MANNEQUIN_MADE in found.options else "none", folder)
@@ -158,7 +169,7 @@ def _subject(place: Path, folder: Path, mesh: MeshOption, found: CalibrationFile
         raise BundleError(
             f"{folder}: was made with {record.name}, which is not beside it; give it: --mesh FILE"
         )
-    return Subject(sheet, load_mesh(file), folder)
+    return Subject(sheet, load_mesh(file, up=_up(found)), folder)
 
 
 def _found(record: InputFile, folder: Path, place: Path) -> Path | None:
@@ -181,9 +192,14 @@ def _has_body(found: CalibrationFile, subject: Subject) -> bool:
     """Return whether a bundle was made with this body."""
     record = next((one for one in found.inputs if one.role == MESH), None)
     if isinstance(subject.body, Mesh):
-        return record is not None and record.sha256 == subject.body.sha256
+        same = record is not None and record.sha256 == subject.body.sha256
+        return same and subject.body.up == _up(found)
     made = MANNEQUIN_MADE in found.options
     return record is None and (subject.body is None or not made)
+
+
+def _up(found: CalibrationFile) -> Up:
+    return "z" if found.options.get("up") == "z" else "y"
 
 
 def _recorded(found: CalibrationFile, role: str, data: bytes) -> bool:

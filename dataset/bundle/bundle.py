@@ -41,7 +41,7 @@ from toonset.dataset.bundle.transforms_read import member, place_in, transforms_
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import load_mesh, save_obj
 from toonset.errors import BundleError, ToonsetError
-from toonset.mesh import Mesh
+from toonset.mesh import Mesh, Up
 from toonset.notebook import MOST_ROWS, Cell, picture_bytes, table
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
@@ -59,14 +59,18 @@ WRITTEN = (
 )
 
 
-def mannequin_of(folder: Path, given: Path | None = None) -> Mesh | None:
+def mannequin_of(folder: Path, given: Path | None = None, *, up: Up = "y") -> Mesh | None:
     """Return the mesh of a file that was given, else the folder's own, else None.
+
+    `up` is the axis that points up in the file that was given.
 
     Raises:
         BundleError: the folder's own is a link out of it.
         MeshError: the file is not a mesh.
     """
-    file = given or member(folder, MANNEQUIN)
+    if given is not None:
+        return load_mesh(given, up=up)
+    file = member(folder, MANNEQUIN)
     return None if file is None else load_mesh(file)
 
 

@@ -23,8 +23,7 @@ from toonset.dataset.importers.native import NativeExport, read_native
 from toonset.dataset.importers.nerfstudio import read_transforms, transforms_files
 from toonset.dataset.importers.paths import ImportView, find_mask, find_picture
 from toonset.errors import BundleError, CameraError
-
-Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # ours from a world with +Z up, front -Y
+from toonset.mesh import Z_UP
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,11 +13,11 @@ from toonset.dataset.bundle.transforms import FAR_HEIGHTS, transforms_dict
 from toonset.dataset.bundle.transforms_read import check_total
 from toonset.dataset.exporters.common import NATIVE
 from toonset.dataset.images.picture import encode_png, load_rgba
-from toonset.dataset.importers.detect import Z_UP, Imported, turned
+from toonset.dataset.importers.detect import Imported, turned
 from toonset.dataset.importers.paths import ImportView
 from toonset.dataset.mesh.load import save_obj
 from toonset.errors import BundleError
-from toonset.mesh import Mesh
+from toonset.mesh import Z_UP, Mesh
 from toonset.write import new_folder, write_bytes, write_json
 
 

@@ -34,6 +34,7 @@ from toonset.errors import LandmarkError
 from toonset.view import View
 
 LEAST_POINTS = 3  # fewer leave the camera's turn open
+UNTURNED = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +87,17 @@ def read_landmarks(
     return tuple(found)
 
 
-def read_known_points(mesh_path: Path) -> dict[str, Numbers]:
-    """Return the named points beside a mannequin's file; empty if that is missing.
+def read_known_points(
+    mesh_path: Path, world_from_file: Float[np.ndarray, "3 3"] = UNTURNED
+) -> dict[str, Numbers]:
+    """Return the named points beside a mannequin's file, turned as it was; empty without them.
 
     Raises:
         LandmarkError: `NAME.landmarks.json` is there, but broken.
     """
     path = mesh_path.with_suffix(".landmarks.json")
-    return read_landmark_file(path).points if path.exists() else {}
+    points = read_landmark_file(path).points if path.exists() else {}
+    return {name: tuple((world_from_file @ point).tolist()) for name, point in points.items()}
 
 
 def _view_index(where: str, key: str, views: Sequence[View]) -> int:

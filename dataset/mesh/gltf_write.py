@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from toonset import __version__
-from toonset.dataset.mesh.gltf import BINARY_CHUNK, JSON_CHUNK
+from toonset.dataset.mesh.gltf_file import BINARY_CHUNK, JSON_CHUNK
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 FLOAT, UNSIGNED_INT = 5126, 5125

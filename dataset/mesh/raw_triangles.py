@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.errors import MeshError
+from toonset.errors import MeshError, printable
 from toonset.mesh import Mesh
 
 VERTICES_PER_FACE = 3  # a heap of unconnected triangles has no more
@@ -24,6 +25,8 @@ class RawTriangles:
         colors: (m, 3) sRGB per face, or None.
         parts: (m,) part per face, or None.
         part_names: name per part.
+        remarks: what was done to them that people should know, without the file's name.
+        world_from_file: how they were turned.
     """
 
     vertices: Float[np.ndarray, "vertices 3"]
@@ -31,6 +34,17 @@ class RawTriangles:
     colors: UInt8[np.ndarray, "faces 3"] | None = None
     parts: Int[np.ndarray, " faces"] | None = None
     part_names: tuple[str, ...] = ("body",)
+    remarks: tuple[str, ...] = ()
+    world_from_file: Float[np.ndarray, "3 3"] = field(default_factory=lambda: np.eye(3))
+
+    def turned(self, rotation: Float[np.ndarray, "3 3"], said: str = "") -> RawTriangles:
+        """Return the triangles turned; `said` is remarked."""
+        return replace(
+            self,
+            vertices=self.vertices @ rotation.T,
+            remarks=(*self.remarks, said) if said else self.remarks,
+            world_from_file=rotation @ self.world_from_file,
+        )
 
 
 def weld_mesh(raw: RawTriangles, path: Path) -> Mesh:
@@ -57,6 +71,8 @@ def weld_mesh(raw: RawTriangles, path: Path) -> Mesh:
         part_names=raw.part_names,
         name=path.name,
         path=path,
+        remarks=tuple(f"{path.name}: {said}" for said in raw.remarks),
+        world_from_file=raw.world_from_file,
     )
 
 
@@ -77,30 +93,10 @@ def check_counts(path: Path, vertices: int, faces: int, max_faces: int) -> None:
             )
 
 
-def face_colors_from_texture(
-    texture: UInt8[np.ndarray, "height width 4"],
-    uvs: Float[np.ndarray, "uvs 2"],
-    corners: Int[np.ndarray, "faces 3"],
-    fallback: UInt8[np.ndarray, "faces 3"],
-) -> UInt8[np.ndarray, "faces 3"]:
-    """Return the texture's colour at the middle of every face.
-
-    Args:
-        texture: sRGB picture; v = 0 is its lower edge.
-        uvs: texture coordinates, repeated outside [0, 1].
-        corners: index into `uvs` per face corner; out of range = the face has none.
-        fallback: colour of faces without usable coordinates.
-    """
-    usable = ((corners >= 0) & (corners < len(uvs))).all(axis=1)
-    colors = fallback.copy()
-    middle = uvs[corners[usable]].mean(axis=1)
-    finite = np.isfinite(middle).all(axis=1)
-    height, width = texture.shape[:2]
-    u, v = np.nan_to_num(middle).T % 1.0
-    column = np.minimum((u * width).astype(int), width - 1)
-    row = np.minimum(((1 - v) * height).astype(int), height - 1)
-    colors[usable] = np.where(finite[:, None], texture[row, column, :3], fallback[usable])
-    return colors
+def listed(names: Sequence[str]) -> str:
+    """Return the first of some names for people, and how many more there are."""
+    shown = ", ".join(printable(name)[:40] for name in names[:3])
+    return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
 
 
 def _is_first(faces: Int[np.ndarray, "faces 3"]) -> Bool[np.ndarray, " faces"]:

@@ -24,7 +24,7 @@ from tests.dataset.exporters.exported_views import (
 )
 from toonset.dataset.exporters.blender import write_blender_script
 from toonset.dataset.exporters.gltf import write_gltf
-from toonset.dataset.mesh.gltf import open_gltf
+from toonset.dataset.mesh.gltf_file import open_gltf
 
 
 def opened(path: Path) -> tuple[Any, dict[str, Any], np.ndarray]:

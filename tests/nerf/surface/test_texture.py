@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from tests.nerf.look.painted import AXES, INK, PALETTE, camera_at, paint_of
-from toonset.dataset.mesh.gltf import open_gltf
+from toonset.dataset.mesh.gltf_file import open_gltf
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import OutputError, SetupError
 from toonset.nerf.look.drawings import Drawing, Drawings, levels_of

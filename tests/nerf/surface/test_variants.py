@@ -13,7 +13,7 @@ import trimesh
 
 from tests.nerf.look.painted import AXES, PALETTE, paint_of
 from toonset.dataset.images.picture import decode_rgba
-from toonset.dataset.mesh.gltf import GltfFile, open_gltf
+from toonset.dataset.mesh.gltf_file import GltfFile, open_gltf
 from toonset.errors import OutputError
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.surface.files import Surface, Variant, palette_texture
