@@ -19,6 +19,7 @@ ALIKE = 0.6  # of the colours that the views share among each other: less is ano
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
+WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE = 1.8  # times the median width: two figures that touch
 
 
@@ -36,6 +37,7 @@ def figure_warnings(
     return (
         *_cuts(found),
         *_wide_views(views),
+        *_whole_page(found, views, rgba),
         *_near_parts(found, views),
         *_other_groups(found),
         *_like_views(found, views, rgba),
@@ -62,6 +64,18 @@ def _wide_views(views: list[View]) -> list[str]:
         if among_others or width > BROAD * view.figure_box[3]:
             said.append(f"view {view.name} is unusually wide: do two figures touch?")
     return said
+
+
+def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
+    """Return a line if the only view may be a panel with all that is on it."""
+    _, _, width, height = views[0].figure_box
+    covered = width * height >= WHOLE * rgba.shape[0] * rgba.shape[1]
+    if len(views) > 1 or not covered or "text" not in found.grouping.kinds:
+        return []
+    return [
+        f"view {views[0].name} is most of the sheet, with text beside it: does it hold more than "
+        "one figure? crop the sheet to the figures, or give them with --boxes"
+    ]
 
 
 def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:

@@ -1,5 +1,6 @@
 """What is left out is doubted if it may be a view, and not if it is a head or a sword."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -46,3 +47,13 @@ def test_few_heads_and_swords_are_doubted(kind: str) -> None:
         bool(split_picture(make_messy_sheet(s, (kind,)).rgba).warnings) for s in range(7300, 7306)
     ]
     assert sum(doubted) <= 1
+
+
+def test_a_panel_with_text_beside_it_is_doubted_and_a_figure_alone_is_not() -> None:
+    page = np.full((320, 240, 4), 255, np.uint8)
+    page[24:304, 60:172, :3] = figure(280, (200, 40, 40))
+    assert not split_picture(page).warnings
+    panel = page.copy()
+    cv2.ellipse(panel, (120, 165), (110, 148), 0, 0, 360, (170, 190, 200, 255), -1)
+    cv2.putText(panel, "NAME", (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0, 255))
+    assert any("most of the sheet" in line for line in split_picture(panel).warnings)
