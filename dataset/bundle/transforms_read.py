@@ -150,7 +150,7 @@ def place_in(root: Path, name: str) -> Path:
 
 
 def spellings(name: str) -> tuple[str, ...]:
-    """Return a path as a file has it, and as it is here if Windows wrote it: images\\000.png."""
+    """Return a path as a file has it, and as it is here if Windows wrote it."""
     return (name, name.replace("\\", "/")) if "\\" in name else (name,)
 
 

@@ -1,5 +1,6 @@
-"""Mend a COLMAP images.txt without the lines of points: every image takes two lines, pose and points.
+"""Mend a COLMAP images.txt that lacks its lines of points.
 
+Every image takes two lines, its pose and its points.
 A model without points has empty lines there, which editors and scripts leave out. COLMAP then takes
 every second pose for points and reads half of the images, without a word.
 
