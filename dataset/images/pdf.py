@@ -83,4 +83,4 @@ def _scale(page: Any, width: float, height: float) -> float:
         area, size = (right - left) * (top - bottom), picture.get_px_size()
         if area > best:
             best, scale = area, math.sqrt(size[0] * size[1] / area)
-    return scale * (1 - 1e-9)  # a page of whole pixels gets no row more
+    return scale * (1 - 1e-6)  # sizes are rounded up, and points are float32
