@@ -27,7 +27,8 @@ from toonset.errors import PictureError
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.read import UNKNOWN, describe, read_whole
 
-FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", *("AVIF",) * features.check("avif"))
+FLAT = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF")
+FORMATS = (*FLAT, "AVIF") if features.check("avif") else FLAT
 MAX_PIXELS = 80_000_000  # 16,384 x 4,096 and a margin; beyond 89 million Pillow suspects a bomb
 ORIENTATION_TAG = 0x0112  # EXIF; values 5 to 8 swap width and height
 COMPRESSION = 4  # of 0 to 9: as small as 6 on noisy pictures and a quarter faster
