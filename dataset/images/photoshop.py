@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from toonset.errors import PictureError
+from toonset.dataset.images.layers import Layer
+from toonset.errors import PictureError, as_text, one_line
 
 MAGIC = b"8BPS"
 HEADER = struct.Struct(">4sH6xHIIHH")  # magic, version, channels, height, width, depth, mode
@@ -50,6 +51,25 @@ def open_photoshop(data: bytes, path: Path, max_pixels: int) -> Image.Image:
     if len(document) and _is_blank(image):
         raise _not_merged(path)
     return _with_profile(image, document)
+
+
+def photoshop_layers(data: bytes, path: Path) -> tuple[Layer, ...]:
+    """Return the visible layers and groups at the top of a Photoshop file, lowest first.
+
+    Args:
+        data: of a file that `open_photoshop` has read.
+        path: for messages.
+
+    Raises:
+        PictureError: as `open_photoshop`.
+    """
+    layers = []
+    for layer in _document(data, path):
+        left, top, right, bottom = layer.bbox
+        if layer.is_visible() and right > left and bottom > top:
+            name = as_text(one_line(layer.name))
+            layers.append(Layer(name, (left, top, right - left, bottom - top)))
+    return tuple(layers)
 
 
 def _checked_size(data: bytes, path: Path, max_pixels: int) -> tuple[int, int]:
