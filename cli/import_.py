@@ -66,7 +66,8 @@ def import_(
         printer.say(remark)
     printer.say(_summary(imported, report, has_mannequin=body is not None))
     values = {"bundle": out, "format": imported.program, "views": list(report.views)}
-    printer.result({**values, "opaque": list(report.opaque), "masked": report.masked}, str(out))
+    values |= {"opaque": list(report.opaque), "masked": report.masked}
+    printer.result({**values, "remarks": list(report.remarks)}, str(out))
 
 
 def _summary(imported: Imported, report: ImportReport, *, has_mannequin: bool) -> str:
@@ -80,6 +81,7 @@ def _summary(imported: Imported, report: ImportReport, *, has_mannequin: bool) -
             f"{len(report.opaque)} without transparent background ({report.opaque[0]} ...): the "
             "whole picture counts as figure; give --masks"
         )
+    lines += report.remarks
     if not has_mannequin:
         lines.append("no mannequin; --mesh puts one into the bundle")
     return "\n".join(lines)

@@ -31,6 +31,23 @@ FOREIGN_FORMATS = (
     (b"%!PS", "a PostScript file"),
     (b"8BPS", "a Photoshop file"),
     (b"gimp xcf", "a GIMP file"),
+    (b"CSFCHUNK", "a Clip Studio Paint file"),
+    (b"SAI-CANVAS", "a PaintTool SAI 2 file"),
+    (b"mdipack", "a MediBang Paint file"),
+    (b"PDN3", "a paint.net file"),
+    (b"\0\xffKSA", "an Affinity file"),
+    (b"v/1\x01", "an OpenEXR picture"),
+    (b"#?RADIANCE", "a Radiance HDR picture"),
+    (b"\xff\x0a", "a JPEG XL picture"),
+    (b"\0\0\0\x0cJXL ", "a JPEG XL picture"),
+    (b"\0\0\0\x0cjP  ", "a JPEG 2000 picture"),
+    (b"\xff\x4f\xff\x51", "a JPEG 2000 picture"),
+    (b"DDS ", "a DDS texture"),
+    (b"qoif", "a QOI picture"),
+    (b"II*\0", "a TIFF picture"),
+    (b"MM\0*", "a TIFF picture"),
+    (b"II+\0", "a BigTIFF picture"),
+    (b"MM\0+", "a BigTIFF picture"),
     (b"BLENDER", "a Blender file"),
     (b"Kaydara FBX", "an FBX file"),
     (b"glTF", "a glTF mesh"),
@@ -41,6 +58,14 @@ FOREIGN_FORMATS = (
     (b"GIF8", "a GIF picture"),
     (b"\x7fELF", "a program"),
 )
+FTYP_BRANDS = {  # the first three letters; mif1 and msf1 are HEIF, as phones write it
+    **dict.fromkeys((b"hei", b"hev", b"mif", b"msf"), "a HEIC picture"),
+    b"avi": "an AVIF picture",
+    b"crx": "a camera's raw picture",
+}
+UNKNOWN = "of an unknown kind"
+TGA_END = b"TRUEVISION-XFILE.\0"
+ASEPRITE, ASEPRITE_FRAME = b"\xe0\xa5", b"\xfa\xf1"
 MAX_DEPTH = 64  # camera files nest eight deep
 LARGEST_INT = 2**63  # beyond, other programs' integers end
 MAX_DIGITS = 400  # as a float's longest; Python itself refuses 4300
@@ -111,12 +136,16 @@ def describe(data: bytes) -> str:
         if data.startswith(magic):
             return description
     if data[4:8] == b"ftyp":
-        return "a HEIC or AVIF picture, or a film"
+        return FTYP_BRANDS.get(data[8:11], "a film")
+    if data.endswith(TGA_END):
+        return "a TGA picture"
+    if data[4:6] == ASEPRITE and data[132:134] == ASEPRITE_FRAME:
+        return "an Aseprite file"
     head = data[:1024]
     if b"<svg" in head:
         return "an SVG drawing"
     is_text = b"\0" not in head and sum(byte < 9 for byte in head) == 0
-    return "text" if is_text else "of an unknown kind"
+    return "text" if is_text else UNKNOWN
 
 
 def parse_json(data: bytes, where: str, error_type: type[ToonsetError]) -> Any:

@@ -78,6 +78,7 @@ def list_sheets(
         ToonsetError: nothing is there, a manifest says what cannot be, two have one name.
     """
     given = [one for place in places for one in _given(place, root, out, say)]
+    given = _without_twins(given, say)
     if not given:
         raise SheetError(f"{', '.join(map(printable, places))}: no sheets there; name pictures")
     here = Given("", Path.cwd(), False, "", {})
@@ -122,7 +123,7 @@ def _given(
     place: str, root: Path | None, out: Path | None, say: Callable[[str], None]
 ) -> Iterator[Given]:
     """Yield the sheets of one place."""
-    from toonset.dataset.images.folder import ENDINGS, picture_files
+    from toonset.dataset.images.folder import ENDINGS, WORKING, picture_files
     from toonset.read import check_there
 
     path, here = Path(place), Path.cwd()
@@ -140,7 +141,8 @@ def _given(
     if WILD.search(place) and not path.exists():
         base = Path(WILD.split(place)[0] + "x").parent  # up to the first wild part
         files = [Path(name) for name in sorted(glob.glob(place, recursive=True))]
-        files = [file for file in files if file.is_dir() or file.suffix.lower() in ENDINGS]
+        meant = (*ENDINGS, *(end for end in WORKING if place.lower().endswith(end)))
+        files = [file for file in files if file.is_dir() or file.suffix.lower() in meant]
         files = [file for file in files if out is None or not _is_within(file, out)]
         parents = {parent for file in files for parent in file.parents}
         files = [file for file in files if file not in parents]  # what is in it is taken
@@ -148,8 +150,9 @@ def _given(
         check_there([path], "picture", SheetError)
         base, files = path.parent, [path]
         if path.is_dir() and not (path / SPLIT).is_file():
-            base, files = path, list(picture_files(path)[0])
-            _say_left(path, say)
+            pictures, others = picture_files(path)
+            base, files = path, list(pictures)
+            _say_left(path, others, say)
     for file in files:
         inside = file.relative_to(base)
         name = clean_name(
@@ -158,13 +161,51 @@ def _given(
         yield Given(str(file), here, False, name, {"sheet": str(file)})
 
 
-def _say_left(folder: Path, say: Callable[[str], None]) -> None:
-    """Say what of a folder is not taken though it might be meant."""
+def _without_twins(given: Sequence[Given], say: Callable[[str], None]) -> list[Given]:
+    """Return the sheets less the copies of one drawing: of hero.png and hero.jpg the first.
+
+    Twins lie in one folder, are called alike but for their endings, and are named in no manifest.
+    """
     from toonset.dataset.images.folder import ENDINGS
 
-    for file in sorted(folder.iterdir()):
-        if file.suffix.lower() in MANIFESTS and file.is_file():
-            say(f"{file}: is not used; to use a manifest, name it in place of its folder")
+    best: dict[tuple[Path, str], Given] = {}
+    ranks = {ending: rank for rank, ending in enumerate(ENDINGS)}
+    for one in given:
+        if (key := _twin_key(one)) is not None:
+            rank = ranks.get(Path(one.where).suffix.lower(), len(ranks))
+            other = best.setdefault(key, one)
+            if rank < ranks.get(Path(other.where).suffix.lower(), len(ranks)):
+                best[key] = one
+    kept = []
+    for one in given:
+        key = _twin_key(one)
+        first = one if key is None else best[key]
+        if first is one or Path(first.where).suffix == Path(one.where).suffix:  # named twice
+            kept.append(one)
+        else:
+            beside = f"{Path(first.where).name} beside it is the same sheet"
+            say(f"{one.where}: left out, {beside} by its name; rename one if it is not")
+    return kept
+
+
+def _twin_key(one: Given) -> tuple[Path, str] | None:
+    """Return what twins share: folder and name without ending; None for folders and URLs."""
+    path = Path(one.where)
+    if one.inside or is_url(one.where) or path.is_dir():
+        return None
+    return Path(os.path.abspath(path)).parent, path.stem
+
+
+def _say_left(folder: Path, others: Sequence[str], say: Callable[[str], None]) -> None:
+    """Say what of a folder is not taken though it might be meant."""
+    from toonset.dataset.images.folder import ENDINGS, left_out_lines
+
+    manifests = [name for name in others if name.lower().endswith(MANIFESTS)]
+    for name in sorted(manifests):
+        say(f"{folder / name}: is not used; to use a manifest, name it in place of its folder")
+    rest = [name for name in others if name not in manifests and not (folder / name).is_dir()]
+    for line in left_out_lines(rest):
+        say(f"{folder}: {line}")
     pictures = [file for file in folder.glob("*/*") if file.suffix.lower() in ENDINGS]
     below = sorted({file.parent.name for file in pictures if file.parent.name[0] != "."})
     if below:

@@ -15,9 +15,11 @@ from toonset.dataset.bundle.transforms_schema import FrameRecord, Intrinsics
 from toonset.dataset.images.picture import picture_size
 from toonset.errors import BundleError
 
-PINHOLE_MODELS = (None, "OPENCV", "PINHOLE", "SIMPLE_PINHOLE")
+PINHOLES = ("", "PINHOLE", "SIMPLE_PINHOLE")
+BENT_PINHOLES = ("OPENCV", "FULL_OPENCV", "RADIAL", "SIMPLE_RADIAL")  # pinholes where all k are 0
 SAME_VIEW_PX = 0.5  # a pinhole may differ this much from the exact camera beside it
-DISTORTION_KEYS = ("k1", "k2", "k3", "k4", "p1", "p2")
+DISTORTION_KEYS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "distortion_params")
+NO_BEND = 1e-9  # of a coefficient: moves no pixel by a thousandth
 
 
 def camera_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) -> Camera:
@@ -69,7 +71,8 @@ def _pinhole_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) 
         name: getattr(frame, name) if getattr(frame, name) is not None else getattr(defaults, name)
         for name in Intrinsics.model_fields
     }
-    if values["camera_model"] not in PINHOLE_MODELS:
+    model = (values["camera_model"] or "").upper()
+    if model not in (*PINHOLES, *BENT_PINHOLES):
         raise BundleError(
             f"camera_model {values['camera_model'][:40]!r} is not supported; undistort to PINHOLE"
         )
@@ -77,6 +80,7 @@ def _pinhole_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) 
     if not np.allclose(matrix[3], [0, 0, 0, 1], 0, 1e-6):
         raise BundleError("transform_matrix must be 4 x 4 with last row 0 0 0 1")
     check_numbers(list(matrix.flat))
+    matrix[:3, :3] = conventions.nearest_rotation(matrix[:3, :3])
     size = _size_wh(values, picture)
     fx = _focal_px(values, size[0])
     fy = fx if values["fl_y"] is None else float(values["fl_y"])
@@ -89,9 +93,19 @@ def _pinhole_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) 
 
 def _refuse_distortion(*records: Intrinsics) -> None:
     for record in records:
-        bent = [k for k in DISTORTION_KEYS if (record.model_extra or {}).get(k)]
-        if bent:
+        others = record.model_extra or {}
+        if others.get("is_fisheye"):
+            raise BundleError("a fisheye lens is not supported; undistort")
+        if bent := [k for k in DISTORTION_KEYS if not _is_zero(others.get(k))]:
             raise BundleError(f"lens distortion {', '.join(bent)} is not supported; undistort")
+
+
+def _is_zero(value: Any) -> bool:
+    """Return whether a coefficient, or a list of them, is missing or 0."""
+    values = value if isinstance(value, list) else [value]
+    return all(
+        one is None or (isinstance(one, int | float) and abs(one) < NO_BEND) for one in values
+    )
 
 
 def _size_wh(values: dict[str, Any], picture: Path | None) -> tuple[int, int]:

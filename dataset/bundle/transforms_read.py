@@ -16,7 +16,7 @@ MAX_SCENE_PIXELS = 2_000_000_000  # of all pictures together: 8 GB in memory
 
 
 class PosedPicture(NamedTuple):
-    """One frame: its path as the file has it, its camera, and where its picture is."""
+    """One frame: its path with forward slashes, its camera, and where its picture is."""
 
     file_path: str
     camera: Camera
@@ -95,7 +95,8 @@ def frame_of(
     if picture is None and need_picture:
         raise BundleError(f"{where}: the picture does not exist; put it there")
     try:
-        return PosedPicture(frame.file_path, camera_of(content, frame, picture), picture)
+        path = spellings(frame.file_path)[-1]
+        return PosedPicture(path, camera_of(content, frame, picture), picture)
     except (CameraError, BundleError) as error:
         raise BundleError(f"{where}: {error}; correct the file") from error
 
@@ -148,10 +149,14 @@ def place_in(root: Path, name: str) -> Path:
     raise BundleError(f"{path}: is a link out of the folder or to nothing; put the file there")
 
 
+def spellings(name: str) -> tuple[str, ...]:
+    """Return a path as a file has it, and as it is here if Windows wrote it."""
+    return (name, name.replace("\\", "/")) if "\\" in name else (name,)
+
+
 def _picture_path(root: Path, frame: FrameRecord, where: str) -> Path | None:
-    candidates = [root / frame.file_path]
-    if not Path(frame.file_path).suffix:
-        candidates.append(root / f"{frame.file_path}.png")
+    candidates = [root / name for name in spellings(frame.file_path)]
+    candidates += [Path(f"{one}.png") for one in candidates if not one.suffix]
     try:
         if not frame.file_path.isprintable():
             raise ValueError("control characters")

@@ -1,10 +1,11 @@
 """Decode and encode pictures in one safe way.
 
-Pillow decodes behind an allow-list of formats; the size is capped from the header before anything
-is decoded. The format is recognised by content, so a PNG named `.jpg` reads fine and a text file
-named `.png` does not. What could be misread is converted properly
-(`toonset.dataset.images.pixel_modes`) or refused by name. A PNG's gAMA chunk is ignored, as paint
-programs do.
+Of working files (Krita, OpenRaster, Photoshop, a PDF's page) it is the picture of all layers
+together: see `zipped`, `photoshop` and `pdf` beside this file. Flat pictures are decoded by Pillow
+behind an allow-list of formats; the size is capped from the header before anything is decoded. The
+format is recognised by content, so a PNG named `.jpg` reads fine and a text file named `.png` does
+not. What could be misread is converted properly (`toonset.dataset.images.pixel_modes`) or refused
+by name. A PNG's gAMA chunk is ignored, as paint programs do.
 """
 
 from __future__ import annotations
@@ -14,17 +15,20 @@ import io
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from jaxtyping import UInt8, UInt16
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import Image, ImageOps, UnidentifiedImageError, features
 
+from toonset.dataset.images import pdf, photoshop, zipped
 from toonset.dataset.images.pixel_modes import rgba_of, said_of
 from toonset.errors import PictureError
 from toonset.palette.pixels.labels import UNLABELLED
-from toonset.read import describe, read_whole
+from toonset.read import UNKNOWN, describe, read_whole
 
-FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF")
+FLAT = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF")
+FORMATS = (*FLAT, "AVIF") if features.check("avif") else FLAT
 MAX_PIXELS = 80_000_000  # 16,384 x 4,096 and a margin; beyond 89 million Pillow suspects a bomb
 ORIENTATION_TAG = 0x0112  # EXIF; values 5 to 8 swap width and height
 COMPRESSION = 4  # of 0 to 9: as small as 6 on noisy pictures and a quarter faster
@@ -37,12 +41,14 @@ def load_rgba(
     """Return a picture as sRGB with straight alpha, upright, 8 bit per channel.
 
     Args:
-        path: a PNG, JPEG, WebP, TIFF, BMP or GIF file with one frame.
+        path: a PNG, JPEG, WebP, AVIF, TIFF, BMP or GIF file with one frame, a Krita, OpenRaster
+            or Photoshop file, or a PDF with one page.
         max_pixels: a header that announces more is refused before decoding.
 
     Raises:
         PictureError: the file is missing, unreadable, damaged, cut off, too large, animated, or
-            of a kind whose colours cannot be told (CMYK without a profile, 32 bit, Lab).
+            of a kind whose colours cannot be told (CMYK without a profile, 32 bit, Lab), or needs
+            a package that is not installed.
     """
     path = Path(path)
     return decode_rgba(read_whole(path, "picture", PictureError), path, max_pixels)
@@ -56,6 +62,7 @@ def decode_rgba(
     Raises:
         PictureError: as `load_rgba`.
     """
+    data = _flat(data, path)
     with _opened(data, path, max_pixels) as image:
         image.load()
         ImageOps.exif_transpose(image, in_place=True)
@@ -68,7 +75,7 @@ def picture_size(path: Path, max_pixels: int = MAX_PIXELS) -> tuple[int, int]:
     Raises:
         PictureError: as `load_rgba`, as far as the header tells.
     """
-    data = read_whole(path, "picture", PictureError)
+    data = _flat(read_whole(path, "picture", PictureError), path)
     with _opened(data, path, max_pixels) as image:
         width, height = image.size
         turned = image.getexif().get(ORIENTATION_TAG) in (5, 6, 7, 8)
@@ -139,10 +146,21 @@ def encode_indexed_png(
     return buffer.getvalue()
 
 
+def _flat(data: bytes, path: Path) -> bytes:
+    """Return a picture file's bytes: of a zip those of the picture of all layers in it."""
+    return zipped.merged_png(data, path) if data.startswith(zipped.MAGIC) else data
+
+
 @contextlib.contextmanager
 def _opened(data: bytes, path: Path, max_pixels: int) -> Iterator[Image.Image]:
     """Yield the lazily opened picture; whatever Pillow raises inside becomes a PictureError."""
     try:
+        if data.startswith(photoshop.MAGIC):
+            yield photoshop.open_photoshop(data, path, max_pixels)
+            return
+        if data.startswith(pdf.MAGIC):
+            yield pdf.open_page(data, path, max_pixels)
+            return
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # odd metadata is not a reason to refuse or to print
             warnings.simplefilter("error", Image.DecompressionBombWarning)
@@ -187,9 +205,23 @@ def _check(image: Image.Image, data: bytes, path: Path, max_pixels: int) -> None
 
 def _not_a_picture(data: bytes, path: Path) -> str:
     kind = describe(data)
-    if kind.endswith(" picture"):
+    if kind == UNKNOWN and path.suffix.lower() == ".tga":  # its first version has no mark
+        kind = "a TGA picture"
+    if not kind.endswith(" picture"):
+        return f"{path}: is {kind}, no picture that can be read; save it as PNG"
+    if kind == "a TIFF picture" and _lists_tags(data):  # Pillow knows TIFFs by their pixels
+        return f"{path}: is a TIFF picture of 32 bit or another kind that is not read; save as PNG"
+    if kind.split()[-2] in ("PNG", "JPEG", "GIF", "TIFF", "AVIF"):
         return f"{path}: starts like {kind} but is damaged or cut off; export or download it again"
-    return f"{path}: is {kind}, no picture that can be read; save it as PNG"
+    return f"{path}: is {kind}, which is not read; save it as PNG"
+
+
+def _lists_tags(data: bytes) -> bool:
+    """Return whether a TIFF's first list of tags lies inside of the file."""
+    order: Literal["little", "big"] = "little" if data.startswith(b"II") else "big"
+    place = int.from_bytes(data[4:8], order)
+    count = int.from_bytes(data[place : place + 2], order)  # of 12 bytes each
+    return place + 2 + 12 * count + 4 <= len(data)
 
 
 def _format_of(data: bytes) -> str:

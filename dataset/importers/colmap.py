@@ -11,13 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from toonset.camera import Camera
 from toonset.dataset.exporters.colmap import load_pycolmap
+from toonset.dataset.importers.colmap_text import with_lines_of_points
 from toonset.errors import BundleError, CameraError
 from toonset.read import read_whole
 
-MODELS = ("PINHOLE", "SIMPLE_PINHOLE")
+PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE")
+MOST_BENT_PX = 0.01  # a lens whose pixels all lie nearer to a pinhole's is one
+GRID = 9  # places across and down the picture where they are compared
 ONLY_FATAL = 3  # pycolmap's log level; what goes wrong reaches us as an exception
 MAX_BYTES = 2**30
 # of each camera model by its number, as COLMAP lists them
@@ -33,7 +37,8 @@ def read_colmap(folder: Path) -> tuple[tuple[str, Camera], ...]:
         folder: a dataset with `sparse/0`, or a model's own folder; .bin or .txt.
 
     Raises:
-        BundleError: there is no model, it is damaged, or a camera is not a pinhole.
+        BundleError: there is no model, it is damaged, or a camera is not a pinhole (a lens model
+            whose coefficients are all 0 is one).
     """
     model = _load(_model_folder(folder))
     posed = [image for _, image in sorted(model.images.items()) if image.has_pose]
@@ -57,12 +62,25 @@ def _load(folder: Path) -> Any:
     pycolmap.logging.minloglevel = ONLY_FATAL
     check_lengths(folder)
     try:
-        return pycolmap.Reconstruction(folder)
+        with with_lines_of_points(folder) as place:
+            return _with_unit_quaternions(pycolmap.Reconstruction(place))
     except (RuntimeError, ValueError, IndexError, MemoryError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise BundleError(
             f"{folder}: is no complete COLMAP model ({reason}); export it again"
         ) from error
+
+
+def _with_unit_quaternions(model: Any) -> Any:
+    """Return the model; quaternions of any length mean the rotation of the unit one."""
+    poses = [frame.rig_from_world for frame in model.frames.values() if frame.has_pose]
+    for rig in model.rigs.values():
+        poses += [pose for pose in rig.non_ref_sensors.values() if pose is not None]
+    for pose in poses:
+        if not pose.rotation.norm() > 0:
+            raise ValueError("a rotation's quaternion is 0")
+        pose.rotation.normalize()
+    return model
 
 
 def _name_of(image: Any, folder: Path) -> str:
@@ -76,20 +94,35 @@ def _name_of(image: Any, folder: Path) -> str:
 
 def _camera_of(image: Any, model: Any, folder: Path) -> Camera:
     lens = model.cameras[image.camera_id]
-    if lens.model.name not in MODELS:
-        raise BundleError(
-            f"{folder}: {image.name} has a {lens.model.name} camera, {' or '.join(MODELS)} is "
-            "needed; undistort the images"
-        )
+    where = f"{folder}: {image.name}"
+    bent = BundleError(
+        f"{where} has a {lens.model.name} camera, {' or '.join(PINHOLES)} (or coefficients of 0) "
+        "is needed; undistort the images"
+    )
+    if lens.is_spherical():
+        raise bent
     pose = np.eye(4)
     pose[:3] = image.cam_from_world().inverse().matrix()
     try:
         size, K = (int(lens.width), int(lens.height)), lens.calibration_matrix()
         if not min(K[0, 0], K[1, 1]) > 0:  # NaN neither
             raise CameraError(f"camera: focal lengths {K[0, 0]:g}, {K[1, 1]:g} must be positive")
+        if not _bent_px(lens, K) <= MOST_BENT_PX:
+            raise bent
         return Camera.from_pinhole(pose, K, size)
     except CameraError as error:
-        raise BundleError(f"{folder}: {image.name}: {error}; export the model again") from error
+        raise BundleError(f"{where}: {error}; export the model again") from error
+
+
+def _bent_px(lens: Any, K: Float[np.ndarray, "3 3"]) -> float:
+    """Return by how much a lens moves a pixel of its picture at most, against its pinhole."""
+    if lens.model.name in PINHOLES:
+        return 0.0
+    u, v = np.meshgrid(np.linspace(0, lens.width, GRID), np.linspace(0, lens.height, GRID))
+    pixels = np.stack([u.ravel(), v.ravel()], axis=1)
+    rays = (pixels - K[:2, 2]) / K.diagonal()[:2]
+    seen = lens.img_from_cam(np.c_[rays, np.ones(len(rays))])
+    return float(np.abs(seen - pixels).max())
 
 
 class _Walk:

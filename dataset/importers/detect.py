@@ -17,13 +17,17 @@ from jaxtyping import Float
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import check_range
+from toonset.dataset.bundle.transforms_read import spellings
 from toonset.dataset.exporters.common import NATIVE
+from toonset.dataset.images.folder import picture_files
 from toonset.dataset.importers.colmap import read_colmap
 from toonset.dataset.importers.native import NativeExport, read_native
 from toonset.dataset.importers.nerfstudio import read_transforms, transforms_files
 from toonset.dataset.importers.paths import ImportView, find_mask, find_picture
 from toonset.errors import BundleError, CameraError
 from toonset.mesh import Z_UP
+
+IMAGES, SOME = "images", 3  # of a COLMAP dataset; names that a line says
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +38,13 @@ class Imported:
         views: pictures with cameras; names are unique.
         program: whose format it is.
         native: toonset's own record of an export, whose exact cameras `views` then have.
+        remarks: lines for people about what was left out.
     """
 
     views: tuple[ImportView, ...]
     program: str
     native: NativeExport | None
+    remarks: tuple[str, ...] = ()
 
 
 def read_import(path: Path, images: Path | None = None, masks: Path | None = None) -> Imported:
@@ -64,7 +70,8 @@ def read_import(path: Path, images: Path | None = None, masks: Path | None = Non
         except (BundleError, CameraError) as error:
             raise BundleError(f"{path}: {view.name}: {error}; correct the file") from error
     exact = views if native is None else [native.exact(view, path) for view in views]
-    return Imported(tuple(exact), program, native)
+    remarks = _without_camera(views, path, images) if program == "COLMAP" else ()
+    return Imported(tuple(exact), program, native, remarks)
 
 
 def turned(camera: Camera, ours_from_theirs: Float[np.ndarray, "3 3"] = Z_UP) -> Camera:
@@ -99,15 +106,34 @@ def _holds_colmap(path: Path) -> bool:
 
 def _colmap_views(path: Path, images: Path | None) -> list[ImportView]:
     """Return a model's views; pictures and masks lie in images/ and masks/ of the dataset."""
-    root = path.parent if path.name == "0" else path
-    root = root.parent if root.name == "sparse" else root
-    folders = [root / "images", path] if images is None else [images]
+    root = _colmap_root(path)
+    folders = [root / IMAGES, path] if images is None else [images]
     views = []
     for name, camera in read_colmap(path):
         where = f"{path}: image {name[:80]!r}"
-        picture = find_picture(folders, name, where)
-        views.append(ImportView(name, camera, picture, find_mask([root / "masks"], name)))
+        picture, mask = find_picture(folders, name, where), find_mask([root / "masks"], name)
+        views.append(ImportView(spellings(name)[-1], camera, picture, mask))
     return views
+
+
+def _colmap_root(path: Path) -> Path:
+    root = path.parent if path.name == "0" else path
+    return root.parent if root.name == "sparse" else root
+
+
+def _without_camera(
+    views: Sequence[ImportView], path: Path, images: Path | None
+) -> tuple[str, ...]:
+    """Return a line if pictures lie beside those of a COLMAP model that have no camera in it."""
+    folder = images or _colmap_root(path) / IMAGES
+    if not folder.is_dir():
+        return ()
+    posed = {view.picture.resolve() for view in views}
+    others = [file.name for file in picture_files(folder)[0] if file.resolve() not in posed]
+    if not others:
+        return ()
+    named = ", ".join(others[:SOME]) + ", ..." * (len(others) > SOME)
+    return (f"left out, for they have no camera: {named} ({len(others)} of {folder})",)
 
 
 def _named(views: Sequence[ImportView], path: Path) -> list[ImportView]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.transforms_read import is_inside
+from toonset.dataset.bundle.transforms_read import is_inside, spellings
 from toonset.errors import BundleError
 
 
@@ -50,11 +51,11 @@ def _first(folders: Sequence[Path], names: Sequence[str], where: str) -> Path | 
         for name in names:
             if not name or not name.isprintable():
                 raise ValueError("control characters")
-            for folder in folders:
-                if not is_inside(folder, folder / name):
+            for folder, own in product(folders, spellings(name)):
+                if not is_inside(folder, folder / own):
                     raise BundleError(f"{where}: lies outside of the folder; it must be inside it")
-                if (folder / name).is_file():
-                    return folder / name
+                if (folder / own).is_file():
+                    return folder / own
     except (OSError, ValueError, RuntimeError) as error:  # too long, a loop of links, a NUL
         raise BundleError(f"{where}: is no file name; correct it") from error
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from toonset.dataset.bundle.transforms_read import check_total
 from toonset.dataset.exporters.common import NATIVE
 from toonset.dataset.images.picture import encode_png, load_rgba
 from toonset.dataset.importers.detect import Imported, turned
+from toonset.dataset.importers.masks import REMARKS, read_mask
 from toonset.dataset.importers.paths import ImportView
 from toonset.dataset.mesh.load import save_obj
 from toonset.errors import BundleError
@@ -29,11 +31,13 @@ class ImportReport:
         views: names of the pictures.
         opaque: those that show no background: the whole picture counts as figure.
         masked: number of pictures whose alpha came from a mask.
+        remarks: lines for people about what was read otherwise than it stands there.
     """
 
     views: tuple[str, ...]
     opaque: tuple[str, ...]
     masked: int
+    remarks: tuple[str, ...] = ()
 
 
 def write_imported(
@@ -49,8 +53,8 @@ def write_imported(
         force: replace an existing folder.
 
     Raises:
-        BundleError: a picture or mask has another size than its camera, or `z_up` is asked for
-            an export of toonset's own.
+        BundleError: a picture or mask has another size than its camera, a mask shows no figure,
+            or `z_up` is asked for an export of toonset's own.
         PictureError: a picture or mask cannot be read.
         OutputError: the folder exists, or cannot be written.
     """
@@ -62,9 +66,11 @@ def write_imported(
         mesh = None if mesh is None else replace(mesh, vertices=mesh.vertices @ Z_UP.T)
     check_total(folder, cameras)
     opaque = []
+    how = Counter[str]()
     with new_folder(folder, force=force) as temporary:
         for view in imported.views:
-            rgba = _picture(view)
+            rgba, read_as = _picture(view)
+            how.update(read_as)
             if (rgba[..., 3] == 255).all():
                 opaque.append(view.name)
             write_bytes(temporary / "images" / view.name, encode_png(rgba))
@@ -75,7 +81,8 @@ def write_imported(
             write_bytes(temporary / MANNEQUIN, save_obj(mesh))
     names = tuple(view.name for view in imported.views)
     masked = sum(view.mask is not None for view in imported.views)
-    return ImportReport(names, tuple(opaque), masked)
+    remarks = tuple(f"{count} of the masks {REMARKS[one]}" for one, count in how.items())
+    return ImportReport(names, tuple(opaque), masked, (*imported.remarks, *remarks))
 
 
 def _body(imported: Imported, mesh: Mesh | None) -> tuple[float, float]:
@@ -85,19 +92,15 @@ def _body(imported: Imported, mesh: Mesh | None) -> tuple[float, float]:
     return (1.0, 1.0) if mesh is None else (mesh.height, mesh.radius)
 
 
-def _picture(view: ImportView) -> UInt8[np.ndarray, "height width 4"]:
-    rgba = _sized(view, view.picture)
-    if view.mask is not None:
-        rgba = rgba.copy()
-        rgba[..., 3] = np.minimum(rgba[..., 3], _sized(view, view.mask)[..., 0])
-    return rgba
-
-
-def _sized(view: ImportView, file: Path) -> UInt8[np.ndarray, "height width 4"]:
-    pixels = load_rgba(file)
-    if pixels.shape[1::-1] != view.camera.size_wh:
+def _picture(view: ImportView) -> tuple[UInt8[np.ndarray, "height width 4"], tuple[str, ...]]:
+    """Return a view's picture with its mask in its alpha, and how the mask had to be read."""
+    rgba = load_rgba(view.picture)
+    if rgba.shape[1::-1] != view.camera.size_wh:
         raise BundleError(
-            f"{file}: is {pixels.shape[1]} x {pixels.shape[0]} px, its camera says "
+            f"{view.picture}: is {rgba.shape[1]} x {rgba.shape[0]} px, its camera says "
             f"{view.camera.size_wh[0]} x {view.camera.size_wh[1]}; give the pictures of that size"
         )
-    return pixels
+    if view.mask is None:
+        return rgba, ()
+    mask = read_mask(view.mask, rgba[..., 3])
+    return np.dstack([rgba[..., :3], np.minimum(rgba[..., 3], mask.alpha)]), mask.how

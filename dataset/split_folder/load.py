@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
+from toonset.dataset.images import photoshop
 from toonset.dataset.images.folder import picture_files
+from toonset.dataset.images.layers import layers_line
 from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
@@ -249,6 +251,10 @@ def _of_sheet(path: Path, options: SheetOptions, where: str) -> Sheet:
         found = split_picture(picture, options)
     except SheetError as error:
         raise SheetError(f"{path}: {error}") from error
+    if data.startswith(photoshop.MAGIC):
+        boxes = [view.figure_box for view in found.views]
+        line = layers_line(photoshop.photoshop_layers(data, path), (width, height), boxes)
+        found = replace(found, remarks=(*found.remarks, *filter(None, [line])))
     split = split_of_sheet(as_text(path.name), data, (width, height), found)
     files = (InputFile(SHEET, path.name, split.sources[0].sha256),)
     notes = _uneven_cells(path, (width, height), options.grid)

@@ -12,7 +12,6 @@ from pathlib import Path
 
 SPLIT_FILE, IMAGES, OVERLAY = "split.json", "images", "overlay.png"
 NOT_SHEETS = {"transforms.json": "images", "config.json": None}  # a bundle, a trained run
-MOST_NAMES = 3  # of files that are left out; more are counted
 
 
 def is_split_folder(path: Path) -> bool:
@@ -28,7 +27,7 @@ def sheet_places(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
     Raises:
         SheetError: a folder without pictures, a bundle, or a file that is given twice.
     """
-    from toonset.dataset.images.folder import picture_files
+    from toonset.dataset.images.folder import drawing_lines, left_out_lines, picture_files
     from toonset.errors import SheetError
 
     places: list[Path] = []
@@ -41,11 +40,9 @@ def sheet_places(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
         _check_no_result(path)
         pictures, others = picture_files(path)
         if not pictures:
-            raise SheetError(f"{path}: is a folder without pictures; name a sheet, or its folder")
-        if others:
-            more = f" and {len(others) - MOST_NAMES} more" if len(others) > MOST_NAMES else ""
-            named = ", ".join(others[:MOST_NAMES])
-            notes.append(f"{path}: no pictures, left out: {named}{more}")
+            told = [*drawing_lines(others), "name a sheet, or its folder"]
+            raise SheetError(f"{path}: is a folder without pictures; {told[0]}")
+        notes += [f"{path}: {line}" for line in left_out_lines(others)]
         places += pictures
     _check_once(places)
     return places, notes

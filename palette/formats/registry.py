@@ -16,6 +16,7 @@ from toonset.errors import PaletteError
 from toonset.palette.formats.adobe import ase_title, read_aco, read_ase, to_ase
 from toonset.palette.formats.gpl import gpl_title, read_gpl, to_gpl
 from toonset.palette.formats.hex import is_color, read_hex, rgb_of_typed, to_hex
+from toonset.palette.formats.jasc import read_jasc
 from toonset.palette.formats.json import json_title, read_json, to_json
 from toonset.palette.formats.text import without_mark
 from toonset.palette.formats.tones import paints_of
@@ -61,6 +62,7 @@ FORMATS = (
     ),
     Format((".ase",), (b"ASEF",), read_ase, to_ase, title=ase_title),
     Format((".aco",), (b"\0\1", b"\0\2"), read_aco),
+    Format((".pal",), (b"JASC-PAL",), read_jasc),
     Format((".json",), (b"[", b"{"), read_json, _json_bytes, title=json_title),
     Format((".hex", ".txt"), (), read_hex, lambda palette, _: to_hex(palette).encode()),
 )

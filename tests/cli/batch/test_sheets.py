@@ -74,8 +74,46 @@ def test_what_a_folder_holds_besides_is_told(library: Path) -> None:
     list_sheets([str(library)], {}, say=said.append)
     assert said == [
         f"{library}/sheets.csv: is not used; to use a manifest, name it in place of its folder",
+        f"{library}: no pictures, left out: body.obj, notes.txt",
         f"{library}: folders in it are not read (sub); '{library}/**/*.png' takes theirs, too",
     ]
+
+
+def test_drawings_that_a_folder_leaves_out_are_named_before_the_rest(library: Path) -> None:
+    for name in ("scan.heic", "hero.psd", "Thumbs.db", "page.clip", "a.txt", "b.txt"):
+        (library / name).write_text("x")
+    said: list[str] = []
+    assert len(list_sheets([str(library)], {}, say=said.append)) == 2
+    assert said[:3] == [
+        f"{library}: working files, left out: hero.psd; name one itself to read it",
+        f"{library}: of kinds that are not read, left out: page.clip, scan.heic; save them as PNG",
+        f"{library}: no pictures, left out: a.txt, b.txt, body.obj and 2 more",
+    ]
+    assert names("hero.psd") == names("*.psd") == ["hero"]
+    assert names("**/*") == ["ann", "bob", "sub-cat", "sub-deep-dan"]
+
+
+def test_a_drawing_that_is_saved_twice_is_one_sheet(library: Path) -> None:
+    for name in ("ann.jpg", "ann.webp", "ann.psd"):
+        (library / name).write_text("x")
+    for places in (["."], ["ann.jpg", "bob.png", "ann.webp", "ann.png"]):
+        said: list[str] = []
+        entries = list_sheets(places, {}, say=said.append)
+        assert [entry.name for entry in entries] == ["ann", "bob"]
+        assert entries[0].sheets == (str(library / "ann.png"),)
+        twins = [line for line in said if "the same sheet" in line]
+        assert [line.split(":")[0] for line in twins] == ["ann.jpg", "ann.webp"]
+        assert twins[0].endswith(
+            "left out, ann.png beside it is the same sheet by its name; rename one if it is not"
+        )
+    assert names("ann.webp", "ann.jpg", "ann.psd") == ["ann"]
+
+
+def test_twins_are_only_those_of_one_folder_that_no_manifest_names(library: Path) -> None:
+    (library / "sub" / "ann.jpg").write_text("x")
+    (library / "ann.jpg").write_text("x")
+    assert "two sheets are called 'ann'" in reason("ann.png", "sub/ann.jpg")
+    assert "two sheets are called 'ann'" in reason(manifest(library, "sheet\nann.png\nann.jpg\n"))
 
 
 def test_a_pattern_finds_no_results_of_the_batch(library: Path) -> None:

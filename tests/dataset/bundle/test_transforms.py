@@ -83,6 +83,64 @@ def test_blender_style_files_are_read(folder):
     )
 
 
+def bare(content):
+    """Leave what other programs write."""
+    for frame in content["frames"]:
+        frame.pop("toonset")
+
+
+def turned_by(change_matrix):
+    """Return an edit of every frame's rotation."""
+
+    def edit(content):
+        for frame in content["frames"]:
+            frame.pop("toonset", None)
+            matrix = np.array(frame["transform_matrix"])
+            matrix[:3, :3] = change_matrix(matrix[:3, :3])
+            frame["transform_matrix"] = matrix.tolist()
+
+    return edit
+
+
+def off_px(folder):
+    points = np.random.default_rng(2).uniform(-1, 1, (20, 3))
+    pairs = zip(read_scene(folder).frames, cameras(), strict=True)
+    return max(
+        np.abs(frame.camera.project(points)[0] - camera.project(points)[0]).max()
+        for frame, (_, camera) in pairs
+    )
+
+
+@pytest.mark.parametrize(
+    ("change_matrix", "most_px"),
+    [(lambda m: np.round(m, 4), 0.5), (lambda m: 1.0003 * m, 0.02), (lambda m: 0.9995 * m, 0.02)],
+)
+def test_a_rotation_that_is_nearly_one_is_the_nearest(folder, change_matrix, most_px):
+    change(folder, bare)
+    plain = off_px(folder)
+    change(folder, turned_by(change_matrix))
+    assert off_px(folder) <= plain + most_px
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        *(
+            lambda c, model=model: c.update(camera_model=model, k1=0, k2=0.0, p1=0, p2=1e-18)
+            for model in ("SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV", "opencv")
+        ),
+        lambda c: c.update(distortion_params=[0, 0, 0, 0]),
+        lambda c: [f.update(file_path=f["file_path"].replace("/", "\\")) for f in c["frames"]],
+        lambda c: [f.update(file_path=f".\\images\\00{i}") for i, f in enumerate(c["frames"])],
+    ],
+)
+def test_what_means_the_same_is_read_the_same(folder, edit):
+    plain = off_px(folder)
+    change(folder, edit)
+    assert off_px(folder) == plain
+    assert [frame.name for frame in read_scene(folder).frames][:1] in (["000.png"], ["000"])
+
+
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
@@ -93,6 +151,15 @@ def test_blender_style_files_are_read(folder):
         (lambda c: c["frames"][1].update(fl_x=7.0), "disagree"),
         (lambda c: c.update(camera_model="EQUIRECTANGULAR"), "'EQUIRECTANGULAR' is not supported"),
         (lambda c: c["frames"][0].update(k1=0.1), "lens distortion k1"),
+        (lambda c: c.update(distortion_params=[0.1, 0]), "lens distortion distortion_params"),
+        (lambda c: c.update(is_fisheye=True), "a fisheye lens is not supported"),
+        (turned_by(lambda m: np.round(m, 1)), "not orthonormal .*; write rotations with 4"),
+        (turned_by(lambda m: 1.05 * m), "not orthonormal .it scales by 1.05 to 1.05"),
+        (turned_by(lambda m: m @ np.diag([1.001, 1, 1])), "not orthonormal"),
+        (
+            lambda c: c["frames"][0].update(file_path="..\\..\\etc\\passwd"),
+            "lies outside of the folder",
+        ),
         (
             lambda c: [c["frames"][0].pop(key) for key in ("toonset", "fl_x")],
             "has neither fl_x nor a camera_angle_x",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image, ImageCms
+from PIL import Image, ImageCms, features
 
 from toonset.dataset.images.picture import (
     encode_indexed_png,
@@ -199,6 +199,15 @@ def test_labels_need_their_colours_and_an_indexed_png(tmp_path: Path) -> None:
         load_indexed_png(tmp_path / "a.png")
 
 
+def float_tiff() -> bytes:
+    """Return a TIFF of RGB in 32-bit floats."""
+    tags = [(256, 4, 1, 1), (257, 4, 1, 1), (258, 3, 1, 32), (259, 3, 1, 1), (262, 3, 1, 2)]
+    tags += [(273, 4, 1, 200), (277, 3, 1, 3), (278, 4, 1, 1), (279, 4, 1, 12), (339, 3, 1, 3)]
+    listed = b"".join(struct.pack("<HHII", *tag) for tag in tags)
+    head = b"II*\0" + struct.pack("<IH", 8, len(tags)) + listed + bytes(4)
+    return head.ljust(200, b"\0") + struct.pack("<fff", 0.1, 0.2, 0.3)
+
+
 NOISE_PNG, NOISE_JPEG = bytes_of(noise(), "PNG"), bytes_of(noise(), "JPEG")
 CMYK = Image.new("CMYK", (8, 8), (10, 20, 30, 0))
 TRNS_16 = chunk(b"tRNS", struct.pack(">HHH", 60000, 5, 5))
@@ -209,11 +218,22 @@ BAD_FILES = [
     (bytes(range(256)), "of an unknown kind, no picture"),
     (b"v 0 0 0\n", "is text, no picture"),
     (b"glTF\2\0\0\0", "is a glTF mesh, no picture"),
-    (b"PK\x03\x04" + bytes(40), "is a zip archive"),
-    (b"8BPS\0\1" + bytes(40), "is a Photoshop file"),
-    (b"%PDF-1.4\n", "is a PDF"),
+    (b"PK\x03\x04" + bytes(40), "zip file is damaged or cut off"),
+    (b"8BPS\0\1" + bytes(40), "Photoshop file is damaged or cut off"),
+    (b"gimp xcf v011" + bytes(40), "is a GIMP file, no picture"),
+    (b"CSFCHUNK" + bytes(40), "is a Clip Studio Paint file"),
+    (b"SAI-CANVAS-TYPE0" + bytes(40), "is a PaintTool SAI 2 file"),
+    (struct.pack("<IH122xIH60x", 200, 0xA5E0, 16, 0xF1FA), "is an Aseprite file"),
+    (b"\xff\x0a" + bytes(40), "is a JPEG XL picture, which is not read; save it as PNG"),
+    (b"\0\0\0\x0cJXL \r\n\x87\n" + bytes(40), "is a JPEG XL picture"),
+    (b"v/1\x01" + bytes(40), "is an OpenEXR picture"),
+    (bytes_of(noise(), "JPEG2000"), "is a JPEG 2000 picture"),
+    (bytes_of(noise(), "TGA"), "is a TGA picture"),
+    (b"\0\0\0\x18ftypisom" + bytes(20), "is a film"),
+    (b"\0\0\0\x18ftypavif" + bytes(20), "an AVIF picture"),
+    (float_tiff(), "is a TIFF picture of 32 bit or another kind that is not read"),
     (b'<?xml version="1.0"?><svg width="9">', "is an SVG drawing"),
-    (b"\0\0\0\x18ftypheic" + bytes(20), "HEIC or AVIF"),
+    (b"\0\0\0\x18ftypheic" + bytes(20), "is a HEIC picture, which is not read; save it as PNG"),
     (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n", "is a PostScript file"),
     (NOISE_PNG[: len(NOISE_PNG) // 2], "PNG file is damaged or cut off"),
     (NOISE_PNG[:20], "damaged or cut off"),
@@ -285,3 +305,16 @@ def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
     file = tmp_path / b"bl\xfcte.png".decode(errors="surrogateescape")
     file.write_bytes(encode_png(OPAQUE))
     assert np.array_equal(load_rgba(file), OPAQUE)
+
+
+def test_a_tga_without_a_mark_is_known_by_its_name(tmp_path: Path) -> None:
+    (tmp_path / "a.tga").write_bytes(bytes_of(noise(), "TGA")[:-26])
+    with pytest.raises(PictureError, match="is a TGA picture, which is not read"):
+        load_rgba(tmp_path / "a.tga")
+
+
+@pytest.mark.skipif(not features.check("avif"), reason="this Pillow reads no AVIF")
+def test_avif_is_read(loaded) -> None:
+    flat = Image.new("RGBA", (16, 16), (200, 30, 40, 255))
+    read = loaded(bytes_of(flat, "AVIF", quality=100))
+    assert np.abs(read.astype(int) - (200, 30, 40, 255)).max() <= 3
