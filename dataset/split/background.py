@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth, sampled
+from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth
+from toonset.dataset.split.background_pattern import Plate, fit_pattern
 from toonset.dataset.split.jpeg_noise import halo_levels, has_jpeg_grid
 from toonset.errors import SheetError
 from toonset.view import Box, over_white
@@ -44,7 +45,7 @@ class Background:
     Attributes:
         rgb: its typical colour; None where the sheet has an alpha channel of its own.
         field: how the colour changes over the sheet; None where it does not.
-        kind: "transparent", "plain", "gradient" or "uneven".
+        kind: "transparent", "plain", "gradient", "uneven" or "patterned".
         sure: share of the border that is background, 0 to 1.
         noise: of 99 % of the border, in levels.
         grain: of 80 % of the border, in levels: what is all over the sheet.
@@ -54,7 +55,7 @@ class Background:
     """
 
     rgb: tuple[int, int, int] | None
-    field: Field | None
+    field: Field | Plate | None
     kind: str
     sure: float
     noise: float
@@ -101,7 +102,8 @@ def find_background(
     if known_rgb is not None:
         known = _judged("plain", None, known_rgb, colors, np.array(known_rgb))
         return replace(known, inset=inset)
-    found = replace(_richest_worth_it(rgba, places, colors, inset), inset=inset)
+    found = _pattern(rgba, places, colors) or _richest_worth_it(rgba, places, colors, inset)
+    found = replace(found, inset=inset)
     if found.sure < LEAST_SURE:
         raise SheetError(
             f"the background is not one colour (the commonest takes {found.sure:.0%} of the "
@@ -191,6 +193,18 @@ def _samples(ring: Bool[np.ndarray, "height width"]) -> tuple[np.ndarray, np.nda
     return rows[::step], columns[::step]
 
 
+def _pattern(
+    rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray
+) -> Background | None:
+    """Return the background that repeats, if it does."""
+    dominant = _dominant(colors)
+    plate = fit_pattern(np.ascontiguousarray(rgba[..., :3]), dominant)
+    if plate is None:
+        return None
+    found = _judged("patterned", plate, dominant, colors, plate.sampled(places))
+    return replace(found, evidence=plate.evidence)
+
+
 def _richest_worth_it(
     rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray, inset: float
 ) -> Background:
@@ -201,7 +215,7 @@ def _richest_worth_it(
         return best
     gradient = fit_gradient(rgba, inset)
     for kind, field in (("gradient", gradient), ("uneven", fit_smooth(rgba, gradient))):
-        expected = sampled(field, places)
+        expected = field.sampled(places)
         richer = _judged(kind, field, field.typical, colors, expected)
         if not _is_worth_it(richer, best):
             continue
@@ -224,7 +238,7 @@ def _is_worth_it(richer: Background, simpler: Background) -> bool:
 
 def _judged(
     kind: str,
-    field: Field | None,
+    field: Field | Plate | None,
     rgb: tuple[int, int, int],
     colors: UInt8[np.ndarray, "n 3"],
     expected: Float[np.ndarray, "*n 3"],

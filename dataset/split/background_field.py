@@ -53,6 +53,27 @@ class Field:
         wide = tall[:, left] * (1 - share) + tall[:, left + 1] * share
         return np.rint(np.clip(wide, 0, 255)).astype(np.uint8)
 
+    def sampled(self, places: tuple[np.ndarray, np.ndarray]) -> Float[np.ndarray, "n 3"]:
+        """Return the field's colours at the pixels (rows, columns) of the sheet."""
+        rows, columns = self.grid.shape[:2]
+        width, height = self.size_wh
+        u = (places[1] + 0.5) * columns / width - 0.5
+        v = (places[0] + 0.5) * rows / height - 0.5
+        source = self.grid.astype(np.float32)
+        maps = [m.astype(np.float32)[None] for m in (u, v)]
+        shorter = 30_000  # OpenCV's remap takes no longer rows
+        parts = [
+            cv2.remap(
+                source,
+                maps[0][:, i : i + shorter],
+                maps[1][:, i : i + shorter],
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            )[0]
+            for i in range(0, len(u), shorter)
+        ]
+        return np.concatenate(parts)
+
 
 def fit_gradient(rgba: UInt8[np.ndarray, "height width 4"], inset: float = 0.0) -> Field:
     """Return the quadratic gradient that border and inside agree on.
@@ -86,28 +107,6 @@ def fit_smooth(rgba: UInt8[np.ndarray, "height width 4"], start: Field) -> Field
         step = cv2.GaussianBlur(off * trusted[..., None], (0, 0), sigma)
         field = field + step / np.maximum(total, 1e-3)[..., None]
     return Field(field, size_wh)
-
-
-def sampled(field: Field, places: tuple[np.ndarray, np.ndarray]) -> Float[np.ndarray, "n 3"]:
-    """Return the field's colours at the pixels (rows, columns) of the sheet."""
-    rows, columns = field.grid.shape[:2]
-    width, height = field.size_wh
-    u = (places[1] + 0.5) * columns / width - 0.5
-    v = (places[0] + 0.5) * rows / height - 0.5
-    source = field.grid.astype(np.float32)
-    maps = [m.astype(np.float32)[None] for m in (u, v)]
-    shorter = 30_000  # OpenCV's remap takes no longer rows
-    parts = [
-        cv2.remap(
-            source,
-            maps[0][:, i : i + shorter],
-            maps[1][:, i : i + shorter],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )[0]
-        for i in range(0, len(u), shorter)
-    ]
-    return np.concatenate(parts)
 
 
 def _small(rgba: np.ndarray) -> tuple[Float[np.ndarray, "rows columns 3"], tuple[int, int]]:
