@@ -20,6 +20,8 @@ ROUNDS = 8  # of fitting and choosing what agrees
 WIDEST_LEVELS = 40.0  # pixels that agree in the first round
 NARROWEST_LEVELS = 8.0  # and in the last
 SMOOTHNESS = 0.06  # of the longest side: width of the smooth field's kernel
+ZONE_SCALES = 5  # widths of a zone's kernels, each half of the last
+ENOUGH = 0.1  # of a kernel: so much of the zone in it tells the colour
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +109,24 @@ def fit_smooth(rgba: UInt8[np.ndarray, "height width 4"], start: Field) -> Field
         step = cv2.GaussianBlur(off * trusted[..., None], (0, 0), sigma)
         field = field + step / np.maximum(total, 1e-3)[..., None]
     return Field(field, size_wh)
+
+
+def fit_zone(
+    rgb: UInt8[np.ndarray, "height width 3"], mask: Bool[np.ndarray, "height width"]
+) -> Field:
+    """Return the smooth field that a part of a picture shows; beyond it, as at its nearest."""
+    small, size_wh = _small(np.dstack([rgb, mask.view(np.uint8)]))
+    cover, _ = _small(np.repeat(255 * mask.view(np.uint8)[..., None], 3, axis=2))
+    known = (cover[..., 0] == 255).astype(np.float32)
+    colors = small.astype(np.float32) * known[..., None]
+    field = np.full_like(colors, colors.sum(axis=(0, 1)) / max(float(known.sum()), 1.0))
+    for halvings in range(ZONE_SCALES):  # the finest that has something to go by
+        sigma = max(small.shape[:2]) / 2 ** (halvings + 1)
+        total = cv2.GaussianBlur(known, (0, 0), sigma)[..., None]
+        mean = cv2.GaussianBlur(colors, (0, 0), sigma) / np.maximum(total, 1e-6)
+        trust = np.clip(total / ENOUGH, 0, 1)
+        field = trust * mean + (1 - trust) * field
+    return Field(field.astype(np.float64), size_wh)
 
 
 def _small(rgba: np.ndarray) -> tuple[Float[np.ndarray, "rows columns 3"], tuple[int, int]]:

@@ -13,7 +13,13 @@ from jaxtyping import Bool, UInt8
 from pydantic import Field
 
 from toonset.dataset.silhouettes.line_width import contour_width_px
-from toonset.dataset.split.background import Background, find_background, flatten, is_transparent
+from toonset.dataset.split.background import (
+    Background,
+    find_background,
+    flatten,
+    is_transparent,
+    remove_residual_alpha,
+)
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
@@ -134,8 +140,11 @@ def split_picture(
     blocks = None if by_hand else find_grid(rgba)
     if blocks is not None:
         return _enlarged(split_picture(blocks.reduced(rgba), options), blocks)
+    residual = 0
     if options.background_rgb is not None or not is_transparent(rgba):
         rgba = flatten(rgba)
+    else:
+        rgba, residual = remove_residual_alpha(rgba)
     ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
     found = find_layout(rgba, paint, ground, options.without)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.split.background import Background
+from toonset.dataset.split.background import SURE_ENOUGH, Background
 from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.segment import SheetLayout
 from toonset.view import View
 
-SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
 PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the narrowest's: no view
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
