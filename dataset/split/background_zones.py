@@ -17,7 +17,7 @@ from toonset.dataset.split.background_field import Field, fit_zone
 from toonset.dataset.split.background_pattern import Plate
 from toonset.raster import dilate
 
-LONGEST_PX = 1600  # of the copy that is looked at
+LONGEST_PX = 1600  # of the copy in which steps are looked for
 MEDIAN_PX = 5  # grain and thin lines are no edges
 EDGE = 10  # levels between neighbours
 LEAST_ZONE = 0.06  # of the border
@@ -45,13 +45,17 @@ class Zones:
         return cv2.resize(own, size_wh, interpolation=cv2.INTER_NEAREST) > 0
 
 
-def find_zones(rgb: UInt8[np.ndarray, "height width 3"], least_share: float) -> Zones:
-    """Return the zones that take more than a share of the picture."""
-    shrink = min(1.0, LONGEST_PX / max(rgb.shape[:2]))
-    small = np.ascontiguousarray(rgb)
-    if shrink < 1:
-        small = cv2.resize(small, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-    small = cv2.medianBlur(small, MEDIAN_PX)
+def find_zones(
+    rgb: UInt8[np.ndarray, "height width 3"], shrink: float, least_share: float
+) -> Zones:
+    """Return the zones that take more than a share of the picture.
+
+    Args:
+        rgb: the picture, shrunk already.
+        shrink: its cells per pixel of the whole one.
+        least_share: of the picture.
+    """
+    small = cv2.medianBlur(np.ascontiguousarray(rgb), MEDIAN_PX)
     near = np.ones((3, 3), np.uint8)
     steep = cv2.subtract(cv2.dilate(small, near), cv2.erode(small, near)).max(axis=2)
     smooth = (steep <= EDGE).view(np.uint8)
@@ -60,6 +64,15 @@ def find_zones(rgb: UInt8[np.ndarray, "height width 3"], least_share: float) -> 
     large[0] = False
     number = np.where(large, np.cumsum(large), 0).astype(np.int32)
     return Zones(number[np.asarray(found, dtype=np.int32)], shrink)
+
+
+def shrunk(picture: UInt8[np.ndarray, "height width c"], longest_px: int) -> tuple[np.ndarray, float]:
+    """Return a picture no longer than that, and its cells per pixel of the whole one."""
+    shrink = min(1.0, longest_px / max(picture.shape[:2]))
+    if shrink == 1:
+        return picture, shrink
+    size = (max(round(side * shrink), 1) for side in picture.shape[1::-1])
+    return cv2.resize(picture, tuple(size), interpolation=cv2.INTER_AREA), shrink
 
 
 def fit_steps(
@@ -72,7 +85,7 @@ def fit_steps(
         ring: its border.
     """
     size_wh = rgb.shape[1], rgb.shape[0]
-    zones = find_zones(rgb, 0.0)
+    zones = find_zones(*shrunk(rgb, LONGEST_PX), 0.0)
     at_border = cv2.resize(ring.view(np.uint8), zones.labels.shape[::-1], interpolation=0) > 0
     shares = np.bincount(zones.labels[at_border], minlength=2) / max(np.count_nonzero(at_border), 1)
     shares[0] = 0

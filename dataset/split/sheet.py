@@ -25,8 +25,9 @@ from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
 from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.split.matting import cut_out, edge_softness_px
+from toonset.dataset.split.pages import Pages, find_pages
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
-from toonset.dataset.split.warnings import border_warnings, figure_warnings
+from toonset.dataset.split.warnings import border_warnings, figure_warnings, page_warnings
 from toonset.errors import SheetError
 from toonset.palette.palette import Hex
 from toonset.palette.pixels.enlarged import Grid, find_grid
@@ -140,6 +141,9 @@ def split_picture(
     blocks = None if by_hand else find_grid(rgba)
     if blocks is not None:
         return _enlarged(split_picture(blocks.reduced(rgba), options), blocks)
+    pages = find_pages(rgba) if options.background_rgb is None else None
+    if pages is not None:
+        rgba = pages.extended(rgba)
     residual = 0
     if options.background_rgb is not None or not is_transparent(rgba):
         rgba = flatten(rgba)
@@ -156,9 +160,13 @@ def split_picture(
         tuple(views),
         ground.rgb,
         ground.sure,
-        border_warnings(ground, found) + (() if by_hand else figure_warnings(found, views, rgba)),
+        (*page_warnings(pages), *border_warnings(ground, found))
+        + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
-        _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+        (
+            *_of_picture(pages, residual),
+            *_remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+        ),
         swatches,
     )
 
@@ -290,6 +298,14 @@ def _swatches(found: SheetLayout) -> tuple[Swatch, ...]:
             printed.boxes.tolist(), printed.rgb.tolist(), strict=True
         )
     )
+
+
+def _of_picture(pages: Pages | None, residual: int) -> tuple[str, ...]:
+    """Return what was changed before the ground was looked for."""
+    said = [] if pages is None else [f"what lies around {pages} was left out"]
+    if residual:
+        said.append(f"alpha of up to {residual} of 255 was taken for transparent")
+    return tuple(said)
 
 
 def _remarks(ground: Background, found: SheetLayout, holes: int, cuts: int) -> tuple[str, ...]:

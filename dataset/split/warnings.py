@@ -8,6 +8,7 @@ from jaxtyping import UInt8
 from toonset.dataset.split.background import SURE_ENOUGH, Background
 from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
+from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout
 from toonset.view import View
 
@@ -17,6 +18,16 @@ ALIKE = 0.6  # of the colours that the views share among each other: less is ano
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
 WIDE = 1.8  # times the median width: two figures that touch
+
+
+def page_warnings(pages: Pages | None) -> tuple[str, ...]:
+    """Return a line if the paper lies at an angle: the drawings are cut as they are seen."""
+    if pages is None or pages.upright:
+        return ()
+    return (
+        "the paper does not fill the picture and lies at an angle: straighten it and crop it to "
+        "the paper for true proportions",
+    )
 
 
 def border_warnings(ground: Background, found: SheetLayout) -> tuple[str, ...]:
